@@ -1,0 +1,3 @@
+//! The `partwise` command line.
+
+fn main() {}

@@ -1,0 +1,97 @@
+//! Triangle meshes: what the body and the garment are made of.
+//!
+//! Positions are metres, z up. Winding is counter-clockwise seen from outside (for a garment: from the side away from the
+//! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
+//! triangles (barycentric area).
+
+pub mod topology;
+
+use glam::DVec3;
+
+pub use topology::Topology;
+
+/// An indexed triangle mesh with optional named groups of triangles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TriMesh {
+    /// Vertex positions in metres, z up.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices of each triangle, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Names of the groups (`hem`, `neckline`, ...); empty where there are none.
+    pub groups: Vec<String>,
+    /// Index into [`groups`](Self::groups) of each triangle; empty exactly where `groups` is.
+    pub triangle_group: Vec<u32>,
+}
+
+impl TriMesh {
+    /// A mesh without groups.
+    #[must_use]
+    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self { positions, triangles, groups: Vec::new(), triangle_group: Vec::new() }
+    }
+
+    /// Number of vertices.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// The three corners of triangle `t`, m.
+    #[must_use]
+    pub fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].map(|v| self.positions[v as usize])
+    }
+
+    /// Twice the area of triangle `t` along its normal, m².
+    #[must_use]
+    pub fn double_area_vector(&self, t: usize) -> DVec3 {
+        let [a, b, c] = self.corners(t);
+        (b - a).cross(c - a)
+    }
+
+    /// Area of each triangle, m².
+    #[must_use]
+    pub fn triangle_areas(&self) -> Vec<f64> {
+        (0..self.triangles.len()).map(|t| 0.5 * self.double_area_vector(t).length()).collect()
+    }
+
+    /// Barycentric area of each vertex, m²: a third of every triangle that touches it.
+    #[must_use]
+    pub fn vertex_areas(&self) -> Vec<f64> {
+        let mut areas = vec![0.0; self.positions.len()];
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            let third = self.double_area_vector(t).length() / 6.0;
+            for &v in triangle {
+                areas[v as usize] += third;
+            }
+        }
+        areas
+    }
+
+    /// Unit vertex normals, weighted by area; zero where every triangle at the vertex is degenerate or there is none.
+    #[must_use]
+    pub fn vertex_normals(&self) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.positions.len()];
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            let n = self.double_area_vector(t);
+            for &v in triangle {
+                normals[v as usize] += n;
+            }
+        }
+        normals.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+
+    /// Smallest and largest coordinate along each axis, m; `None` for a mesh without vertices.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
+    }
+
+    /// The same triangles and groups at other positions.
+    #[must_use]
+    pub fn with_positions(&self, positions: Vec<DVec3>) -> Self {
+        debug_assert_eq!(positions.len(), self.positions.len());
+        Self { positions, ..self.clone() }
+    }
+}

@@ -1,0 +1,194 @@
+//! Edges, neighbours and boundary loops of a triangle mesh, in a deterministic order.
+//!
+//! Edges are sorted by (smaller vertex, larger vertex); neighbours are sorted by index; so everything that iterates over
+//! them sums in the same order on any number of threads.
+
+use super::TriMesh;
+
+/// No triangle on that side of an edge.
+pub const NONE: u32 = u32::MAX;
+
+/// The connectivity of a [`TriMesh`].
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Topology {
+    /// Vertex pairs, smaller index first, sorted.
+    pub edges: Vec<[u32; 2]>,
+    /// The first two triangles at each edge (by index); [`NONE`] where there is no second.
+    pub edge_triangles: Vec<[u32; 2]>,
+    /// How many triangles share each edge: 1 boundary, 2 inside, more is non-manifold.
+    pub edge_valence: Vec<u32>,
+    neighbour_start: Vec<u32>,
+    neighbour_list: Vec<u32>,
+}
+
+impl Topology {
+    /// Reads the connectivity off the triangles; O(n log n).
+    #[must_use]
+    pub fn new(mesh: &TriMesh) -> Self {
+        let mut halves: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * mesh.triangles.len());
+        for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+            for (i, j) in [(a, b), (b, c), (c, a)] {
+                halves.push((i.min(j), i.max(j), t as u32));
+            }
+        }
+        halves.sort_unstable();
+        let mut topology = Self::default();
+        for &(a, b, t) in &halves {
+            if topology.edges.last() == Some(&[a, b]) {
+                let last = topology.edges.len() - 1;
+                if topology.edge_valence[last] == 1 {
+                    topology.edge_triangles[last][1] = t;
+                }
+                topology.edge_valence[last] += 1;
+            } else {
+                topology.edges.push([a, b]);
+                topology.edge_triangles.push([t, NONE]);
+                topology.edge_valence.push(1);
+            }
+        }
+        topology.link_neighbours(mesh.positions.len());
+        topology
+    }
+
+    fn link_neighbours(&mut self, vertices: usize) {
+        let mut start = vec![0u32; vertices + 1];
+        for &[a, b] in &self.edges {
+            start[a as usize + 1] += 1;
+            start[b as usize + 1] += 1;
+        }
+        for v in 0..vertices {
+            start[v + 1] += start[v];
+        }
+        let mut next = start.clone();
+        let mut list = vec![0u32; 2 * self.edges.len()];
+        // Edges come sorted by (a, b): first the smaller neighbours of each vertex, then the larger, each ascending.
+        for &[a, b] in &self.edges {
+            list[next[b as usize] as usize] = a;
+            next[b as usize] += 1;
+        }
+        for &[a, b] in &self.edges {
+            list[next[a as usize] as usize] = b;
+            next[a as usize] += 1;
+        }
+        self.neighbour_start = start;
+        self.neighbour_list = list;
+    }
+
+    /// Vertices joined to `v` by an edge, ascending.
+    #[must_use]
+    pub fn neighbours(&self, v: u32) -> &[u32] {
+        let v = v as usize;
+        &self.neighbour_list[self.neighbour_start[v] as usize..self.neighbour_start[v + 1] as usize]
+    }
+
+    /// Index of the edge between two vertices.
+    #[must_use]
+    pub fn edge_between(&self, a: u32, b: u32) -> Option<usize> {
+        self.edges.binary_search(&[a.min(b), a.max(b)]).ok()
+    }
+
+    /// Whether each vertex lies on a boundary edge.
+    #[must_use]
+    pub fn boundary_vertices(&self) -> Vec<bool> {
+        let mut on = vec![false; self.neighbour_start.len().saturating_sub(1)];
+        for (edge, &valence) in self.edges.iter().zip(&self.edge_valence) {
+            if valence == 1 {
+                on[edge[0] as usize] = true;
+                on[edge[1] as usize] = true;
+            }
+        }
+        on
+    }
+
+    /// Component number of each vertex (by smallest vertex index) and how many components there are.
+    #[must_use]
+    pub fn components(&self) -> (Vec<u32>, usize) {
+        let n = self.neighbour_start.len().saturating_sub(1);
+        let mut component = vec![NONE; n];
+        let mut count = 0;
+        let mut stack = Vec::new();
+        for seed in 0..n as u32 {
+            if component[seed as usize] != NONE {
+                continue;
+            }
+            component[seed as usize] = count;
+            stack.push(seed);
+            while let Some(v) = stack.pop() {
+                for &w in self.neighbours(v) {
+                    if component[w as usize] == NONE {
+                        component[w as usize] = count;
+                        stack.push(w);
+                    }
+                }
+            }
+            count += 1;
+        }
+        (component, count as usize)
+    }
+
+    /// Boundary loops as vertex cycles, each starting at its smallest vertex, ordered by it. A pinched boundary vertex
+    /// (more than two boundary edges) is walked through at its lowest unused edge.
+    #[must_use]
+    pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
+        let mut links: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();
+        for (&[a, b], &valence) in self.edges.iter().zip(&self.edge_valence) {
+            if valence == 1 {
+                links.entry(a).or_default().push(b);
+                links.entry(b).or_default().push(a);
+            }
+        }
+        let mut loops = Vec::new();
+        while let Some((&start, _)) = links.iter().find(|(_, ends)| !ends.is_empty()) {
+            let mut cycle = vec![start];
+            let mut at = start;
+            loop {
+                let Some(ends) = links.get_mut(&at) else { break };
+                if ends.is_empty() {
+                    break;
+                }
+                let next = ends.remove(0);
+                if let Some(back) = links.get_mut(&next)
+                    && let Some(i) = back.iter().position(|&v| v == at)
+                {
+                    back.remove(i);
+                }
+                if next == start {
+                    break;
+                }
+                cycle.push(next);
+                at = next;
+            }
+            loops.push(cycle);
+        }
+        loops
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn square() -> TriMesh {
+        TriMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y], vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    #[test]
+    fn a_square_has_five_edges_and_one_loop() {
+        let topology = Topology::new(&square());
+        assert_eq!(topology.edges, [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]);
+        assert_eq!(topology.edge_valence, [1, 2, 1, 1, 1]);
+        assert_eq!(topology.neighbours(0), [1, 2, 3]);
+        assert_eq!(topology.neighbours(2), [0, 1, 3]);
+        assert_eq!(topology.boundary_loops(), [vec![0, 1, 2, 3]]);
+        assert_eq!(topology.components().1, 1);
+    }
+
+    #[test]
+    fn areas_add_up() {
+        let mesh = square();
+        assert_eq!(mesh.triangle_areas(), [0.5, 0.5]);
+        assert!((mesh.vertex_areas().iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert!(mesh.vertex_normals().iter().all(|n| (*n - DVec3::Z).length() < 1e-15));
+    }
+}
