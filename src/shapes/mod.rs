@@ -37,7 +37,9 @@ pub enum ShapeError {
         high_cm: f64,
     },
     /// Heights that do not ascend.
-    #[error("{upper} is {upper_cm:.1} cm, which is not 2 cm above {lower} at {lower_cm:.1} cm; give both heights, or neither")]
+    #[error(
+        "{upper} is {upper_cm:.1} cm, which is not 2 cm above {lower} at {lower_cm:.1} cm; give both heights, or neither"
+    )]
     Order {
         /// The height that should be the lower one.
         lower: &'static str,
