@@ -31,9 +31,18 @@ pub struct GirthMark {
 /// Every girth of the form, trunk first, then limbs downward; limbs are the left ones.
 #[must_use]
 pub fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
-    let trunk = |name, z, asked| GirthMark { name, plane: Plane { origin: form.trunk.centre(z), normal: glam::DVec3::Z }, asked };
-    let leg = |name, z, asked| GirthMark { name, plane: Plane { origin: form.leg.centre(z), normal: glam::DVec3::Z }, asked };
-    let arm = |name, t, asked| GirthMark { name, plane: Plane { origin: form.arm.centre(t), normal: form.arm.direction() }, asked };
+    let trunk = |name, z, asked| GirthMark {
+        name,
+        plane: Plane { origin: form.trunk.centre(z), normal: glam::DVec3::Z },
+        asked,
+    };
+    let leg =
+        |name, z, asked| GirthMark { name, plane: Plane { origin: form.leg.centre(z), normal: glam::DVec3::Z }, asked };
+    let arm = |name, t, asked| GirthMark {
+        name,
+        plane: Plane { origin: form.arm.centre(t), normal: form.arm.direction() },
+        asked,
+    };
     [
         trunk("bust", m.bust_height, m.bust),
         trunk("underbust", underbust_height(m), m.underbust),

@@ -84,10 +84,7 @@ impl Jet {
             return low;
         }
         let share = 0.5 * h * h;
-        Self {
-            value: low.value - k * h * h * h / 6.0,
-            gradient: low.gradient * (1.0 - share) + high.gradient * share,
-        }
+        Self { value: low.value - k * h * h * h / 6.0, gradient: low.gradient * (1.0 - share) + high.gradient * share }
     }
 
     /// Smooth maximum, the mirror of [`smooth_min`](Self::smooth_min).

@@ -52,11 +52,7 @@ impl<const K: usize> Profile<K> {
                 Segment { start: stations[i].0, coefficients }
             })
             .collect();
-        Self {
-            segments,
-            first: stations.first().map_or(0.0, |s| s.0),
-            last: stations.last().map_or(0.0, |s| s.0),
-        }
+        Self { segments, first: stations.first().map_or(0.0, |s| s.0), last: stations.last().map_or(0.0, |s| s.0) }
     }
 
     /// First and last coordinate.

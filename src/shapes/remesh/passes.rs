@@ -140,8 +140,7 @@ pub(super) fn flip(mesh: &mut HalfEdgeMesh, rule: Rule) {
 
 fn wants_flip(mesh: &HalfEdgeMesh, h: u32, rule: Rule) -> bool {
     let g = mesh.twin(h);
-    let (v0, v1, a, b) =
-        (mesh.origin(h), mesh.target(h), mesh.origin(previous(h)), mesh.origin(previous(g)));
+    let (v0, v1, a, b) = (mesh.origin(h), mesh.target(h), mesh.origin(previous(h)), mesh.origin(previous(g)));
     let [p0, p1, pa, pb] = [v0, v1, a, b].map(|v| mesh.positions[v as usize]);
     let better = match rule {
         Rule::Valence => {
