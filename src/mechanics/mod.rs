@@ -1,3 +1,5 @@
-//! To come.
+//! Mechanics: what moves the PARTs and the cloth.
 
+pub mod energy;
 pub mod paper;
+pub mod refine;
