@@ -1,1 +1,4 @@
-//! To come.
+//! Mechanics: what moves the PARTs and the cloth.
+
+pub mod energy;
+pub mod refine;

@@ -4,10 +4,12 @@
 //! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
 //! triangles (barycentric area).
 
+pub mod rest;
 pub mod topology;
 
 use glam::DVec3;
 
+pub use rest::RestShape;
 pub use topology::Topology;
 
 /// An indexed triangle mesh with optional named groups of triangles.
