@@ -1,4 +1,5 @@
 //! Mechanics: what moves the PARTs and the cloth.
 
 pub mod energy;
+pub mod paper;
 pub mod refine;
