@@ -9,12 +9,14 @@ use glam::{DVec2, DVec3};
 
 use super::draft::Draft;
 use super::error::MeshError;
+use super::fit::facing_body;
 use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around};
 use super::report::{MeshReport, Remark, Repair};
 use super::scan::Face;
 use super::source::{ObjSource, RawObj};
 use super::topology::{NONE, Topology};
 use super::{TriMesh, winding};
+use crate::distance::Body;
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -122,11 +124,28 @@ fn body_from(raw: RawObj, options: &ImportOptions) -> Result<Imported, MeshError
         if !options.open_body {
             let number = imported.source.file_vertices();
             let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
-            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b });
+            let hint = open_hint(&imported.report, options);
+            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b, hint });
         }
         imported.report.remarks.push(Remark::Open { edges, loops });
     }
     Ok(imported)
+}
+
+/// What may close a body that came in open: its seams joined, or the body alone taken out of a scene.
+fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
+    let apart = report.remarks.iter().find_map(|remark| match remark {
+        Remark::Coincident { vertices } => Some(*vertices),
+        _ => None,
+    });
+    let mut hint = String::new();
+    if let Some(vertices) = apart {
+        hint += &format!("{vertices} vertices lie exactly on another: try --weld. ");
+    }
+    if report.groups > 1 && options.group.is_none() {
+        hint += &format!("The file has {} groups: choose the body with --body-group. ", report.groups);
+    }
+    hint
 }
 
 fn garment_from(raw: RawObj, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
@@ -249,6 +268,22 @@ fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
 }
 
 impl Imported {
+    /// Turns the connected parts of a garment that face the body, so that normals point away from it, and says so.
+    pub fn face_away_from(&mut self, body: &Body) {
+        let facing = facing_body(&self.mesh, body);
+        let topology = Topology::new(&self.mesh);
+        let (component, count) = topology.components();
+        let mut turned = vec![false; count];
+        for t in (0..facing.len()).filter(|&t| facing[t]) {
+            turned[component[self.mesh.triangles[t][0] as usize] as usize] = true;
+            self.turn(t);
+        }
+        let components = turned.iter().filter(|&&turned| turned).count();
+        if components > 0 {
+            self.report.repairs.push(Repair::TurnedOutward { components });
+        }
+    }
+
     /// Turns triangles so that neighbours agree, and notes what the topology shows.
     fn make_agree(&mut self, coincident: usize) {
         let (turn, _, turned) = winding::agree(&self.mesh);
