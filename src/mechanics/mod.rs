@@ -1,5 +1,6 @@
 //! Mechanics: what moves the PARTs and the cloth.
 
+pub mod coupled;
 pub mod energy;
 pub mod paper;
 pub mod refine;

@@ -127,8 +127,7 @@ pub fn section(mesh: &TriMesh, plane: Plane) -> Vec<SectionLoop> {
     let starts: Vec<(u32, u32)> = links.keys().filter(|k| !ends.contains(k)).copied().collect();
     let mut loops = Vec::new();
     let mut starts = starts.into_iter();
-    loop {
-        let Some(start) = starts.next().or_else(|| links.keys().next().copied()) else { break };
+    while let Some(start) = starts.next().or_else(|| links.keys().next().copied()) {
         let mut points = vec![point(start)];
         let mut at = start;
         let mut closed = false;

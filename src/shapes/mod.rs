@@ -7,7 +7,9 @@
 pub mod anatomy;
 pub mod body;
 pub mod contour;
+mod cut;
 pub mod fitting;
+pub mod garment;
 pub mod girth;
 pub mod jet;
 pub mod measures;
@@ -15,6 +17,8 @@ pub mod profile;
 mod remesh;
 pub mod solid;
 
+pub use body::dress_form;
+pub use garment::{BUILT_IN, Garment, GarmentRequest, GarmentSpec, garment};
 pub use measures::BodySpec;
 pub use remesh::Density;
 
@@ -35,6 +39,18 @@ pub enum ShapeError {
         low_cm: f64,
         /// The most accepted, cm.
         high_cm: f64,
+    },
+    /// A length of a garment that makes none.
+    #[error("{name} is {found}; it must be from {low} to {high}")]
+    Length {
+        /// Its name in the spec.
+        name: &'static str,
+        /// What was given.
+        found: f64,
+        /// The least accepted.
+        low: f64,
+        /// The most accepted.
+        high: f64,
     },
     /// Heights that do not ascend.
     #[error(

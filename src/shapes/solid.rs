@@ -56,6 +56,12 @@ impl Sweep {
         Self::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], exponent, stations, rounding)
     }
 
+    /// A sweep along the same axis with other sections.
+    #[must_use]
+    pub fn with_stations(&self, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
+        Self { profile: Profile::new(stations), rounding, ..self.clone() }
+    }
+
     /// The coordinate of `p` along the axis, m.
     #[must_use]
     pub fn along(&self, p: DVec3) -> f64 {
