@@ -1,27 +1,29 @@
 //! Colours of the PARTs: distinct between neighbours, stable from table to table.
 //!
 //! Greedy colouring of the PART adjacency graph, large PARTs first. A PART wants the colour that most of its vertices had
-//! in the step before; where a neighbour has it already, or there was no step before, it takes the colour of the palette
-//! farthest from those of its neighbours. Ties go to the colour used least, then to the first.
+//! in the step before; where a neighbour has it already, or there was no step before, it takes the colour used
+//! least among those far from its neighbours', or the farthest. Ties go to the first.
 //!
 //! Limits: with more neighbours than the palette has colours two may share one; neighbours then differ as far as it goes.
 
 use super::colour_map::{Rgb, oklch};
 
 /// The body: a matte grey with a trace of skin, so that the garment keeps the colour.
-pub const BODY: Rgb = [150, 142, 137];
+pub const BODY: Rgb = [186, 178, 172];
 /// The garment as loaded.
 pub const CLOTH: Rgb = [196, 202, 210];
 /// The displaced garment.
-pub const DRAPED: Rgb = [92, 150, 205];
+pub const DRAPED: Rgb = [118, 176, 228];
 
 const HUES: usize = 12;
+/// Colours this far apart (see `difference`) are told apart at a glance; farther is no better.
+const FAR_ENOUGH: u32 = 12_000;
 
 /// Twelve hues in three lightnesses; neighbouring entries lie far apart.
 #[must_use]
 pub fn palette() -> Vec<Rgb> {
     let mut colours = Vec::with_capacity(3 * HUES);
-    for (lightness, chroma, turn) in [(0.74, 0.14, 0.0), (0.56, 0.15, 15.0), (0.87, 0.095, 8.0)] {
+    for (lightness, chroma, turn) in [(0.76, 0.14, 0.0), (0.88, 0.09, 12.0), (0.60, 0.15, 20.0)] {
         for i in 0..HUES {
             // 5 and 12 share no factor, so this visits every hue, 150° at a time.
             colours.push(oklch(lightness, chroma, turn + 30.0 * ((5 * i) % HUES) as f64));
@@ -59,7 +61,7 @@ pub fn colour_parts(part_of_vertex: &[u32], part_count: usize, triangles: &[[u32
             let distance = taken.iter().map(|&t| difference(colours[c], t)).min().unwrap_or(u32::MAX);
             let free = distance > 0;
             let vote = if free { votes[c] } else { 0 };
-            (vote, distance, std::cmp::Reverse(used[c]), std::cmp::Reverse(c))
+            (vote, distance.min(FAR_ENOUGH), std::cmp::Reverse(used[c]), std::cmp::Reverse(c))
         });
         let best = best.unwrap_or(0);
         used[best] += 1;

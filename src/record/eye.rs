@@ -1,7 +1,8 @@
 //! Where the 3D views look from: the front, slightly above and to one side, with the whole garment in the view.
 //!
 //! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of what must be seen, m; a = width over
-//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + half the depth.
+//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + half the depth;
+//! h includes the colour bar under the hem.
 //!
 //! Limits: the viewer's views have any shape; a is what the layout gives them in a window of 16:10.
 
@@ -16,9 +17,9 @@ const ELEVATION_DEG: f64 = 7.0;
 /// How far to the garment's left the eye stands, degrees: enough to see depth.
 const AZIMUTH_DEG: f64 = 18.0;
 /// Air around what must be seen.
-const MARGIN: f64 = 1.06;
-/// Part of the width that the colour bar and its numbers take, relative to the garment's height.
-const LEGEND_WIDTH: f64 = 0.17;
+const MARGIN: f64 = 1.14;
+/// Room for the colour bar and its numbers under the garment, relative to the larger of its half extents.
+const LEGEND_HEIGHT: f64 = 0.30;
 
 /// An eye and the directions of its picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,6 +38,10 @@ pub struct Eye {
     pub half_height: f64,
     /// Centre of the garment, m.
     pub centre: DVec3,
+    /// Unit vector from the garment to the eye.
+    pub toward: DVec3,
+    /// Half the garment's depth along `toward`, m.
+    pub half_depth: f64,
 }
 
 impl Eye {
@@ -65,11 +70,12 @@ impl Eye {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
         let centre = right * middle((left_end, right_end)) + up * middle((low, high)) + toward * middle((back, near));
         let (half_width, half_height) = (0.5 * (right_end - left_end), 0.5 * (high - low));
-        let legend = LEGEND_WIDTH * 2.0 * half_height;
+        let legend = LEGEND_HEIGHT * half_height.max(half_width);
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
-        let fit = (half_height / tan).max((half_width + 0.5 * legend) / (tan * aspect));
-        let target = centre + right * (0.5 * legend);
-        let position = target + toward * (MARGIN * fit + 0.5 * (near - back));
-        Some(Self { position, target, right, up, half_width, half_height, centre })
+        let fit = ((half_height + 0.5 * legend) / tan).max(half_width / (tan * aspect));
+        let half_depth = 0.5 * (near - back);
+        let target = centre - up * (0.5 * legend);
+        let position = target + toward * (MARGIN * fit + half_depth);
+        Some(Self { position, target, right, up, half_width, half_height, centre, toward, half_depth })
     }
 }

@@ -1,4 +1,4 @@
-//! Colour bars: a standing strip beside the garment, in the plane of the picture, with numbers and the unit.
+//! Colour bars: a strip under the hem, in the plane of the picture, with numbers and the unit.
 //!
 //! A strip in the scene is seen in every view, screenshot and web page; a legend in a view of its own costs the room of one.
 
@@ -29,19 +29,22 @@ pub(crate) struct Legend<'a> {
 }
 
 impl Legend<'_> {
-    /// Logs `{path}/bar` and `{path}/ticks` beside the garment.
+    /// Logs `{path}/bar` and `{path}/ticks` under the garment.
     pub(crate) fn log(&self, open: &Open, path: &str) -> Result<(), RecordError> {
         let eye = &open.eye;
-        let height = 1.3 * eye.half_height;
-        let width = 0.045 * height;
-        let foot = eye.centre + eye.right * (eye.half_width + 1.2 * width) - eye.up * (0.5 * height);
-        let at = |across: f64, along: f64| single(foot + eye.right * (across * width) + eye.up * (along * height));
+        let size = eye.half_height.max(eye.half_width);
+        let (length, thickness) = (1.5 * eye.half_width.max(0.4 * eye.half_height), 0.045 * size);
+        // In front of the legs: in the plane of the garment's nearest point.
+        let start = eye.centre + eye.toward * eye.half_depth
+            - eye.up * (eye.half_height + 0.19 * size)
+            - eye.right * (0.5 * length);
+        let at = |along: f64, above: f64| single(start + eye.right * (along * length) + eye.up * (above * thickness));
         let mut corners = Vec::new();
         let mut colours = Vec::new();
         let mut triangles = Vec::new();
         for band in 0..BANDS {
             let (low, high) = (f64::from(band) / f64::from(BANDS), f64::from(band + 1) / f64::from(BANDS));
-            corners.extend([at(0.0, low), at(1.0, low), at(1.0, high), at(0.0, high)]);
+            corners.extend([at(low, 0.0), at(high, 0.0), at(high, 1.0), at(low, 1.0)]);
             colours.extend([self.map.at(0.5 * (low + high)); 4]);
             triangles.extend([[4 * band, 4 * band + 1, 4 * band + 2], [4 * band, 4 * band + 2, 4 * band + 3]]);
         }
@@ -49,13 +52,14 @@ impl Legend<'_> {
         let bar = Mesh3D::new(corners).with_triangle_indices(triangles).with_vertex_colors(rerun_colours(colours));
         open.log(&format!("{path}/bar"), &bar)?;
 
-        let mut places = vec![at(1.6, 1.09)];
+        // The viewer writes a text under its point.
+        let mut places = vec![at(0.5, 3.2)];
         let mut labels = vec![format!("{}, {}", self.title, self.unit)];
         for tick in 0..TICKS {
             let t = f64::from(tick) / f64::from(TICKS - 1);
             let value = self.range.low + t * (self.range.high - self.range.low);
             let bound = if self.open_end && tick == TICKS - 1 { "≥ " } else { "" };
-            places.push(at(2.4, t));
+            places.push(at(t, 0.0));
             labels.push(format!("{bound}{}", number(value)));
         }
         open.log(&format!("{path}/ticks"), &texts(places, labels))

@@ -49,9 +49,9 @@ impl Panel {
         if !self.title.is_empty() {
             line(&mut text, format_args!("## {}\n", self.title));
         }
-        two_columns(&mut text, "", "", self.facts.iter().map(|(k, v)| (k.as_str(), v.clone())));
+        two_columns(&mut text, "Drape", "", self.facts.iter().map(|(k, v)| (k.as_str(), v.clone())));
         if !self.levels.is_empty() {
-            line(&mut text, format_args!("### Range table: {}\n", self.table));
+            line(&mut text, format_args!("**{}**\n", self.table));
             line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
             for (i, row) in self.levels.iter().enumerate() {
                 let range = range_cm(row.lower_m, row.upper_m);
@@ -65,7 +65,7 @@ impl Panel {
             line(&mut text, format_args!("> ⚠ {warning}\n"));
         }
         if !self.command_line.is_empty() {
-            line(&mut text, format_args!("### Command\n\n```\n{}\n```\n", self.command_line));
+            line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));
         }
         let own = env!("CARGO_PKG_VERSION");
         line(&mut text, format_args!("partwise {own} · Rerun {RERUN_VERSION}"));
@@ -86,10 +86,7 @@ fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterat
     if rows.peek().is_none() {
         return;
     }
-    if !title.is_empty() {
-        line(text, format_args!("### {title}\n"));
-    }
-    line(text, format_args!("| | {unit} |\n|:--|--:|"));
+    line(text, format_args!("| **{title}** | {unit} |\n|:--|--:|"));
     for (name, value) in rows {
         line(text, format_args!("| {name} | {value} |"));
     }

@@ -16,7 +16,6 @@
 //! | `/report` | TextDocument | table, fabric, counts, timings, command line, versions | `table` |
 //! | `/levels/histogram/<level>` | BarChart | how many vertices lie how far off, split by level | `table` |
 //! | `/levels/parts/<level>` | BarChart | PARTs of each level | `table` |
-//! | `/levels/ms/<stage>` | BarChart | time of each stage, ms, as bars | `table` |
 //! | `/numbers/<name>` | Scalars | PART count, error, ... | `table` |
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
 //! | `/solver/energy`, `/solver/residual` | Scalars | J; residual over weight | `iteration` |
@@ -51,8 +50,6 @@ pub const REPORT: &str = "/report";
 pub const HISTOGRAM: &str = "/levels/histogram";
 /// PARTs of each level.
 pub const LEVEL_PARTS: &str = "/levels/parts";
-/// Time of each stage as bars.
-pub const STAGE_BARS: &str = "/levels/ms";
 /// Scalars over `table`.
 pub const NUMBERS: &str = "/numbers";
 /// Times of the stages over `table`, ms.

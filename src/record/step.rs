@@ -135,7 +135,7 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
 
 /// One arrow per PART, from its vertex nearest the eye's side of its middle: the centroid of a ring lies inside the body.
 fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError> {
-    let toward = (open.eye.position - open.eye.target).normalize_or_zero();
+    let toward = open.eye.toward;
     let parts = step.part_force_n.len();
     let mut sum = vec![(DVec3::ZERO, 0.0, f64::NEG_INFINITY); parts];
     for (&p, &x) in step.part_of_vertex.iter().zip(&open.garment.positions) {
@@ -157,14 +157,14 @@ fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError
     let height = 2.0 * open.eye.half_height;
     let scale = LONGEST_ARROW * height / full;
     // Off the surface by a hair, so that an arrow along the cloth is not half sunk in it.
-    let origins = best.iter().map(|(_, x)| single(*x + 0.012 * height * toward));
+    let origins = best.iter().map(|(_, x)| single(*x + 0.035 * height * toward));
     let vectors = step.part_force_n.iter().map(|f| {
         let length = (f.length() * scale).min(1.25 * LONGEST_ARROW * height);
         single(f.normalize_or_zero() * length)
     });
     let arrows = Arrows3D::from_vectors(vectors)
         .with_origins(origins)
-        .with_radii([0.0028 * height as f32])
+        .with_radii([0.0045 * height as f32])
         .with_colors([Color::from_rgb(238, 240, 243)]);
     open.log(paths::FORCE_ARROWS, &arrows)
 }
@@ -232,10 +232,8 @@ fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
 
 fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log("/numbers/part_count", &Scalars::single(step.part_force_n.len() as f64))?;
-    for (i, (stage, ms)) in step.panel.timings_ms.iter().enumerate() {
+    for (stage, ms) in &step.panel.timings_ms {
         open.log(&format!("{}/{stage}", paths::STAGE_MS), &Scalars::single(*ms))?;
-        let bar = BarChart::new(vec![*ms]).with_abscissa(vec![i as f64]);
-        open.log(&format!("{}/{stage}", paths::STAGE_BARS), &bar)?;
     }
     for (leaf, value) in step.scalars {
         open.log(&format!("{}/{leaf}", paths::NUMBERS), &Scalars::single(*value))?;

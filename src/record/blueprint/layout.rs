@@ -44,7 +44,10 @@ impl Layout {
         if self.iterations {
             tabs.push(solver(eye));
         }
-        Node::Tabs(tabs)
+        match tabs.pop() {
+            Some(only) if tabs.is_empty() => only,
+            last => Node::Tabs(tabs.into_iter().chain(last).collect()),
+        }
     }
 
     fn stages(&self, eye: &Eye) -> Node {
@@ -73,8 +76,6 @@ impl Layout {
             if self.error {
                 below.push((1.0, View::plot("Error, mm", &["/numbers/error"]).into()));
             }
-        } else {
-            below.push((1.0, View::bars("Time of each stage, ms", &[paths::STAGE_BARS]).into()));
         }
         let mut rows = vec![(3.0, top), (1.0, Node::Row("Levels", below))];
         if self.several_tables {

@@ -74,7 +74,7 @@ impl View {
 
     /// Bars.
     pub(crate) fn bars(name: impl Into<String>, contents: &[&str]) -> Self {
-        Self::new("BarChart", name, contents).with("PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop))
+        Self::new("BarChart", name, contents).with("PlotLegend", &PlotLegend::new().with_visible(false))
     }
 
     /// Rows of numbers, one per step of `timeline`.
