@@ -1,0 +1,159 @@
+//! Stage one: PARTs, the connected pieces of garment at one level of distance (equation 1).
+//!
+//! A vertex i with unsigned distance d_i belongs to level k of the range table where V_L ≤ d_i < V_H; a PART is a maximal
+//! set of vertices of one level joined by garment edges. PARTs are numbered by level, then by smallest vertex index, so
+//! that a table gives the same numbers on any machine. Two PARTs are adjacent where a garment edge joins them; the edges that
+//! do are their seam.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | d_i | distance of vertex i from the body, unsigned | m |
+//! | S_k | vertices of PART k | – |
+//!
+//! Source: Luo, Jiang, Cong, section 2.1. Limits: connectivity is by garment edges alone, so two layers that touch without
+//! sharing vertices stay apart; a table that meets distance noise yields many single-vertex PARTs, which are counted.
+
+mod extent;
+mod join;
+mod seams;
+
+pub use seams::Seam;
+
+use rayon::prelude::*;
+
+use crate::mesh::Topology;
+use crate::range_table::RangeTable;
+
+/// The PART number of a vertex outside every level.
+pub const UNASSIGNED: u32 = u32::MAX;
+
+/// One PART.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// Its level: index into the table's effective levels, from 0.
+    pub level: u32,
+    /// Its vertices S_k, ascending, never empty.
+    pub vertices: Vec<u32>,
+}
+
+/// A garment cut into PARTs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Parts {
+    /// PART of each vertex, or [`UNASSIGNED`].
+    pub part_of_vertex: Vec<u32>,
+    /// The PARTs, by level, then by smallest vertex.
+    pub parts: Vec<Part>,
+    /// Where PARTs meet, by PART numbers.
+    pub seams: Vec<Seam>,
+    /// Vertices outside every level of the table.
+    pub unassigned: usize,
+    /// Vertices whose distance lies in a hole of the table as printed.
+    pub hole_vertices: usize,
+    /// PARTs of a single vertex.
+    pub singletons: usize,
+    /// Number of PARTs at each level, empty levels included.
+    pub parts_per_level: Vec<usize>,
+}
+
+/// Cuts a garment by its vertices' distances to the body (m; a negative one, inside the body, counts by its magnitude).
+/// O(n log n) in the number of edges.
+#[must_use]
+pub fn segment(topology: &Topology, distances_m: &[f64], table: &RangeTable) -> Parts {
+    let unsigned: Vec<f64> = distances_m.iter().map(|d| d.abs()).collect();
+    let assigned = table.assign(&unsigned);
+    let label: Vec<u32> = assigned.level_of_vertex.iter().map(|l| l.map_or(UNASSIGNED, |l| l as u32)).collect();
+    Parts::from_labels(topology, &label, |label| label, assigned.level_count, assigned.hole_vertices)
+}
+
+impl Parts {
+    /// Number of PARTs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Whether there is no PART at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// PARTs that share a seam with each PART, ascending.
+    #[must_use]
+    pub fn neighbours(&self) -> Vec<Vec<u32>> {
+        let mut list = vec![Vec::new(); self.parts.len()];
+        // Seams come sorted by their pair, smaller number first, so both directions fill in ascending order.
+        for seam in &self.seams {
+            list[seam.parts[1] as usize].push(seam.parts[0]);
+        }
+        for seam in &self.seams {
+            list[seam.parts[0] as usize].push(seam.parts[1]);
+        }
+        list
+    }
+
+    /// PARTs as the connected pieces of equal label; `level_of` gives the level of a label.
+    pub(crate) fn from_labels(
+        topology: &Topology,
+        label: &[u32],
+        level_of: impl Fn(u32) -> u32,
+        level_count: usize,
+        hole_vertices: usize,
+    ) -> Self {
+        let n = label.len();
+        let mut piece_of_vertex = vec![UNASSIGNED; n];
+        let mut pieces: Vec<Part> = Vec::new();
+        let mut stack = Vec::new();
+        for seed in 0..n {
+            if label[seed] == UNASSIGNED || piece_of_vertex[seed] != UNASSIGNED {
+                continue;
+            }
+            let piece = pieces.len() as u32;
+            let mut vertices = Vec::new();
+            piece_of_vertex[seed] = piece;
+            stack.push(seed as u32);
+            while let Some(v) = stack.pop() {
+                vertices.push(v);
+                for &w in topology.neighbours(v) {
+                    if label[w as usize] == label[seed] && piece_of_vertex[w as usize] == UNASSIGNED {
+                        piece_of_vertex[w as usize] = piece;
+                        stack.push(w);
+                    }
+                }
+            }
+            vertices.sort_unstable();
+            pieces.push(Part { level: level_of(label[seed]), vertices });
+        }
+        // Pieces are found by smallest vertex; the stable sort keeps that order within a level.
+        let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
+        order.sort_by_key(|&p| pieces[p as usize].level);
+        let mut number = vec![0u32; pieces.len()];
+        for (new, &old) in order.iter().enumerate() {
+            number[old as usize] = new as u32;
+        }
+        let mut parts = pieces;
+        parts.sort_by_key(|p| p.level);
+        let part_of_vertex: Vec<u32> =
+            piece_of_vertex.iter().map(|&p| number.get(p as usize).copied().unwrap_or(UNASSIGNED)).collect();
+        let mut parts_per_level = vec![0; level_count];
+        for part in &parts {
+            if let Some(count) = parts_per_level.get_mut(part.level as usize) {
+                *count += 1;
+            }
+        }
+        Self {
+            seams: seams::find(topology, &part_of_vertex),
+            unassigned: part_of_vertex.iter().filter(|&&p| p == UNASSIGNED).count(),
+            hole_vertices,
+            singletons: parts.iter().filter(|p| p.vertices.len() == 1).count(),
+            parts_per_level,
+            part_of_vertex,
+            parts,
+        }
+    }
+
+    /// One value per PART from its number and itself, in parallel, in order.
+    pub(crate) fn map<T: Send>(&self, f: impl Fn(usize, &Part) -> T + Sync) -> Vec<T> {
+        self.parts.par_iter().with_min_len(16).enumerate().map(|(i, p)| f(i, p)).collect()
+    }
+}

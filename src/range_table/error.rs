@@ -1,0 +1,156 @@
+//! What can be wrong with a range table, row by row.
+
+use super::GapRule;
+
+/// A range table that cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// Not TOML, or a key that is missing, unknown or of another type.
+    #[error(
+        "{place}: {message}; a range table has name = \"...\", unit = \"cm\", gap = \"extend-lower\" | \"extend-upper\" | \
+         \"own-level\" | \"error\" and levels = [[lower, upper], ...]"
+    )]
+    Syntax {
+        /// File and line.
+        place: String,
+        /// What the parser found and expected.
+        message: String,
+    },
+    /// A unit other than the only one there is.
+    #[error("{place}: found unit = \"{found}\", expected unit = \"cm\"; convert the bounds to centimetres")]
+    Unit {
+        /// File and line.
+        place: String,
+        /// What was written.
+        found: String,
+    },
+    /// An unknown gap rule.
+    #[error(
+        "{place}: found gap = \"{found}\", expected \"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose who \
+         takes the distances between two rows that do not meet"
+    )]
+    Gap {
+        /// File and line.
+        place: String,
+        /// What was written.
+        found: String,
+    },
+    /// No rows.
+    #[error(
+        "{place}: found no levels, expected at least one row [lower, upper]; [[0, inf]] makes the garment one level"
+    )]
+    Empty {
+        /// File and line.
+        place: String,
+    },
+    /// A row that is not two numbers.
+    #[error("{place}: row {row} has {found} numbers, expected two, [lower, upper]; an open last row is [lower, inf]")]
+    NotAPair {
+        /// File and line.
+        place: String,
+        /// Row number, from 1.
+        row: usize,
+        /// How many numbers it has.
+        found: usize,
+    },
+    /// A row whose bounds make no sense, alone or after the row before.
+    #[error("{place}: row {row} {problem}")]
+    Row {
+        /// File and line, or the table's name.
+        place: String,
+        /// Row number, from 1.
+        row: usize,
+        /// What is wrong.
+        problem: BoundProblem,
+    },
+    /// Parameters that make no table.
+    #[error("{what}: found {found}, expected {expected}")]
+    Family {
+        /// Which family of tables.
+        what: &'static str,
+        /// The value given.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+}
+
+/// What is wrong with the bounds of one row (cm).
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BoundProblem {
+    /// NaN.
+    #[error("is [{0}, {1}], expected two numbers; write the bounds in centimetres")]
+    NotANumber(f64, f64),
+    /// A negative bound.
+    #[error("is [{0}, {1}], expected bounds of at least 0; distances are unsigned, so start at 0")]
+    Negative(f64, f64),
+    /// Upper not above lower.
+    #[error("is [{0}, {1}], expected the upper value above the lower one; swap them or remove the row")]
+    Unordered(f64, f64),
+    /// An infinite bound before the end.
+    #[error("is [{0}, {1}], expected a finite upper value because rows follow; only the last row may end at inf")]
+    OpenBeforeTheEnd(f64, f64),
+    /// Starts below the start of the row before.
+    #[error(
+        "starts at {lower}, expected at least {before}, the upper value of the row before; sort the rows by distance"
+    )]
+    OutOfOrder {
+        /// Its lower value.
+        lower: f64,
+        /// The upper value before.
+        before: f64,
+    },
+    /// Starts inside the row before.
+    #[error("starts at {lower}, inside the row before, which ends at {before}; let it start at {before}")]
+    Overlap {
+        /// Its lower value.
+        lower: f64,
+        /// The upper value before.
+        before: f64,
+    },
+    /// A hole where none is allowed.
+    #[error(
+        "starts at {lower}, but the row before ends at {before} and gap = \"error\" allows no hole; close it, or choose \
+         \"extend-lower\", \"extend-upper\" or \"own-level\""
+    )]
+    Hole {
+        /// Its lower value.
+        lower: f64,
+        /// The upper value before.
+        before: f64,
+    },
+    /// No rows at all.
+    #[error("is missing, expected at least one level [lower, upper]; [[0, inf]] makes the garment one level")]
+    Missing,
+}
+
+/// The first row (from 1) that cannot stand, and why.
+pub(super) fn first_problem(rows: &[(f64, f64)], gap: GapRule) -> Option<(usize, BoundProblem)> {
+    if rows.is_empty() {
+        return Some((1, BoundProblem::Missing));
+    }
+    let mut before: Option<(f64, f64)> = None;
+    for (i, &(lower, upper)) in rows.iter().enumerate() {
+        let problem = if lower.is_nan() || upper.is_nan() {
+            Some(BoundProblem::NotANumber(lower, upper))
+        } else if lower < 0.0 || upper < 0.0 {
+            Some(BoundProblem::Negative(lower, upper))
+        } else if lower >= upper {
+            Some(BoundProblem::Unordered(lower, upper))
+        } else if upper == f64::INFINITY && i + 1 < rows.len() {
+            Some(BoundProblem::OpenBeforeTheEnd(lower, upper))
+        } else {
+            before.and_then(|(start, end)| match lower {
+                l if l < start => Some(BoundProblem::OutOfOrder { lower, before: end }),
+                l if l < end => Some(BoundProblem::Overlap { lower, before: end }),
+                l if l > end && gap == GapRule::Error => Some(BoundProblem::Hole { lower, before: end }),
+                _ => None,
+            })
+        };
+        if let Some(problem) = problem {
+            return Some((i + 1, problem));
+        }
+        before = Some((lower, upper));
+    }
+    None
+}

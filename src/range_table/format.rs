@@ -1,0 +1,152 @@
+//! Range tables as TOML: reading with file, line and row in every message, and writing so that it reads back equal.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::error::first_problem;
+use super::{GapRule, Level, RangeTable, TableError};
+
+/// Table 3 as printed, inside the binary.
+const TABLE_3: &str = include_str!("../../assets/tables/table-3.toml");
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    #[serde(default)]
+    source: String,
+    unit: Spanned<String>,
+    gap: Option<Spanned<String>>,
+    levels: Spanned<Vec<Spanned<Vec<f64>>>>,
+}
+
+impl RangeTable {
+    /// The paper's Table 3, verbatim, hole and all.
+    #[must_use]
+    pub fn table_3() -> Self {
+        // The text is part of the program and a test reads it, so it always parses.
+        Self::parse(TABLE_3, "table-3.toml").unwrap_or_default()
+    }
+
+    /// Reads a table; `source_name` (a path) only serves the messages.
+    ///
+    /// # Errors
+    /// [`TableError`] with file, line, row, what was found and what was expected.
+    pub fn parse(text: &str, source_name: &str) -> Result<Self, TableError> {
+        let at = |offset: usize| format!("{source_name}:{}", line_of(text, offset));
+        let file: File = toml::from_str(text).map_err(|e| TableError::Syntax {
+            place: e.span().map_or_else(|| source_name.to_owned(), |span| at(span.start)),
+            message: e.message().replace('\n', ", "),
+        })?;
+        if file.unit.get_ref() != "cm" {
+            return Err(TableError::Unit { place: at(file.unit.span().start), found: file.unit.into_inner() });
+        }
+        let gap = match &file.gap {
+            None => GapRule::default(),
+            Some(word) => {
+                let rules = [GapRule::ExtendLower, GapRule::ExtendUpper, GapRule::OwnLevel, GapRule::Error];
+                let known = rules.into_iter().find(|r| r.as_str() == word.get_ref());
+                let found = || TableError::Gap { place: at(word.span().start), found: word.get_ref().clone() };
+                known.ok_or_else(found)?
+            }
+        };
+        let rows = file.levels.get_ref();
+        if rows.is_empty() {
+            return Err(TableError::Empty { place: at(file.levels.span().start) });
+        }
+        let mut bounds = Vec::with_capacity(rows.len());
+        for (i, row) in rows.iter().enumerate() {
+            let &[lower, upper] = row.get_ref().as_slice() else {
+                let (row, found) = (i + 1, row.get_ref().len());
+                return Err(TableError::NotAPair { place: at(rows[i].span().start), row, found });
+            };
+            bounds.push((lower, upper));
+        }
+        if let Some((row, problem)) = first_problem(&bounds, gap) {
+            return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });
+        }
+        let levels = bounds.into_iter().map(|(lower_cm, upper_cm)| Level { lower_cm, upper_cm }).collect();
+        Ok(Self { name: file.name, source: file.source, gap, levels })
+    }
+
+    /// The table as a file that [`parse`](Self::parse) reads back to an equal one.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let quoted = |s: &str| toml::Value::String(s.to_owned()).to_string();
+        let mut text = format!("name = {}\n", quoted(&self.name));
+        if !self.source.is_empty() {
+            text.push_str(&format!("source = {}\n", quoted(&self.source)));
+        }
+        text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap.as_str()));
+        for level in &self.levels {
+            // `{:?}` is the shortest text that reads back to the same bits; TOML spells infinity the same way.
+            text.push_str(&format!("    [{:?}, {:?}],\n", level.lower_cm, level.upper_cm));
+        }
+        text.push_str("]\n");
+        text
+    }
+}
+
+/// Line number, from 1, of a byte offset.
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::range_table::BoundProblem;
+
+    fn file(levels: &str) -> String {
+        format!("name = \"t\"\nunit = \"cm\"\nlevels = [\n{levels}\n]\n")
+    }
+
+    fn message(text: &str) -> String {
+        RangeTable::parse(text, "t.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_written_table_reads_back_equal() {
+        let table = RangeTable::table_3();
+        assert_eq!(RangeTable::parse(&table.to_toml(), "again").unwrap(), table);
+        let odd = RangeTable::from_bounds("a \"quoted\"\nname", &[0.1 + 0.2, 1.0 / 3.0, f64::INFINITY]).unwrap();
+        assert_eq!(RangeTable::parse(&odd.to_toml(), "odd").unwrap(), odd);
+    }
+
+    #[test]
+    fn each_bad_bound_is_named_with_its_line_and_row() {
+        for (rows, line, row, word) in [
+            ("[0, 1],\n[2, 1.5],", 5, 2, "above the lower"),
+            ("[0, 1],\n[0.9, 2],", 5, 2, "inside the row before"),
+            ("[1, 2],\n[0, 1],", 5, 2, "sort the rows"),
+            ("[-1, 2],", 4, 1, "at least 0"),
+            ("[nan, 2],", 4, 1, "two numbers"),
+            ("[0, inf],\n[3, 4],", 4, 1, "only the last row"),
+        ] {
+            let text = file(rows);
+            let said = message(&text);
+            assert!(said.starts_with(&format!("t.toml:{line}: row {row} ")), "{said}");
+            assert!(said.contains(word), "{said}");
+        }
+        assert!(message(&file("[0, 1],\n[2],")).starts_with("t.toml:5: row 2 has 1 numbers"));
+        assert!(message(&file("")).starts_with("t.toml:3: found no levels"));
+    }
+
+    #[test]
+    fn keys_and_words_are_checked() {
+        assert!(message("name = 1").starts_with("t.toml:1:"));
+        assert!(message("name = \"t\"\nunit = \"mm\"\nlevels = [[0, 1]]").contains("t.toml:2: found unit = \"mm\""));
+        assert!(message("name = \"t\"\nunit = \"cm\"\nlevels = [[0, 1]]\ncolour = 3").starts_with("t.toml:4:"));
+        assert!(message("name = \"t\"\nunit = \"cm\"\ngap = \"close\"\nlevels = [[0, 1]]").starts_with("t.toml:3:"));
+        assert!(message("name = \"t\"\nunit = \"cm\"\nlevels = [[0, 1]").contains("t.toml:"));
+        assert!(message("name = \"t\"\nunit = \"cm\"").contains("levels"));
+    }
+
+    #[test]
+    fn a_hole_is_an_error_where_the_table_says_so() {
+        let text = format!("gap = \"error\"\n{}", file("[0, 3],\n[3.5, inf]"));
+        let error = RangeTable::parse(&text, "t.toml").unwrap_err();
+        let problem = BoundProblem::Hole { lower: 3.5, before: 3.0 };
+        assert_eq!(error, TableError::Row { place: "t.toml:6".into(), row: 2, problem });
+    }
+}

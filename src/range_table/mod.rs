@@ -1,0 +1,239 @@
+//! Range tables: the lower and upper values of the distance that cut a garment into PARTs (equation 1, Table 3).
+//!
+//! A table is an ordered list of levels `[V_L, V_H)`. Equation (1) prints `≤` on both sides; with shared bounds that
+//! would put a vertex into two levels, so the upper value belongs to the level above. Where two neighbouring levels leave a
+//! hole (Table 3 has one, 3 to 3.5 cm) a [`GapRule`] says who takes it.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | V_L, V_H | lower and upper value of a level, as printed | cm |
+//! | d | distance of a garment vertex from the body, unsigned | m |
+//!
+//! Limits: distances below the first lower value or at and above a finite last upper value belong to no level; the vertices
+//! there are reported as unassigned.
+
+mod error;
+mod format;
+
+pub use error::{BoundProblem, TableError};
+
+/// Metres in a centimetre: tables are written in centimetres, everything else is metres.
+pub const METRES_PER_CM: f64 = 0.01;
+
+/// One row of a range table, in centimetres as printed: `lower ≤ d < upper`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Lower value V_L, cm.
+    pub lower_cm: f64,
+    /// Upper value V_H, cm; infinite in an open last row.
+    pub upper_cm: f64,
+}
+
+/// Who takes the distances between two rows that do not meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GapRule {
+    /// The level below grows up to the next one.
+    #[default]
+    ExtendLower,
+    /// The level above grows down to the one before.
+    ExtendUpper,
+    /// The hole is a level between the two.
+    OwnLevel,
+    /// A table with a hole is refused.
+    Error,
+}
+
+impl GapRule {
+    /// As written in a table file.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::ExtendLower => "extend-lower",
+            Self::ExtendUpper => "extend-upper",
+            Self::OwnLevel => "own-level",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// A named, ordered list of distance levels.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RangeTable {
+    /// What it is called in reports.
+    pub name: String,
+    /// Where its values come from; empty if nobody said.
+    pub source: String,
+    /// Who takes a hole between two rows.
+    pub gap: GapRule,
+    /// The rows as printed, holes and all.
+    pub levels: Vec<Level>,
+}
+
+/// A level after the holes are given away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectiveLevel {
+    /// Lower value, cm.
+    pub lower_cm: f64,
+    /// Upper value, cm.
+    pub upper_cm: f64,
+    /// The table's row it stands for, from 0; `None` for a hole that is a level of its own.
+    pub row: Option<usize>,
+}
+
+impl RangeTable {
+    /// A checked table.
+    ///
+    /// # Errors
+    /// [`TableError`] names the row that is negative, not a number, empty, out of order or overlapping, or the hole that
+    /// [`GapRule::Error`] forbids.
+    pub fn new(name: impl Into<String>, gap: GapRule, levels: Vec<Level>) -> Result<Self, TableError> {
+        let table = Self { name: name.into(), source: String::new(), gap, levels };
+        table.validate()?;
+        Ok(table)
+    }
+
+    /// A checked table without holes from its ascending bounds in centimetres: `n + 1` bounds make `n` levels.
+    ///
+    /// # Errors
+    /// As [`RangeTable::new`].
+    pub fn from_bounds(name: impl Into<String>, bounds_cm: &[f64]) -> Result<Self, TableError> {
+        let levels = bounds_cm.windows(2).map(|w| Level { lower_cm: w[0], upper_cm: w[1] }).collect();
+        Self::new(name, GapRule::default(), levels)
+    }
+
+    /// The same table with its origin told.
+    #[must_use]
+    pub fn with_source(mut self, source: impl Into<String>) -> Self {
+        self.source = source.into();
+        self
+    }
+
+    /// Checks rows that were put together by hand.
+    ///
+    /// # Errors
+    /// As [`RangeTable::new`].
+    pub fn validate(&self) -> Result<(), TableError> {
+        let rows: Vec<_> = self.levels.iter().map(|l| (l.lower_cm, l.upper_cm)).collect();
+        match error::first_problem(&rows, self.gap) {
+            None => Ok(()),
+            Some((row, problem)) => Err(TableError::Row { place: format!("table \"{}\"", self.name), row, problem }),
+        }
+    }
+
+    /// The holes between rows, cm.
+    #[must_use]
+    pub fn holes_cm(&self) -> Vec<[f64; 2]> {
+        let meets = self.levels.windows(2).map(|w| [w[0].upper_cm, w[1].lower_cm]);
+        meets.filter(|[from, to]| from < to).collect()
+    }
+
+    /// The levels after the gap rule, ascending, without holes; PARTs number their level by this list.
+    #[must_use]
+    pub fn effective_levels(&self) -> Vec<EffectiveLevel> {
+        let mut out: Vec<EffectiveLevel> = Vec::with_capacity(self.levels.len() + 1);
+        for (row, level) in self.levels.iter().enumerate() {
+            let mut lower_cm = level.lower_cm;
+            let before = out.last().map(|l| l.upper_cm);
+            if let (Some(before), Some(last)) = (before, out.last_mut())
+                && before < lower_cm
+            {
+                match self.gap {
+                    GapRule::ExtendLower => last.upper_cm = lower_cm,
+                    GapRule::ExtendUpper => lower_cm = before,
+                    GapRule::OwnLevel => out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None }),
+                    // A checked table has no hole under this rule; an unchecked one keeps it, and its vertices stay
+                    // unassigned, which is reported.
+                    GapRule::Error => {}
+                }
+            }
+            out.push(EffectiveLevel { lower_cm, upper_cm: level.upper_cm, row: Some(row) });
+        }
+        out
+    }
+
+    /// Index into [`effective_levels`](Self::effective_levels) of a distance in metres; `None` outside the table or NaN.
+    #[must_use]
+    pub fn level_of(&self, distance_m: f64) -> Option<usize> {
+        level_in(&self.effective_levels(), distance_m)
+    }
+
+    /// The level of each distance (m), and which of them a hole took.
+    #[must_use]
+    pub fn assign(&self, distances_m: &[f64]) -> Assignment {
+        let levels = self.effective_levels();
+        let holes = self.holes_cm();
+        let level_of_vertex: Vec<_> = distances_m.iter().map(|&d| level_in(&levels, d)).collect();
+        let in_hole = |d: &&f64| holes.iter().any(|[from, to]| from * METRES_PER_CM <= **d && **d < to * METRES_PER_CM);
+        let hole_vertices = distances_m.iter().filter(in_hole).count();
+        Assignment { level_of_vertex, level_count: levels.len(), hole_vertices }
+    }
+}
+
+/// What [`RangeTable::assign`] found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Assignment {
+    /// Index into the effective levels, or `None` outside the table.
+    pub level_of_vertex: Vec<Option<usize>>,
+    /// Number of effective levels.
+    pub level_count: usize,
+    /// How many distances lie in a hole of the table as printed.
+    pub hole_vertices: usize,
+}
+
+fn level_in(levels: &[EffectiveLevel], distance_m: f64) -> Option<usize> {
+    let above = levels.partition_point(|l| l.lower_cm * METRES_PER_CM <= distance_m);
+    let level = above.checked_sub(1)?;
+    (distance_m < levels[level].upper_cm * METRES_PER_CM || levels[level].upper_cm == f64::INFINITY).then_some(level)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_3_is_verbatim_with_its_hole() {
+        let table = RangeTable::table_3();
+        assert_eq!(table.levels.len(), 19);
+        assert_eq!(table.holes_cm(), [[3.0, 3.5]]);
+        assert_eq!(table.levels[0], Level { lower_cm: 0.0, upper_cm: 0.06 });
+        assert_eq!(table.levels[18], Level { lower_cm: 11.0, upper_cm: f64::INFINITY });
+        assert_eq!(table.gap, GapRule::ExtendLower);
+    }
+
+    #[test]
+    fn the_gap_rule_says_who_takes_the_hole() {
+        let mut table = RangeTable::table_3();
+        let of = |t: &RangeTable| t.level_of(0.032);
+        assert_eq!(of(&table), Some(12));
+        table.gap = GapRule::ExtendUpper;
+        assert_eq!(of(&table), Some(13));
+        table.gap = GapRule::OwnLevel;
+        assert_eq!(of(&table), Some(13));
+        assert_eq!(table.effective_levels()[13].row, None);
+        assert_eq!(table.level_of(0.036), Some(14));
+        table.gap = GapRule::Error;
+        assert!(matches!(table.validate(), Err(TableError::Row { row: 14, problem: BoundProblem::Hole { .. }, .. })));
+        assert_eq!(of(&table), None);
+    }
+
+    #[test]
+    fn bounds_belong_to_the_level_above() {
+        let table = RangeTable::table_3();
+        assert_eq!(table.level_of(0.0), Some(0));
+        assert_eq!(table.level_of(0.005), Some(7));
+        assert_eq!(table.level_of(0.005 - 1e-12), Some(6));
+        assert_eq!(table.level_of(0.11), Some(18));
+        assert_eq!(table.level_of(1e9), Some(18));
+        assert_eq!(table.level_of(f64::INFINITY), Some(18));
+        assert_eq!(table.level_of(f64::NAN), None);
+    }
+
+    #[test]
+    fn what_no_row_covers_is_unassigned() {
+        let table = RangeTable::from_bounds("two rows", &[1.0, 2.0, 4.0]).unwrap();
+        let found = table.assign(&[0.005, 0.01, 0.039, 0.04]);
+        assert_eq!(found.level_of_vertex, [None, Some(0), Some(1), None]);
+        assert_eq!(RangeTable::table_3().assign(&[0.029, 0.03, 0.034, 0.035]).hole_vertices, 2);
+    }
+}
