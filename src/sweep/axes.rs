@@ -1,0 +1,223 @@
+//! The values of every axis of a sweep, read from its file, and their full grid.
+
+use std::collections::BTreeMap;
+
+use toml::{Spanned, Value};
+
+use super::error::PlanError;
+use super::file::{At, Grid, Single, Source, number};
+use super::inputs::Inputs;
+use super::point::{BodyChoice, Input, ModelChoice, Point, Refine, TableChoice};
+use super::tables::{default_table, tables};
+
+/// The body where a sweep names none.
+pub const DEFAULT_BODY: &str = "dress-form";
+/// The garment where a sweep names none.
+pub const DEFAULT_GARMENT: &str = "low-cut-dress";
+/// The fabric where a sweep names none.
+pub const DEFAULT_FABRIC: &str = "interlock";
+/// Points a plan may have: a larger grid is a slip of the pen (at a millisecond a point it takes a quarter of an hour, and
+/// its rows fill half a gigabyte).
+const LIMIT: usize = 1_000_000;
+
+/// The values of every axis.
+pub(super) struct Axes {
+    bodies: Vec<BodyChoice>,
+    garments: Vec<Input>,
+    fabrics: Vec<Input>,
+    models: Vec<ModelChoice>,
+    pub(super) tables: Vec<TableChoice>,
+    extents_cm: Vec<Vec<f64>>,
+    min_parts: Vec<usize>,
+    refine: Vec<Refine>,
+    seeds: Vec<u64>,
+}
+
+impl Axes {
+    /// Reads the axes of a grid; an axis it lacks has the one value of `base`, or the default.
+    pub(super) fn read(source: Source<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Self, PlanError> {
+        let axis = Axis { source };
+        let models = axis.of(&base.model, &grid.models, "models", |v| match v.get_ref().as_str() {
+            Some("paper") => Ok(ModelChoice::Paper),
+            Some("coupled") => Ok(ModelChoice::Coupled),
+            _ => Err(source.wrong(v, "model", "\"paper\" or \"coupled\"")),
+        })?;
+        let extents_cm = axis.of(&base.extent_cm, &grid.extents_cm, "extents_cm", |v| extent(source, v))?;
+        let min_parts = axis.of(&base.min_part, &grid.min_parts, "min_parts", |v| {
+            source.count(v, "min_part", 1, "a number of vertices, 1 for PARTs as the paper defines them")
+        })?;
+        let refine = axis.of(&base.refine, &grid.refine, "refine", |v| match v.get_ref().as_str() {
+            Some("converged") => Ok(Refine::Converged),
+            _ => source.count(v, "refine", 0, "a number of steps, or \"converged\"").map(Refine::Steps),
+        })?;
+        let seeds = axis.of(&base.seed, &grid.seeds, "seeds", |v| {
+            source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")
+        })?;
+        let fabrics = axis.of(&base.fabric, &grid.fabrics, "fabrics", |v| {
+            let label = source.text(v, "fabric", "a built-in name or a file")?;
+            inputs.input(&label, &source.place(v))
+        })?;
+        let bodies = axis.of(&base.body, &grid.bodies, "bodies", |v| body(source, v, inputs))?;
+        let tables = axis.of(&base.table, &grid.tables, "tables", |v| tables(source, v, inputs))?;
+        Ok(Self {
+            bodies: bodies.unwrap_or_else(|| vec![dress_form()]),
+            garments: garments(axis, base, grid, inputs)?,
+            fabrics: fabrics.unwrap_or_else(|| vec![Input::built_in(DEFAULT_FABRIC)]),
+            models: models.unwrap_or_else(|| vec![ModelChoice::Coupled]),
+            tables: tables.map_or_else(|| vec![default_table()], |t| t.into_iter().flatten().collect()),
+            extents_cm: extents_cm.unwrap_or_else(|| vec![Vec::new()]),
+            min_parts: min_parts.unwrap_or_else(|| vec![1]),
+            refine: refine.unwrap_or_else(|| vec![Refine::Steps(0)]),
+            seeds: seeds.unwrap_or_else(|| vec![0]),
+        })
+    }
+
+    /// Appends every combination, the last axis fastest.
+    pub(super) fn expand(&self, points: &mut Vec<Point>, name: &str) -> Result<(), PlanError> {
+        let lengths = [
+            self.bodies.len(),
+            self.garments.len(),
+            self.fabrics.len(),
+            self.models.len(),
+            self.tables.len(),
+            self.extents_cm.len(),
+            self.min_parts.len(),
+            self.refine.len(),
+            self.seeds.len(),
+        ];
+        let count = lengths.iter().fold(1_usize, |n, &length| n.saturating_mul(length));
+        let found = count.saturating_add(points.len());
+        if found > LIMIT {
+            return Err(PlanError::TooMany { name: name.to_owned(), found, limit: LIMIT });
+        }
+        for number in 0..count {
+            // The number's digits, one base an axis.
+            let mut rest = number;
+            let mut at = [0; 9];
+            for (digit, &length) in at.iter_mut().zip(&lengths).rev() {
+                *digit = rest % length;
+                rest /= length;
+            }
+            let point = Point {
+                id: String::new(),
+                index: 0,
+                body: self.bodies[at[0]].clone(),
+                garment: self.garments[at[1]].clone(),
+                fabric: self.fabrics[at[2]].clone(),
+                model: self.models[at[3]],
+                table: self.tables[at[4]].clone(),
+                extents_cm: self.extents_cm[at[5]].clone(),
+                min_part: self.min_parts[at[6]],
+                refine: self.refine[at[7]],
+                seed: self.seeds[at[8]],
+            };
+            points.push(point.named());
+        }
+        Ok(())
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Axis<'a> {
+    source: Source<'a>,
+}
+
+impl Axis<'_> {
+    /// The values of an axis: of the grid's list, or the base's one; `None` where neither has it.
+    fn of<T>(
+        self,
+        base: &Option<At>,
+        grid: &Option<Spanned<Vec<At>>>,
+        key: &'static str,
+        mut read: impl FnMut(&At) -> Result<T, PlanError>,
+    ) -> Result<Option<Vec<T>>, PlanError> {
+        let Some(list) = grid else {
+            return base.as_ref().map(|v| read(v).map(|value| vec![value])).transpose();
+        };
+        if list.get_ref().is_empty() {
+            let (place, found) = (self.source.line(list.span().start), "an empty list".to_owned());
+            let expected = "at least one value; leave the key out for the value of [base]".to_owned();
+            return Err(PlanError::Value { place, key, found, expected });
+        }
+        list.get_ref().iter().map(&mut read).collect::<Result<_, _>>().map(Some)
+    }
+}
+
+/// Garments, each at every size.
+fn garments(axis: Axis<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Vec<Input>, PlanError> {
+    let source = axis.source;
+    let garments = axis.of(&base.garment, &grid.garments, "garments", |v| {
+        let label = source.text(v, "garment", "a name, name@vertices or a file")?;
+        inputs.input(&label, &source.place(v))
+    })?;
+    let garments = garments.unwrap_or_else(|| vec![Input::built_in(DEFAULT_GARMENT)]);
+    let sized = garments.iter().find(|g| g.file.is_some() || g.label.contains('@'));
+    let sizes = axis.of(&base.size, &grid.sizes, "sizes", |v| match sized {
+        None => source.count::<u32>(v, "size", 4, "a number of vertices, at least 4"),
+        Some(garment) => {
+            let expected = "no sizes where a garment has its own, as {}; write name@vertices for each instead";
+            Err(source.wrong(v, "size", expected.replace("{}", &garment.label)))
+        }
+    })?;
+    let Some(sizes) = sizes else { return Ok(garments) };
+    let at_sizes = |g: &Input| sizes.iter().map(|n| Input::built_in(format!("{}@{n}", g.label))).collect::<Vec<_>>();
+    Ok(garments.iter().flat_map(at_sizes).collect())
+}
+
+fn dress_form() -> BodyChoice {
+    BodyChoice {
+        label: DEFAULT_BODY.to_owned(),
+        input: Input::built_in(DEFAULT_BODY),
+        measurements_cm: BTreeMap::new(),
+    }
+}
+
+/// A body by name, file, or measurements.
+fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<BodyChoice, PlanError> {
+    let expected =
+        "a name, a file, or { bust = 92, ... } in centimetres with an optional name = \"...\" and of = \"...\"";
+    let place = source.place(value);
+    let table = match value.get_ref() {
+        Value::String(label) => {
+            let input = inputs.input(label, &place)?;
+            return Ok(BodyChoice { label: label.clone(), input, measurements_cm: BTreeMap::new() });
+        }
+        Value::Table(table) => table,
+        _ => return Err(source.wrong(value, "body", expected)),
+    };
+    let (mut label, mut of, mut measurements_cm) = (None, DEFAULT_BODY, BTreeMap::new());
+    for (key, entry) in table {
+        match (key.as_str(), entry) {
+            ("name", Value::String(name)) => label = Some(name.clone()),
+            ("of", Value::String(name)) => of = name,
+            (measure, entry) => match number(entry) {
+                Some(cm) if cm > 0.0 && cm.is_finite() => {
+                    measurements_cm.insert(measure.to_owned(), cm);
+                }
+                _ => return Err(source.wrong(value, "body", expected)),
+            },
+        }
+    }
+    let words = || measurements_cm.iter().map(|(key, cm)| format!("{key}={cm}")).collect::<Vec<_>>().join(" ");
+    let label = label.unwrap_or_else(|| format!("{of} {}", words()));
+    Ok(BodyChoice { label, input: inputs.input(of, &place)?, measurements_cm })
+}
+
+/// No extent, one, or a cascade from coarse to fine.
+fn extent(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
+    let wrong =
+        || source.wrong(value, "extent_cm", "centimetres, 0 or \"none\" for not cut, or a falling list of them");
+    let positive = |v: &Value| number(v).filter(|cm| *cm > 0.0 && cm.is_finite());
+    match value.get_ref() {
+        Value::String(word) if word == "none" => Ok(Vec::new()),
+        Value::Array(list) => {
+            let cascade: Vec<f64> = list.iter().map(positive).collect::<Option<_>>().ok_or_else(wrong)?;
+            if cascade.is_empty() || !cascade.is_sorted_by(|a, b| a > b) {
+                return Err(wrong());
+            }
+            Ok(cascade)
+        }
+        one if number(one) == Some(0.0) => Ok(Vec::new()),
+        one => positive(one).map(|cm| vec![cm]).ok_or_else(wrong),
+    }
+}
