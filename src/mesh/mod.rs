@@ -4,11 +4,34 @@
 //! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
 //! triangles (barycentric area).
 
+mod draft;
+pub mod error;
+pub mod export;
+pub mod fit;
+pub mod frame;
+pub mod health;
+pub mod import;
+pub mod polygon;
+pub mod push_out;
+pub mod report;
+pub mod rest;
+mod scan;
+pub mod self_intersection;
+mod source;
 pub mod topology;
+pub mod triangle_crossing;
+pub mod whole_file;
+pub mod winding;
 
 use glam::DVec3;
 
+pub use error::MeshError;
+pub use frame::{Axis, Frame, Unit};
+pub use rest::RestShape;
+pub use scan::{Corner, Face};
+pub use source::ObjSource;
 pub use topology::Topology;
+pub use whole_file::WholeFile;
 
 /// An indexed triangle mesh with optional named groups of triangles.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -141,11 +141,7 @@ impl Topology {
         while let Some((&start, _)) = links.iter().find(|(_, ends)| !ends.is_empty()) {
             let mut cycle = vec![start];
             let mut at = start;
-            loop {
-                let Some(ends) = links.get_mut(&at) else { break };
-                if ends.is_empty() {
-                    break;
-                }
+            while let Some(ends) = links.get_mut(&at).filter(|ends| !ends.is_empty()) {
                 let next = ends.remove(0);
                 if let Some(back) = links.get_mut(&next)
                     && let Some(i) = back.iter().position(|&v| v == at)

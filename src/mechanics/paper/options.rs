@@ -1,0 +1,107 @@
+//! The readings of equations (2) to (9): what the page leaves open or gets wrong, one option each. The defaults work; the
+//! literal ones can be run and seen to fail.
+
+/// ΔV in (2) and (7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Volume {
+    /// Barycentric vertex area × thickness: the cloth's own volume, in any frame.
+    #[default]
+    AreaTimesThickness,
+    /// Δx Δy Δz to the adjacent point, as printed. A triangle mesh has no next point, so each factor is the mean absolute
+    /// difference to the neighbours. Fails: zero wherever the cloth lies along an axis, and another value in another frame.
+    Cuboid,
+}
+
+/// cos(•_p) in Fᵃ of (2) and (7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Cosine {
+    /// |cos|: a stiffness is positive.
+    #[default]
+    Absolute,
+    /// cos, as printed. Fails: around a closed ring the cosines cancel and D = F/Fᵃ grows without bound.
+    Signed,
+    /// sin(•_p) = √(1 − cos²): the share of the axis that lies in the cloth, where a membrane's force is. Not on the page; it
+    /// gives hanging cloth, whose normal is horizontal, the vertical stiffness that both others deny it.
+    InSurface,
+}
+
+/// q as a factor of Fᵃ in (2) and (7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Clearance {
+    /// max(q, 0) + thickness: the cloth's outer face, at least a thickness away, so that a tight PART keeps a stiffness. The
+    /// floor is reached by vertices inside the body, which are counted.
+    #[default]
+    PlusThickness,
+    /// q, as printed. Fails: zero on the skin, negative inside, so a tight PART has no stiffness or a negative one.
+    Literal,
+}
+
+/// The sign of D_z in (9).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Contactless {
+    /// −F⁰/Fᵃ, which is (6) with F¹ = 0: cloth sinks.
+    #[default]
+    AsEquation6,
+    /// F⁰/Fᵃ, as printed. Fails: cloth rises.
+    AsPrinted,
+}
+
+/// q_f in (2) and (7), N/m³.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum BodyForce {
+    /// One scalar from the vertical balance of the whole garment: Σ q_f cos γ_q ΔV over the contact PARTs = its weight.
+    #[default]
+    FromBalance,
+    /// This value.
+    Given(f64),
+}
+
+/// p_f in (2) and (7), N/m⁵.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum LineForce {
+    /// From the fabric's membrane stiffness along the warp, so that a strip hanging from its top sinks as its closed form
+    /// says, however it is cut into PARTs.
+    #[default]
+    FromMembrane,
+    /// This value, everywhere.
+    Given(f64),
+}
+
+/// How to read equations (2) to (9).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaperOptions {
+    /// ΔV.
+    pub volume: Volume,
+    /// cos(•_p).
+    pub cosine: Cosine,
+    /// q as a factor.
+    pub clearance: Clearance,
+    /// The sign of (9).
+    pub contactless: Contactless,
+    /// q_f.
+    pub body_force: BodyForce,
+    /// p_f.
+    pub line_force: LineForce,
+    /// A PART is in contact if any of its vertices is at most this far from the body, m. Default 0.5 cm, the upper value of
+    /// level 7 in Table 3: the paper only says "directly attached" and "contactless".
+    pub contact_distance_m: f64,
+    /// An axis has no stiffness where |Σ cos q ΔV| is at most this share of Σ |q| ΔV. Default 0.02: cloth within
+    /// about one degree of the axis, closer than the normals of a triangle mesh mean it. The same share of Σ ΔV decides whether
+    /// the contact PARTs can carry the garment at all.
+    pub degenerate_below: f64,
+}
+
+impl Default for PaperOptions {
+    fn default() -> Self {
+        Self {
+            volume: Volume::default(),
+            cosine: Cosine::default(),
+            clearance: Clearance::default(),
+            contactless: Contactless::default(),
+            body_force: BodyForce::default(),
+            line_force: LineForce::default(),
+            contact_distance_m: 0.005,
+            degenerate_below: 0.02,
+        }
+    }
+}

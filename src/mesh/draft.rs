@@ -1,0 +1,140 @@
+//! From polygons to a clean list of triangles: cut, weld if asked, drop what is degenerate, double or unused.
+
+use glam::DVec3;
+
+use super::polygon;
+use super::report::Repair;
+use super::scan::{Corner, Face};
+use super::topology::NONE;
+
+/// Triangles that still know where they come from.
+#[derive(Debug, Default)]
+pub(super) struct Draft {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Corner of the file behind each triangle corner.
+    pub(super) corner: Vec<[u32; 3]>,
+    /// Face of the file behind each triangle.
+    pub(super) face: Vec<u32>,
+    /// Mesh vertex of each file vertex, or [`NONE`].
+    pub(super) mesh_vertex: Vec<u32>,
+    /// Vertices in the mesh that lie on an earlier one.
+    pub(super) coincident: usize,
+}
+
+impl Draft {
+    /// Cuts `faces` over `positions` (by file vertex, m) and cleans up; what is done is added to `repairs`.
+    pub(super) fn new(
+        positions: &[DVec3],
+        corners: &[Corner],
+        faces: &[Face],
+        weld: bool,
+        repairs: &mut Vec<Repair>,
+    ) -> Self {
+        let mut used = vec![false; positions.len()];
+        for face in faces {
+            corners_of(corners, face).iter().for_each(|corner| used[corner.vertex as usize] = true);
+        }
+        let (stand_in, coincident) = coincident(positions, &used);
+        let stands_for = |v: u32| if weld { stand_in[v as usize] } else { v };
+        let mut draft = Self { coincident: if weld { 0 } else { coincident }, ..Self::default() };
+        let (mut quads, mut larger, mut degenerate) = (0, 0, 0);
+        for (number, face) in faces.iter().enumerate() {
+            match face.count {
+                0..=3 => {}
+                4 => quads += 1,
+                _ => larger += 1,
+            }
+            // A corner repeated in a row adds nothing to the outline.
+            let mut outline: Vec<u32> = (face.first..face.first + face.count).collect();
+            let vertex = |c: &u32| stands_for(corners[*c as usize].vertex);
+            outline.dedup_by_key(|c| vertex(c));
+            while outline.len() > 1 && vertex(&outline[0]) == vertex(&outline[outline.len() - 1]) {
+                outline.pop();
+            }
+            degenerate += (face.count as usize - outline.len()).min(face.count as usize - 2);
+            let places: Vec<DVec3> = outline.iter().map(|c| positions[vertex(c) as usize]).collect();
+            for triangle in polygon::triangulate(&places) {
+                let corner = triangle.map(|i| outline[i]);
+                let [a, b, c] = corner.map(|c| vertex(&c));
+                if a == b || b == c || c == a {
+                    degenerate += 1;
+                    continue;
+                }
+                draft.triangles.push([a, b, c]);
+                draft.corner.push(corner);
+                draft.face.push(number as u32);
+            }
+        }
+        let duplicates = draft.drop_duplicates();
+        let unused = used.iter().filter(|&&used| !used).count();
+        draft.compact(positions, stands_for);
+        let mut note = |count: usize, repair: Repair| {
+            if count > 0 {
+                repairs.push(repair);
+            }
+        };
+        note(quads + larger, Repair::PolygonsCut { quads, larger });
+        note(if weld { coincident } else { 0 }, Repair::Welded { vertices: coincident });
+        note(degenerate, Repair::DegenerateDropped { triangles: degenerate });
+        note(duplicates, Repair::DuplicatesDropped { triangles: duplicates });
+        note(unused, Repair::UnusedDropped { vertices: unused });
+        draft
+    }
+
+    /// Keeps the first of the triangles over the same three vertices, whichever way round.
+    fn drop_duplicates(&mut self) -> usize {
+        let mut keys: Vec<([u32; 3], u32)> = self.triangles.iter().copied().zip(0..).collect();
+        keys.iter_mut().for_each(|(key, _)| key.sort_unstable());
+        keys.sort_unstable();
+        let mut keep = vec![true; self.triangles.len()];
+        for pair in keys.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            keep[pair[1].1 as usize] = false;
+        }
+        let dropped = keep.iter().filter(|&&keep| !keep).count();
+        if dropped > 0 {
+            fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
+                let mut flags = keep.iter();
+                list.retain(|_| flags.next().is_some_and(|&keep| keep));
+            }
+            retain(&mut self.triangles, &keep);
+            retain(&mut self.corner, &keep);
+            retain(&mut self.face, &keep);
+        }
+        dropped
+    }
+
+    /// Numbers the vertices that are left, in the order of the file.
+    fn compact(&mut self, positions: &[DVec3], stands_for: impl Fn(u32) -> u32) {
+        let mut number = vec![NONE; positions.len()];
+        self.triangles.iter().flatten().for_each(|&v| number[v as usize] = 0);
+        for (v, slot) in number.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
+            *slot = self.positions.len() as u32;
+            self.positions.push(positions[v]);
+        }
+        self.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
+        self.mesh_vertex = (0..positions.len() as u32).map(|v| number[stands_for(v) as usize]).collect();
+    }
+}
+
+fn corners_of<'a>(corners: &'a [Corner], face: &Face) -> &'a [Corner] {
+    &corners[face.first as usize..(face.first + face.count) as usize]
+}
+
+/// For each vertex the first used one at exactly its place, and how many used vertices lie on an earlier one.
+fn coincident(positions: &[DVec3], used: &[bool]) -> (Vec<u32>, usize) {
+    // Adding zero makes the two zeros one.
+    let key = |v: u32| (positions[v as usize] + 0.0).to_array().map(f64::to_bits);
+    let mut order: Vec<u32> = (0..positions.len() as u32).filter(|&v| used[v as usize]).collect();
+    order.sort_by_key(|&v| (key(v), v));
+    let mut stand_in: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut count = 0;
+    for i in 1..order.len() {
+        let (before, v) = (order[i - 1], order[i]);
+        if key(before) == key(v) {
+            stand_in[v as usize] = stand_in[before as usize];
+            count += 1;
+        }
+    }
+    (stand_in, count)
+}

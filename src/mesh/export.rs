@@ -1,0 +1,118 @@
+//! OBJ out: a displaced garment in its file's own faces, groups, texture coordinates, unit and axes; or any mesh.
+//!
+//! Vertices that no face uses are left out, so numbers are those of the file where it had none. Normals are not
+//! written: they would be those of the old shape.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::TriMesh;
+use super::error::MeshError;
+use super::import::Imported;
+use super::topology::NONE;
+use super::whole_file::WholeFile;
+
+/// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
+///
+/// # Errors
+/// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.
+pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> Result<(), MeshError> {
+    write(path, &imported_text(imported, positions)?)
+}
+
+/// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
+///
+/// # Errors
+/// [`MeshError::Unwritable`]; nothing is left behind then.
+pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
+    write(path, &mesh_text(mesh))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), MeshError> {
+    let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
+    WholeFile::write(path, text.as_bytes()).map_err(unwritable)
+}
+
+fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, MeshError> {
+    let source = &imported.source;
+    let expected = imported.mesh.vertex_count();
+    if positions.len() != expected {
+        return Err(MeshError::WrongCount { found: positions.len(), expected });
+    }
+    let mut used = vec![NONE; source.mesh_vertex.len()];
+    let mut textured = vec![NONE; source.textures.len()];
+    for corner in source.faces.iter().flat_map(|face| source.corners_of(face)) {
+        used[corner.vertex as usize] = 0;
+        if corner.texture != NONE {
+            textured[corner.texture as usize] = 0;
+        }
+    }
+    let mut text = String::new();
+    let frame = &source.frame;
+    let _ = writeln!(text, "# {} {}, {} up", env!("CARGO_PKG_NAME"), frame.unit, frame.up);
+    let mut statements = source.statements.iter().peekable();
+    // A material file is named before anything uses it, also where its line stood late.
+    for (_, library) in source.statements.iter().filter(|(_, line)| line.starts_with("mtllib")) {
+        let _ = writeln!(text, "{library}");
+    }
+    let mut count = 0;
+    for (file_vertex, slot) in used.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
+        count += 1;
+        *slot = count;
+        let v = source.mesh_vertex[file_vertex];
+        // A vertex of degenerate faces alone is in no triangle and stays where it was.
+        let p = positions.get(v as usize).map_or(source.positions[file_vertex], |&p| frame.to_file(p));
+        write_vertex(&mut text, p);
+    }
+    count = 0;
+    for (t, slot) in textured.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
+        count += 1;
+        *slot = count;
+        let uv = source.textures[t];
+        let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
+    }
+    let mut pending: Vec<&str> = Vec::new();
+    for face in &source.faces {
+        while let Some((_, line)) = statements.next_if(|(before, _)| *before <= face.number) {
+            let keyword = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
+            pending.retain(|old| keyword(old) != keyword(line));
+            pending.push(line);
+        }
+        for line in pending.drain(..).filter(|line| !line.starts_with("mtllib")) {
+            let _ = writeln!(text, "{line}");
+        }
+        text.push('f');
+        for corner in source.corners_of(face) {
+            let _ = match corner.texture {
+                NONE => write!(text, " {}", used[corner.vertex as usize]),
+                t => write!(text, " {}/{}", used[corner.vertex as usize], textured[t as usize]),
+            };
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+fn mesh_text(mesh: &TriMesh) -> String {
+    let mut text = format!("# {} m, z up\n", env!("CARGO_PKG_NAME"));
+    mesh.positions.iter().for_each(|&p| write_vertex(&mut text, p));
+    let mut current = NONE;
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let group = mesh.triangle_group.get(t).copied().unwrap_or(NONE);
+        if group != current {
+            current = group;
+            let _ = writeln!(text, "g {}", mesh.groups.get(group as usize).map_or("", String::as_str));
+        }
+        let _ = writeln!(text, "f {} {} {}", triangle[0] + 1, triangle[1] + 1, triangle[2] + 1);
+    }
+    text
+}
+
+/// Shortest digits that read back as the same number. Writing into a String cannot fail.
+fn write_vertex(text: &mut String, p: DVec3) {
+    // Adding zero makes of minus zero zero.
+    let p = p + 0.0;
+    let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+}

@@ -1,0 +1,301 @@
+//! Somebody else's body and garment, read from OBJ, set in metres with z up, repaired as far as is safe.
+//!
+//! Vertices are those of the file, in its order, so far as a face uses them: corners that differ in texture coordinate
+//! alone are one vertex. Nothing is joined by position unless asked, as that can make a clean mesh non-manifold.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+
+use super::draft::Draft;
+use super::error::MeshError;
+use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around};
+use super::report::{MeshReport, Remark, Repair};
+use super::scan::Face;
+use super::source::{ObjSource, RawObj};
+use super::topology::{NONE, Topology};
+use super::{TriMesh, winding};
+
+/// Name of the triangles without a group in a file that has groups.
+const UNGROUPED: &str = "(none)";
+
+/// What the user chose about a file.
+#[derive(Debug, Clone, Default)]
+pub struct ImportOptions {
+    /// Take this group (or object) alone.
+    pub group: Option<String>,
+    /// Unit of the file; guessed where it is not given.
+    pub unit: Option<Unit>,
+    /// Up axis of the file; guessed where it is not given.
+    pub up: Option<Axis>,
+    /// Join vertices at exactly the same place.
+    pub weld: bool,
+    /// Accept a body with a boundary.
+    pub open_body: bool,
+}
+
+/// What is known of the body when a garment comes in.
+#[derive(Debug, Clone)]
+pub enum Beside<'a> {
+    /// It came from a file of this frame, which the garment shares.
+    File(&'a Frame),
+    /// It is in metres, z up, within these bounds; the garment's frame is the one that fits it best.
+    Bounds(DVec3, DVec3),
+}
+
+/// A mesh with its origin.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    /// The mesh: metres, z up.
+    pub mesh: TriMesh,
+    /// What was found and repaired.
+    pub report: MeshReport,
+    /// What an export needs.
+    pub source: ObjSource,
+    /// Texture coordinates of each triangle's corners; `None` for triangles without.
+    pub texture: Vec<Option<[DVec2; 3]>>,
+}
+
+impl Imported {
+    /// The frame the file was read in.
+    #[must_use]
+    pub fn frame(&self) -> &Frame {
+        &self.source.frame
+    }
+
+    /// This mesh at the vertices of `other`, a file of the same faces: the garment in its rest shape.
+    ///
+    /// # Errors
+    /// [`MeshError::OtherTopology`] with the first difference.
+    pub fn in_the_shape_of(&self, other: &Self) -> Result<TriMesh, MeshError> {
+        let differs = |difference: String| MeshError::OtherTopology {
+            file: other.source.file.clone(),
+            other: self.source.file.clone(),
+            difference,
+        };
+        let (ours, theirs) = (&self.source, &other.source);
+        if ours.faces.len() != theirs.faces.len() {
+            return Err(differs(format!("{} faces, expected {}", theirs.faces.len(), ours.faces.len())));
+        }
+        for (i, (a, b)) in ours.faces.iter().zip(&theirs.faces).enumerate() {
+            let vertices =
+                |source: &ObjSource, face| source.corners_of(face).iter().map(|c| c.vertex).collect::<Vec<_>>();
+            if vertices(ours, a) != vertices(theirs, b) {
+                return Err(differs(format!("face {} has other vertices", i + 1)));
+            }
+        }
+        // The polygons agree; triangles are taken from here, as another shape may cut its quads along other diagonals.
+        let place = |&v: &u32| theirs.mesh_vertex.get(v as usize).and_then(|&w| other.mesh.positions.get(w as usize));
+        let positions: Option<Vec<DVec3>> = ours.file_vertices().iter().map(|v| place(v).copied()).collect();
+        Ok(self.mesh.with_positions(positions.ok_or_else(|| differs("vertices are missing".to_owned()))?))
+    }
+}
+
+/// Reads a body.
+///
+/// # Errors
+/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; a unit that
+/// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
+pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
+    body_from(RawObj::read(file)?, options)
+}
+
+/// Reads a garment that belongs to a body.
+///
+/// # Errors
+/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; no frame that
+/// puts it around the body.
+pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
+    garment_from(RawObj::read(file)?, options, body)
+}
+
+fn body_from(raw: RawObj, options: &ImportOptions) -> Result<Imported, MeshError> {
+    let faces = chosen_faces(&raw, options)?;
+    let frame = guess_frame(&used_positions(&raw, &faces), options.unit, options.up)
+        .map_err(|height| MeshError::UnknownScale { file: raw.file.clone(), height })?;
+    let mut imported = build(raw, faces, frame, options)?;
+    face_outward(&mut imported);
+    let topology = Topology::new(&imported.mesh);
+    let open: Vec<_> = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1).collect();
+    if let Some(&(&[a, b], _)) = open.first() {
+        let (edges, loops) = (open.len(), imported.report.boundary_loops);
+        if !options.open_body {
+            let number = imported.source.file_vertices();
+            let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
+            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b });
+        }
+        imported.report.remarks.push(Remark::Open { edges, loops });
+    }
+    Ok(imported)
+}
+
+fn garment_from(raw: RawObj, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
+    let faces = chosen_faces(&raw, options)?;
+    let frame = match (body, options.unit, options.up) {
+        (_, Some(unit), Some(up)) => Frame::given(unit, up),
+        (Beside::File(frame), unit, up) => Frame {
+            unit: unit.unwrap_or(frame.unit),
+            up: up.unwrap_or(frame.up),
+            guessed: frame.guessed,
+            reason: "as the body".to_owned(),
+        },
+        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&used_positions(&raw, &faces), (lo, hi), unit, up)
+            .ok_or_else(|| MeshError::NoFrame { file: raw.file.clone() })?,
+    };
+    build(raw, faces, frame, options)
+}
+
+fn chosen_faces(raw: &RawObj, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
+    let scan = &raw.scan;
+    let faces = match &options.group {
+        None => scan.faces.clone(),
+        Some(asked) => {
+            let wanted = scan.names.iter().position(|name| name == asked).map(|i| i as u32);
+            let chosen = scan.faces.iter().filter(|face| wanted.is_some_and(|w| face.group == w || face.object == w));
+            let chosen: Vec<Face> = chosen.copied().collect();
+            if chosen.is_empty() {
+                let used = |i: u32| scan.faces.iter().any(|face| face.group == i || face.object == i);
+                let available = (0u32..).zip(&scan.names).filter(|&(i, _)| used(i)).map(|(_, name)| name.clone());
+                let (file, asked) = (raw.file.clone(), asked.clone());
+                return Err(MeshError::UnknownGroup { file, asked, available: available.collect() });
+            }
+            chosen
+        }
+    };
+    if faces.is_empty() {
+        let file = raw.file.clone();
+        return Err(MeshError::Empty { file, vertices: scan.vertices, faces: 0 });
+    }
+    Ok(faces)
+}
+
+fn used_positions(raw: &RawObj, faces: &[Face]) -> Vec<DVec3> {
+    let mut used = vec![false; raw.positions.len()];
+    for face in faces {
+        for corner in &raw.scan.corners[face.first as usize..(face.first + face.count) as usize] {
+            used[corner.vertex as usize] = true;
+        }
+    }
+    raw.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
+}
+
+fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -> Result<Imported, MeshError> {
+    let RawObj { file, scan, positions, textures } = raw;
+    let placed: Vec<DVec3> = positions.iter().map(|&p| frame.to_metres(p)).collect();
+    let mut repairs = Vec::new();
+    let mut remarks = Vec::new();
+    if let Some(name) = &options.group {
+        repairs.push(Repair::GroupChosen { name: name.clone(), left_out: scan.faces.len() - faces.len() });
+    }
+    let draft = Draft::new(&placed, &scan.corners, &faces, options.weld, &mut repairs);
+    if draft.triangles.is_empty() {
+        let empty = MeshError::Empty { file, vertices: scan.vertices, faces: faces.len() };
+        return Err(empty);
+    }
+    let group: Vec<u32> = draft.face.iter().map(|&f| scan.group_of(&faces[f as usize])).collect();
+    let (groups, triangle_group) = named_groups(&group, &scan.names);
+    let texture = draft.corner.iter().map(|corners| {
+        let known = corners.map(|c| scan.corners[c as usize].texture);
+        known.iter().all(|&t| t != NONE).then(|| known.map(|t| textures[t as usize]))
+    });
+    let texture: Vec<_> = texture.collect();
+    let mesh = TriMesh { positions: draft.positions, triangles: draft.triangles, groups, triangle_group };
+    if scan.small_faces > 0 {
+        remarks.push(Remark::SmallFaces { count: scan.small_faces });
+    }
+    if let Some((line, text)) = scan.first_unknown.clone() {
+        remarks.push(Remark::UnknownLines { count: scan.unknown, line, text });
+    }
+    let report = MeshReport {
+        file: file.display().to_string(),
+        frame: frame.clone(),
+        vertices: mesh.vertex_count(),
+        triangles: mesh.triangles.len(),
+        faces: faces.len(),
+        components: 0,
+        groups: mesh.groups.len(),
+        boundary_edges: 0,
+        boundary_loops: 0,
+        repairs,
+        remarks,
+    };
+    let source = ObjSource {
+        file,
+        frame,
+        corners: scan.corners,
+        faces,
+        names: scan.names,
+        statements: scan.statements,
+        positions,
+        textures,
+        mesh_vertex: draft.mesh_vertex,
+    };
+    let mut imported = Imported { mesh, report, source, texture };
+    imported.make_agree(draft.coincident);
+    Ok(imported)
+}
+
+/// Groups in the order of the file, those without triangles left out.
+fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
+    let mut used: Vec<u32> = group.to_vec();
+    used.sort_unstable();
+    used.dedup();
+    if used == [NONE] {
+        return (Vec::new(), Vec::new());
+    }
+    let name = |&g: &u32| names.get(g as usize).map_or(UNGROUPED, String::as_str).to_owned();
+    let place = |g: &u32| used.partition_point(|u| u < g) as u32;
+    (used.iter().map(name).collect(), group.iter().map(place).collect())
+}
+
+impl Imported {
+    /// Turns triangles so that neighbours agree, and notes what the topology shows.
+    fn make_agree(&mut self, coincident: usize) {
+        let (turn, _, turned) = winding::agree(&self.mesh);
+        (0..turn.len()).filter(|&t| turn[t]).for_each(|t| self.turn(t));
+        let topology = Topology::new(&self.mesh);
+        let loops = topology.boundary_loops();
+        let report = &mut self.report;
+        report.components = topology.components().1;
+        report.boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+        report.boundary_loops = loops.len();
+        if turned.to_agree > 0 {
+            report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });
+        }
+        let findings = super::health::Findings::new(&self.mesh, &topology);
+        let mut note = |count: usize, remark: Remark| {
+            if count > 0 {
+                report.remarks.push(remark);
+            }
+        };
+        note(coincident, Remark::Coincident { vertices: coincident });
+        note(findings.non_manifold_edges, Remark::NonManifold { edges: findings.non_manifold_edges });
+        note(findings.pinched_vertices, Remark::Pinched { vertices: findings.pinched_vertices });
+        note(findings.no_area, Remark::NoArea { triangles: findings.no_area });
+        note(turned.one_sided, Remark::OneSided { patches: turned.one_sided });
+    }
+
+    /// Turns one triangle round, its texture coordinates with it.
+    pub(super) fn turn(&mut self, t: usize) {
+        self.mesh.triangles[t].swap(1, 2);
+        if let Some(corners) = &mut self.texture[t] {
+            corners.swap(1, 2);
+        }
+    }
+}
+
+/// Turns the connected parts that enclose a negative volume.
+fn face_outward(imported: &mut Imported) {
+    let (component, count) = Topology::new(&imported.mesh).components();
+    let inward: Vec<bool> =
+        winding::signed_volumes(&imported.mesh, &component, count).iter().map(|&volume| volume < 0.0).collect();
+    for t in 0..imported.mesh.triangles.len() {
+        if inward[component[imported.mesh.triangles[t][0] as usize] as usize] {
+            imported.turn(t);
+        }
+    }
+    let components = inward.iter().filter(|&&turned| turned).count();
+    if components > 0 {
+        imported.report.repairs.push(Repair::TurnedOutward { components });
+    }
+}

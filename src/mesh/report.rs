@@ -1,0 +1,215 @@
+//! What was found in a mesh file and what was repaired, for people and for machines.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::frame::Frame;
+
+/// Something changed on the way in.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Repair {
+    /// Faces with more than three corners were cut.
+    PolygonsCut {
+        /// Faces of four corners.
+        quads: usize,
+        /// Faces of five and more.
+        larger: usize,
+    },
+    /// Vertices at the same place were joined, as asked.
+    Welded {
+        /// Vertices that vanished.
+        vertices: usize,
+    },
+    /// Triangles that name a vertex twice were dropped.
+    DegenerateDropped {
+        /// How many.
+        triangles: usize,
+    },
+    /// Triangles of the same three vertices as an earlier one were dropped.
+    DuplicatesDropped {
+        /// How many.
+        triangles: usize,
+    },
+    /// Vertices that no face uses were dropped.
+    UnusedDropped {
+        /// How many.
+        vertices: usize,
+    },
+    /// Triangles were turned round to agree with their neighbours.
+    WindingTurned {
+        /// How many.
+        triangles: usize,
+    },
+    /// Parts of the surface were turned inside out to face outward.
+    TurnedOutward {
+        /// How many connected parts.
+        components: usize,
+    },
+    /// A group was chosen and the rest left out.
+    GroupChosen {
+        /// Its name.
+        name: String,
+        /// Faces left out.
+        left_out: usize,
+    },
+}
+
+impl fmt::Display for Repair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PolygonsCut { quads, larger } => {
+                write!(f, "cut {quads} quads and {larger} larger polygons into triangles")
+            }
+            Self::Welded { vertices } => write!(f, "joined {vertices} vertices to another at the same place, as asked"),
+            Self::DegenerateDropped { triangles } => {
+                write!(f, "dropped {triangles} triangles that name the same vertex twice")
+            }
+            Self::DuplicatesDropped { triangles } => {
+                write!(f, "dropped {triangles} triangles that were there already")
+            }
+            Self::UnusedDropped { vertices } => write!(f, "dropped {vertices} vertices that no face uses"),
+            Self::WindingTurned { triangles } => {
+                write!(f, "turned {triangles} triangles round to agree with their neighbours")
+            }
+            Self::TurnedOutward { components } => {
+                write!(f, "turned {components} connected parts inside out, so that they face outward")
+            }
+            Self::GroupChosen { name, left_out } => write!(f, "took group \"{name}\" and left {left_out} faces out"),
+        }
+    }
+}
+
+/// Something worth knowing that was left as it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Remark {
+    /// Vertices at the place of another, not joined.
+    Coincident {
+        /// How many.
+        vertices: usize,
+    },
+    /// Edges of three triangles and more.
+    NonManifold {
+        /// How many.
+        edges: usize,
+    },
+    /// Vertices where the boundary meets itself.
+    Pinched {
+        /// How many.
+        vertices: usize,
+    },
+    /// Neighbours that cannot agree on a side.
+    OneSided {
+        /// Patches.
+        patches: usize,
+    },
+    /// Triangles without area.
+    NoArea {
+        /// How many.
+        triangles: usize,
+    },
+    /// The body has a boundary.
+    Open {
+        /// Boundary edges.
+        edges: usize,
+        /// Loops they form.
+        loops: usize,
+    },
+    /// Points and lines, passed over.
+    SmallFaces {
+        /// How many.
+        count: usize,
+    },
+    /// Lines of no known keyword, passed over.
+    UnknownLines {
+        /// How many.
+        count: usize,
+        /// The first one's number.
+        line: usize,
+        /// How it begins.
+        text: String,
+    },
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coincident { vertices } => write!(
+                f,
+                "{vertices} vertices lie exactly on another; they were not joined (--weld joins them), so the surface may come \
+                 apart there"
+            ),
+            Self::NonManifold { edges } => write!(f, "{edges} edges belong to three triangles or more"),
+            Self::Pinched { vertices } => write!(f, "the boundary touches itself at {vertices} vertices"),
+            Self::OneSided { patches } => {
+                write!(f, "{patches} patches have one side only; their winding was left as it is")
+            }
+            Self::NoArea { triangles } => write!(f, "{triangles} triangles have no area"),
+            Self::Open { edges, loops } => write!(
+                f,
+                "the body is open: {edges} boundary edges in {loops} loops; inside and outside go by the normals alone, \
+                 which is unreliable near the holes"
+            ),
+            Self::SmallFaces { count } => write!(f, "passed over {count} points and lines given as faces"),
+            Self::UnknownLines { count, line, text } => {
+                write!(f, "passed over {count} lines of no known keyword, the first on line {line}: \"{text}\"")
+            }
+        }
+    }
+}
+
+/// What a mesh file holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// The file.
+    pub file: String,
+    /// How its numbers were read.
+    pub frame: Frame,
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Triangles of the mesh.
+    pub triangles: usize,
+    /// Faces they came from.
+    pub faces: usize,
+    /// Connected parts.
+    pub components: usize,
+    /// Named groups.
+    pub groups: usize,
+    /// Edges with one triangle.
+    pub boundary_edges: usize,
+    /// Loops they form.
+    pub boundary_loops: usize,
+    /// What was changed.
+    pub repairs: Vec<Repair>,
+    /// What was left as it is.
+    pub remarks: Vec<Remark>,
+}
+
+impl MeshReport {
+    /// Whether the surface has no boundary.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.boundary_edges == 0
+    }
+}
+
+impl fmt::Display for MeshReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} vertices, {} triangles from {} faces, {} connected parts, {} groups, {}",
+            self.file,
+            self.vertices,
+            self.triangles,
+            self.faces,
+            self.components,
+            self.groups,
+            if self.is_closed() { "closed".to_owned() } else { format!("{} boundary loops", self.boundary_loops) }
+        )?;
+        writeln!(f, "  {} ({} up): {}", self.frame.unit, self.frame.up, self.frame.reason)?;
+        self.repairs.iter().try_for_each(|repair| writeln!(f, "  {repair}"))?;
+        self.remarks.iter().try_for_each(|remark| writeln!(f, "  note: {remark}"))
+    }
+}

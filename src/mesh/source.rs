@@ -1,0 +1,143 @@
+//! An OBJ file as it was written: polygons, groups, texture coordinates, in its own unit and axes.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DVec2, DVec3};
+
+use super::error::MeshError;
+use super::frame::Frame;
+use super::scan::{Corner, Face, Scan};
+use super::topology::NONE;
+
+/// What an export needs to give a file back with other positions.
+#[derive(Debug, Clone)]
+pub struct ObjSource {
+    /// The file read.
+    pub file: PathBuf,
+    /// Its unit and up axis.
+    pub frame: Frame,
+    /// Corners of all faces, face after face.
+    pub corners: Vec<Corner>,
+    /// The faces of three corners and more; of the chosen group where one was chosen.
+    pub faces: Vec<Face>,
+    /// Names of groups and objects.
+    pub names: Vec<String>,
+    /// Grouping and material lines, each with the number of the face it stands before.
+    pub statements: Vec<(u32, String)>,
+    /// Positions by file vertex, in the file's frame; zero where no face uses one.
+    pub positions: Vec<DVec3>,
+    /// Texture coordinates of the file.
+    pub textures: Vec<DVec2>,
+    /// Mesh vertex of each file vertex, or [`NONE`] where no face uses it.
+    pub mesh_vertex: Vec<u32>,
+}
+
+impl ObjSource {
+    /// The corners of one face.
+    #[must_use]
+    pub fn corners_of(&self, face: &Face) -> &[Corner] {
+        &self.corners[face.first as usize..(face.first + face.count) as usize]
+    }
+
+    /// The file vertex, from 0, of each mesh vertex: the first of those welded into it.
+    #[must_use]
+    pub fn file_vertices(&self) -> Vec<u32> {
+        let count = self.mesh_vertex.iter().filter(|&&v| v != NONE).max().map_or(0, |&v| v as usize + 1);
+        let mut file_vertices = vec![NONE; count];
+        for (file_vertex, &v) in self.mesh_vertex.iter().enumerate().rev() {
+            if v != NONE {
+                file_vertices[v as usize] = file_vertex as u32;
+            }
+        }
+        file_vertices
+    }
+}
+
+/// A file read and checked, before anything is chosen or repaired.
+pub(super) struct RawObj {
+    pub(super) file: PathBuf,
+    pub(super) scan: Scan,
+    /// Positions by file vertex, in the file's frame; those no face uses are zero.
+    pub(super) positions: Vec<DVec3>,
+    pub(super) textures: Vec<DVec2>,
+}
+
+impl RawObj {
+    /// Reads a file.
+    pub(super) fn read(file: &Path) -> Result<Self, MeshError> {
+        let unreadable = |reason: String| MeshError::Unreadable { file: file.to_owned(), reason };
+        if file.is_dir() {
+            return Err(unreadable("it is a folder, expected an OBJ file".to_owned()));
+        }
+        let bytes = std::fs::read(file).map_err(|e| unreadable(e.to_string()))?;
+        if let Some(found) = other_format(file, &bytes) {
+            return Err(MeshError::NotObj { file: file.to_owned(), found });
+        }
+        // Comments and names come in any encoding; numbers are ASCII in all of them.
+        Self::parse(file, &String::from_utf8_lossy(&bytes))
+    }
+
+    /// Reads a text; `file` is for the messages.
+    pub(super) fn parse(file: &Path, text: &str) -> Result<Self, MeshError> {
+        let mut scan = Scan::new(file, text)?;
+        let refused = |reason: String| MeshError::Refused { file: file.to_owned(), reason };
+        let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..tobj::LoadOptions::default() };
+        let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, |_| Ok(Default::default()))
+            .map_err(|e| refused(e.to_string()))?;
+        scan.plain = String::new();
+        let indices: Vec<&u32> = models.iter().flat_map(|model| &model.mesh.indices).collect();
+        if models.len() > 1 || indices.len() != scan.corners.len() {
+            return Err(refused(format!("{} face corners of {} were understood", indices.len(), scan.corners.len())));
+        }
+        let mut positions = vec![DVec3::ZERO; scan.vertices];
+        let mut textures = vec![DVec2::ZERO; scan.textures];
+        for mesh in models.iter().map(|model| &model.mesh) {
+            // tobj numbers vertices by first use; the corners of both readings come in one order.
+            for (k, (corner, &i)) in scan.corners.iter().zip(&mesh.indices).enumerate() {
+                let i = 3 * i as usize;
+                positions[corner.vertex as usize] = DVec3::from_slice(&mesh.positions[i..i + 3]);
+                if corner.texture != NONE {
+                    let i = 2 * mesh.texcoord_indices[k] as usize;
+                    textures[corner.texture as usize] = DVec2::from_slice(&mesh.texcoords[i..i + 2]);
+                }
+            }
+        }
+        Ok(Self { file: file.to_owned(), scan, positions, textures })
+    }
+}
+
+/// What a file is if it's no OBJ; told by its first bytes, not by its name, except where the bytes tell nothing.
+fn other_format(file: &Path, bytes: &[u8]) -> Option<&'static str> {
+    let starts = |magic: &[u8]| bytes.starts_with(magic);
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]).into_owned();
+    let text = head.trim_start();
+    let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let binary_stl = || {
+        let count = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+        count.is_some_and(|n| bytes.len() as u64 == 84 + 50 * u64::from(n))
+    };
+    if starts(b"glTF") || (text.starts_with('{') && String::from_utf8_lossy(bytes).contains("\"asset\"")) {
+        Some("a glTF scene")
+    } else if (text.starts_with("solid") && text.contains("facet")) || binary_stl() {
+        Some("an STL mesh")
+    } else if text.starts_with("ply\n") || text.starts_with("ply\r") {
+        Some("a PLY mesh")
+    } else if starts(b"Kaydara FBX") {
+        Some("an FBX scene")
+    } else if starts(b"AutoCAD Binary DXF") || (text.starts_with('0') && text.contains("SECTION")) || extension == "dxf"
+    {
+        Some("a DXF drawing")
+    } else if starts(b"PK\x03\x04") {
+        Some("a ZIP archive (3MF, or a packed OBJ)")
+    } else if starts(b"BLENDER") {
+        Some("a Blender scene")
+    } else if text.starts_with("OFF") || text.starts_with("COFF") {
+        Some("an OFF mesh")
+    } else if text.starts_with("<?xml") || text.starts_with("<COLLADA") {
+        Some("an XML file (COLLADA?)")
+    } else if bytes.contains(&0) {
+        Some("binary data")
+    } else {
+        None
+    }
+}

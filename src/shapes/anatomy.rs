@@ -1,0 +1,340 @@
+//! The dress form as a solid: trunk, bust, seat, neck, head, arms, hands, legs and feet, smoothly joined.
+//!
+//! Sections are superellipses whose half axes are a girth's radius R = girth/2π times a share for breadth and for depth in front and
+//! behind. The shares come from ANSUR II breadths and depths (women, regressed to European size 38: chest 26.0 × 22.5, waist 25.8 × 17.0,
+//! hip 33.5 × 20.9 cm); what has no measurement (head, hands, feet, the curve of the back) is drawn by eye and grows
+//! with stature. One factor per girth ([`Factors`]) is found by measuring, see [`fitting`](super::fitting).
+//!
+//! The figure stands on z = 0, looks along −y, its left is +x, and its arms hang 40° off the vertical.
+
+use glam::DVec3;
+
+use super::jet::Jet;
+use super::measures::Measures;
+use super::solid::{Ellipsoid, Section, Solid, Sweep};
+
+/// Angle of the arms from the vertical, radians: enough for a sleeve under the arm, as dress forms and A poses have it.
+const ARM_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
+
+/// Correction of each girth's radius, 1 to begin with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "named as the girths they correct")]
+pub struct Factors {
+    pub bust: f64,
+    pub underbust: f64,
+    pub waist: f64,
+    pub hip: f64,
+    pub neck: f64,
+    pub thigh: f64,
+    pub knee: f64,
+    pub calf: f64,
+    pub ankle: f64,
+    pub biceps: f64,
+    pub wrist: f64,
+}
+
+impl Default for Factors {
+    fn default() -> Self {
+        Self {
+            bust: 1.0,
+            underbust: 1.0,
+            waist: 1.0,
+            hip: 1.0,
+            neck: 1.0,
+            thigh: 1.0,
+            knee: 1.0,
+            calf: 1.0,
+            ankle: 1.0,
+            biceps: 1.0,
+            wrist: 1.0,
+        }
+    }
+}
+
+/// The parts of the figure. Limbs are the left ones; the right ones are their mirror images.
+#[derive(Debug, Clone)]
+pub struct Anatomy {
+    /// From the crotch to the base of the neck.
+    pub trunk: Sweep,
+    /// The left breast.
+    pub breast: Ellipsoid,
+    /// The left half of the seat.
+    pub buttock: Ellipsoid,
+    /// From between the shoulders into the head.
+    pub neck: Sweep,
+    cranium: Ellipsoid,
+    jaw: Ellipsoid,
+    /// From inside the shoulder to the finger tips.
+    pub arm: Sweep,
+    /// From inside the hip to the sole.
+    pub leg: Sweep,
+    foot: Sweep,
+    /// How far along the arm's axis the wrist is, m.
+    pub wrist_at: f64,
+    /// How far along the arm's axis the biceps girth is taken, m.
+    pub biceps_at: f64,
+    /// How far along the neck's axis its girth is taken, m.
+    pub neck_at: f64,
+}
+
+fn radius(girth: f64, factor: f64) -> f64 {
+    girth * factor / std::f64::consts::TAU
+}
+
+fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
+impl Anatomy {
+    /// The figure for these measurements, m, and corrections.
+    #[must_use]
+    pub fn new(m: &Measures, f: &Factors) -> Self {
+        let k = m.scale();
+        let hip = radius(m.hip, f.hip);
+        let bust = radius(m.bust, f.bust);
+        let (trunk, chest_front) = trunk(m, f);
+        // Bust less underbust, relative to the 13 cm of the default body.
+        let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
+        let (swell, protrusion) = (cup.powf(0.35), 0.031 * cup.powf(0.8));
+        let breast_radii = DVec3::new(0.066, 0.060, 0.072) * swell * (bust / 0.14).sqrt();
+        let breast = Ellipsoid {
+            centre: DVec3::new(0.53 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
+            radii: breast_radii,
+            lean: 0.25,
+        };
+        let seat = hip / 0.1528;
+        let buttock = Ellipsoid {
+            centre: DVec3::new(0.075 * seat, 0.043 * seat, m.hip_height + 0.005 * k),
+            radii: DVec3::new(0.083, 0.079, 0.095) * seat,
+            lean: 0.1,
+        };
+        let (arm, wrist_at, biceps_at) = arm(m, f);
+        let (leg, foot) = leg(m, f);
+        let (neck, neck_at) = neck(m, f);
+        let top = m.stature;
+        let nape = neck.centre(0.17 * k).y;
+        let cranium = Ellipsoid {
+            centre: DVec3::new(0.0, nape + 0.008 * k, top - 0.098 * k),
+            radii: DVec3::new(0.074, 0.094, 0.098) * k,
+            lean: 0.0,
+        };
+        let jaw = Ellipsoid {
+            centre: DVec3::new(0.0, nape - 0.034 * k, top - 0.157 * k),
+            radii: DVec3::new(0.053, 0.060, 0.062) * k,
+            lean: 0.12,
+        };
+        Self { trunk, breast, buttock, neck, cranium, jaw, arm, leg, foot, wrist_at, biceps_at, neck_at }
+    }
+
+    /// Trunk, bust, seat and the root of the neck.
+    #[must_use]
+    pub fn torso(&self, p: DVec3) -> Jet {
+        let mut field = self.trunk.at(p);
+        for side in [1.0, -1.0] {
+            field = field.smooth_min(sided(&self.breast, p, side), 0.075);
+            field = field.smooth_min(sided(&self.buttock, p, side), 0.07);
+        }
+        field.smooth_min(self.neck.at(p), 0.06)
+    }
+
+    /// Both arms.
+    #[must_use]
+    pub fn arms(&self, p: DVec3) -> Jet {
+        sided(&self.arm, p, p.x.signum())
+    }
+
+    /// Both legs with their feet, flat on the floor.
+    #[must_use]
+    pub fn legs(&self, p: DVec3) -> Jet {
+        let one = |side: f64| {
+            let limb = sided(&self.leg, p, side).smooth_min(sided(&self.foot, p, side), 0.05);
+            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.015)
+        };
+        one(1.0).smooth_min(one(-1.0), 0.006)
+    }
+
+    /// The head.
+    #[must_use]
+    pub fn head(&self, p: DVec3) -> Jet {
+        self.cranium.at(p).smooth_min(self.jaw.at(p), 0.07)
+    }
+}
+
+impl Solid for Anatomy {
+    fn at(&self, p: DVec3) -> Jet {
+        self.torso(p).smooth_min(self.arms(p), 0.045).smooth_min(self.legs(p), 0.035).smooth_min(self.head(p), 0.035)
+    }
+}
+
+/// A left part's field, or its mirror image's for a negative `side`.
+fn sided(part: &dyn Solid, p: DVec3, side: f64) -> Jet {
+    let mirror = DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0);
+    let jet = part.at(p * mirror);
+    Jet::new(jet.value, jet.gradient * mirror)
+}
+
+fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
+    let k = m.scale();
+    let hip = radius(m.hip, f.hip);
+    let waist = radius(m.waist, f.waist);
+    let under = radius(m.underbust, f.underbust);
+    let bust = radius(m.bust, f.bust);
+    let chest = mix(under, bust, 0.5);
+    let shoulder = shoulder_half(m);
+    let neck = radius(m.neck, f.neck);
+    let under_z = underbust_height(m);
+    let rise = m.acromion - m.axilla;
+    let top = m.cervicale - 0.018 * k;
+    let front = 0.70 * mix(under, bust, 0.35);
+    let stations: [(f64, Section); 11] = [
+        (m.crotch + 0.036 * k, [0.0, 0.005, 0.92 * hip, 0.52 * hip, 0.56 * hip]),
+        (m.hip_height + 0.02 * k, [0.0, 0.005, 1.00 * hip, 0.59 * hip, 0.62 * hip]),
+        (mix(m.hip_height, m.waist_height, 0.5), {
+            let r = mix(hip, waist, 0.45);
+            [0.0, 0.002, 1.07 * r, 0.67 * r, 0.65 * r]
+        }),
+        (m.waist_height, [0.0, -0.002, 1.12 * waist, 0.74 * waist, 0.73 * waist]),
+        (under_z, [0.0, 0.004, 1.09 * under, 0.78 * under, 0.82 * under]),
+        (m.bust_height, [0.0, 0.008, 1.03 * mix(under, bust, 0.4), front, 0.86 * mix(under, bust, 0.4)]),
+        (m.axilla, [0.0, 0.013, 1.10 * chest, 0.66 * chest, 0.80 * chest]),
+        (m.axilla + 0.45 * rise, [0.0, 0.018, 0.91 * shoulder, 0.56 * chest, 0.68 * chest]),
+        (m.acromion - 0.022 * k, [0.0, 0.022, 0.90 * shoulder, 0.44 * chest, 0.54 * chest]),
+        (m.acromion + 0.012 * k, [0.0, 0.025, 0.66 * shoulder, 0.36 * chest, 0.44 * chest]),
+        (top, [0.0, 0.027, 0.95 * neck, 0.30 * chest, 0.34 * chest]),
+    ];
+    (Sweep::upright(2.3, &stations, [0.02, 0.01]), front - 0.008)
+}
+
+/// Height of the underbust girth, m: a third of the way from the bust to the waist.
+#[must_use]
+pub fn underbust_height(m: &Measures) -> f64 {
+    mix(m.bust_height, m.waist_height, 0.36)
+}
+
+/// Half the distance between the ends of the shoulders, m: half the neck's base plus the shoulder, seen from the front.
+fn shoulder_half(m: &Measures) -> f64 {
+    // The shoulder slopes by 22 degrees or so, and starts where the neck's base is 1.15 times the middle's girth.
+    let by_length = 0.927 * m.shoulder_length + 1.15 * m.neck / std::f64::consts::TAU;
+    // A wide chest needs wide shoulders, or the arms would start inside it.
+    by_length.max(0.5 * (m.bust + m.underbust) / std::f64::consts::TAU + 0.045)
+}
+
+fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
+    let k = m.scale();
+    let r = radius(m.neck, f.neck);
+    let lean: f64 = 0.24;
+    let axes = [DVec3::X, DVec3::new(0.0, lean.cos(), lean.sin()), DVec3::new(0.0, -lean.sin(), lean.cos())];
+    let ring = |share: f64| [0.0, 0.0, 0.97 * share * r, 1.03 * share * r, 1.03 * share * r];
+    let at = 0.073 * k;
+    let stations = [
+        (-0.03 * k, ring(1.3)),
+        (0.0, ring(1.2)),
+        (0.035 * k, ring(1.06)),
+        (at, ring(1.0)),
+        (0.12 * k, ring(1.0)),
+        (0.18 * k, ring(0.9)),
+    ];
+    (Sweep::new(DVec3::new(0.0, 0.027, m.cervicale - 0.072 * k), axes, 2.0, &stations, [0.01, 0.02]), at)
+}
+
+fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
+    let k = m.scale();
+    let (b, w) = (radius(m.biceps, f.biceps), radius(m.wrist, f.wrist));
+    let t = DVec3::new(ARM_ANGLE.sin(), -0.07, -ARM_ANGLE.cos()).normalize();
+    let u = t.cross(DVec3::Y).normalize();
+    let v = u.cross(t);
+    let origin = DVec3::new(shoulder_half(m) - 0.012 * k, 0.022, m.acromion - 0.038 * k);
+    let wrist = m.arm_length - 0.02 * k;
+    let biceps = 0.37 * wrist;
+    let oval = |s: f64, thick: f64, wide: f64| (s, [0.0, 0.0, thick, wide, wide]);
+    let stations = [
+        oval(-0.035 * k, 0.62 * b, 0.85 * b),
+        oval(0.015 * k, 0.98 * b, 1.08 * b),
+        oval(0.055 * k, 1.10 * b, 1.14 * b),
+        oval(0.20 * wrist, 1.04 * b, 1.06 * b),
+        oval(biceps, b, b),
+        oval(0.54 * wrist, 0.92 * mix(w, b, 0.62), 0.95 * mix(w, b, 0.62)),
+        oval(0.66 * wrist, 0.93 * mix(w, b, 0.66), mix(w, b, 0.66)),
+        oval(0.84 * wrist, 0.93 * mix(w, b, 0.28), 1.05 * mix(w, b, 0.28)),
+        oval(wrist, 0.88 * w, 1.12 * w),
+        oval(wrist + 0.04 * k, 0.017 * k, 0.034 * k),
+        oval(wrist + 0.085 * k, 0.0155 * k, 0.040 * k),
+        oval(wrist + 0.13 * k, 0.0125 * k, 0.034 * k),
+        oval(wrist + 0.175 * k, 0.009 * k, 0.021 * k),
+    ];
+    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.004]), wrist, biceps)
+}
+
+/// Half the gap between the thighs where they are closest, m: what the mesh needs to keep them apart.
+const THIGH_GAP: f64 = 0.009;
+
+fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
+    let k = m.scale();
+    let thigh = radius(m.thigh, f.thigh);
+    let knee = radius(m.knee, f.knee);
+    let calf = radius(m.calf, f.calf);
+    let ankle = radius(m.ankle, f.ankle);
+    let inner = 0.88 * thigh + THIGH_GAP;
+    let foot_x = (0.085 * k).max(1.1 * calf + 0.01);
+    let knee_x = mix(inner, foot_x, 0.45).max(knee + 0.008);
+    let calf_z = calf_height(m);
+    let stations: [(f64, Section); 11] = [
+        (0.005 * k, [foot_x, 0.02 * k, 0.95 * ankle, 1.0 * ankle, 1.15 * ankle]),
+        (ankle_height(m), [foot_x, 0.019 * k, 0.93 * ankle, 1.02 * ankle, 1.12 * ankle]),
+        (mix(ankle_height(m), calf_z, 0.45), {
+            let r = mix(ankle, calf, 0.42);
+            [foot_x, 0.020 * k, 0.97 * r, 0.95 * r, 1.06 * r]
+        }),
+        (calf_z, [mix(foot_x, knee_x, 0.6), 0.017 * k, 0.98 * calf, 0.92 * calf, 1.10 * calf]),
+        (m.knee_height - 0.055 * k, {
+            let r = mix(calf, knee, 0.5);
+            [mix(foot_x, knee_x, 0.85), 0.012 * k, 0.97 * r, 0.98 * r, 1.02 * r]
+        }),
+        (m.knee_height, [knee_x, 0.006 * k, 0.98 * knee, 1.06 * knee, 0.98 * knee]),
+        (m.knee_height + 0.07 * k, {
+            let r = mix(knee, thigh, 0.33);
+            [mix(knee_x, inner, 0.25), 0.005 * k, 0.96 * r, 1.04 * r, 1.03 * r]
+        }),
+        (mix(m.knee_height, m.crotch, 0.6), {
+            let r = mix(knee, thigh, 0.72);
+            [mix(knee_x, inner, 0.65), 0.003 * k, 0.92 * r, 1.06 * r, 1.08 * r]
+        }),
+        (thigh_height(m), [inner, 0.004 * k, 0.88 * thigh, 1.06 * thigh, 1.14 * thigh]),
+        (m.crotch + 0.03 * k, [0.99 * inner, 0.004 * k, 0.87 * thigh, 1.00 * thigh, 1.06 * thigh]),
+        (m.crotch + 0.13 * k, [0.84 * inner, 0.002 * k, 0.60 * thigh, 0.72 * thigh, 0.74 * thigh]),
+    ];
+    let leg = Sweep::upright(2.0, &stations, [0.005, 0.03]);
+    // The foot points forward and 7 degrees outward.
+    let t = DVec3::new(0.12, -0.993, 0.0).normalize();
+    let origin = DVec3::new(foot_x, 0.022 * k, 0.012 * k);
+    let step = |s: f64, half: f64, high: f64| (s * k, [0.0, 0.0, half * k, 0.03 * k, high * k]);
+    let stations = [
+        step(-0.045, 0.024, 0.030),
+        step(-0.02, 0.031, 0.050),
+        step(0.03, 0.034, 0.058),
+        step(0.08, 0.040, 0.042),
+        step(0.13, 0.046, 0.026),
+        step(0.165, 0.044, 0.017),
+        step(0.195, 0.034, 0.012),
+    ];
+    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.008, 0.007]);
+    (leg, foot)
+}
+
+/// Height of the thigh girth, m: the first at which the legs are apart.
+#[must_use]
+pub fn thigh_height(m: &Measures) -> f64 {
+    m.crotch - 0.035 * m.scale()
+}
+
+/// Height of the calf girth, m: the EU 38 column has none; 0.72 of the knee's is usual.
+#[must_use]
+pub fn calf_height(m: &Measures) -> f64 {
+    0.72 * m.knee_height
+}
+
+/// Height of the ankle girth, m, above the foot.
+#[must_use]
+pub fn ankle_height(m: &Measures) -> f64 {
+    0.115 * m.scale()
+}

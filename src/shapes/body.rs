@@ -1,0 +1,143 @@
+//! The dress form as a mesh.
+//!
+//! The solid of [`anatomy`](super::anatomy) is contoured, remeshed to triangles of even shape that are smaller where
+//! limbs are thin, and its girths are corrected until those of the mesh, measured by slicing it, are what was asked.
+//! The figure stands on z = 0, looks along −y, its left is +x. Lengths in metres.
+
+use glam::DVec3;
+
+use super::ShapeError;
+use super::anatomy::{Anatomy, Factors};
+use super::contour::contour;
+pub use super::fitting::GirthMark;
+use super::fitting::{fit, girth_marks};
+use super::girth::loop_around;
+pub use super::measures::{BodySpec, Measures};
+use super::remesh::{Density, Surface, remesh};
+use super::solid::Solid;
+use crate::mesh::TriMesh;
+
+/// Triangles of the form unless asked otherwise.
+pub const DEFAULT_TRIANGLES: usize = 15_000;
+/// Spacing of the first contour, m: a quarter of the thinnest part, a hand.
+const SPACING: f64 = 0.012;
+/// Newton steps of a projection.
+const PROJECTION_STEPS: usize = 3;
+/// Corrections with girths measured on the mesh.
+const MESH_ROUNDS: usize = 2;
+
+/// A form ready to be meshed, or dressed.
+#[derive(Debug, Clone)]
+pub struct DressForm {
+    /// Its measurements.
+    pub measures: Measures,
+    /// Its solid.
+    pub anatomy: Anatomy,
+}
+
+impl DressForm {
+    /// The solid whose girths are those of `spec`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] where `spec` is no body.
+    pub fn new(spec: &BodySpec) -> Result<Self, ShapeError> {
+        let measures = spec.measures()?;
+        let factors: Factors = fit(&measures, &[1.0; 11]);
+        Ok(Self { measures, anatomy: Anatomy::new(&measures, &factors) })
+    }
+
+    /// Where each girth is taken and what was asked.
+    #[must_use]
+    pub fn girths(&self) -> [GirthMark; 11] {
+        girth_marks(&self.measures, &self.anatomy)
+    }
+
+    /// A closed mesh of about `triangles` triangles (an even number).
+    ///
+    /// # Errors
+    /// [`ShapeError::TooFew`] under 2,000 triangles, [`ShapeError::NotManifold`] if the surface cannot be meshed.
+    pub fn mesh(&self, triangles: usize) -> Result<TriMesh, ShapeError> {
+        if triangles < 2_000 {
+            return Err(ShapeError::TooFew { what: "triangles of the body", found: triangles, least: 2_000 });
+        }
+        let m = &self.measures;
+        let reach = self.anatomy.arm.centre(self.anatomy.wrist_at + 0.25 * m.scale()).x;
+        let depth = 0.18 * m.scale() + 0.3 * m.bust.max(m.waist).max(m.hip) / 2.0;
+        let (low, high) = (DVec3::new(-reach, -depth, -0.03), DVec3::new(reach, depth, m.stature + 0.04));
+        let rough = contour(&self.anatomy, low, high, SPACING);
+        let tags = vec![0; rough.positions.len()];
+        // A closed surface of genus 0 has two triangles for each vertex but two.
+        let density = Density::Vertices(triangles / 2 + 2);
+        let skin = Skin { solid: &self.anatomy, head: m.stature - 0.2 * m.scale(), scale: m.scale() };
+        let (mut mesh, _) = remesh(&rough, tags, &skin, density).ok_or(ShapeError::NotManifold { what: "body" })?;
+        self.correct(&mut mesh);
+        Ok(mesh)
+    }
+
+    /// Moves the vertices to a solid corrected by the girths found on the mesh.
+    fn correct(&self, mesh: &mut TriMesh) {
+        let mut bias = [1.0; 11];
+        for _ in 0..MESH_ROUNDS {
+            for (bias, mark) in bias.iter_mut().zip(self.girths()) {
+                if let Some(found) = loop_around(mesh, mark.plane) {
+                    *bias *= (mark.asked / found.tape_length()).clamp(0.95, 1.05);
+                }
+            }
+            let corrected = Anatomy::new(&self.measures, &fit(&self.measures, &bias));
+            for p in &mut mesh.positions {
+                *p = onto(&corrected, *p);
+            }
+        }
+    }
+}
+
+/// The surface of the form, finer at wrists, hands, ankles and neck than on the trunk.
+struct Skin<'a> {
+    solid: &'a Anatomy,
+    head: f64,
+    scale: f64,
+}
+
+impl Surface for Skin<'_> {
+    fn project(&self, p: DVec3, _tag: u8) -> DVec3 {
+        onto(self.solid, p)
+    }
+
+    fn relative_size(&self, p: DVec3) -> f64 {
+        // Along the arm from the shoulder to the wrist the radius halves, and so do the triangles; the same towards the feet.
+        let mirrored = DVec3::new(p.x.abs(), p.y, p.z);
+        let t = self.solid.arm.along(mirrored) / self.solid.wrist_at;
+        let off_axis = (mirrored - self.solid.arm.centre(t * self.solid.wrist_at)).length();
+        let on_arm = 1.0 - smooth_step(0.10, 0.16, off_axis / self.scale);
+        let arm = 1.0 - 0.45 * on_arm * smooth_step(0.1, 0.95, t);
+        let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / self.scale));
+        let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
+        arm.min(ankle).min(head)
+    }
+}
+
+fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// The point of the solid's surface near `p`.
+fn onto(solid: &dyn Solid, mut p: DVec3) -> DVec3 {
+    for _ in 0..PROJECTION_STEPS {
+        let at = solid.at(p);
+        let step = at.value / at.gradient.length_squared().max(0.05);
+        p -= step * at.gradient;
+        if step.abs() < 1e-7 {
+            break;
+        }
+    }
+    p
+}
+
+/// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
+///
+/// # Errors
+/// [`ShapeError`] where the measurements are no body.
+pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
+    DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
+}

@@ -1,0 +1,204 @@
+//! Girths: a mesh cut by a plane, and the length of what comes out.
+//!
+//! Every triangle whose corners lie on both sides of the plane gives one segment between two crossed edges; segments
+//! that share an edge are joined to loops (or chains, where the mesh is open). The girth along the surface is the loop's
+//! length; a tape laid around it spans hollows, so the tape's girth is that of the loop's convex hull in the plane
+//! (Andrew's monotone chain, 1979). All lengths in metres. A vertex exactly on the plane counts as above it.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec2, DVec3};
+
+use crate::mesh::TriMesh;
+
+/// A plane by a point and its unit normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// A point of the plane, m.
+    pub origin: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+}
+
+impl Plane {
+    /// The horizontal plane at height `z`, m.
+    #[must_use]
+    pub fn horizontal(z: f64) -> Self {
+        Self { origin: DVec3::new(0.0, 0.0, z), normal: DVec3::Z }
+    }
+
+    /// Two unit vectors that span the plane.
+    #[must_use]
+    pub fn axes(&self) -> [DVec3; 2] {
+        let (u, v) = self.normal.any_orthonormal_pair();
+        [u, v]
+    }
+}
+
+/// One curve in which a plane cuts a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SectionLoop {
+    /// Where it crosses the mesh's edges, in order, m.
+    pub points: Vec<DVec3>,
+    /// Whether the last point joins the first.
+    pub closed: bool,
+    /// The plane it lies in.
+    pub plane: Plane,
+}
+
+impl SectionLoop {
+    /// Length along the surface, m.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        let inner: f64 = self.points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        match (self.closed, self.points.first(), self.points.last()) {
+            (true, Some(&first), Some(&last)) => inner + last.distance(first),
+            _ => inner,
+        }
+    }
+
+    /// Length of a tape pulled tight around it, m.
+    #[must_use]
+    pub fn tape_length(&self) -> f64 {
+        let [u, v] = self.plane.axes();
+        hull_length(self.points.iter().map(|p| DVec2::new(p.dot(u), p.dot(v))).collect())
+    }
+
+    /// Mean of its points, m.
+    #[must_use]
+    pub fn centre(&self) -> DVec3 {
+        self.points.iter().sum::<DVec3>() / self.points.len().max(1) as f64
+    }
+}
+
+/// Perimeter of the convex hull of points in a plane, m.
+#[must_use]
+pub fn hull_length(mut points: Vec<DVec2>) -> f64 {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    let mut half = |reverse: bool| -> Vec<DVec2> {
+        if reverse {
+            points.reverse();
+        }
+        let mut chain: Vec<DVec2> = Vec::new();
+        for &p in &points {
+            while let [.., a, b] = chain[..] {
+                if (b - a).perp_dot(p - a) > 0.0 {
+                    break;
+                }
+                chain.pop();
+            }
+            chain.push(p);
+        }
+        chain
+    };
+    let (lower, upper) = (half(false), half(true));
+    let length = |chain: &[DVec2]| chain.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
+    length(&lower) + length(&upper)
+}
+
+/// All curves in which `plane` cuts `mesh`, in the order of their first crossed edge.
+#[must_use]
+pub fn section(mesh: &TriMesh, plane: Plane) -> Vec<SectionLoop> {
+    let height: Vec<f64> = mesh.positions.iter().map(|&p| (p - plane.origin).dot(plane.normal)).collect();
+    let above = |v: u32| height[v as usize] >= 0.0;
+    // Consistent winding makes every segment run from an edge going down to an edge going up, and its successor's first edge
+    // is its last.
+    let mut links: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
+    for &[a, b, c] in &mesh.triangles {
+        let (mut down, mut up) = (None, None);
+        for (i, j) in [(a, b), (b, c), (c, a)] {
+            match (above(i), above(j)) {
+                (true, false) => down = Some((i, j)),
+                (false, true) => up = Some((j, i)),
+                _ => {}
+            }
+        }
+        if let (Some(down), Some(up)) = (down, up) {
+            links.insert(down, up);
+        }
+    }
+    let point = |(a, b): (u32, u32)| {
+        let (ha, hb) = (height[a as usize], height[b as usize]);
+        mesh.positions[a as usize].lerp(mesh.positions[b as usize], ha / (ha - hb))
+    };
+    // Open chains first, from the edges nothing leads to; what is left are loops.
+    let ends: std::collections::BTreeSet<(u32, u32)> = links.values().copied().collect();
+    let starts: Vec<(u32, u32)> = links.keys().filter(|k| !ends.contains(k)).copied().collect();
+    let mut loops = Vec::new();
+    let mut starts = starts.into_iter();
+    while let Some(start) = starts.next().or_else(|| links.keys().next().copied()) {
+        let mut points = vec![point(start)];
+        let mut at = start;
+        let mut closed = false;
+        while let Some(next) = links.remove(&at) {
+            if next == start {
+                closed = true;
+                break;
+            }
+            points.push(point(next));
+            at = next;
+        }
+        loops.push(SectionLoop { points, closed, plane });
+    }
+    loops
+}
+
+/// The closed curve of a section whose centre is nearest to the plane's origin.
+#[must_use]
+pub fn loop_around(mesh: &TriMesh, plane: Plane) -> Option<SectionLoop> {
+    section(mesh, plane)
+        .into_iter()
+        .filter(|l| l.closed)
+        .min_by(|a, b| a.centre().distance(plane.origin).total_cmp(&b.centre().distance(plane.origin)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An open prism of n sides and radius r between z = 0 and 1, standing at `x`.
+    fn prism(n: u32, r: f64, x: f64) -> TriMesh {
+        let mut mesh = TriMesh::default();
+        for i in 0..n {
+            let a = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+            for z in [0.0, 1.0] {
+                mesh.positions.push(DVec3::new(x + r * a.cos(), r * a.sin(), z));
+            }
+            let (p, q) = (2 * i, 2 * ((i + 1) % n));
+            mesh.triangles.extend([[p, q, p + 1], [q, q + 1, p + 1]]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn a_prism_s_girth_is_that_of_its_polygon() {
+        let loops = section(&prism(12, 0.5, 0.0), Plane::horizontal(0.3));
+        assert_eq!(loops.len(), 1);
+        let exact = 12.0 * 2.0 * 0.5 * (std::f64::consts::PI / 12.0).sin();
+        assert!(loops[0].closed);
+        assert!((loops[0].length() - exact).abs() < 1e-12);
+        assert!((loops[0].tape_length() - exact).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_prisms_give_two_loops_and_an_upright_plane_two_chains() {
+        let mut mesh = prism(8, 0.2, 0.0);
+        let other = prism(8, 0.2, 1.0);
+        let shift = mesh.positions.len() as u32;
+        mesh.positions.extend(&other.positions);
+        mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + shift)));
+        assert_eq!(section(&mesh, Plane::horizontal(0.5)).len(), 2);
+        let near = loop_around(&mesh, Plane { origin: DVec3::new(1.0, 0.0, 0.5), normal: DVec3::Z }).unwrap();
+        assert!((near.centre().x - 1.0).abs() < 1e-9);
+        let chains = section(&prism(8, 0.2, 0.0), Plane { origin: DVec3::new(0.01, 0.0, 0.0), normal: DVec3::X });
+        assert_eq!(chains.len(), 2);
+        assert!(chains.iter().all(|c| !c.closed && (c.length() - 1.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_tape_spans_hollows() {
+        let star = [(0.0, 0.0), (2.0, 0.0), (1.0, 0.5), (2.0, 1.0), (0.0, 1.0)];
+        assert!((hull_length(star.iter().map(|&(x, y)| DVec2::new(x, y)).collect()) - 6.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,91 @@
+//! What bad mesh input gets: one message with file, line, found, expected, what to do.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
+
+use std::fs;
+use std::path::Path;
+
+use partwise::mesh::import::{Beside, ImportOptions, import_body, import_garment};
+use partwise::mesh::{Axis, Frame, MeshError, Unit};
+
+fn refusal(name: &str, bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    let frame = Frame::given(Unit::M, Axis::Z);
+    let error = import_garment(&path, &ImportOptions::default(), &Beside::File(&frame)).unwrap_err();
+    let said = error.to_string();
+    assert!(said.contains(name), "no file name in: {said}");
+    said
+}
+
+fn says(text: &str, parts: &[&str]) {
+    let said = refusal("garment.obj", text.as_bytes());
+    for part in parts {
+        assert!(said.contains(part), "no \"{part}\" in: {said}");
+    }
+}
+
+#[test]
+fn coordinates_that_are_no_numbers_name_their_line() {
+    says("v 0 0 0\nv 1 nan 0\n", &["line 2", "nan", "finite"]);
+    says("v 0 0 0\n\nv 1 0 -inf\n", &["line 3", "-inf", "finite"]);
+    says("v 0 0 0\nv 1 1e999 0\n", &["line 2", "1e999", "finite"]);
+    says("v 0 0 0\nv 1 zwei 0\n", &["line 2", "\"zwei\"", "v x y z"]);
+    says("v 0 0\n", &["line 1", "found 2", "expected 3"]);
+    says("v 0 0 0\nvt inf 0\n", &["line 2", "inf"]);
+}
+
+#[test]
+fn indices_out_of_range_name_their_line_and_the_range() {
+    let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    says(&format!("{three}f 1 2 4\n"), &["line 4", "found 4", "1 to 3"]);
+    says(&format!("{three}f 1 2 0\n"), &["line 4", "found 0", "1 to 3"]);
+    says(&format!("{three}f 1 2 -4\n"), &["line 4", "found -4", "-1 to -3"]);
+    says(&format!("{three}f 1/1 2/1 3/1\n"), &["line 4", "found 1", "no texture coordinates"]);
+    says(&format!("{three}f 1 2 99999999999\n"), &["line 4", "99999999999"]);
+    says(&format!("{three}f 1 2 3.5\n"), &["line 4", "\"3.5\"", "v/vt/vn"]);
+    says(&format!("{three}f 1/2/3/4 2 3\n"), &["line 4", "1/2/3/4"]);
+}
+
+#[test]
+fn empty_meshes_say_what_there_was() {
+    says("", &["empty", "0 vertices"]);
+    says("v 0 0 0\nv 1 0 0\nv 0 1 0\n", &["empty", "3 vertices and 0 faces"]);
+    says("v 0 0 0\nv 1 0 0\nf 1 2\nf 1 1 2\n", &["empty", "no triangle"]);
+}
+
+#[test]
+fn other_formats_are_named() {
+    let said = |name: &str, bytes: &[u8], format: &str| {
+        let said = refusal(name, bytes);
+        assert!(said.contains(format) && said.contains("OBJ"), "{said}");
+    };
+    said("a.stl", b"solid box\n facet normal 0 0 1\n", "STL");
+    let mut binary = vec![0u8; 84 + 50];
+    binary[80] = 1;
+    said("b.stl", &binary, "STL");
+    said("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "glTF");
+    said("a.glb", b"glTF\x02\0\0\0", "glTF");
+    said("pattern.dxf", b"  0\nSECTION\n  2\nHEADER\n", "DXF");
+    said("a.ply", b"ply\nformat ascii 1.0\n", "PLY");
+    said("a.fbx", b"Kaydara FBX Binary  \0", "FBX");
+}
+
+#[test]
+fn a_missing_file_and_a_folder_are_told_apart() {
+    let read = |path: &Path| import_body(path, &ImportOptions::default()).unwrap_err();
+    let missing = read(Path::new("no/such/body.obj"));
+    assert!(matches!(missing, MeshError::Unreadable { .. }) && missing.to_string().contains("no/such/body.obj"));
+    let folder = tempfile::tempdir().unwrap();
+    assert!(read(folder.path()).to_string().contains("folder"));
+}
+
+#[test]
+fn a_body_of_no_human_size_asks_for_its_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.obj");
+    fs::write(&path, "v 0 0 0\nv 3 0 0\nv 0 3.2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n").unwrap();
+    let said = import_body(&path, &ImportOptions::default()).unwrap_err().to_string();
+    assert!(said.contains("units tall") && said.contains("--unit"), "{said}");
+    assert!(import_body(&path, &ImportOptions { unit: Some(Unit::M), ..ImportOptions::default() }).is_ok());
+}
