@@ -9,9 +9,10 @@ use super::file::{At, Grid, Single, Source, number};
 use super::inputs::Inputs;
 use super::point::{BodyChoice, Input, ModelChoice, Point, Refine, TableChoice};
 use super::tables::{default_table, tables};
+use crate::shapes::BodySpec;
 
 /// The body where a sweep names none.
-pub const DEFAULT_BODY: &str = "dress-form";
+pub const DEFAULT_BODY: &str = "form";
 /// The garment where a sweep names none.
 pub const DEFAULT_GARMENT: &str = "low-cut-dress";
 /// The fabric where a sweep names none.
@@ -31,6 +32,7 @@ pub(super) struct Axes {
     min_parts: Vec<usize>,
     refine: Vec<Refine>,
     seeds: Vec<u64>,
+    options: Vec<BTreeMap<String, String>>,
 }
 
 impl Axes {
@@ -53,6 +55,7 @@ impl Axes {
         let seeds = axis.of(&base.seed, &grid.seeds, "seeds", |v| {
             source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")
         })?;
+        let options = axis.of(&base.options, &grid.options, "options", |v| options(source, v))?;
         let fabrics = axis.of(&base.fabric, &grid.fabrics, "fabrics", |v| {
             let label = source.text(v, "fabric", "a built-in name or a file")?;
             inputs.input(&label, &source.place(v))
@@ -69,6 +72,7 @@ impl Axes {
             min_parts: min_parts.unwrap_or_else(|| vec![1]),
             refine: refine.unwrap_or_else(|| vec![Refine::Steps(0)]),
             seeds: seeds.unwrap_or_else(|| vec![0]),
+            options: options.unwrap_or_else(|| vec![BTreeMap::new()]),
         })
     }
 
@@ -84,6 +88,7 @@ impl Axes {
             self.min_parts.len(),
             self.refine.len(),
             self.seeds.len(),
+            self.options.len(),
         ];
         let count = lengths.iter().fold(1_usize, |n, &length| n.saturating_mul(length));
         let found = count.saturating_add(points.len());
@@ -93,7 +98,7 @@ impl Axes {
         for number in 0..count {
             // The number's digits, one base an axis.
             let mut rest = number;
-            let mut at = [0; 9];
+            let mut at = [0; 10];
             for (digit, &length) in at.iter_mut().zip(&lengths).rev() {
                 *digit = rest % length;
                 rest /= length;
@@ -110,6 +115,7 @@ impl Axes {
                 min_part: self.min_parts[at[6]],
                 refine: self.refine[at[7]],
                 seed: self.seeds[at[8]],
+                options: self.options[at[9]].clone(),
             };
             points.push(point.named());
         }
@@ -168,39 +174,58 @@ fn dress_form() -> BodyChoice {
     BodyChoice {
         label: DEFAULT_BODY.to_owned(),
         input: Input::built_in(DEFAULT_BODY),
-        measurements_cm: BTreeMap::new(),
+        measurements: BodySpec::default(),
     }
 }
 
 /// A body by name, file, or measurements.
 fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<BodyChoice, PlanError> {
-    let expected =
-        "a name, a file, or { bust = 92, ... } in centimetres with an optional name = \"...\" and of = \"...\"";
+    let expected = "\"form\", an OBJ file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
+                    optional name = \"...\" and of = (one of these)";
     let place = source.place(value);
     let table = match value.get_ref() {
-        Value::String(label) => {
-            let input = inputs.input(label, &place)?;
-            return Ok(BodyChoice { label: label.clone(), input, measurements_cm: BTreeMap::new() });
-        }
+        Value::String(label) => return named_body(source, value, label, expected, inputs),
         Value::Table(table) => table,
         _ => return Err(source.wrong(value, "body", expected)),
     };
-    let (mut label, mut of, mut measurements_cm) = (None, DEFAULT_BODY, BTreeMap::new());
-    for (key, entry) in table {
-        match (key.as_str(), entry) {
-            ("name", Value::String(name)) => label = Some(name.clone()),
-            ("of", Value::String(name)) => of = name,
-            (measure, entry) => match number(entry) {
-                Some(cm) if cm > 0.0 && cm.is_finite() => {
-                    measurements_cm.insert(measure.to_owned(), cm);
-                }
-                _ => return Err(source.wrong(value, "body", expected)),
-            },
-        }
+    let text = |key| table.get(key).map(|v: &Value| v.as_str().ok_or_else(|| source.wrong(value, "body", expected)));
+    let (name, of) = (text("name").transpose()?, text("of").transpose()?.unwrap_or(DEFAULT_BODY));
+    let mut body = named_body(source, value, of, expected, inputs)?;
+    for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
+        let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
+        let changed = body.measurements.with(measure, cm);
+        body.measurements = changed.map_err(|e| PlanError::Body { place: place.clone(), source: e })?;
+        body.label = format!("{} {measure}={cm}", body.label);
     }
-    let words = || measurements_cm.iter().map(|(key, cm)| format!("{key}={cm}")).collect::<Vec<_>>().join(" ");
-    let label = label.unwrap_or_else(|| format!("{of} {}", words()));
-    Ok(BodyChoice { label, input: inputs.input(of, &place)?, measurements_cm })
+    body.label = name.map_or(body.label, str::to_owned);
+    match body.measurements.measures() {
+        Ok(_) => Ok(body),
+        Err(source) => Err(PlanError::Body { place, source }),
+    }
+}
+
+/// The form, as it comes or from a file of measurements, or a mesh.
+fn named_body(
+    source: Source<'_>,
+    value: &At,
+    label: &str,
+    expected: &str,
+    inputs: &mut Inputs,
+) -> Result<BodyChoice, PlanError> {
+    let place = source.place(value);
+    let body = BodyChoice { label: label.to_owned(), ..dress_form() };
+    if label == DEFAULT_BODY {
+        return Ok(body);
+    }
+    if !Inputs::names_a_file(label) {
+        return Err(source.wrong(value, "body", expected));
+    }
+    if label.ends_with(".toml") {
+        let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
+        let measurements = spec.map_err(|source| PlanError::Body { place, source })?;
+        return Ok(BodyChoice { measurements, ..body });
+    }
+    Ok(BodyChoice { input: inputs.input(label, &place)?, ..body })
 }
 
 /// No extent, one, or a cascade from coarse to fine.
@@ -220,4 +245,16 @@ fn extent(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
         one if number(one) == Some(0.0) => Ok(Vec::new()),
         one => positive(one).map(|cm| vec![cm]).ok_or_else(wrong),
     }
+}
+
+/// Scalars by name, as text.
+fn options(source: Source<'_>, value: &At) -> Result<BTreeMap<String, String>, PlanError> {
+    let wrong = || source.wrong(value, "options", "{ name = value, ... } of strings, numbers and true or false");
+    let text = |v: &Value| match v {
+        Value::String(text) => Some(text.clone()),
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(v.to_string()),
+        _ => None,
+    };
+    let table = value.get_ref().as_table().ok_or_else(wrong)?;
+    table.iter().map(|(key, v)| text(v).map(|text| (key.clone(), text)).ok_or_else(wrong)).collect()
 }

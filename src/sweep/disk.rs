@@ -75,3 +75,21 @@ fn sync_folder(path: &Path) {
         let _ = folder.sync_all();
     }
 }
+
+/// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
+/// that), replaced otherwise.
+pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
+    let found = read_if_there(path)?;
+    match found {
+        Some(found) if found == text => Ok(()),
+        Some(found) if found.starts_with(text) => {
+            let cut = open_end(path)?.cut(text.len() as u64);
+            cut.map_err(|source| StoreError::Io {
+                path: path.to_owned(),
+                doing: "a torn line cannot be cut off",
+                source,
+            })
+        }
+        _ => replace(path, text),
+    }
+}

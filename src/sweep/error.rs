@@ -5,6 +5,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::range_table::TableError;
+use crate::shapes::ShapeError;
 
 /// A sweep file that cannot be used. The user can mend all of these.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +50,14 @@ pub enum PlanError {
         place: String,
         /// What is wrong with it.
         source: TableError,
+    },
+    /// Measurements that make no body.
+    #[error("{place}: body: {source}")]
+    Body {
+        /// File and line of the sweep file.
+        place: String,
+        /// What is wrong with them.
+        source: ShapeError,
     },
     /// Nothing to do.
     #[error(

@@ -19,7 +19,7 @@
 //!
 //! | in `[base]`, `[[points]]` | in `[grid]` | values | default |
 //! |---|---|---|---|
-//! | `body` | `bodies` | built-in name, file, or `{ bust = 92, ... }` in cm with `of`, `name` | `dress-form` |
+//! | `body` | `bodies` | `form`, OBJ, TOML of measurements, or `{ bust = 92, ... }` in cm with `of`, `name` | `form` |
 //! | `garment` | `garments` | `name@vertices` or file | `low-cut-dress` |
 //! | `size` | `sizes` | vertices, for a garment built in and named without them | – |
 //! | `fabric` | `fabrics` | built-in name or file | `interlock` |
@@ -29,6 +29,7 @@
 //! | `min_part` | `min_parts` | vertices | 1 |
 //! | `refine` | `refine` | steps or `converged` | 0 |
 //! | `seed` | `seeds` | 0 is the undisturbed start | 0 |
+//! | `options` | `options` | `{ name = value, ... }`: whatever else the solver understands | none |
 
 use serde::Deserialize;
 use toml::{Spanned, Value};
@@ -69,6 +70,7 @@ pub(super) struct Single {
     pub(super) min_part: Option<At>,
     pub(super) refine: Option<At>,
     pub(super) seed: Option<At>,
+    pub(super) options: Option<At>,
 }
 
 impl Single {
@@ -86,6 +88,7 @@ impl Single {
             min_part: or(self.min_part, &base.min_part),
             refine: or(self.refine, &base.refine),
             seed: or(self.seed, &base.seed),
+            options: or(self.options, &base.options),
         }
     }
 }
@@ -104,6 +107,7 @@ pub(super) struct Grid {
     pub(super) min_parts: Option<Spanned<Vec<At>>>,
     pub(super) refine: Option<Spanned<Vec<At>>>,
     pub(super) seeds: Option<Spanned<Vec<At>>>,
+    pub(super) options: Option<Spanned<Vec<At>>>,
 }
 
 /// The text of a sweep file and its name, for the messages.

@@ -155,6 +155,6 @@ impl Manifest {
             source: e.into(),
         })?;
         text.push('\n');
-        disk::replace(&path, text.as_bytes())
+        disk::make(&path, text.as_bytes())
     }
 }

@@ -1,7 +1,7 @@
 //! One point of a sweep: everything that determines one run, and its name by content.
 //!
 //! A point's id is the blake3 hash of the canonical JSON of all that determines its result: version of the program, body,
-//! garment, fabric, model, range table, extents, smallest PART, refinement and seed. A file counts by its contents, not by its
+//! garment, fabric, model, range table, extents, smallest PART, refinement, seed and options. A file counts by its contents, not by its
 //! name or place, so that a moved folder or a shard on another machine has the same ids; a range table counts by its
 //! bounds and its gap rule. What changes nothing but timings (repeats, jobs, threads) is no part of it.
 
@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::range_table::{RangeTable, TableError};
+use crate::shapes::BodySpec;
 
 use super::families;
 
@@ -44,15 +45,15 @@ impl Input {
     }
 }
 
-/// A body and what is measured otherwise than it comes.
+/// A body: the built-in form with its measurements, or a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyChoice {
     /// What the reports call it.
     pub label: String,
-    /// The body before `measurements`.
+    /// The built-in form, or the file of a mesh.
     pub input: Input,
-    /// Measurements by name, cm, as a body's TOML file and the flags have them (`bust = 92`).
-    pub measurements_cm: BTreeMap<String, f64>,
+    /// The form's measurements; built-in garments are made to them, on a mesh too.
+    pub measurements: BodySpec,
 }
 
 /// The models of stage two.
@@ -170,6 +171,8 @@ pub struct Point {
     pub refine: Refine,
     /// Seed of the perturbed start; 0 is the undisturbed one.
     pub seed: u64,
+    /// Whatever else the solver understands, by name.
+    pub options: BTreeMap<String, String>,
 }
 
 impl Point {
@@ -182,14 +185,21 @@ impl Point {
         self.extents_cm.iter().map(f64::to_string).collect::<Vec<_>>().join(">")
     }
 
+    /// The options as the rows have them: `a=1 b=2`, empty for none.
+    #[must_use]
+    pub fn options_text(&self) -> String {
+        self.options.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
+    }
+
     /// All that tells this point from others, in one line.
     #[must_use]
     pub fn label(&self) -> String {
         let Self { body, garment, fabric, model, table, min_part, refine, seed, .. } = self;
         let extent = self.extent_text();
+        let options = self.options.iter().map(|(key, value)| format!(", {key} {value}")).collect::<String>();
         format!(
             "body {}, garment {}, fabric {}, {model}, table {}, extent {extent}, min-part {min_part}, refine {refine}, \
-             seed {seed}",
+             seed {seed}{options}",
             body.label, garment.label, fabric.label, table.label
         )
     }
@@ -199,7 +209,7 @@ impl Point {
         let key = Key {
             partwise: VERSION,
             body: self.body.input.key(),
-            measurements_cm: &self.body.measurements_cm,
+            measurements: &self.body.measurements,
             garment: self.garment.key(),
             fabric: self.fabric.key(),
             model: self.model,
@@ -208,6 +218,7 @@ impl Point {
             min_part: self.min_part,
             refine: self.refine,
             seed: self.seed,
+            options: &self.options,
         };
         self.id = content_id(&key);
         self
@@ -226,7 +237,7 @@ pub(super) fn content_id(value: &impl Serialize) -> String {
 struct Key<'a> {
     partwise: &'a str,
     body: InputKey<'a>,
-    measurements_cm: &'a BTreeMap<String, f64>,
+    measurements: &'a BodySpec,
     garment: InputKey<'a>,
     fabric: InputKey<'a>,
     model: ModelChoice,
@@ -235,6 +246,7 @@ struct Key<'a> {
     min_part: usize,
     refine: Refine,
     seed: u64,
+    options: &'a BTreeMap<String, String>,
 }
 
 #[derive(Serialize)]

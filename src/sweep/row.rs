@@ -71,6 +71,8 @@ pub struct Row {
     /// Steps, or `converged`.
     pub refine: String,
     pub seed: u64,
+    /// `name=value` of each, empty for none.
+    pub options: String,
     pub status: Status,
     /// Why it failed; empty where it did not.
     pub error: String,
@@ -102,7 +104,7 @@ pub struct Row {
 }
 
 /// The columns of [`Row`], in order.
-pub const COLUMNS: [&str; 36] = [
+pub const COLUMNS: [&str; 37] = [
     "point",
     "index",
     "body",
@@ -114,6 +116,7 @@ pub const COLUMNS: [&str; 36] = [
     "min_part",
     "refine",
     "seed",
+    "options",
     "status",
     "error",
     "vertices",
@@ -157,6 +160,7 @@ impl Row {
             min_part: point.min_part,
             refine: point.refine.to_string(),
             seed: point.seed,
+            options: point.options_text(),
             status: Status::Error,
             error: error.into(),
             ..Self::default()

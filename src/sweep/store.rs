@@ -12,13 +12,15 @@
 //! again; a bad line with good ones after it is no accident of ours and is refused. On resume points that failed are tried
 //! again unless asked otherwise: what failed for want of memory or room deserves it.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use super::disk::{self, Append};
+use super::disk::{self, make};
 use super::error::StoreError;
+use super::journal::{Journal, Medium, take_lock};
+use super::lines::{csv_text, json_text, read_rows};
 use super::manifest::{MANIFEST, Manifest};
-use super::row::{Row, Status, csv_header, csv_line, json_line};
+use super::row::{Row, Status, csv_line, json_line};
 
 /// Name of the JSON lines in a sweep's folder.
 pub const JSON_LINES: &str = "rows.jsonl";
@@ -45,9 +47,6 @@ impl Existing {
     /// `--resume`: failed points are tried again, another plan's rows refused.
     pub const RESUME: Self = Self::Resume { retry_failed: true, adopt: false };
 }
-
-/// Makes the media rows are appended to from opened files.
-pub type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;
 
 /// The rows of one sweep, open for writing.
 pub struct Store {
@@ -210,105 +209,4 @@ fn left_over(folder: &Path, found: &Manifest, wanted: &Manifest, how: Existing) 
     }
     rows.retain(|r| r.status == Status::Ok || !retry_failed);
     Ok(rows)
-}
-
-fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
-    let bytes = disk::read_if_there(path)?.unwrap_or_default();
-    let places = manifest.places();
-    let mut rows: Vec<Row> = Vec::new();
-    let mut seen = vec![false; manifest.points.len()];
-    let mut bad: Option<(usize, String)> = None;
-    for (i, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
-        // Only the last line can lack its end, and only the last may be bad: then it was torn.
-        if let Some((line, message)) = bad {
-            return Err(StoreError::Damaged { path: path.to_owned(), line, message });
-        }
-        let parsed = match line.strip_suffix(b"\n") {
-            None => Err("the line has no end".to_owned()),
-            Some(line) => serde_json::from_slice::<Row>(line).map_err(|e| e.to_string()),
-        };
-        match parsed {
-            Err(message) => bad = Some((i + 1, message)),
-            Ok(mut row) => {
-                // The id counts, not the number: a crash while rows are adopted leaves new numbers beside the old plan.
-                let place = places.get(row.point.as_str());
-                let Some(&place) = place.filter(|&&i| !std::mem::replace(&mut seen[i], true)) else {
-                    let message =
-                        if place.is_some() { "its point has a row before" } else { "its point is not in plan.json" };
-                    return Err(StoreError::Damaged {
-                        path: path.to_owned(),
-                        line: i + 1,
-                        message: message.to_owned(),
-                    });
-                };
-                row.index = place;
-                rows.push(row);
-            }
-        }
-    }
-    Ok(rows)
-}
-
-fn take_lock(path: &Path) -> Result<File, StoreError> {
-    let file = disk::open_end(path)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path: path.to_owned() }),
-        Err(TryLockError::Error(source)) => {
-            Err(StoreError::Io { path: path.to_owned(), doing: "cannot be locked", source })
-        }
-    }
-}
-
-/// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
-/// that), replaced otherwise.
-fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
-    let found = disk::read_if_there(path)?;
-    match found {
-        Some(found) if found == text => Ok(()),
-        Some(found) if found.starts_with(text) => {
-            let cut = disk::open_end(path)?.cut(text.len() as u64);
-            cut.map_err(|source| StoreError::Io {
-                path: path.to_owned(),
-                doing: "a torn line cannot be cut off",
-                source,
-            })
-        }
-        _ => disk::replace(path, text),
-    }
-}
-
-pub(super) fn json_text(rows: &[Row]) -> Vec<u8> {
-    rows.iter().flat_map(json_line).collect()
-}
-
-pub(super) fn csv_text(rows: &[Row]) -> Vec<u8> {
-    csv_header().into_bytes().into_iter().chain(rows.iter().flat_map(csv_line)).collect()
-}
-
-/// A file that grows by whole lines.
-struct Journal {
-    path: PathBuf,
-    medium: Box<dyn Append>,
-    length: u64,
-}
-
-impl Journal {
-    fn open(path: PathBuf, medium: &Medium<'_>) -> Result<Self, StoreError> {
-        let file = disk::open_end(&path)?;
-        let length = file.metadata().map(|m| m.len());
-        let length =
-            length.map_err(|source| StoreError::Io { path: path.clone(), doing: "cannot be measured", source })?;
-        Ok(Self { path, medium: medium(file), length })
-    }
-
-    fn append(&mut self, line: &[u8], kept: usize) -> Result<(), StoreError> {
-        if let Err(source) = self.medium.append(line) {
-            // What was written of the line is cut off again; where even that fails, resume drops it.
-            let _ = self.medium.cut(self.length);
-            return Err(StoreError::Write { path: self.path.clone(), kept, source });
-        }
-        self.length += line.len() as u64;
-        Ok(())
-    }
 }

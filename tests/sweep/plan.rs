@@ -29,6 +29,7 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
         [[points]]
         table = { quantile = 7 }
         extent_cm = [12, 6]
+        options = { rest = "texture", contact_cm = 0.5 }
         "#,
     );
     let found: Vec<_> =
@@ -46,6 +47,10 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
     );
     assert_eq!(found[15], ("pullover-1@500", "table-3 x0.5", 1));
     let last = &plan.points[16];
+    assert_eq!(
+        (last.options_text().as_str(), last.options["rest"].as_str()),
+        ("contact_cm=0.5 rest=texture", "texture")
+    );
     assert_eq!(
         (last.refine, last.extent_text().as_str(), &last.table.rule),
         (Refine::Converged, "12>6", &TableRule::Quantile { levels: 7 })
@@ -78,16 +83,22 @@ fn ids_are_made_of_contents_not_of_names_or_timings() {
     };
     assert_eq!(id("[base]\ngarment = \"a.obj\""), id("repeats = 9\nwarm_up = 2\n[base]\ngarment = \"b.obj\""));
     assert_eq!(id("[base]\ntable = \"t.toml\""), id("[base]\ntable = \"u.toml\""));
-    assert_eq!(
-        id("[base]\nbody = { bust = 92 }"),
-        id("[base]\nbody = { bust = 92.0, name = \"x\", of = \"dress-form\" }")
-    );
+    assert_eq!(id("[base]\nbody = { bust = 92 }"), id("[base]\nbody = { bust = 92.0, name = \"x\", of = \"form\" }"));
+    write("w.toml", "bust_cm = 92");
+    assert_eq!(id("[base]\nbody = { bust = 92 }"), id("[base]\nbody = \"w.toml\""));
+    assert_eq!(id("[base]\nbody = { waist = 75, of = \"w.toml\" }"), id("[base]\nbody = { bust = 92, waist = 75 }"));
     assert_eq!(id("[base]\ntable = { levels = 38 }").len(), 32);
     let before = id("[base]\ngarment = \"a.obj\"");
     write("a.obj", "v 0 0 1");
-    let ids =
-        [before, id("[base]\ngarment = \"a.obj\""), id(""), id("[base]\nseed = 1"), id("[base]\nbody = { bust = 93 }")];
-    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), 5);
+    let ids = [
+        before,
+        id("[base]\ngarment = \"a.obj\""),
+        id(""),
+        id("[base]\nseed = 1"),
+        id("[base]\noptions = { a = 1 }"),
+        id("[base]\nbody = { bust = 93 }"),
+    ];
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), 6);
 }
 
 #[test]
@@ -146,6 +157,10 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         (format!("{point}refine = \"fully\""), "s.toml:3: refine: found \"fully\"", "converged"),
         (format!("{point}min_part = 0"), "s.toml:3: min_part: found 0", "1 for"),
         (format!("{point}body = {{ bust = \"wide\" }}"), "s.toml:3: body: found", "centimetres"),
+        (format!("{point}options = {{ a = [1] }}"), "s.toml:3: options: found", "name = value"),
+        (format!("{point}body = {{ chest = 92 }}"), "s.toml:3: body: the spec", "chest"),
+        (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
+        (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),
         ("name = \"n\"\nrepeats = 0\n[grid]".to_owned(), "s.toml:2: repeats: found 0", "at least 1"),
         ("name = \"n\"".to_owned(), "s.toml: found no points", "[grid]"),
     ] {

@@ -45,7 +45,7 @@ fn missing_points_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let parts = run_shards(folder.path(), &plan(), 3);
     let error = merge(&parts[..2], &folder.path().join("out")).unwrap_err().to_string();
-    assert!(error.starts_with("66 of 200 points are missing: 2 (body dress-form, garment low-cut-dress"), "{error}");
+    assert!(error.starts_with("66 of 200 points are missing: 2 (body form, garment low-cut-dress"), "{error}");
     assert!(error.contains("and 56 more"), "{error}");
     assert!(matches!(merge(&[], folder.path()), Err(MergeError::Nothing)));
 }
