@@ -23,6 +23,7 @@ pub mod range_table;
 pub mod record;
 pub mod shapes;
 pub mod sweep;
+pub mod table_search;
 
 pub use glam::DVec3;
 

@@ -10,7 +10,6 @@
 mod axes;
 mod disk;
 mod error;
-pub mod families;
 pub mod file;
 mod inputs;
 mod journal;

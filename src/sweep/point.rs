@@ -14,8 +14,6 @@ use serde::Serialize;
 use crate::range_table::{RangeTable, TableError};
 use crate::shapes::BodySpec;
 
-use super::families;
-
 /// The version that computes; rows of different versions are never mixed.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -123,7 +121,7 @@ impl TableChoice {
     pub fn resolve(&self, distances_m: &[f64]) -> Result<RangeTable, TableError> {
         let mut table = match &self.rule {
             TableRule::Rows(table) => table.clone(),
-            TableRule::Quantile { levels } => families::quantile(distances_m, *levels)?,
+            TableRule::Quantile { levels } => RangeTable::quantiles(distances_m, *levels)?,
         };
         table.name.clone_from(&self.label);
         Ok(table)

@@ -16,7 +16,6 @@ use serde::Deserialize;
 use toml::Value;
 
 use super::error::PlanError;
-use super::families;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
 use super::point::{TableChoice, TableRule};
@@ -76,7 +75,7 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
         let (first, last) = (end(&family.first_cm, GEOMETRIC_CM.0)?, end(&family.last_cm, GEOMETRIC_CM.1)?);
         let suffix = if ends { format!(" {first}-{last} cm") } else { String::new() };
         let counts = counts(source, entry, value)?.into_iter();
-        let make = |n| made(format!("geometric {n}{suffix}"), families::geometric(n, first, last));
+        let make = |n| made(format!("geometric {n}{suffix}"), RangeTable::geometric(first, last, n));
         counts.map(make).collect::<Result<Vec<_>, _>>()?
     } else {
         let of = family.of.clone().unwrap_or_else(|| TABLE_3.to_owned());
@@ -90,11 +89,11 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
                 let mut table = Ok(base.clone());
                 if let Some(n) = levels {
                     label = format!("{label} {n} levels");
-                    table = table.and_then(|t| families::with_levels(&t, n));
+                    table = table.and_then(|t| t.with_level_count(n));
                 }
                 if let Some(factor) = scale {
                     label = format!("{label} x{factor}");
-                    table = table.and_then(|t| families::scaled(&t, factor));
+                    table = table.and_then(|t| t.scaled(factor));
                 }
                 choices.push(made(label, table)?);
             }
