@@ -7,9 +7,11 @@ use toml::{Spanned, Value};
 use super::error::PlanError;
 use super::file::{At, Grid, Single, Source, number};
 use super::inputs::Inputs;
-use super::point::{BodyChoice, Input, ModelChoice, Point, Refine, TableChoice};
+use super::point::{BodyChoice, FabricChoice, Input, ModelChoice, Point, Refine, TableChoice};
 use super::tables::{default_table, tables};
-use crate::shapes::BodySpec;
+use crate::fabric::Fabric;
+use crate::shapes::garment::TABLE_4_SIZES;
+use crate::shapes::{BUILT_IN, BodySpec, GarmentRequest, GarmentSpec};
 
 /// The body where a sweep names none.
 pub const DEFAULT_BODY: &str = "form";
@@ -25,7 +27,7 @@ const LIMIT: usize = 1_000_000;
 pub(super) struct Axes {
     bodies: Vec<BodyChoice>,
     garments: Vec<Input>,
-    fabrics: Vec<Input>,
+    fabrics: Vec<FabricChoice>,
     models: Vec<ModelChoice>,
     pub(super) tables: Vec<TableChoice>,
     extents_cm: Vec<Vec<f64>>,
@@ -58,14 +60,19 @@ impl Axes {
         let options = axis.of(&base.options, &grid.options, "options", |v| options(source, v))?;
         let fabrics = axis.of(&base.fabric, &grid.fabrics, "fabrics", |v| {
             let label = source.text(v, "fabric", "a built-in name or a file")?;
-            inputs.input(&label, &source.place(v))
+            let place = source.place(v);
+            let fabric = match Inputs::names_a_file(&label) {
+                true => Fabric::parse(&inputs.text(&label, &place)?, &label),
+                false => Fabric::by_name(&label),
+            };
+            fabric.map(|fabric| FabricChoice { label, fabric }).map_err(|source| PlanError::Fabric { place, source })
         })?;
         let bodies = axis.of(&base.body, &grid.bodies, "bodies", |v| body(source, v, inputs))?;
         let tables = axis.of(&base.table, &grid.tables, "tables", |v| tables(source, v, inputs))?;
         Ok(Self {
             bodies: bodies.unwrap_or_else(|| vec![dress_form()]),
             garments: garments(axis, base, grid, inputs)?,
-            fabrics: fabrics.unwrap_or_else(|| vec![Input::built_in(DEFAULT_FABRIC)]),
+            fabrics: fabrics.map_or_else(default_fabric, Ok)?,
             models: models.unwrap_or_else(|| vec![ModelChoice::Coupled]),
             tables: tables.map_or_else(|| vec![default_table()], |t| t.into_iter().flatten().collect()),
             extents_cm: extents_cm.unwrap_or_else(|| vec![Vec::new()]),
@@ -154,20 +161,57 @@ fn garments(axis: Axis<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> 
     let source = axis.source;
     let garments = axis.of(&base.garment, &grid.garments, "garments", |v| {
         let label = source.text(v, "garment", "a name, name@vertices or a file")?;
+        if !Inputs::names_a_file(&label) {
+            let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
+            known.map_err(|e| PlanError::Shape { place: source.place(v), key: "garment", source: e })?;
+        }
         inputs.input(&label, &source.place(v))
     })?;
     let garments = garments.unwrap_or_else(|| vec![Input::built_in(DEFAULT_GARMENT)]);
     let sized = garments.iter().find(|g| g.file.is_some() || g.label.contains('@'));
-    let sizes = axis.of(&base.size, &grid.sizes, "sizes", |v| match sized {
-        None => source.count::<u32>(v, "size", 4, "a number of vertices, at least 4"),
-        Some(garment) => {
+    let sizes = axis.of(&base.size, &grid.sizes, "sizes", |v| match (sized, v.get_ref().as_str()) {
+        (Some(garment), _) => {
             let expected = "no sizes where a garment has its own, as {}; write name@vertices for each instead";
             Err(source.wrong(v, "size", expected.replace("{}", &garment.label)))
         }
+        (None, Some("larger")) => Ok(Size::OfTable4(0)),
+        (None, Some("smaller")) => Ok(Size::OfTable4(1)),
+        (None, _) => {
+            let expected = "a number of vertices, at least 4, or \"larger\" or \"smaller\" of the paper's two";
+            source.count(v, "size", 4, expected).map(Size::Vertices)
+        }
     })?;
     let Some(sizes) = sizes else { return Ok(garments) };
-    let at_sizes = |g: &Input| sizes.iter().map(|n| Input::built_in(format!("{}@{n}", g.label))).collect::<Vec<_>>();
+    let at_sizes = |g: &Input| sizes.iter().map(|size| g.at(size.of(&g.label))).collect::<Vec<_>>();
     Ok(garments.iter().flat_map(at_sizes).collect())
+}
+
+/// How many vertices a garment shall have.
+#[derive(Clone, Copy)]
+enum Size {
+    Vertices(usize),
+    /// The first or second size of the paper's Table 4.
+    OfTable4(usize),
+}
+
+impl Size {
+    fn of(self, garment: &str) -> Option<usize> {
+        match self {
+            Self::Vertices(count) => Some(count),
+            Self::OfTable4(which) => {
+                let place = BUILT_IN.iter().position(|name| *name == garment)?;
+                Some(TABLE_4_SIZES[place][which])
+            }
+        }
+    }
+}
+
+fn default_fabric() -> Result<Vec<FabricChoice>, PlanError> {
+    let label = DEFAULT_FABRIC.to_owned();
+    match Fabric::by_name(&label) {
+        Ok(fabric) => Ok(vec![FabricChoice { label, fabric }]),
+        Err(source) => Err(PlanError::Fabric { place: "the default".to_owned(), source }),
+    }
 }
 
 fn dress_form() -> BodyChoice {
@@ -194,13 +238,13 @@ fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<BodyChoic
     for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
         let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
         let changed = body.measurements.with(measure, cm);
-        body.measurements = changed.map_err(|e| PlanError::Body { place: place.clone(), source: e })?;
+        body.measurements = changed.map_err(|e| PlanError::Shape { place: place.clone(), key: "body", source: e })?;
         body.label = format!("{} {measure}={cm}", body.label);
     }
     body.label = name.map_or(body.label, str::to_owned);
     match body.measurements.measures() {
         Ok(_) => Ok(body),
-        Err(source) => Err(PlanError::Body { place, source }),
+        Err(source) => Err(PlanError::Shape { place, key: "body", source }),
     }
 }
 
@@ -222,7 +266,7 @@ fn named_body(
     }
     if label.ends_with(".toml") {
         let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
-        let measurements = spec.map_err(|source| PlanError::Body { place, source })?;
+        let measurements = spec.map_err(|source| PlanError::Shape { place, key: "body", source })?;
         return Ok(BodyChoice { measurements, ..body });
     }
     Ok(BodyChoice { input: inputs.input(label, &place)?, ..body })

@@ -4,6 +4,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::fabric::FabricError;
 use crate::range_table::TableError;
 use crate::shapes::ShapeError;
 
@@ -51,11 +52,21 @@ pub enum PlanError {
         /// What is wrong with it.
         source: TableError,
     },
-    /// Measurements that make no body.
-    #[error("{place}: body: {source}")]
-    Body {
+    /// A fabric that cannot be read.
+    #[error("{place}: fabric: {source}")]
+    Fabric {
         /// File and line of the sweep file.
         place: String,
+        /// What is wrong with it.
+        source: FabricError,
+    },
+    /// Measurements that make no body, or a garment that is not there.
+    #[error("{place}: {key}: {source}")]
+    Shape {
+        /// File and line of the sweep file.
+        place: String,
+        /// `body` or `garment`.
+        key: &'static str,
         /// What is wrong with them.
         source: ShapeError,
     },

@@ -21,7 +21,7 @@
 //! |---|---|---|---|
 //! | `body` | `bodies` | `form`, OBJ, TOML of measurements, or `{ bust = 92, ... }` in cm with `of`, `name` | `form` |
 //! | `garment` | `garments` | `name@vertices` or file | `low-cut-dress` |
-//! | `size` | `sizes` | vertices, for a garment built in and named without them | – |
+//! | `size` | `sizes` | vertices, or `larger`, `smaller` of Table 4; for a garment built in and named without | – |
 //! | `fabric` | `fabrics` | built-in name or file | `interlock` |
 //! | `model` | `models` | `paper`, `coupled` | `coupled` |
 //! | `table` | `tables` | see [`tables`](super::tables) | `table-3` |

@@ -32,7 +32,7 @@ pub use journal::Medium;
 pub use manifest::{Listed, Manifest, Shard};
 pub use merge::{join, merge};
 pub use plan::Plan;
-pub use point::{BodyChoice, Input, ModelChoice, Point, Refine, TableChoice, TableRule};
+pub use point::{BodyChoice, FabricChoice, Input, ModelChoice, Point, Refine, TableChoice, TableRule};
 pub use row::{COLUMNS, Measures, Row, Status};
 pub use run::{Outcome, Progress, Run, run_missing, sweep};
 pub use solve::{PointError, Solve, Solved, result_hash};

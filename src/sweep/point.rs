@@ -3,7 +3,7 @@
 //! A point's id is the blake3 hash of the canonical JSON of all that determines its result: version of the program, body,
 //! garment, fabric, model, range table, extents, smallest PART, refinement, seed and options. A file counts by its contents, not by its
 //! name or place, so that a moved folder or a shard on another machine has the same ids; a range table counts by its
-//! bounds and its gap rule. What changes nothing but timings (repeats, jobs, threads) is no part of it.
+//! bounds and its gap rule, a fabric by its constants. What changes nothing but timings (repeats, jobs, threads) is no part of it.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,13 +11,14 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use crate::fabric::Fabric;
 use crate::range_table::{RangeTable, TableError};
 use crate::shapes::BodySpec;
 
 /// The version that computes; rows of different versions are never mixed.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// A body, garment or fabric: built in by name, or a file.
+/// A body or garment: built in by name, or a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
     /// As written in the sweep file: a built-in name (a garment's with `@vertices`) or a path.
@@ -35,11 +36,32 @@ impl Input {
         Self { label: label.into(), file: None, digest: None }
     }
 
+    /// A built-in garment with so many vertices; as it comes without a number.
+    pub(super) fn at(&self, vertices: Option<usize>) -> Self {
+        vertices.map_or_else(|| self.clone(), |n| Self::built_in(format!("{}@{n}", self.label)))
+    }
+
     fn key(&self) -> InputKey<'_> {
         match &self.digest {
             Some(digest) => InputKey::Contents(digest),
             None => InputKey::Name(&self.label),
         }
+    }
+}
+
+/// A fabric under the name it has in the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FabricChoice {
+    /// As written in the sweep file: a built-in name or a path.
+    pub label: String,
+    /// Its constants.
+    pub fabric: Fabric,
+}
+
+impl FabricChoice {
+    /// What determines a result: the constants, not what they are called and where they come from.
+    fn key(&self) -> Fabric {
+        Fabric { name: String::new(), source: String::new(), ..self.fabric.clone() }
     }
 }
 
@@ -155,7 +177,7 @@ pub struct Point {
     /// The garment.
     pub garment: Input,
     /// The fabric.
-    pub fabric: Input,
+    pub fabric: FabricChoice,
     /// Stage two's model.
     pub model: ModelChoice,
     /// Stage one's range table.
@@ -237,7 +259,7 @@ struct Key<'a> {
     body: InputKey<'a>,
     measurements: &'a BodySpec,
     garment: InputKey<'a>,
-    fabric: InputKey<'a>,
+    fabric: Fabric,
     model: ModelChoice,
     table: TableKey,
     extents_cm: &'a [f64],

@@ -61,6 +61,14 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
 }
 
 #[test]
+fn the_papers_sizes_go_by_name() {
+    let plan =
+        parse("name = \"n\"\n[grid]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nsizes = [\"smaller\", \"larger\"]");
+    let found: Vec<_> = plan.points.iter().map(|p| p.garment.label.as_str()).collect();
+    assert_eq!(found, ["flared-skirt@3613", "flared-skirt@3920", "pullover-1@4710", "pullover-1@5103"]);
+}
+
+#[test]
 fn equal_points_are_left_out_and_said() {
     let plan =
         parse("name = \"n\"\n[grid]\ntables = [\"table-3\", { scale = [1, 2] }]\nextents_cm = [0, \"none\", 0.0, 5]");
@@ -158,7 +166,11 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         ),
         (format!("{point}table = \"no/such.toml\""), "s.toml:3: no/such.toml: cannot be read", "folder"),
         (format!("{point}garment = \"no.obj\""), "s.toml:3: no.obj: cannot be read", "folder"),
-        (format!("{point}garment = \"skirt@90\"\nsize = 80"), "s.toml:4: size: found 80", "skirt@90"),
+        (format!("{point}garment = \"flared-skirt@900\"\nsize = 800"), "s.toml:4: size: found 800", "skirt@900"),
+        (format!("{point}garment = \"sari\""), "s.toml:3: garment: there is no garment", "flared-skirt"),
+        (format!("{point}garment = \"flared-skirt@many\""), "s.toml:3: garment: ", "no number of vertices"),
+        (format!("{point}fabric = \"steel\""), "s.toml:3: fabric: no fabric is called `steel`", "jersey"),
+        (format!("{point}fabric = \"no/steel.toml\""), "s.toml:3: no/steel.toml: cannot be read", "folder"),
         (format!("{point}model = \"rubber\""), "s.toml:3: model: found \"rubber\"", "coupled"),
         (format!("{point}extent_cm = [3, 6]"), "s.toml:3: extent_cm: found [3, 6]", "falling"),
         (format!("{point}extent_cm = -1"), "s.toml:3: extent_cm: found -1", "none"),
