@@ -96,9 +96,9 @@ impl Anatomy {
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
         let (swell, protrusion) = (cup.powf(0.35), 0.031 * cup.powf(0.8));
-        let breast_radii = DVec3::new(0.066, 0.060, 0.072) * swell * (bust / 0.14).sqrt();
+        let breast_radii = DVec3::new(0.062, 0.060, 0.070) * swell * (bust / 0.14).sqrt();
         let breast = Ellipsoid {
-            centre: DVec3::new(0.53 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
+            centre: DVec3::new(0.50 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
             radii: breast_radii,
             lean: 0.25,
         };
