@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::jet::Jet;
 use super::measures::Measures;
-use super::solid::{Ellipsoid, Section, Solid, Sweep};
+use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
 /// Angle of the arms from the vertical, radians: enough for a sleeve under the arm, as dress forms and A poses have it.
 const ARM_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
@@ -126,51 +126,74 @@ impl Anatomy {
         Self { trunk, breast, buttock, neck, cranium, jaw, arm, leg, foot, wrist_at, biceps_at, neck_at }
     }
 
-    /// Trunk, bust, seat and the root of the neck.
+    /// Trunk, bust, seat and neck.
     #[must_use]
     pub fn torso(&self, p: DVec3) -> Jet {
         let mut field = self.trunk.at(p);
         for side in [1.0, -1.0] {
-            field = field.smooth_min(sided(&self.breast, p, side), 0.075);
-            field = field.smooth_min(sided(&self.buttock, p, side), 0.07);
+            field = Sided::new(&self.breast, side).join(field, p, 0.075);
+            field = Sided::new(&self.buttock, side).join(field, p, 0.07);
         }
-        field.smooth_min(self.neck.at(p), 0.06)
+        self.neck.join(field, p, 0.06)
     }
 
-    /// Both arms.
+    /// The arm on the side of `p`.
     #[must_use]
-    pub fn arms(&self, p: DVec3) -> Jet {
-        sided(&self.arm, p, p.x.signum())
+    pub fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
+        Sided::new(&self.arm, p.x)
     }
 
-    /// Both legs with their feet, flat on the floor.
+    /// Trunk, neck and legs.
     #[must_use]
-    pub fn legs(&self, p: DVec3) -> Jet {
+    pub fn torso_and_legs(&self, p: DVec3) -> Jet {
+        Legs(self).join(self.torso(p), p, 0.035)
+    }
+
+    /// Everything but the head.
+    #[must_use]
+    pub fn below_the_head(&self, p: DVec3) -> Jet {
+        self.arm_at(p).join(self.torso_and_legs(p), p, 0.045)
+    }
+}
+
+/// Both legs with their feet, flat on the floor.
+struct Legs<'a>(&'a Anatomy);
+
+impl Solid for Legs<'_> {
+    fn at(&self, p: DVec3) -> Jet {
         let one = |side: f64| {
-            let limb = sided(&self.leg, p, side).smooth_min(sided(&self.foot, p, side), 0.05);
+            let limb = Sided::new(&self.0.foot, side).join(Sided::new(&self.0.leg, side).at(p), p, 0.05);
             limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.015)
         };
-        one(1.0).smooth_min(one(-1.0), 0.006)
+        let near = one(p.x);
+        // The other leg matters only next to the middle.
+        if p.x.abs() > 0.05 { near } else { near.smooth_min(one(-p.x), 0.006) }
     }
 
-    /// The head.
-    #[must_use]
-    pub fn head(&self, p: DVec3) -> Jet {
-        self.cranium.at(p).smooth_min(self.jaw.at(p), 0.07)
+    fn at_least(&self, p: DVec3) -> f64 {
+        let leg = &self.0.leg;
+        (p.z - leg.range().1).max(0.0)
+    }
+}
+
+/// The head.
+struct Head<'a>(&'a Anatomy);
+
+impl Solid for Head<'_> {
+    fn at(&self, p: DVec3) -> Jet {
+        self.0.cranium.at(p).smooth_min(self.0.jaw.at(p), 0.07)
+    }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        // The smooth joint adds at most a sixth of its width.
+        (self.0.cranium.at_least(p).min(self.0.jaw.at_least(p)) - 0.012).max(0.0)
     }
 }
 
 impl Solid for Anatomy {
     fn at(&self, p: DVec3) -> Jet {
-        self.torso(p).smooth_min(self.arms(p), 0.045).smooth_min(self.legs(p), 0.035).smooth_min(self.head(p), 0.035)
+        Head(self).join(self.below_the_head(p), p, 0.035)
     }
-}
-
-/// A left part's field, or its mirror image's for a negative `side`.
-fn sided(part: &dyn Solid, p: DVec3, side: f64) -> Jet {
-    let mirror = DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0);
-    let jet = part.at(p * mirror);
-    Jet::new(jet.value, jet.gradient * mirror)
 }
 
 fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {

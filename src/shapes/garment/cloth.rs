@@ -12,7 +12,7 @@ use crate::shapes::body::DressForm;
 use crate::shapes::fitting::ray;
 use crate::shapes::jet::Jet;
 use crate::shapes::profile::Profile;
-use crate::shapes::solid::{Section, Solid, Sweep};
+use crate::shapes::solid::{Section, Sided, Solid, Sweep};
 
 /// Least distance between the undraped garment and the body, m. The field is off by up to a third at the shoulders, and a mesh's
 /// chords cut corners, so that 3 mm remain everywhere.
@@ -45,21 +45,17 @@ struct Under<'a> {
 
 impl Solid for Under<'_> {
     fn at(&self, p: DVec3) -> Jet {
-        let trunk = self.form.torso(p).smooth_min(self.form.legs(p), 0.035);
-        if self.arms { trunk.smooth_min(self.form.arms(p), 0.045) } else { trunk }
+        if self.arms { self.form.below_the_head(p) } else { self.form.torso_and_legs(p) }
     }
 }
 
 impl Solid for Cloth<'_> {
     fn at(&self, p: DVec3) -> Jet {
-        let under = Under { form: self.form, arms: self.arms }.at(p) - CLEARANCE;
         let mut cloth = self.tube.at(p);
         if let Some(sleeve) = &self.sleeve {
-            let mirror = DVec3::new(p.x.signum(), 1.0, 1.0);
-            let arm = sleeve.at(p * mirror);
-            cloth = cloth.smooth_min(Jet::new(arm.value, arm.gradient * mirror), 0.05);
+            cloth = Sided::new(sleeve, p.x).join(cloth, p, 0.05);
         }
-        cloth.smooth_min(under, BLEND)
+        cloth.smooth_min(Under { form: self.form, arms: self.arms }.at(p) - CLEARANCE, BLEND)
     }
 }
 
@@ -203,7 +199,10 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     // Cloth hangs off the bust: below it, it comes back only part of the way.
     underbust[3] = underbust[3].max(0.5 * (underbust[3] + bust[3]));
     let axilla_z = m.axilla - 0.01;
-    let axilla = section(axilla_z, 0.5 * (m.bust + m.underbust) + (ease.bust_cm + 4.0) / 100.0);
+    let axilla = section(
+        axilla_z,
+        0.5 * (m.bust + m.underbust) + (ease.bust_cm + if spec.sleeves.is_some() { 4.0 } else { 0.0 }) / 100.0,
+    );
     stations.extend([
         (m.hip_height, hip),
         (m.waist_height, waist),
