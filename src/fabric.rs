@@ -36,3 +36,145 @@ pub struct Fabric {
     /// Coulomb friction coefficient against the body.
     pub friction: f64,
 }
+
+/// The fabrics inside the binary, as they stand in `assets/fabrics/`.
+const FILES: [(&str, &str); 11] = [
+    ("interlock", include_str!("../assets/fabrics/interlock.toml")),
+    ("jersey", include_str!("../assets/fabrics/jersey.toml")),
+    ("rib-knit", include_str!("../assets/fabrics/rib-knit.toml")),
+    ("ponte", include_str!("../assets/fabrics/ponte.toml")),
+    ("denim", include_str!("../assets/fabrics/denim.toml")),
+    ("trouser", include_str!("../assets/fabrics/trouser.toml")),
+    ("tablecloth", include_str!("../assets/fabrics/tablecloth.toml")),
+    ("polyester-jacket", include_str!("../assets/fabrics/polyester-jacket.toml")),
+    ("silk", include_str!("../assets/fabrics/silk.toml")),
+    ("cotton", include_str!("../assets/fabrics/cotton.toml")),
+    ("wool", include_str!("../assets/fabrics/wool.toml")),
+];
+
+/// Names of the built-in fabrics.
+pub const BUILT_IN: [&str; 11] = [
+    "interlock",
+    "jersey",
+    "rib-knit",
+    "ponte",
+    "denim",
+    "trouser",
+    "tablecloth",
+    "polyester-jacket",
+    "silk",
+    "cotton",
+    "wool",
+];
+
+/// What can be wrong with a fabric.
+#[derive(Debug, thiserror::Error)]
+pub enum FabricError {
+    /// No such name.
+    #[error("no fabric is called `{found}`; expected one of {known}, or a TOML file")]
+    Unknown {
+        /// What was asked for.
+        found: String,
+        /// What there is.
+        known: String,
+    },
+    /// Not a fabric file.
+    #[error("{file}: {reason}; see assets/fabrics/ for examples")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// What the reader said, with line and column.
+        reason: String,
+    },
+    /// A constant no cloth can have.
+    #[error("{file}: {key} is {found}; expected {expected}")]
+    Constant {
+        /// The file.
+        file: String,
+        /// Which constant.
+        key: &'static str,
+        /// Its value.
+        found: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+}
+
+impl Fabric {
+    /// A built-in fabric.
+    ///
+    /// # Errors
+    /// [`FabricError::Unknown`] lists those there are.
+    pub fn by_name(name: &str) -> Result<Self, FabricError> {
+        match FILES.iter().find(|(known, _)| *known == name) {
+            Some((known, text)) => Self::parse(text, known),
+            None => Err(FabricError::Unknown { found: name.to_owned(), known: BUILT_IN.join(", ") }),
+        }
+    }
+
+    /// Reads a fabric from TOML; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`FabricError::Syntax`] with the line, [`FabricError::Constant`] for values no cloth can have.
+    pub fn parse(text: &str, file: &str) -> Result<Self, FabricError> {
+        let fabric: Self = toml::from_str(text)
+            .map_err(|e| FabricError::Syntax { file: file.to_owned(), reason: e.to_string().trim_end().to_owned() })?;
+        fabric.check(file)?;
+        Ok(fabric)
+    }
+
+    fn check(&self, file: &str) -> Result<(), FabricError> {
+        let positive = [
+            ("density_kg_per_m2", self.density_kg_per_m2),
+            ("thickness_m", self.thickness_m),
+            ("stretch_weft_n_per_m", self.stretch_weft_n_per_m),
+            ("stretch_warp_n_per_m", self.stretch_warp_n_per_m),
+            ("shear_n_per_m", self.shear_n_per_m),
+            ("bending_nm, weft", self.bending_nm[0]),
+            ("bending_nm, bias", self.bending_nm[1]),
+            ("bending_nm, warp", self.bending_nm[2]),
+        ];
+        let wrong = |key, found, expected| FabricError::Constant { file: file.to_owned(), key, found, expected };
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(wrong(key, value, "a positive, finite number"));
+            }
+        }
+        // Beyond √(k_u k_v) the membrane's energy would have no lower bound; one half is the isotropic limit.
+        if !(0.0..=0.5).contains(&self.poisson) {
+            return Err(wrong("poisson", self.poisson, "0 to 0.5"));
+        }
+        if !(0.0..=10.0).contains(&self.friction) {
+            return Err(wrong("friction", self.friction, "0 (none) to 10"));
+        }
+        // Thicker than this is upholstery, and a likely slip of the unit.
+        if self.thickness_m > 0.02 {
+            return Err(wrong("thickness_m", self.thickness_m, "metres, at most 0.02; is it in millimetres?"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_fabric_reads_and_bears_its_name() {
+        for name in BUILT_IN {
+            assert_eq!(Fabric::by_name(name).unwrap().name, name);
+        }
+        assert_eq!(BUILT_IN.map(|n| n), FILES.map(|(n, _)| n));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let good = FILES[0].1;
+        let said = |text: &str| Fabric::parse(text, "f.toml").unwrap_err().to_string();
+        assert!(said(&good.replace("poisson = 0.3", "poisson = 0.9")).contains("poisson is 0.9"));
+        assert!(said(&good.replace("8.00e-04", "0.8")).contains("millimetres"));
+        assert!(said(&good.replace("friction", "frction")).contains("frction"));
+        assert!(said(&good.replace("density_kg_per_m2 = 0.187", "density_kg_per_m2 = nan")).contains("density"));
+        assert!(Fabric::by_name("tweed").unwrap_err().to_string().contains("denim"));
+    }
+}

@@ -1,4 +1,5 @@
 //! What bad mesh input gets: one message with file, line, found, expected, what to do.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
 use std::fs;
 use std::path::Path;

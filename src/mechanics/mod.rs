@@ -1,3 +1,6 @@
-//! To come.
+//! Mechanics: what moves the PARTs and the cloth.
 
+pub mod coupled;
+pub mod energy;
 pub mod paper;
+pub mod refine;

@@ -1,25 +1,29 @@
-//! The state of a mesh in figures, and of a body and a garment together.
+//! The state of a mesh in figures: what `partwise check` prints of a body and of a garment, each by itself.
 
-use super::{Topology, TriMesh};
+use std::fmt;
 
-/// A triangle lower than this share of its longest edge has no area worth the name.
-const NO_AREA: f64 = 1e-9;
+use serde::Serialize;
+
+use super::self_intersection::self_intersecting_pairs;
+use super::{Topology, TriMesh, winding};
+
+/// A triangle lower than this share of its longest edge has no area worth the name: with coordinates written to seven
+/// digits, its normal would be noise.
+const NO_AREA: f64 = 1e-6;
 
 /// What is wrong with a mesh, counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Findings {
+pub(super) struct Findings {
     /// Edges of three triangles and more.
-    pub non_manifold_edges: usize,
+    pub(super) non_manifold_edges: usize,
     /// Vertices with more than two boundary edges.
-    pub pinched_vertices: usize,
+    pub(super) pinched_vertices: usize,
     /// Triangles without area.
-    pub no_area: usize,
+    pub(super) no_area: usize,
 }
 
 impl Findings {
-    /// Counts.
-    #[must_use]
-    pub fn new(mesh: &TriMesh, topology: &Topology) -> Self {
+    pub(super) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let mut boundary = vec![0u32; mesh.vertex_count()];
         for (edge, _) in topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1) {
             edge.iter().for_each(|&v| boundary[v as usize] += 1);
@@ -34,5 +38,149 @@ impl Findings {
             pinched_vertices: boundary.iter().filter(|&&edges| edges > 2).count(),
             no_area: (0..mesh.triangles.len()).filter(no_area).count(),
         }
+    }
+}
+
+/// Five figures that stand for many: by nearest rank.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// The smallest.
+    pub min: f64,
+    /// The 1st percentile.
+    pub p01: f64,
+    /// The 5th percentile.
+    pub p05: f64,
+    /// The median.
+    pub p50: f64,
+    /// The 95th percentile.
+    pub p95: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+impl Percentiles {
+    /// Of these values; zeros for none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_unstable_by(f64::total_cmp);
+        let last = values.len().saturating_sub(1);
+        let at = |share: f64| values.get((share * last as f64).round() as usize).copied().unwrap_or_default();
+        Self { min: at(0.0), p01: at(0.01), p05: at(0.05), p50: at(0.5), p95: at(0.95), max: at(1.0) }
+    }
+
+    /// As words, each value times `scale`, with `digits` behind the point.
+    #[must_use]
+    pub fn text(&self, scale: f64, digits: usize) -> String {
+        let [min, p01, p05, p50, p95, max] =
+            [self.min, self.p01, self.p05, self.p50, self.p95, self.max].map(|v| format!("{:.digits$}", v * scale));
+        format!("{min} smallest, {p01} (1 %), {p05} (5 %), {p50} median, {p95} (95 %), {max} largest")
+    }
+}
+
+/// A mesh in figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Health {
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Connected parts.
+    pub components: usize,
+    /// Edges with one triangle.
+    pub boundary_edges: usize,
+    /// Loops they form.
+    pub boundary_loops: usize,
+    /// No boundary at all.
+    pub closed: bool,
+    /// Edges of three triangles and more.
+    pub non_manifold_edges: usize,
+    /// Vertices where the boundary touches itself.
+    pub pinched_vertices: usize,
+    /// Edges whose two triangles run the same way.
+    pub disagreeing_edges: usize,
+    /// Triangles without area.
+    pub no_area: usize,
+    /// Pairs of triangles that cross, counted exactly.
+    pub self_intersecting_pairs: usize,
+    /// Area, m².
+    pub area_m2: f64,
+    /// Enclosed volume, m³; of closed meshes alone.
+    pub volume_m3: Option<f64>,
+    /// Smallest angle of each triangle, degrees.
+    pub min_angle_deg: Percentiles,
+    /// Edge lengths, m.
+    pub edge_length_m: Percentiles,
+}
+
+/// Takes every figure of a mesh; O(n log n).
+#[must_use]
+pub fn health(mesh: &TriMesh) -> Health {
+    let topology = Topology::new(mesh);
+    let findings = Findings::new(mesh, &topology);
+    let (component, components) = topology.components();
+    let boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+    let closed = boundary_edges == 0 && !mesh.triangles.is_empty();
+    let length = |&[a, b]: &[u32; 2]| mesh.positions[a as usize].distance(mesh.positions[b as usize]);
+    Health {
+        vertices: mesh.vertex_count(),
+        triangles: mesh.triangles.len(),
+        components,
+        boundary_edges,
+        boundary_loops: topology.boundary_loops().len(),
+        closed,
+        non_manifold_edges: findings.non_manifold_edges,
+        pinched_vertices: findings.pinched_vertices,
+        disagreeing_edges: winding::disagreeing_edges(mesh, &topology),
+        no_area: findings.no_area,
+        self_intersecting_pairs: self_intersecting_pairs(mesh).len(),
+        area_m2: mesh.triangle_areas().iter().sum(),
+        volume_m3: closed.then(|| winding::signed_volumes(mesh, &component, components).iter().sum()),
+        min_angle_deg: Percentiles::of((0..mesh.triangles.len()).map(|t| min_angle(mesh, t)).collect()),
+        edge_length_m: Percentiles::of(topology.edges.iter().map(length).collect()),
+    }
+}
+
+fn min_angle(mesh: &TriMesh, t: usize) -> f64 {
+    let corners = mesh.corners(t);
+    let angle = |k: usize| {
+        let (a, b) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+        // By the tangent: exact near zero, where the cosine is not.
+        a.cross(b).length().atan2(a.dot(b)).to_degrees()
+    };
+    angle(0).min(angle(1)).min(angle(2))
+}
+
+impl Health {
+    /// Name and value of each figure, as a table wants them.
+    #[must_use]
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let closed = match self.volume_m3 {
+            Some(volume) => format!("yes, {:.2} litres", 1e3 * volume),
+            None => format!("no, {} boundary edges in {} loops", self.boundary_edges, self.boundary_loops),
+        };
+        let winding = match self.disagreeing_edges {
+            0 => "consistent".to_owned(),
+            edges => format!("turns over at {edges} edges"),
+        };
+        vec![
+            ("vertices", self.vertices.to_string()),
+            ("triangles", self.triangles.to_string()),
+            ("connected parts", self.components.to_string()),
+            ("closed", closed),
+            ("area", format!("{:.3} m²", self.area_m2)),
+            ("winding", winding),
+            ("self-intersecting pairs", self.self_intersecting_pairs.to_string()),
+            ("non-manifold edges", self.non_manifold_edges.to_string()),
+            ("pinched boundary vertices", self.pinched_vertices.to_string()),
+            ("triangles without area", self.no_area.to_string()),
+            ("smallest angles, degrees", self.min_angle_deg.text(1.0, 1)),
+            ("edge lengths, mm", self.edge_length_m.text(1e3, 1)),
+        ]
+    }
+}
+
+impl fmt::Display for Health {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.rows().iter().try_for_each(|(name, value)| writeln!(f, "{name:<26} {value}"))
     }
 }

@@ -7,15 +7,19 @@
 mod draft;
 pub mod error;
 pub mod export;
+pub mod fit;
 pub mod frame;
 pub mod health;
 pub mod import;
 pub mod polygon;
+pub mod push_out;
 pub mod report;
 pub mod rest;
 mod scan;
+pub mod self_intersection;
 mod source;
 pub mod topology;
+pub mod triangle_crossing;
 pub mod whole_file;
 pub mod winding;
 

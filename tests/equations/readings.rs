@@ -40,7 +40,8 @@ fn signed_cosines_of_an_uneven_ring_explode() {
     let mut case = ring();
     case.garment.positions[24].x += 0.02;
     case.surface = case.body.nearest_all(&case.garment.positions);
-    let touching = PaperOptions { contact_distance_m: 0.2, ..given(700.0, 3e9) };
+    // The default threshold would catch this one, a ring with seams and a bust need not be so even.
+    let touching = PaperOptions { contact_distance_m: 0.2, degenerate_below: 1e-3, ..given(700.0, 3e9) };
     let absolute = case.solve(&touching).parts[0];
     let signed = case.solve(&PaperOptions { cosine: Cosine::Signed, ..touching }).parts[0];
     assert!(!signed.degenerate[0]);

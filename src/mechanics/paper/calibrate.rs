@@ -8,16 +8,18 @@
 //!
 //! (the load at depth r is what hangs below it). The PART that covers some of the strip sinks by the mean of u over its
 //! vertices, D̄ = (ρ g/k) c̄ with c̄ the area mean of L s − s²/2 (m²). Equation (9) gives D = F⁰/Fᵃ = ρ g A/Fᵃ, so the strip asks for
-//! Fᵃ = k A/c̄. Equation (2) gives Fᵃ = p_f Σ |cos γ_p| q ΔV = p_f t A w̄ with w̄ the area mean of |cos γ_p| q over the PART, hence
+//! Fᵃ = k A/c̄. Equation (2) gives Fᵃ = p_f Σ |cos γ_p| q ΔV = p_f t A w̄ with w̄ the area mean of |cos γ_p| q, hence, PART by PART,
 //!
 //! ```text
-//! p_f = k / (t m c̄),     m = area mean of |cos γ_p| q over the whole garment
+//! p_f = k / (t w̄ c̄)
 //! ```
 //!
-//! with m in place of w̄: p_f is a field of the garment, as in Table 1, not a figure that cancels the factors cos and q; these
-//! stay as weights relative to the garment's mean, and where they are uniform D is the closed form exactly, however
-//! many PARTs the strip is cut into. Depth s is z_top − z and L the garment's height. A PART at the very top has c̄ = 0: it
-//! is held, p_f is infinite; so is a garment without height, which has nothing that hangs. m uses positive readings whatever the options say, so that a failing reading shows in D.
+//! and D is the closed form however many PARTs the strip is cut into. Along z the factors cos γ_p and q thus only say how a
+//! PART shares its stiffness among its vertices; along x and y Fᵃ keeps the ratio of the cosines. (With one w̄ for the whole
+//! garment a tight PART, whose q is small, was a hundred times softer than a loose one, and contact pushed a skirt's hip 4 m
+//! away.) Depth s is z_top − z and L the garment's height. A PART at the very top has c̄ = 0: it is held, p_f is infinite; so is
+//! a garment without height, which has nothing that hangs. w̄ takes the positive readings whatever the options say, so that
+//! a failing reading shows in D; where the cloth is vertical and w̄ vanishes, the mean of q stands in.
 //!
 //! **q_f** (N/m³). One scalar so that the contact PARTs carry the garment: Σ q_f cos γ_q ΔV = weight.
 
@@ -44,53 +46,44 @@ pub(super) fn clearance(signed_distance: f64, thickness_m: f64, reading: Clearan
 }
 
 /// What p_f needs to know of the whole garment.
-pub(super) struct HangingStrip {
-    top_z: f64,
-    height_m: f64,
-    /// k/(t m), N/m³.
-    scale: f64,
-    /// Whether m vanished, so that the mean of q alone stands in.
-    pub(super) vertical: bool,
+pub(super) struct HangingStrip<'a> {
+    /// The garment.
+    pub(super) garment: &'a TriMesh,
+    /// Its unit vertex normals.
+    pub(super) normals: &'a [DVec3],
+    /// Its barycentric vertex areas, m².
+    pub(super) areas: &'a [f64],
+    /// The nearest body point of each vertex.
+    pub(super) surface: &'a [SurfacePoint],
+    /// k, N/m.
+    pub(super) stiffness: f64,
+    /// t, m.
+    pub(super) thickness_m: f64,
+    /// The reading of cos(•_p).
+    pub(super) cosine: Cosine,
+    /// As [`PaperOptions::degenerate_below`](super::PaperOptions::degenerate_below).
+    pub(super) degenerate_below: f64,
 }
 
-impl HangingStrip {
-    /// Reads height and mean weight m off the garment.
-    pub(super) fn new(
-        garment: &TriMesh,
-        normals: &[DVec3],
-        areas: &[f64],
-        surface: &[SurfacePoint],
-        (stiffness_n_per_m, thickness_m): (f64, f64),
-        (cosine, degenerate_below): (Cosine, f64),
-    ) -> Self {
-        let (lo, hi) = garment.bounds().unwrap_or_default();
-        let positive = if cosine == Cosine::InSurface { Cosine::InSurface } else { Cosine::Absolute };
-        let (mut weighted, mut plain, mut area) = (0.0, 0.0, 0.0);
-        for ((&n, &a), s) in normals.iter().zip(areas).zip(surface) {
-            let q = clearance(s.signed_distance, thickness_m, Clearance::PlusThickness);
-            weighted += a * q * share(n, positive).z;
+impl HangingStrip<'_> {
+    /// p_f of a PART, N/m⁵; infinite at the very top. `top_z` and `height_m` are the garment's.
+    pub(super) fn line_force(&self, vertices: &[u32], top_z: f64, height_m: f64) -> f64 {
+        let positive = if self.cosine == Cosine::InSurface { Cosine::InSurface } else { Cosine::Absolute };
+        let (mut compliance, mut weighted, mut plain, mut area) = (0.0, 0.0, 0.0, 0.0);
+        for v in vertices.iter().map(|&v| v as usize) {
+            let a = self.areas[v];
+            let s = top_z - self.garment.positions[v].z;
+            let q = clearance(self.surface[v].signed_distance, self.thickness_m, Clearance::PlusThickness);
+            compliance += a * (height_m * s - 0.5 * s * s);
+            weighted += a * q * share(self.normals[v], positive).z;
             plain += a * q;
             area += a;
         }
-        let vertical = weighted <= degenerate_below * plain;
-        let m = if vertical { plain } else { weighted } / area;
-        Self { top_z: hi.z, height_m: hi.z - lo.z, scale: stiffness_n_per_m / (thickness_m * m), vertical }
-    }
-
-    /// L s − s²/2 at height z, m².
-    fn compliance(&self, z: f64) -> f64 {
-        let s = self.top_z - z;
-        self.height_m * s - 0.5 * s * s
-    }
-
-    /// p_f of a PART, N/m⁵; infinite at the very top.
-    pub(super) fn line_force(&self, garment: &TriMesh, areas: &[f64], vertices: &[u32]) -> f64 {
-        let (mut sum, mut area) = (0.0, 0.0);
-        for &v in vertices {
-            sum += areas[v as usize] * self.compliance(garment.positions[v as usize].z);
-            area += areas[v as usize];
+        // Vertices without triangles have no area and no force either; any value does.
+        if area <= 0.0 {
+            return 0.0;
         }
-        // A PART of vertices without triangles has no area and no force either; any value does.
-        if area > 0.0 { self.scale * area / sum } else { 0.0 }
+        let w = if weighted > self.degenerate_below * plain { weighted } else { plain };
+        self.stiffness * area * area / (self.thickness_m * w * compliance)
     }
 }

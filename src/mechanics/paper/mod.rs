@@ -78,8 +78,8 @@ pub enum PaperWarning {
         /// Σ cos γ_q ΔV / Σ ΔV over the contact PARTs; 0 where there are none.
         support: f64,
     },
-    /// The garment's normals are all horizontal, so that Fᵃ_z vanishes everywhere.
-    #[error("the garment hangs along z everywhere: every cos γ_p is 0, so no PART has a stiffness along z")]
+    /// Fᵃ_z vanishes everywhere: the cloth is vertical, or the reading fails.
+    #[error("no PART has a stiffness along z, so the garment keeps its height")]
     NoVerticalStiffness,
     /// Axes without stiffness; the PARTs stay where they are along them.
     #[error("{parts} PARTs have an axis without stiffness and keep still along it")]

@@ -65,12 +65,17 @@ pub fn solve(
             }
         }
     };
-    let constants = (fabric.stretch_warp_n_per_m, thickness);
-    let strip =
-        HangingStrip::new(garment, &normals, &areas, surface, constants, (options.cosine, options.degenerate_below));
-    if strip.vertical && options.line_force == LineForce::FromMembrane {
-        warnings.push(PaperWarning::NoVerticalStiffness);
-    }
+    let strip = HangingStrip {
+        garment,
+        normals: &normals,
+        areas: &areas,
+        surface,
+        stiffness: fabric.stretch_warp_n_per_m,
+        thickness_m: thickness,
+        cosine: options.cosine,
+        degenerate_below: options.degenerate_below,
+    };
+    let (lo, hi) = garment.bounds().unwrap_or_default();
 
     let forces = parts.map(|k, part| {
         let s = &sums[k];
@@ -78,7 +83,7 @@ pub fn solve(
         let anti_force = if s.contact { body_force * s.body } else { DVec3::ZERO };
         let line_force = match options.line_force {
             LineForce::Given(value) => value,
-            LineForce::FromMembrane => strip.line_force(garment, &areas, &part.vertices),
+            LineForce::FromMembrane => strip.line_force(&part.vertices, hi.z, hi.z - lo.z),
         };
         let b = balance(s, gravity, anti_force, line_force, options.contactless, options.degenerate_below);
         PartForces {
@@ -105,7 +110,9 @@ pub fn solve(
     if degenerate_parts > 0 {
         warnings.push(PaperWarning::Degenerate { parts: degenerate_parts });
     }
-    let (lo, hi) = garment.bounds().unwrap_or_default();
+    if !forces.is_empty() && forces.iter().all(|f| f.degenerate[2]) {
+        warnings.push(PaperWarning::NoVerticalStiffness);
+    }
     let lengths = || forces.iter().map(|f| f.displacement.length());
     let exploded = lengths().filter(|&d| d > lo.distance(hi)).count();
     if exploded > 0 {

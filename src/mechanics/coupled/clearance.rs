@@ -1,0 +1,34 @@
+//! The push-out: no vertex of a preview is left inside the body.
+//!
+//! A vertex nearer than h to the body goes along ∇q to q = h, again where another part of the body is then too near.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::distance::Body;
+
+/// Times a vertex is moved at most: the second is for narrow places (an armpit), the rest for luck.
+const ROUNDS: usize = 4;
+
+/// Moves every vertex that is not held to at least `offset_m` from the body; returns how many moved.
+pub fn push_out(body: &Body, held: &[bool], offset_m: f64, positions: &mut [DVec3]) -> usize {
+    let moved: Vec<bool> = positions
+        .par_iter_mut()
+        .with_min_len(128)
+        .zip(held)
+        .map(|(x, &held)| {
+            let mut moved = false;
+            for _ in 0..if held { 0 } else { ROUNDS } {
+                let near = body.nearest(*x);
+                // Rounding may leave it a hair short: an eighth of the way is near enough.
+                if near.signed_distance >= 0.875 * offset_m {
+                    break;
+                }
+                *x += near.normal * (offset_m - near.signed_distance);
+                moved = true;
+            }
+            moved
+        })
+        .collect();
+    moved.iter().filter(|&&m| m).count()
+}

@@ -1,0 +1,302 @@
+//! A garment ready to be evaluated: E, ∇E and the positive part of ∇²E.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | x | vertex positions | m |
+//! | E | energy | J |
+//! | ∇E | gradient, minus the force | N |
+//! | ∇²E | Hessian in 3×3 blocks | N/m |
+
+use glam::{DMat3, DVec3};
+
+use super::bending::{Hinge, Wing};
+use super::contact::Contacts;
+use super::friction::Friction;
+use super::gravity;
+use super::membrane::{Stiffness, Triangle};
+use super::ordering::nested_dissection;
+use super::pattern::{HELD, Pattern, Slot};
+use crate::GRAVITY;
+use crate::distance::Body;
+use crate::fabric::Fabric;
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+/// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with
+/// (compression stockings reach 2 to 5 kPa), so a looser one stays well off the skin.
+const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
+
+/// The cloth keeps at least this distance (m) from the body, however thin it is: a triangle a centimetre long over a
+/// limb of 5 cm radius sags 0.25 mm below its vertices.
+const LEAST_OFFSET: f64 = 5e-4;
+
+/// What can be wrong with a garment's data.
+#[derive(Debug, thiserror::Error)]
+pub enum EnergyError {
+    /// As many rest triangles as triangles are needed.
+    #[error("the rest shape has {rest} triangles and the garment {mesh}: give the rest shape of this very mesh")]
+    RestCount {
+        /// Triangles of the rest shape.
+        rest: usize,
+        /// Triangles of the mesh.
+        mesh: usize,
+    },
+    /// A triangle without rest area has no strain.
+    #[error("triangle {triangle} (from 0) has no area in the rest shape: repair the mesh or the pattern first")]
+    Degenerate {
+        /// Its index.
+        triangle: usize,
+    },
+    /// A held vertex that is not there.
+    #[error("held vertex {vertex} does not exist: the garment has {count} vertices, numbered from 0")]
+    Held {
+        /// Index asked for.
+        vertex: u32,
+        /// Vertices there are.
+        count: usize,
+    },
+    /// No vertex left to move.
+    #[error("no vertex is free: all {count} are held")]
+    NothingFree {
+        /// Vertices there are.
+        count: usize,
+    },
+}
+
+/// The unchanging part of the energy of one garment in one fabric.
+#[derive(Debug, Clone)]
+pub struct Cloth {
+    /// Mass of each vertex, kg.
+    pub masses: Vec<f64>,
+    /// Rest area of each vertex, m².
+    pub areas: Vec<f64>,
+    /// Whether each vertex is held.
+    pub held: Vec<bool>,
+    /// Weight of the whole garment, N.
+    pub weight: f64,
+    /// Distance the cloth keeps from the body, m.
+    pub offset: f64,
+    /// Coulomb friction against the body.
+    pub friction: f64,
+    /// Vertex of each unknown, in elimination order.
+    pub order: Vec<u32>,
+    /// Unknown of each vertex, [`HELD`] where it is held.
+    pub unknown: Vec<u32>,
+    /// Where the Hessian's blocks are.
+    pub pattern: Pattern,
+    /// The triangles' rest data.
+    pub triangles: Vec<Triangle>,
+    /// The inner edges.
+    pub hinges: Vec<Hinge>,
+    stiffness: Stiffness,
+    triangle_slots: Vec<[Slot; 6]>,
+    bending_blocks: Vec<f64>,
+}
+
+impl Cloth {
+    /// Precomputes everything that does not depend on positions. `held` vertices do not move.
+    ///
+    /// # Errors
+    /// [`EnergyError`] names the triangle or vertex that is wrong.
+    pub fn new(
+        mesh: &TriMesh,
+        topology: &Topology,
+        rest: &RestShape,
+        fabric: &Fabric,
+        held: &[u32],
+    ) -> Result<Self, EnergyError> {
+        let n = mesh.vertex_count();
+        if rest.corners.len() != mesh.triangles.len() {
+            return Err(EnergyError::RestCount { rest: rest.corners.len(), mesh: mesh.triangles.len() });
+        }
+        let mut is_held = vec![false; n];
+        for &vertex in held {
+            *is_held.get_mut(vertex as usize).ok_or(EnergyError::Held { vertex, count: n })? = true;
+        }
+        let triangles = mesh
+            .triangles
+            .iter()
+            .zip(&rest.corners)
+            .enumerate()
+            .map(|(triangle, (&v, &c))| Triangle::new(v, c).ok_or(EnergyError::Degenerate { triangle }))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut areas = vec![0.0; n];
+        for t in &triangles {
+            for &v in &t.vertices {
+                areas[v as usize] += t.area / 3.0;
+            }
+        }
+        // A vertex of no triangle has no mass and nothing to balance: it keeps still.
+        for (h, &area) in is_held.iter_mut().zip(&areas) {
+            *h |= area == 0.0;
+        }
+        let masses: Vec<f64> = areas.iter().map(|a| a * fabric.density_kg_per_m2).collect();
+        let hinges = hinges(mesh, topology, rest, fabric);
+        let free: Vec<u32> = (0..n as u32).filter(|&v| !is_held[v as usize]).collect();
+        if free.is_empty() {
+            return Err(EnergyError::NothingFree { count: n });
+        }
+        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &hinges));
+        let mut unknown = vec![HELD; n];
+        for (i, &v) in order.iter().enumerate() {
+            unknown[v as usize] = i as u32;
+        }
+        let mut cloth = Self {
+            weight: GRAVITY * masses.iter().sum::<f64>(),
+            masses,
+            areas,
+            held: is_held,
+            offset: fabric.thickness_m.max(LEAST_OFFSET),
+            friction: fabric.friction,
+            order,
+            unknown,
+            pattern: Pattern::default(),
+            triangles,
+            hinges,
+            stiffness: Stiffness::new(fabric),
+            triangle_slots: Vec::new(),
+            bending_blocks: Vec::new(),
+        };
+        cloth.lay_out(topology);
+        Ok(cloth)
+    }
+
+    /// Builds the pattern, the triangles' slots in it and bending's constant blocks.
+    fn lay_out(&mut self, topology: &Topology) {
+        let u = &self.unknown;
+        let edges = topology.edges.iter().copied().chain(self.hinges.iter().map(|h| [h.vertices[2], h.vertices[3]]));
+        let pairs = edges.map(|[a, b]| (u[a as usize], u[b as usize])).filter(|&(i, j)| i != HELD && j != HELD);
+        let pattern = Pattern::new(self.order.len(), pairs);
+        let slot = |a: u32, b: u32| pattern.slot(u[a as usize], u[b as usize]);
+        self.triangle_slots = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.vertices;
+                [slot(a, a), slot(b, b), slot(c, c), slot(b, a), slot(c, a), slot(c, b)]
+            })
+            .collect();
+        self.bending_blocks = vec![0.0; pattern.rows.len()];
+        for hinge in &self.hinges {
+            for i in 0..4 {
+                for j in 0..=i {
+                    let s = slot(hinge.vertices[i], hinge.vertices[j]);
+                    if s.block != HELD {
+                        self.bending_blocks[s.block as usize] += hinge.hessian(i, j);
+                    }
+                }
+            }
+        }
+        self.pattern = pattern;
+    }
+
+    /// Number of vertices, held or free.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.masses.len()
+    }
+
+    /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
+    #[must_use]
+    pub fn contacts<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+        let stiffness = HALF_THICKNESS_PRESSURE / (0.5 * self.offset);
+        let friction = Friction::new(self.friction);
+        let mut contacts = Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, friction);
+        contacts.update(x);
+        contacts.friction_refresh(x);
+        contacts
+    }
+
+    /// E at `x`, J; `contacts` must have been updated at `x`.
+    #[must_use]
+    pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
+        let membrane: f64 = self.triangles.iter().map(|t| t.energy(&self.stiffness, x)).sum();
+        let bending: f64 = self.hinges.iter().map(|h| h.energy(x)).sum();
+        gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
+    }
+
+    /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
+    pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
+        gradient.clear();
+        gradient.resize(x.len(), DVec3::ZERO);
+        gravity::add_gradient(&self.masses, gradient);
+        let membrane: f64 = self.triangles.iter().map(|t| t.add_gradient(&self.stiffness, x, gradient)).sum();
+        let bending: f64 = self.hinges.iter().map(|h| h.add_gradient(x, gradient)).sum();
+        contacts.add_gradient(gradient);
+        contacts.friction.add_gradient(x, gradient);
+        for (g, &held) in gradient.iter_mut().zip(&self.held) {
+            if held {
+                *g = DVec3::ZERO;
+            }
+        }
+        gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
+    }
+
+    /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
+    pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        blocks.clear();
+        blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
+        for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
+            let parts = t.hessian(&self.stiffness, x);
+            for (slot, part) in slots.iter().zip(&parts) {
+                if slot.block != HELD {
+                    blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
+                }
+            }
+        }
+        for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
+            let i = self.unknown[v as usize];
+            if i != HELD {
+                blocks[self.pattern.starts[i as usize] as usize] += block;
+            }
+        }
+    }
+
+    /// H d for a Hessian in [`hessian`](Self::hessian)'s blocks, both over the unknowns in elimination order.
+    pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.resize(d.len(), DVec3::ZERO);
+        for (j, &dj) in d.iter().enumerate() {
+            let range = self.pattern.column(j);
+            let column = blocks[range.clone()].iter().zip(&self.pattern.rows[range]);
+            let mut sum = DVec3::ZERO;
+            for (k, (block, &row)) in column.enumerate() {
+                let i = row as usize;
+                sum += block.transpose() * d[i];
+                if k > 0 {
+                    out[i] += *block * dj;
+                }
+            }
+            out[j] += sum;
+        }
+    }
+}
+
+/// The inner edges as hinges; an edge of three or more triangles bends between its first two only.
+fn hinges(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabric: &Fabric) -> Vec<Hinge> {
+    let wing = |t: u32, a: u32, b: u32| {
+        let corners = mesh.triangles[t as usize];
+        let at = |v: u32| corners.iter().position(|&c| c == v);
+        let (i, j) = (at(a)?, at(b)?);
+        let k = 3 - i - j;
+        let flat = rest.corners[t as usize];
+        Some((corners[k], Wing { corners: [flat[i], flat[j], flat[k]] }))
+    };
+    let inner =
+        topology.edges.iter().zip(&topology.edge_triangles).zip(&topology.edge_valence).filter(|&(_, &v)| v > 1);
+    inner
+        .filter_map(|((&[a, b], &[s, t]), _)| {
+            let ((c, first), (d, second)) = (wing(s, a, b)?, wing(t, a, b)?);
+            Some(Hinge::new([a, b, c, d], [first, second], fabric.bending_nm))
+        })
+        .collect()
+}
+
+/// Which vertices share a block with each.
+fn block_neighbours(n: usize, topology: &Topology, hinges: &[Hinge]) -> Vec<Vec<u32>> {
+    let mut neighbours: Vec<Vec<u32>> = (0..n as u32).map(|v| topology.neighbours(v).to_vec()).collect();
+    for [_, _, c, d] in hinges.iter().map(|h| h.vertices) {
+        neighbours[c as usize].push(d);
+        neighbours[d as usize].push(c);
+    }
+    neighbours
+}

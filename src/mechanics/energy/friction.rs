@@ -1,0 +1,122 @@
+//! Friction: where the cloth rests on the body it holds on, up to Coulomb's limit.
+//!
+//! Each touching vertex has an anchor a on the body and a tangential spring that yields at μ_f N:
+//!
+//! E = μ_f N φ(|u|), u = (I − n nᵀ)(x − a), φ(y) = y²/2ε for y < ε, y − ε/2 beyond,
+//!
+//! so the force is μ_f N u/ε while it sticks and μ_f N û once it slips. N, n and a are those of the last
+//! [`refresh`](Friction::refresh) (the lagging of Li and others: "Incremental potential contact", SIGGRAPH 2020), which makes
+//! the force the gradient of an energy in between. A refresh also drags the anchor of a slipped vertex to ε behind it: the
+//! return mapping of plasticity, here for statics. A state that repeats itself under a refresh is in equilibrium with
+//! Coulomb's law: |f_t| ≤ μ_f N, opposed to the slip where equal.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | μ_f | friction coefficient | – |
+//! | N | normal force | N |
+//! | a | anchor: where the vertex touched first, dragged where it slipped | m |
+//! | ε | elastic slip, [`ELASTIC_SLIP`] | m |
+//!
+//! Limits: statics has no history of its own; the anchors are where the solver's path first touched the body.
+
+use glam::{DMat3, DVec3};
+
+use super::contact::Touch;
+use super::membrane::outer;
+
+/// ε, m: how far a vertex moves before friction is full. Smaller is truer to Coulomb and stiffer to solve: at 0.5 mm the
+/// tangential spring of a vertex under its own weight is some hundred times softer than a jersey.
+pub const ELASTIC_SLIP: f64 = 5e-4;
+
+/// One vertex's hold on the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Hold {
+    vertex: u32,
+    anchor: DVec3,
+    normal: DVec3,
+    /// μ_f N, N.
+    limit: f64,
+}
+
+impl Hold {
+    fn slip(&self, x: &[DVec3]) -> DVec3 {
+        let d = x[self.vertex as usize] - self.anchor;
+        d - self.normal * self.normal.dot(d)
+    }
+}
+
+/// Every hold of a cloth on the body.
+#[derive(Debug, Clone, Default)]
+pub struct Friction {
+    coefficient: f64,
+    holds: Vec<Hold>,
+}
+
+impl Friction {
+    /// No friction.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// With Coulomb's coefficient.
+    #[must_use]
+    pub fn new(coefficient: f64) -> Self {
+        Self { coefficient, holds: Vec::new() }
+    }
+
+    /// Takes normal forces and normals from `touches` at `x`; keeps the anchors of those that held, drags those that
+    /// slipped, lets go of those that left.
+    pub fn refresh(&mut self, touches: &[Touch], x: &[DVec3]) {
+        if self.coefficient <= 0.0 {
+            return;
+        }
+        let mut old = self.holds.iter().peekable();
+        let mut holds = Vec::with_capacity(touches.len());
+        for t in touches {
+            while old.next_if(|h| h.vertex < t.vertex).is_some() {}
+            let position = x[t.vertex as usize];
+            let anchor = old.next_if(|h| h.vertex == t.vertex).map_or(position, |h| h.anchor);
+            let mut hold = Hold { vertex: t.vertex, anchor, normal: t.normal, limit: self.coefficient * t.force() };
+            let slip = hold.slip(x);
+            // The anchor stays in the tangent plane through the vertex; only the slip within ε is elastic.
+            hold.anchor = position - slip.clamp_length_max(ELASTIC_SLIP);
+            holds.push(hold);
+        }
+        self.holds = holds;
+    }
+
+    /// Energy at the lagged forces, J.
+    #[must_use]
+    pub fn energy(&self, x: &[DVec3]) -> f64 {
+        self.holds.iter().map(|h| h.limit * huber(h.slip(x).length())).sum()
+    }
+
+    /// Adds the gradient, N.
+    pub fn add_gradient(&self, x: &[DVec3], gradient: &mut [DVec3]) {
+        for h in &self.holds {
+            let u = h.slip(x);
+            gradient[h.vertex as usize] += u * (h.limit / u.length().max(ELASTIC_SLIP));
+        }
+    }
+
+    /// Each hold's Hessian block, N/m.
+    pub fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DMat3)> + 'a {
+        self.holds.iter().map(|h| {
+            let u = h.slip(x);
+            let y = u.length();
+            let tangent = DMat3::IDENTITY - outer(h.normal, h.normal);
+            let block = if y < ELASTIC_SLIP {
+                tangent * (h.limit / ELASTIC_SLIP)
+            } else {
+                (tangent - outer(u / y, u / y)) * (h.limit / y)
+            };
+            (h.vertex, block)
+        })
+    }
+}
+
+/// φ, m.
+fn huber(y: f64) -> f64 {
+    if y < ELASTIC_SLIP { y * y / (2.0 * ELASTIC_SLIP) } else { y - 0.5 * ELASTIC_SLIP }
+}

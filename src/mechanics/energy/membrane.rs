@@ -1,0 +1,151 @@
+//! Membrane: the cost of stretching and shearing each triangle.
+//!
+//! With F = [F_u F_v] the deformation gradient of a triangle (columns: the images of the weft and warp unit vectors),
+//!
+//! ψ = ½ C_uu s_u² + C_uv s_u s_v + ½ C_vv s_v² + ½ μ γ²,  s_u = |F_u| − 1, s_v = |F_v| − 1, γ = F_u·F_v,
+//!
+//! and the energy is Σ A ψ. A uniaxial pull along the warp meets C_vv − C_uv²/C_uu, which is the measured stiffness k_v:
+//! C_uu = k_u/(1−ν²), C_vv = k_v/(1−ν²), C_uv = ν √(k_u k_v)/(1−ν²). Orthotropic, with the shear stiffness independent,
+//! as cloth is (Wang, O'Brien, Ramamoorthi: "Data-driven elastic models for cloth", SIGGRAPH 2011). The strain is that of
+//! length, after Baraff, Witkin ("Large steps in cloth simulation", SIGGRAPH 1998), not Green's: it does not soften under
+//! compression, so a triangle does not snap through.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | A | rest area | m² |
+//! | k_u, k_v | uniaxial stiffness along weft and warp | N/m |
+//! | μ | shear stiffness | N/m |
+//! | ν | Poisson's ratio, the geometric mean of both directions | – |
+//! | b_i | gradient of corner i's shape function | 1/m |
+//!
+//! The Hessian is positive semi-definite: exact in tension up to terms of strain times stiffness within the plane, and
+//! without the negative stiffness that compression and shear have out of the plane (Teran and others: "Robust
+//! quasistatic finite elements and flesh simulation", SCA 2005, for the principle).
+//!
+//! Limits: constants are those at zero strain; a measured curve's stiffening is not followed.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::fabric::Fabric;
+
+/// One triangle's rest data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangle {
+    /// Its vertices.
+    pub vertices: [u32; 3],
+    /// Rest area A, m².
+    pub area: f64,
+    /// Gradients b_i of the shape functions, 1/m.
+    pub gradients: [DVec2; 3],
+}
+
+/// Membrane stiffness, N/m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stiffness {
+    uu: f64,
+    uv: f64,
+    vv: f64,
+    shear: f64,
+}
+
+impl Stiffness {
+    /// From a fabric's uniaxial constants.
+    #[must_use]
+    pub fn new(fabric: &Fabric) -> Self {
+        let (k_u, k_v, nu) = (fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m, fabric.poisson);
+        let d = 1.0 - nu * nu;
+        Self { uu: k_u / d, uv: nu * (k_u * k_v).sqrt() / d, vv: k_v / d, shear: fabric.shear_n_per_m }
+    }
+}
+
+/// Shorter than this (relative to rest) a triangle's side has no direction: the strain is then constant to first order.
+const SHORTEST: f64 = 1e-12;
+
+impl Triangle {
+    /// Rest data of a triangle with flat corners `rest`; `None` where it has no area.
+    #[must_use]
+    pub fn new(vertices: [u32; 3], rest: [DVec2; 3]) -> Option<Self> {
+        let [a, b, c] = rest;
+        let double = (b - a).perp_dot(c - a);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        if !double.is_finite() || double.abs() <= 1e-12 * longest {
+            return None;
+        }
+        // ∇N_i is the opposite side turned by 90 degrees, over twice the signed area.
+        let gradient = |p: DVec2, q: DVec2| (q - p).perp() / double;
+        Some(Self { vertices, area: 0.5 * double.abs(), gradients: [gradient(b, c), gradient(c, a), gradient(a, b)] })
+    }
+
+    /// F_u and F_v.
+    #[must_use]
+    pub fn deformation(&self, x: &[DVec3]) -> [DVec3; 2] {
+        let [a, b, c] = self.vertices.map(|v| x[v as usize]);
+        let [_, p, q] = self.gradients;
+        // The gradients sum to zero, so two edges carry everything.
+        [(b - a) * p.x + (c - a) * q.x, (b - a) * p.y + (c - a) * q.y]
+    }
+
+    /// Energy A ψ, J.
+    #[must_use]
+    pub fn energy(&self, c: &Stiffness, x: &[DVec3]) -> f64 {
+        let [fu, fv] = self.deformation(x);
+        let (su, sv, gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
+        self.area * (0.5 * c.uu * su * su + c.uv * su * sv + 0.5 * c.vv * sv * sv + 0.5 * c.shear * gamma * gamma)
+    }
+
+    /// Adds the energy's gradient to `gradient`, N; returns the energy.
+    pub fn add_gradient(&self, c: &Stiffness, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+        let [fu, fv] = self.deformation(x);
+        let (lu, lv) = (fu.length(), fv.length());
+        let (su, sv, gamma) = (lu - 1.0, lv - 1.0, fu.dot(fv));
+        let (tu, tv, tau) = (c.uu * su + c.uv * sv, c.uv * su + c.vv * sv, c.shear * gamma);
+        let pu = self.area * (fu * (tu / lu.max(SHORTEST)) + fv * tau);
+        let pv = self.area * (fv * (tv / lv.max(SHORTEST)) + fu * tau);
+        for (&v, b) in self.vertices.iter().zip(&self.gradients) {
+            gradient[v as usize] += pu * b.x + pv * b.y;
+        }
+        self.area * 0.5 * (tu * su + tv * sv + tau * gamma)
+    }
+
+    /// The positive part of the Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m.
+    #[must_use]
+    pub fn hessian(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 6] {
+        let [fu, fv] = self.deformation(x);
+        let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
+        let (su, sv) = (lu - 1.0, lv - 1.0);
+        let (u, v) = (fu / lu, fv / lv);
+        let (tu, tv, tau) = (c.uu * su + c.uv * sv, c.uv * su + c.vv * sv, c.shear * fu.dot(fv));
+        let n = fu.cross(fv).normalize_or_zero();
+        let (wu, wv) = (n.cross(u), n.cross(v));
+        let (a, b, t) = positive_part(tu / lu, tv / lv, tau);
+        let nn = outer(n, n);
+        let huu = outer(u, u) * c.uu + outer(fv, fv) * c.shear + outer(wu, wu) * (tu / lu).max(0.0) + nn * a;
+        let hvv = outer(v, v) * c.vv + outer(fu, fu) * c.shear + outer(wv, wv) * (tv / lv).max(0.0) + nn * b;
+        let huv = outer(u, v) * c.uv + outer(fv, fu) * c.shear + nn * t;
+        let block = |i: usize, j: usize| {
+            let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
+            huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)
+        };
+        [block(0, 0), block(1, 1), block(2, 2), block(1, 0), block(2, 0), block(2, 1)]
+    }
+}
+
+/// a bᵀ.
+pub(super) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// The nearest positive semi-definite matrix to [[a, t], [t, b]], as (a, b, t).
+fn positive_part(a: f64, b: f64, t: f64) -> (f64, f64, f64) {
+    let (mean, half) = (0.5 * (a + b), 0.5 * (a - b));
+    let radius = half.hypot(t);
+    if mean >= radius {
+        return (a, b, t);
+    }
+    let top = mean + radius;
+    if top <= 0.0 {
+        return (0.0, 0.0, 0.0);
+    }
+    // Eigenvector of `top` has the squared components (1 ± half/radius)/2 and product t/(2 radius).
+    (top * 0.5 * (1.0 + half / radius), top * 0.5 * (1.0 - half / radius), top * 0.5 * t / radius)
+}

@@ -1,0 +1,26 @@
+//! One energy for the whole drape: E(x) = gravity + membrane + bending + contact + friction.
+//!
+//! [`Cloth`] holds what does not change while a garment settles: rest shape, masses, hinges, the held vertices and the
+//! pattern of the Hessian. [`Contacts`] holds what does: which vertices touch the body, and how they hold on to it.
+//! Forces are −∇E. Every Hessian here is positive semi-definite, so a Newton step always descends.
+//!
+//! | term | file | equation |
+//! |---|---|---|
+//! | gravity | [`gravity`] | Σ m g z |
+//! | membrane | [`membrane`] | Σ A ψ(F), orthotropic |
+//! | bending | [`bending`] | Σ ½ 3B/(A₀+A₁) \|Σ c x\|² |
+//! | contact | [`contact`] | Σ ½ κ A (h − q)² |
+//! | friction | [`friction`] | Σ μ N φ(\|u\|) |
+
+pub mod bending;
+mod cloth;
+pub mod contact;
+pub mod friction;
+pub mod gravity;
+pub mod membrane;
+pub mod ordering;
+pub mod pattern;
+
+pub use cloth::{Cloth, EnergyError};
+pub use contact::Contacts;
+pub use friction::Friction;

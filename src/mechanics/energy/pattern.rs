@@ -1,0 +1,68 @@
+//! Where the Hessian's 3×3 blocks are: a symmetric sparse pattern over the free vertices, built once a garment.
+//!
+//! Two free vertices share a block if a triangle or a hinge holds both. Unknowns are numbered in the order of
+//! elimination ([`ordering`](super::ordering)), columns ascending, lower half only: block (i, j) with i ≥ j.
+
+/// Marks a vertex that is held, and a block that falls away with it.
+pub const HELD: u32 = u32::MAX;
+
+/// The lower half of a symmetric block pattern, by columns.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Pattern {
+    /// First block of each column, and one past the last: unknowns + 1.
+    pub starts: Vec<u32>,
+    /// Row of each block; the first of a column is its diagonal.
+    pub rows: Vec<u32>,
+}
+
+/// A block and whether it is met transposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slot {
+    /// Index of the block, [`HELD`] for none.
+    pub block: u32,
+    /// Whether the pair comes as (column, row).
+    pub transposed: bool,
+}
+
+impl Pattern {
+    /// From pairs (row, column) of unknowns, in any order, repeated or not; every diagonal block is there.
+    #[must_use]
+    pub fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
+        let mut all: Vec<(u32, u32)> = pairs.map(|(i, j)| (i.min(j), i.max(j))).collect();
+        all.extend((0..unknowns as u32).map(|i| (i, i)));
+        all.sort_unstable();
+        all.dedup();
+        let mut starts = vec![0; unknowns + 1];
+        for &(column, _) in &all {
+            starts[column as usize + 1] += 1;
+        }
+        for i in 0..unknowns {
+            starts[i + 1] += starts[i];
+        }
+        Self { starts, rows: all.into_iter().map(|(_, row)| row).collect() }
+    }
+
+    /// Number of unknown vertices.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Blocks of a column.
+    #[must_use]
+    pub fn column(&self, j: usize) -> std::ops::Range<usize> {
+        self.starts[j] as usize..self.starts[j + 1] as usize
+    }
+
+    /// The block of a pair of unknowns.
+    #[must_use]
+    pub fn slot(&self, i: u32, j: u32) -> Slot {
+        if i == HELD || j == HELD {
+            return Slot { block: HELD, transposed: false };
+        }
+        let range = self.column(i.min(j) as usize);
+        let found = self.rows[range.clone()].binary_search(&i.max(j));
+        let block = found.map_or(HELD, |k| (range.start + k) as u32);
+        Slot { block, transposed: i < j }
+    }
+}

@@ -1,0 +1,90 @@
+//! How a garment lies about a body before anything is draped.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::health::Percentiles;
+use super::self_intersection::crossing_pairs;
+use super::{MeshError, Topology, TriMesh};
+use crate::distance::Body;
+
+/// A garment whose nearest vertex is farther than this from the body (m) is not worn: the loosest gown hangs from a shoulder
+/// or a waist.
+pub const FARTHEST: f64 = 1.0;
+
+/// Body and garment together, in figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fit {
+    /// Garment vertices inside the body.
+    pub penetrating_vertices: usize,
+    /// The deepest of them, m below the surface.
+    pub deepest_m: f64,
+    /// Pairs of a garment and a body triangle that cross, counted exactly.
+    pub crossing_pairs: usize,
+    /// Signed distance of the garment's vertices to the body, m.
+    pub clearance_m: Percentiles,
+}
+
+impl Fit {
+    /// Measures; `body_mesh` is the mesh that `body` was made of.
+    #[must_use]
+    pub fn new(garment: &TriMesh, body_mesh: &TriMesh, body: &Body) -> Self {
+        let distance: Vec<f64> = body.nearest_all(&garment.positions).iter().map(|near| near.signed_distance).collect();
+        Self {
+            penetrating_vertices: distance.iter().filter(|&&q| q < 0.0).count(),
+            deepest_m: distance.iter().fold(0.0, |deepest, &q| f64::max(deepest, -q)),
+            crossing_pairs: crossing_pairs(garment, body_mesh).len(),
+            clearance_m: Percentiles::of(distance),
+        }
+    }
+
+    /// Name and value of each figure, as a table wants them.
+    #[must_use]
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let inside = match self.penetrating_vertices {
+            0 => "none".to_owned(),
+            n => format!("{n} vertices, up to {:.1} mm deep", 1e3 * self.deepest_m),
+        };
+        vec![
+            ("inside the body", inside),
+            ("triangle pairs that cross", self.crossing_pairs.to_string()),
+            ("clearance, mm", self.clearance_m.text(1e3, 1)),
+        ]
+    }
+}
+
+impl fmt::Display for Fit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.rows().iter().try_for_each(|(name, value)| writeln!(f, "{name:<26} {value}"))
+    }
+}
+
+/// Whether the body is near at all.
+///
+/// # Errors
+/// [`MeshError::NotNear`] if every vertex is farther than [`FARTHEST`] from it.
+pub fn check_near(garment: &TriMesh, body: &Body) -> Result<(), MeshError> {
+    let distances = body.nearest_all(&garment.positions);
+    let nearest = distances.iter().map(|near| near.signed_distance.abs()).fold(f64::INFINITY, f64::min);
+    if nearest > FARTHEST { Err(MeshError::NotNear { nearest, limit: FARTHEST }) } else { Ok(()) }
+}
+
+/// Triangles of the connected parts of a garment that face the body, which by our winding they should not: those to be
+/// turned so that normals point away from it. A part faces the body if the area-weighted sum of n · ∇q is negative.
+#[must_use]
+pub fn facing_body(garment: &TriMesh, body: &Body) -> Vec<bool> {
+    let (component, count) = Topology::new(garment).components();
+    let middles: Vec<_> = (0..garment.triangles.len())
+        .map(|t| {
+            let [a, b, c] = garment.corners(t);
+            (a + b + c) / 3.0
+        })
+        .collect();
+    let mut outward = vec![0.0; count];
+    let part = |t: usize| component[garment.triangles[t][0] as usize] as usize;
+    for (t, near) in body.nearest_all(&middles).iter().enumerate() {
+        outward[part(t)] += garment.double_area_vector(t).dot(near.normal);
+    }
+    (0..garment.triangles.len()).map(|t| outward[part(t)] < 0.0).collect()
+}

@@ -1,0 +1,154 @@
+//! Whether two triangles cross, exactly.
+//!
+//! Two triangles cross if an edge of one goes from strictly one side of the other's plane to strictly the other through the
+//! triangle, or if both lie in one plane and their insides overlap. To touch is not to cross: neighbours share an edge
+//! or a vertex, and unjoined seams lie on each other. A fold so sharp that two neighbours coincide does cross. Every
+//! decision is the sign of a determinant, taken exactly (Shewchuk: "Adaptive precision floating-point arithmetic and fast robust
+//! geometric predicates", Discrete & Computational Geometry 18, 1997; the `robust` crate).
+//!
+//! Limits: a triangle without area crosses nothing in its own plane.
+
+use glam::DVec3;
+use robust::{Coord, Coord3D, orient2d, orient3d};
+
+/// Whether triangles `a` and `b` cross. Symmetric, and the same for any order of the corners.
+#[must_use]
+pub fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    let a_sides = a.map(|p| side(b, p));
+    if same_side(a_sides) {
+        return false;
+    }
+    let b_sides = b.map(|p| side(a, p));
+    if same_side(b_sides) {
+        return false;
+    }
+    if a_sides == [0.0; 3] && b_sides == [0.0; 3] {
+        return overlap(a, b);
+    }
+    pierces(a, a_sides, b) || pierces(b, b_sides, a)
+}
+
+/// Positive, zero or negative: where `p` lies against the plane of the triangle.
+fn side(t: [DVec3; 3], p: DVec3) -> f64 {
+    let [a, b, c, p] = [t[0], t[1], t[2], p].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
+    orient3d(a, b, c, p)
+}
+
+fn same_side(sides: [f64; 3]) -> bool {
+    sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0)
+}
+
+/// Whether an edge of `a`, with its corners on these sides of `b`, goes through `b`.
+fn pierces(a: [DVec3; 3], sides: [f64; 3], b: [DVec3; 3]) -> bool {
+    (0..3).any(|k| {
+        let next = (k + 1) % 3;
+        let through_plane = (sides[k] > 0.0 && sides[next] < 0.0) || (sides[k] < 0.0 && sides[next] > 0.0);
+        through_plane && {
+            let turns = [0, 1, 2].map(|i| side([a[k], a[next], b[i]], b[(i + 1) % 3]));
+            turns.iter().all(|&s| s >= 0.0) || turns.iter().all(|&s| s <= 0.0)
+        }
+    })
+}
+
+/// Whether the insides of two triangles in one plane overlap: no edge of either has the other all on its outer side.
+fn overlap(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    // Seen along the axis in which the plane is widest; leaving a coordinate out keeps the others exact.
+    let normal = (a[1] - a[0]).cross(a[2] - a[0]).abs();
+    let (i, j) = match normal.max_element() {
+        m if m == normal.x => (1, 2),
+        m if m == normal.y => (0, 2),
+        _ => (0, 1),
+    };
+    let flat = |t: [DVec3; 3]| {
+        let t = t.map(|p| Coord { x: p[i], y: p[j] });
+        let turn = orient2d(t[0], t[1], t[2]);
+        (turn != 0.0).then_some(if turn < 0.0 { [t[0], t[2], t[1]] } else { t })
+    };
+    let (Some(a), Some(b)) = (flat(a), flat(b)) else { return false };
+    let apart = |t: [Coord<f64>; 3], other: [Coord<f64>; 3]| {
+        (0..3).any(|k| other.iter().all(|&p| orient2d(t[k], t[(k + 1) % 3], p) <= 0.0))
+    };
+    !apart(a, b) && !apart(b, a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3Swizzles;
+    use proptest::prelude::*;
+
+    const FLAT: [DVec3; 3] = [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
+
+    fn p(x: f64, y: f64, z: f64) -> DVec3 {
+        DVec3::new(x, y, z)
+    }
+
+    #[test]
+    fn what_goes_through_crosses_and_what_touches_does_not() {
+        assert!(cross(FLAT, [p(1.0, 1.0, -1.0), p(1.0, 1.0, 1.0), p(9.0, 9.0, 1.0)]));
+        // Through its edge, exactly.
+        assert!(cross(FLAT, [p(2.0, 2.0, -1.0), p(2.0, 2.0, 1.0), p(9.0, 9.0, 1.0)]));
+        // Beside it, above it, a corner on it, an edge on it, an edge on its edge.
+        assert!(!cross(FLAT, [p(3.0, 3.0, -1.0), p(3.0, 3.0, 1.0), p(9.0, 9.0, 1.0)]));
+        assert!(!cross(FLAT, [p(1.0, 1.0, 0.1), p(1.0, 1.0, 1.0), p(9.0, 9.0, 1.0)]));
+        assert!(!cross(FLAT, [p(1.0, 1.0, 0.0), p(1.0, 1.0, 1.0), p(2.0, 1.0, 1.0)]));
+        assert!(!cross(FLAT, [p(1.0, 1.0, 0.0), p(2.0, 1.0, 0.0), p(2.0, 1.0, 1.0)]));
+        assert!(!cross(FLAT, [p(1.0, 0.0, 0.0), p(2.0, 0.0, 0.0), p(2.0, -1.0, 1.0)]));
+        // A corner in its plane, the opposite edge through it: a line of points in common.
+        assert!(cross(FLAT, [p(-1.0, 1.0, 0.0), p(1.0, 1.0, 1.0), p(1.0, 1.0, -1.0)]));
+    }
+
+    #[test]
+    fn neighbours_cross_only_where_they_do() {
+        // Over a shared edge: folded to any angle, and folded flat onto itself.
+        assert!(!cross(FLAT, [FLAT[0], FLAT[1], p(0.0, -4.0, 0.0)]));
+        assert!(!cross(FLAT, [FLAT[0], FLAT[1], p(0.0, 4.0, 1e-300)]));
+        assert!(cross(FLAT, [FLAT[0], FLAT[1], p(1.0, 3.0, 0.0)]));
+        // At a shared corner: in one plane beside and upon each other, and through each other.
+        assert!(!cross(FLAT, [FLAT[0], p(-4.0, 0.0, 0.0), p(0.0, -4.0, 0.0)]));
+        assert!(cross(FLAT, [FLAT[0], p(1.0, 2.0, 0.0), p(2.0, 1.0, 0.0)]));
+        assert!(cross(FLAT, [FLAT[0], p(1.0, 1.0, 1.0), p(1.0, 1.0, -1.0)]));
+        assert!(!cross(FLAT, [FLAT[0], p(1.0, 1.0, 1.0), p(-3.0, 1.0, -1.0)]));
+        assert!(cross(FLAT, FLAT));
+    }
+
+    #[test]
+    fn a_triangle_without_area_crosses_nothing_in_its_plane() {
+        let thin = [p(1.0, 1.0, 0.0), p(2.0, 1.0, 0.0), p(3.0, 1.0, 0.0)];
+        assert!(!cross(FLAT, thin) && !cross(thin, FLAT) && !cross(thin, thin));
+        // Standing, it still pierces.
+        assert!(cross(FLAT, [p(1.0, 1.0, -1.0), p(1.0, 1.0, 0.5), p(1.0, 1.0, 1.0)]));
+    }
+
+    proptest! {
+        /// On small whole numbers degenerate cases are common; the answer must not depend on the order of anything.
+        #[test]
+        fn the_order_of_corners_does_not_matter(c in prop::array::uniform18(-2i8..3)) {
+            let at = |k: usize| p(c[k].into(), c[k + 1].into(), c[k + 2].into());
+            let (a, b) = ([at(0), at(3), at(6)], [at(9), at(12), at(15)]);
+            let expected = cross(a, b);
+            for order in [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+                prop_assert_eq!(cross(order.map(|k| a[k]), b), expected);
+                prop_assert_eq!(cross(b, order.map(|k| a[k])), expected);
+            }
+        }
+
+        /// Against sampling: a common point well inside both, found on a grid, is a crossing.
+        #[test]
+        fn disjoint_boxes_never_cross_and_a_shared_inner_point_always_does(
+            c in prop::array::uniform12(-1.0..1.0f64), w in prop::array::uniform4(0.1..0.45f64),
+        ) {
+            let at = |k: usize| p(c[k], c[k + 1], c[k + 2]);
+            let a = [at(0), at(3), at(6)];
+            let shared = a[0] + w[0] * (a[1] - a[0]) + w[1] * (a[2] - a[0]);
+            // A triangle through that point, two corners free.
+            let (q, r) = (at(9), at(9).yzx() - 0.5);
+            let s = (shared - w[2] * q - w[3] * r) / (1.0 - w[2] - w[3]);
+            let area = (q - s).cross(r - s).length().min((a[1] - a[0]).cross(a[2] - a[0]).length());
+            prop_assume!(area > 1e-3);
+            prop_assert!(cross(a, [q, r, s]));
+            let beyond = DVec3::X * (1.0 + 2.0 * a.iter().chain(&[q, r, s]).map(|p| p.length()).fold(0.0, f64::max));
+            prop_assert!(!cross(a, [q + beyond, r + beyond, s + beyond]));
+        }
+    }
+}

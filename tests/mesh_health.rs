@@ -1,0 +1,139 @@
+//! Health, fit and push-out on shapes whose figures are known.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use partwise::distance::Body;
+use partwise::mesh::fit::{Fit, check_near, facing_body};
+use partwise::mesh::health::health;
+use partwise::mesh::push_out::push_out;
+use partwise::mesh::{MeshError, TriMesh};
+
+/// A sphere about the origin: `n` parallels, 2n meridians, closed with two poles.
+fn sphere(radius: f64, n: u32) -> TriMesh {
+    let around = 2 * n;
+    let at = |i: u32, j: u32| {
+        let (polar, turn) = (PI * f64::from(i) / f64::from(n + 1), PI * f64::from(j) / f64::from(n));
+        radius * DVec3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos())
+    };
+    let mut positions = vec![DVec3::Z * radius, DVec3::NEG_Z * radius];
+    positions.extend((1..=n).flat_map(|i| (0..around).map(move |j| at(i, j))));
+    let v = |i: u32, j: u32| 2 + (i - 1) * around + j % around;
+    let mut triangles = Vec::new();
+    for j in 0..around {
+        triangles.push([0, v(1, j), v(1, j + 1)]);
+        triangles.push([1, v(n, j + 1), v(n, j)]);
+        for i in 1..n {
+            triangles.push([v(i, j), v(i + 1, j), v(i + 1, j + 1)]);
+            triangles.push([v(i, j), v(i + 1, j + 1), v(i, j + 1)]);
+        }
+    }
+    TriMesh::new(positions, triangles)
+}
+
+/// A tube about the z axis, open at both ends: `rows` rings of `around` vertices, radius by turn and height.
+fn tube(rows: u32, around: u32, height: f64, radius: impl Fn(f64, f64) -> f64) -> TriMesh {
+    let at = |i: u32, j: u32| {
+        let (z, turn) =
+            (height * (f64::from(i) / f64::from(rows - 1) - 0.5), 2.0 * PI * f64::from(j) / f64::from(around));
+        let r = radius(turn, z);
+        DVec3::new(r * turn.cos(), r * turn.sin(), z)
+    };
+    let positions = (0..rows).flat_map(|i| (0..around).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect();
+    let v = |i: u32, j: u32| i * around + j % around;
+    let square = |i: u32, j: u32| [[v(i, j), v(i, j + 1), v(i + 1, j + 1)], [v(i, j), v(i + 1, j + 1), v(i + 1, j)]];
+    TriMesh::new(positions, (0..rows - 1).flat_map(|i| (0..around).flat_map(move |j| square(i, j))).collect())
+}
+
+#[test]
+fn a_sphere_is_sound_and_its_figures_are_those_of_geometry() {
+    let found = health(&sphere(0.5, 40));
+    assert_eq!((found.vertices, found.triangles), (2 + 40 * 80, 2 * 80 * 40));
+    assert!(found.closed && found.components == 1 && found.boundary_loops == 0);
+    assert_eq!((found.self_intersecting_pairs, found.disagreeing_edges, found.non_manifold_edges), (0, 0, 0));
+    // An inscribed polyhedron falls short of the sphere by about (π/n)²/2.
+    assert!((found.area_m2 / PI - 1.0).abs() < 3e-3, "{}", found.area_m2);
+    assert!((found.volume_m3.unwrap() / (PI / 6.0) - 1.0).abs() < 5e-3);
+    assert!(found.min_angle_deg.min > 0.0 && found.min_angle_deg.max <= 60.0);
+    let said = found.to_string();
+    assert!(said.contains("closed") && said.contains("yes, 52"), "{said}");
+}
+
+#[test]
+fn two_spheres_that_overlap_are_found_to_cross() {
+    let (mut both, other) = (sphere(0.5, 12), sphere(0.5, 12));
+    let n = both.positions.len() as u32;
+    both.positions.extend(other.positions.iter().map(|p| p + DVec3::new(0.31, 0.17, 0.11)));
+    both.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + n)));
+    let found = health(&both);
+    assert_eq!(found.components, 2);
+    assert!(found.closed && found.self_intersecting_pairs > 20);
+    let apart: Vec<DVec3> =
+        both.positions.iter().enumerate().map(|(v, &p)| if v as u32 >= n { p + DVec3::X } else { p }).collect();
+    assert_eq!(health(&both.with_positions(apart)).self_intersecting_pairs, 0);
+}
+
+#[test]
+fn a_tube_has_two_loops_and_faces_away_from_what_it_holds() {
+    let garment = tube(21, 60, 0.4, |_, _| 0.6);
+    let found = health(&garment);
+    assert_eq!((found.boundary_loops, found.boundary_edges, found.closed), (2, 120, false));
+    let body_mesh = sphere(0.5, 40);
+    let body = Body::new(&body_mesh).unwrap();
+    assert!(facing_body(&garment, &body).iter().all(|&facing| !facing));
+    let mut reversed = garment.clone();
+    reversed.triangles.iter_mut().for_each(|t| t.reverse());
+    assert!(facing_body(&reversed, &body).iter().all(|&facing| facing));
+    let fit = Fit::new(&garment, &body_mesh, &body);
+    assert_eq!((fit.penetrating_vertices, fit.crossing_pairs), (0, 0));
+    assert!((fit.clearance_m.min - 0.1).abs() < 2e-3, "{fit}");
+    assert!(check_near(&garment, &body).is_ok());
+    let away = garment.with_positions(garment.positions.iter().map(|p| p + DVec3::X * 30.0).collect());
+    let error = check_near(&away, &body).unwrap_err();
+    assert!(matches!(error, MeshError::NotNear { nearest, .. } if (nearest - 28.9).abs() < 0.01), "{error}");
+    assert!(error.to_string().contains("28.90 m"), "{error}");
+}
+
+/// Sizes of a dent (m): shallow and wide; deep; a spike at single vertices.
+#[test]
+fn dents_are_pushed_out_without_turning_a_triangle_over() {
+    let body_mesh = sphere(0.5, 60);
+    let body = Body::new(&body_mesh).unwrap();
+    for (depth, width) in [(0.012, 0.3), (0.045, 0.25), (0.03, 0.02)] {
+        let garment = tube(41, 160, 0.3, |turn, z| {
+            let dent = (-((turn - PI) / width).powi(2) - (z / (0.5 * width)).powi(2)).exp();
+            0.52 - (0.02 + depth) * dent
+        });
+        let before = Fit::new(&garment, &body_mesh, &body);
+        let thickness = 0.0005;
+        let (pushed, report) = push_out(&garment, &body, thickness);
+        assert!(report.found_inside > 0 && report.found_inside == before.penetrating_vertices);
+        assert!((report.deepest_m - before.deepest_m).abs() < 1e-15);
+        assert_eq!((report.left_inside, report.turned_over), (0, 0), "{report}");
+        let q = body.nearest_all(&pushed.positions);
+        for (v, (near, was)) in q.iter().zip(body.nearest_all(&garment.positions)).enumerate() {
+            let floor = if was.signed_distance < 0.0 { thickness } else { was.signed_distance.min(thickness) };
+            assert!(near.signed_distance > floor * (1.0 - 1e-5), "vertex {v}: {} < {floor}", near.signed_distance);
+        }
+        for t in 0..garment.triangles.len() {
+            assert!(garment.double_area_vector(t).dot(pushed.double_area_vector(t)) > 0.0);
+        }
+        // Away from the dent nothing moved.
+        let still = garment.positions.iter().zip(&pushed.positions).filter(|(p, q)| p == q).count();
+        assert_eq!(still + report.moved, garment.vertex_count());
+        assert!(report.moved < garment.vertex_count() / 2, "{report}");
+        assert_eq!(report.too_deep > 0, depth > 0.031, "{report}");
+    }
+}
+
+#[test]
+fn a_garment_that_is_outside_is_left_as_it_is() {
+    let body = Body::new(&sphere(0.5, 30)).unwrap();
+    let garment = tube(11, 40, 0.3, |_, _| 0.5002);
+    let (same, report) = push_out(&garment, &body, 0.001);
+    assert_eq!(same, garment);
+    assert_eq!((report.found_inside, report.moved), (0, 0));
+    assert!(report.is_clean() && report.to_string().contains("no vertex"));
+}
