@@ -104,8 +104,9 @@ impl Anatomy {
         };
         let seat = hip / 0.1528;
         let buttock = Ellipsoid {
-            centre: DVec3::new(0.075 * seat, 0.043 * seat, m.hip_height + 0.005 * k),
-            radii: DVec3::new(0.083, 0.079, 0.095) * seat,
+            centre: DVec3::new(0.076 * seat, 0.043 * seat, m.hip_height + 0.028 * k),
+            // Its lower end stays a little above the crotch, or the seat would close the gap between the legs.
+            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.038 * k),
             lean: 0.1,
         };
         let (arm, wrist_at, biceps_at) = arm(m, f);
@@ -163,7 +164,7 @@ impl Solid for Legs<'_> {
     fn at(&self, p: DVec3) -> Jet {
         let one = |side: f64| {
             let limb = Sided::new(&self.0.foot, side).join(Sided::new(&self.0.leg, side).at(p), p, 0.05);
-            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.015)
+            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.035)
         };
         let near = one(p.x);
         // The other leg matters only next to the middle.
@@ -282,10 +283,10 @@ fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
         oval(wrist, 0.88 * w, 1.12 * w),
         oval(wrist + 0.04 * k, 0.017 * k, 0.034 * k),
         oval(wrist + 0.085 * k, 0.0155 * k, 0.040 * k),
-        oval(wrist + 0.13 * k, 0.0125 * k, 0.034 * k),
-        oval(wrist + 0.175 * k, 0.009 * k, 0.021 * k),
+        oval(wrist + 0.13 * k, 0.0135 * k, 0.034 * k),
+        oval(wrist + 0.175 * k, 0.0115 * k, 0.023 * k),
     ];
-    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.004]), wrist, biceps)
+    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.009]), wrist, biceps)
 }
 
 /// Half the gap between the thighs where they are closest, m: what the mesh needs to keep them apart.
@@ -336,11 +337,11 @@ fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
         step(-0.02, 0.031, 0.050),
         step(0.03, 0.034, 0.058),
         step(0.08, 0.040, 0.042),
-        step(0.13, 0.046, 0.026),
-        step(0.165, 0.044, 0.017),
-        step(0.195, 0.034, 0.012),
+        step(0.13, 0.046, 0.029),
+        step(0.165, 0.044, 0.021),
+        step(0.195, 0.036, 0.017),
     ];
-    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.008, 0.007]);
+    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.01, 0.011]);
     (leg, foot)
 }
 
