@@ -34,6 +34,30 @@ pub(crate) fn block(size: DVec3, tilt: f64) -> Body {
     Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
 }
 
+/// A table 40 cm deep, its top at z = 0, its edges at x = ±`half` rounded with `radius`: a cloth of 1 cm cells on a sharp
+/// edge would catch on its own corners.
+pub(crate) fn table(half: f64, radius: f64) -> Body {
+    let arc = |k: usize| {
+        let (sin, cos) = (std::f64::consts::PI * k as f64 / 24.0).sin_cos();
+        DVec3::new(half - radius + radius * sin, 0.0, radius * (cos - 1.0))
+    };
+    let right: Vec<DVec3> = (0..=24).map(arc).collect();
+    let left = right.iter().rev().map(|p| DVec3::new(-p.x, p.y, p.z));
+    let profile: Vec<DVec3> = right.iter().copied().chain(left).collect();
+    let n = profile.len() as u32;
+    let mut positions: Vec<DVec3> = Vec::new();
+    for y in [-0.2, 0.2] {
+        positions.extend(profile.iter().map(|p| *p + DVec3::Y * y));
+    }
+    positions.extend([DVec3::new(0.0, -0.2, -radius), DVec3::new(0.0, 0.2, -radius)]);
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        let j = (i + 1) % n;
+        triangles.extend([[i, n + j, n + i], [i, j, n + j], [2 * n, j, i], [2 * n + 1, n + i, n + j]]);
+    }
+    Body::new(&TriMesh::new(positions, triangles)).unwrap()
+}
+
 /// A sphere about the origin.
 pub(crate) fn sphere(radius: f64) -> Body {
     let (nt, np) = (32, 16);

@@ -16,7 +16,7 @@
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | A_i | rest area shared out to the inner vertices of each triangle | m² |
+//! | A_i | rest area, each triangle's shared among its inner vertices | m² |
 //! | B_u, B_45, B_v | bending stiffness along weft, bias and warp | N·m |
 //! | x_uu, x_uv, x_vv | second derivatives of the position | 1/m |
 //!
@@ -63,11 +63,14 @@ impl Bending {
         let mut share = vec![0.0; mesh.vertex_count()];
         let mut bare = vec![false; mesh.triangles.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
-            let inner = triangle.iter().filter(|&&v| fans[v as usize].is_some()).count();
-            bare[t] = inner == 0;
+            let corners = voronoi(rest.corners[t]);
+            let inner = || triangle.iter().zip(corners).filter(|&(&v, _)| fans[v as usize].is_some());
+            let sum: f64 = inner().map(|(_, part)| part).sum();
+            bare[t] = sum == 0.0;
             let [a, b, c] = rest.corners[t];
-            for &v in triangle.iter().filter(|&&v| fans[v as usize].is_some()) {
-                share[v as usize] += 0.5 * (b - a).perp_dot(c - a).abs() / inner as f64;
+            let area = 0.5 * (b - a).perp_dot(c - a).abs();
+            for (&v, part) in inner() {
+                share[v as usize] += area * part / sum;
             }
         }
         for (v, fan) in fans.iter().enumerate() {
@@ -176,6 +179,25 @@ impl Bending {
             (0..vertices.len()).flat_map(row)
         })
     }
+}
+
+/// Each corner's part of a triangle: its Voronoi cell, or halves and quarters where that leaves the triangle (Meyer,
+/// Desbrun, Schröder, Barr: "Discrete differential-geometry operators for triangulated 2-manifolds", 2003). A third each would
+/// weigh vertices by their valence, and a strip would bend more where the light ones lie.
+fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
+    let side = |i: usize| (corners[(i + 2) % 3] - corners[(i + 1) % 3]).length_squared();
+    let squares = [side(0), side(1), side(2)];
+    let total: f64 = squares.iter().sum();
+    if let Some(obtuse) = (0..3).find(|&i| 2.0 * squares[i] > total) {
+        return std::array::from_fn(|i| if i == obtuse { 0.5 } else { 0.25 });
+    }
+    // Cell of corner i: (b² cot B + c² cot C)/8 with cot B = (a² + c² − b²)/4A; over A, up to the factor common to all.
+    let part = |i: usize| {
+        let (b, c) = (squares[(i + 1) % 3], squares[(i + 2) % 3]);
+        b * (total - 2.0 * b) + c * (total - 2.0 * c)
+    };
+    let parts = [part(0), part(1), part(2)];
+    parts.map(|p| p / parts.iter().sum::<f64>())
 }
 
 /// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre takes minus their sum.
