@@ -22,6 +22,7 @@ pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod shapes;
+pub mod wrinkles;
 
 pub use glam::DVec3;
 
