@@ -22,6 +22,8 @@ pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod shapes;
+pub mod sweep;
+pub mod table_search;
 
 pub use glam::DVec3;
 

@@ -15,8 +15,11 @@
 
 mod extent;
 mod join;
+mod representable;
 mod seams;
 
+pub(crate) use extent::nearest_seeds;
+pub use representable::representable_rms_m;
 pub use seams::Seam;
 
 use rayon::prelude::*;

@@ -85,9 +85,9 @@ pub struct PaperOptions {
     /// A PART is in contact if any of its vertices is at most this far from the body, m. Default 0.5 cm, the upper value of
     /// level 7 in Table 3: the paper only says "directly attached" and "contactless".
     pub contact_distance_m: f64,
-    /// An axis has no stiffness where |Σ cos q ΔV| is at most this share of Σ |q| ΔV. Default 0.02: cloth within
-    /// about one degree of the axis, closer than the normals of a triangle mesh mean it. The same share of Σ ΔV decides whether
-    /// the contact PARTs can carry the garment at all.
+    /// An axis has no stiffness where |Σ cos q ΔV| is at most this share of Σ |q| ΔV. Default 0.02: cloth within about one
+    /// degree of the axis, closer than the normals of a triangle mesh mean it. The same share of Σ ΔV decides whether the
+    /// contact PARTs can carry the garment at all.
     pub degenerate_below: f64,
 }
 
