@@ -7,7 +7,7 @@ use glam::DVec3;
 use partwise::mesh::{Topology, TriMesh};
 use partwise::parts::{Parts, representable_rms_m, segment};
 use partwise::range_table::RangeTable;
-use partwise::table_search::{Front, Sample, SearchError, SearchOptions, search};
+use partwise::table_search::{Front, Sample, SearchError, SearchOptions, search, search_extents};
 use proptest::prelude::*;
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
@@ -93,7 +93,7 @@ proptest! {
             }
         }
         if expected.is_empty() {
-            let refused = matches!(found, Err(SearchError::TooFewParts { max_parts: 14, .. }));
+            let refused = matches!(found, Err(SearchError::TooFewParts { max_parts: 14 }));
             prop_assert!(refused);
             return Ok(());
         }
@@ -146,6 +146,28 @@ fn no_included_table_is_better_and_no_round_is_worse() {
 }
 
 #[test]
+fn extents_compete_on_one_front() {
+    let garment = Wavy::new(31, 24, 0.4);
+    let options = SearchOptions { candidates: 25, ..SearchOptions::with_extent(60, 0.2) };
+    let extents = [None, Some(0.01), Some(0.2), Some(0.3)];
+    let front = search_extents(&[garment.sample(1.0)], &options, &extents, &|_| {}).unwrap();
+    is_a_front(&front);
+    for &extent_m in &[None, Some(0.2), Some(0.3)] {
+        let alone = search(&[garment.sample(1.0)], &SearchOptions { extent_m, ..options.clone() }, &|_| {}).unwrap();
+        for point in &alone.front().points {
+            assert!(front.best_within(point.parts).unwrap().rms_m <= point.rms_m);
+        }
+    }
+    for point in &front.points {
+        let parts = garment.parts(&point.table("found", "test").unwrap(), point.extent_m);
+        assert_eq!(parts.len(), point.parts);
+        assert!((representable_rms_m(&parts, &garment.displacement) - point.rms_m).abs() < 1e-9);
+    }
+    let only = search_extents(&[garment.sample(1.0)], &options, &[Some(0.01)], &|_| {});
+    assert_eq!(only, Err(SearchError::TooFewParts { max_parts: 60 }));
+}
+
+#[test]
 fn threads_do_not_change_the_search_and_progress_counts_up() {
     let garment = Wavy::new(25, 20, 0.0);
     let run = |threads: usize, extent_m: Option<f64>| {
@@ -174,7 +196,7 @@ fn what_cannot_be_searched_is_refused() {
     let short = Sample { distances_m: &garment.distances[1..], ..garment.sample(1.0) };
     assert!(matches!(refuse(short, 5), SearchError::Length { garment: 1, found: 19, expected: 20, .. }));
     assert!(matches!(refuse(garment.sample(0.0), 5), SearchError::Weight { .. }));
-    assert_eq!(refuse(garment.sample(1.0), 0), SearchError::TooFewParts { max_parts: 0, least: 1 });
+    assert_eq!(refuse(garment.sample(1.0), 0), SearchError::TooFewParts { max_parts: 0 });
     let mut distances = garment.distances.clone();
     distances[7] = f64::NAN;
     let holed = Sample { distances_m: &distances, ..garment.sample(1.0) };

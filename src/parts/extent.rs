@@ -29,7 +29,7 @@ impl Parts {
         let pieces = self.map(|number, part| {
             let inside = |w: u32| self.part_of_vertex[w as usize] == number as u32;
             let local = |w: u32| inside(w).then(|| place[w as usize] as usize);
-            nearest_seeds(&part.vertices, local, mesh, topology, extent_m)
+            nearest_seeds(&part.vertices, local, mesh, topology, (extent_m, usize::MAX)).unwrap_or_default()
         });
         let mut label = vec![UNASSIGNED; self.part_of_vertex.len()];
         let mut level_of_label = Vec::new();
@@ -46,14 +46,14 @@ impl Parts {
 }
 
 /// The nearest seed of each of these connected vertices, and how many seeds it takes. `local` is the place of a vertex in the
-/// list, `None` for others.
+/// list, `None` for others; with more than `most` seeds it gives up.
 pub(crate) fn nearest_seeds(
     vertices: &[u32],
     local: impl Fn(u32) -> Option<usize>,
     mesh: &TriMesh,
     topology: &Topology,
-    extent_m: f64,
-) -> (Vec<u32>, usize) {
+    (extent_m, most): (f64, usize),
+) -> Option<(Vec<u32>, usize)> {
     let mut distance = vec![f64::INFINITY; vertices.len()];
     let mut seed_of_vertex = vec![0u32; vertices.len()];
     let mut seeds = 0;
@@ -83,7 +83,10 @@ pub(crate) fn nearest_seeds(
         let farthest = |best: usize, i: usize| if distance[i] > distance[best] { i } else { best };
         next = (0..distance.len()).fold(0, farthest);
         if distance[next] <= 0.5 * extent_m || distance[next] == 0.0 || extent_m.is_nan() {
-            return (seed_of_vertex, seeds);
+            return Some((seed_of_vertex, seeds));
+        }
+        if seeds >= most {
+            return None;
         }
     }
 }

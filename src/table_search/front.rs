@@ -11,6 +11,8 @@ pub struct FrontPoint {
     pub rms_m: f64,
     /// Bounds between its levels, cm; the first level starts at 0, the last is open.
     pub inner_bounds_cm: Vec<f64>,
+    /// The extent its PARTs are cut to, m.
+    pub extent_m: Option<f64>,
 }
 
 impl FrontPoint {

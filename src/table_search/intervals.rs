@@ -7,7 +7,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Sample;
+use super::{Sample, SearchOptions};
 use crate::parts::nearest_seeds;
 
 /// What a level costs.
@@ -24,7 +24,7 @@ pub(super) fn costs(
     sample: &Sample<'_>,
     bin_of_vertex: &[u32],
     bins: usize,
-    extent_m: Option<f64>,
+    options: &SearchOptions,
     step: &(dyn Fn() + Sync),
 ) -> Vec<Vec<Cost>> {
     let mut members = vec![Vec::new(); bins];
@@ -32,7 +32,7 @@ pub(super) fn costs(
         members[bin as usize].push(v as u32);
     }
     let row = |lower: usize| {
-        let mut pieces = Pieces::new(sample, extent_m);
+        let mut pieces = Pieces::new(sample, options);
         let grow = |vertices: &Vec<u32>| {
             pieces.grow(vertices);
             pieces.cost()
@@ -48,6 +48,8 @@ pub(super) fn costs(
 struct Pieces<'a> {
     sample: &'a Sample<'a>,
     extent_m: Option<f64>,
+    /// A level with more PARTs is in no table, so cuts stop there.
+    max_parts: usize,
     /// Union-find; `ABSENT` for vertices not in yet.
     parent: Vec<u32>,
     /// By root: vertices (only their number matters without an extent), sum of displacements, cost.
@@ -63,13 +65,18 @@ struct Pieces<'a> {
 
 const ABSENT: u32 = u32::MAX;
 
+/// More PARTs than any table may have.
+const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
+
 impl<'a> Pieces<'a> {
-    fn new(sample: &'a Sample<'a>, extent_m: Option<f64>) -> Self {
+    fn new(sample: &'a Sample<'a>, options: &SearchOptions) -> Self {
+        let (extent_m, max_parts) = (options.extent_m, options.max_parts);
         let n = sample.displacement.len();
         let cuts = if extent_m.is_some() { n } else { 0 };
         Self {
             sample,
             extent_m,
+            max_parts,
             parent: vec![ABSENT; n],
             vertices: vec![Vec::new(); cuts],
             size: vec![0; n],
@@ -110,8 +117,13 @@ impl<'a> Pieces<'a> {
             for &r in &self.roots {
                 // No cost yet: new or changed.
                 if self.cut[r as usize].parts == 0 {
-                    self.cut[r as usize] =
-                        cut_cost(self.sample, &mut self.vertices[r as usize], &mut self.place, extent_m);
+                    self.cut[r as usize] = cut_cost(
+                        self.sample,
+                        &mut self.vertices[r as usize],
+                        &mut self.place,
+                        extent_m,
+                        self.max_parts,
+                    );
                 }
             }
         }
@@ -140,7 +152,7 @@ impl<'a> Pieces<'a> {
     }
 
     fn cost(&self) -> Cost {
-        let add = |a: Cost, b: Cost| Cost { parts: a.parts + b.parts, error: a.error + b.error };
+        let add = |a: Cost, b: Cost| Cost { parts: a.parts.saturating_add(b.parts), error: a.error + b.error };
         let of = |&r: &u32| match self.extent_m {
             None => Cost { parts: 1, error: self.error[r as usize] },
             Some(_) => self.cut[r as usize],
@@ -149,8 +161,8 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// The cost of one connected piece, cut to an extent.
-fn cut_cost(sample: &Sample<'_>, vertices: &mut [u32], place: &mut [u32], extent_m: f64) -> Cost {
+/// The cost of one connected piece, cut to an extent, or [`TOO_MANY`].
+fn cut_cost(sample: &Sample<'_>, vertices: &mut [u32], place: &mut [u32], extent_m: f64, max_parts: usize) -> Cost {
     vertices.sort_unstable();
     // `place` keeps entries of other pieces, so an entry counts only if it points back.
     for (&v, i) in vertices.iter().zip(0..) {
@@ -160,7 +172,8 @@ fn cut_cost(sample: &Sample<'_>, vertices: &mut [u32], place: &mut [u32], extent
         let i = place[w as usize] as usize;
         (vertices.get(i) == Some(&w)).then_some(i)
     };
-    let (seed_of_vertex, seeds) = nearest_seeds(vertices, local, sample.mesh, sample.topology, extent_m);
+    let found = nearest_seeds(vertices, local, sample.mesh, sample.topology, (extent_m, max_parts));
+    let Some((seed_of_vertex, seeds)) = found else { return TOO_MANY };
     let mut count = vec![0u32; seeds];
     let mut mean = vec![DVec3::ZERO; seeds];
     for (&v, &s) in vertices.iter().zip(&seed_of_vertex) {

@@ -56,7 +56,7 @@ pub struct Sample<'a> {
 /// What to search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchOptions {
-    /// Candidate bounds per round. Default 200.
+    /// Candidate bounds per round. Default 400, with an extent 60: its cost grows with the square, times a cut.
     pub candidates: usize,
     /// Most PARTs a table may yield, over all garments together.
     pub max_parts: usize,
@@ -69,10 +69,16 @@ pub struct SearchOptions {
 }
 
 impl SearchOptions {
-    /// Defaults with a limit of PARTs.
+    /// Defaults for levels alone with a limit of PARTs.
     #[must_use]
     pub fn new(max_parts: usize) -> Self {
-        Self { candidates: 200, max_parts, extent_m: None, rounds: 3, include: vec![RangeTable::table_3()] }
+        Self { candidates: 400, max_parts, extent_m: None, rounds: 3, include: vec![RangeTable::table_3()] }
+    }
+
+    /// Defaults for levels that are cut to an extent (m).
+    #[must_use]
+    pub fn with_extent(max_parts: usize, extent_m: f64) -> Self {
+        Self { candidates: 60, rounds: 2, extent_m: Some(extent_m), ..Self::new(max_parts) }
     }
 }
 
@@ -125,13 +131,11 @@ pub enum SearchError {
     },
     /// Even the coarsest table has more PARTs.
     #[error(
-        "no table has {max_parts} PARTs or fewer: one single level already has {least}; allow more or a larger extent"
+        "no table tried has {max_parts} PARTs or fewer, not even one single level; allow more PARTs or a larger extent"
     )]
     TooFewParts {
         /// The limit given.
         max_parts: usize,
-        /// PARTs of a single level.
-        least: usize,
     },
 }
 
@@ -173,29 +177,50 @@ pub fn search(
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(Progress { round, rounds: round_count, done, total });
         };
-        let mut costs = vec![vec![intervals::Cost::default(); candidates.bins()]; candidates.bins()];
+        let bins = candidates.bins();
+        // Row a holds the levels [a, b) for b = a + 1, a + 2, ...
+        let mut costs: Vec<_> = (0..bins).map(|a| vec![intervals::Cost::default(); bins - a]).collect();
         for sample in samples {
             let share = sample.weight / (total_weight * sample.distances_m.len() as f64);
-            let bins = candidates.bin_of(sample.distances_m);
-            let found = intervals::costs(sample, &bins, candidates.bins(), options.extent_m, &step);
-            for (row, found) in costs.iter_mut().zip(found) {
-                // Row a holds the levels [a, b) for b = a + 1, a + 2, ...
-                for (cost, found) in row.iter_mut().zip(found) {
-                    cost.parts += found.parts;
-                    cost.error += share * found.error;
-                }
+            let bin_of_vertex = candidates.bin_of(sample.distances_m);
+            let found = intervals::costs(sample, &bin_of_vertex, bins, options, &step);
+            for (cost, found) in costs.iter_mut().flatten().zip(found.into_iter().flatten()) {
+                cost.parts = cost.parts.saturating_add(found.parts);
+                cost.error += share * found.error;
             }
         }
-        let found = program::front(&costs, &candidates.inner_cm(), options.max_parts);
+        let mut found = program::front(&costs, &candidates.inner_cm(), options.max_parts);
+        found.points.iter_mut().for_each(|p| p.extent_m = options.extent_m);
         let front = rounds.last().map_or_else(|| found.clone(), |before| before.union(&found));
         let Some(best) = front.best_within(options.max_parts) else {
-            let least = costs.first().and_then(|row| row.last()).map_or(0, |c| c.parts as usize);
-            return Err(SearchError::TooFewParts { max_parts: options.max_parts, least });
+            return Err(SearchError::TooFewParts { max_parts: options.max_parts });
         };
         candidates = candidates.around(&best.inner_bounds_cm, options.candidates);
         rounds.push(front);
     }
     Ok(Search { rounds })
+}
+
+/// [`search`] at several extents (`None`: levels alone), and the front over all of them; a point tells its extent. Extents at which
+/// no table is coarse enough add nothing.
+///
+/// # Errors
+/// As [`search`], if no extent yields a table.
+pub fn search_extents(
+    samples: &[Sample<'_>],
+    options: &SearchOptions,
+    extents_m: &[Option<f64>],
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Front, SearchError> {
+    let mut front = Front::default();
+    for &extent_m in extents_m {
+        match search(samples, &SearchOptions { extent_m, ..options.clone() }, progress) {
+            Ok(found) => front = front.union(found.front()),
+            Err(SearchError::TooFewParts { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    if front.points.is_empty() { Err(SearchError::TooFewParts { max_parts: options.max_parts }) } else { Ok(front) }
 }
 
 fn check(samples: &[Sample<'_>]) -> Result<(), SearchError> {

@@ -37,7 +37,7 @@ pub(super) fn front(costs: &[Vec<Cost>], inner_cm: &[f64], max_parts: usize) -> 
         if squared < least {
             least = squared;
             let inner_bounds_cm = bounds(costs, &from, inner_cm, parts, width);
-            points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm });
+            points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extent_m: None });
         }
     }
     Front { points }

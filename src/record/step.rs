@@ -1,0 +1,242 @@
+//! One step of the timeline `table`: the PARTs of a range table, their forces, the drape, and what was measured.
+
+use glam::DVec3;
+use rerun::{Arrows3D, BarChart, Clear, Color, Scalars, TextDocument};
+
+use super::colour_map::{ColourMap, Range};
+use super::colours::{self, colour_parts};
+use super::error::RecordError;
+use super::legend::Legend;
+use super::meshes::{self, single};
+use super::panel::Panel;
+use super::{Open, paths};
+use crate::mesh::TriMesh;
+
+/// Share of the garment's height that the longest arrow takes.
+const LONGEST_ARROW: f64 = 0.16;
+/// Values above this quantile share the last colour: a PART of one vertex can have any force.
+const QUANTILE: f64 = 0.99;
+/// Bins of the distance histogram.
+const BINS: usize = 80;
+
+/// A value per vertex of the draped garment.
+#[derive(Debug, Clone, Copy)]
+pub struct Overlay<'a> {
+    /// `error`, or what the recording's layout lists under fit (`strain`, `pressure`).
+    pub name: &'a str,
+    /// Unit of the values.
+    pub unit: &'a str,
+    /// One value per vertex.
+    pub values: &'a [f64],
+}
+
+/// All that one range table gives. Slices are per vertex of the garment unless they say otherwise.
+#[derive(Debug, Clone, Copy)]
+pub struct StepView<'a> {
+    /// Step of the timeline `table`.
+    pub index: i64,
+    /// Distance to the body, m.
+    pub distance_m: &'a [f64],
+    /// PART of each vertex.
+    pub part_of_vertex: &'a [u32],
+    /// Resultant force of each PART, N; as many as there are PARTs.
+    pub part_force_n: &'a [DVec3],
+    /// Displaced vertices, m.
+    pub draped: &'a [DVec3],
+    /// The text panel; its levels give the bars.
+    pub panel: &'a Panel,
+    /// Further scalars over `table`: leaf of `/numbers` and value (`error/rms_mm`).
+    pub scalars: &'a [(&'a str, f64)],
+    /// Error, strain, pressure.
+    pub overlays: &'a [Overlay<'a>],
+}
+
+impl StepView<'_> {
+    pub(crate) fn check(&self, vertices: usize) -> Result<(), RecordError> {
+        let lengths = [
+            ("distances", self.distance_m.len()),
+            ("PART numbers", self.part_of_vertex.len()),
+            ("displaced positions", self.draped.len()),
+        ];
+        let overlays = self.overlays.iter().map(|o| (o.name, o.values.len()));
+        for (what, found) in lengths.into_iter().chain(overlays) {
+            if found != vertices {
+                return Err(RecordError::Mismatch {
+                    what: what.to_owned(),
+                    found,
+                    expected: vertices,
+                    of: "vertices of the garment",
+                });
+            }
+        }
+        let expected = self.part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
+        if self.part_force_n.len() < expected {
+            return Err(RecordError::Mismatch {
+                what: "forces".to_owned(),
+                found: self.part_force_n.len(),
+                expected,
+                of: "PARTs",
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Logs the whole step.
+pub(crate) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    distance(open, step)?;
+    parts(open, step)?;
+    force(open, step)?;
+    drape(open, step)?;
+    levels(open, step)?;
+    numbers(open, step)
+}
+
+fn distance(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    if open.distance == step.distance_m {
+        return Ok(());
+    }
+    step.distance_m.clone_into(&mut open.distance);
+    open.at(step.index, 2);
+    let cm: Vec<f64> = step.distance_m.iter().map(|d| 100.0 * d).collect();
+    let range = Range::to_quantile(cm.iter().copied(), QUANTILE);
+    let map = ColourMap::DISTANCE;
+    open.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
+    let open_end = cm.iter().any(|&d| d > range.high);
+    Legend { title: "distance", unit: "cm", map, range, open_end }.log(open, paths::DISTANCE_LEGEND)
+}
+
+fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    open.at(step.index, 3);
+    let chosen =
+        colour_parts(step.part_of_vertex, step.part_force_n.len(), &open.garment.triangles, &open.vertex_colour);
+    let palette = colours::palette();
+    open.vertex_colour = step.part_of_vertex.iter().map(|&p| chosen[p as usize]).collect();
+    let mesh = open.cells.colours(|v| palette[open.vertex_colour[v as usize] as usize]);
+    open.log(paths::PARTS, &mesh)
+}
+
+fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    open.at(step.index, 4);
+    let per_vertex =
+        |unit: f64| step.part_of_vertex.iter().map(move |&p| unit * step.part_force_n[p as usize].length());
+    let (factor, unit) =
+        if Range::to_quantile(per_vertex(1.0), QUANTILE).high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
+    let magnitude: Vec<f64> = per_vertex(factor).collect();
+    let range = Range::to_quantile(magnitude.iter().copied(), QUANTILE);
+    let map = ColourMap::FORCE;
+    let shades = map.colours(&magnitude, range);
+    let mesh = open.cells.colours(|v| shades[v as usize]);
+    open.log(paths::FORCE, &mesh)?;
+    let open_end = magnitude.iter().any(|&f| f > range.high);
+    Legend { title: "|F|", unit, map, range, open_end }.log(open, paths::FORCE_LEGEND)?;
+    arrows(open, step, range.high / factor)
+}
+
+/// One arrow per PART, from its vertex nearest the eye's side of its middle: the centroid of a ring lies inside the body.
+fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError> {
+    let toward = open.eye.toward;
+    let parts = step.part_force_n.len();
+    let mut sum = vec![(DVec3::ZERO, 0.0, f64::NEG_INFINITY); parts];
+    for (&p, &x) in step.part_of_vertex.iter().zip(&open.garment.positions) {
+        let (total, count, front) = &mut sum[p as usize];
+        *total += x;
+        *count += 1.0;
+        *front = front.max(x.dot(toward));
+    }
+    let mut best = vec![(f64::INFINITY, DVec3::ZERO); parts];
+    for (&p, &x) in step.part_of_vertex.iter().zip(&open.garment.positions) {
+        let (total, count, front) = sum[p as usize];
+        let middle = total / count;
+        let wanted = middle + toward * (front - middle.dot(toward));
+        let off = x.distance_squared(wanted);
+        if off < best[p as usize].0 {
+            best[p as usize] = (off, x);
+        }
+    }
+    let height = 2.0 * open.eye.half_height;
+    let scale = LONGEST_ARROW * height / full;
+    // Off the surface by a hair, so that an arrow along the cloth is not half sunk in it.
+    let origins = best.iter().map(|(_, x)| single(*x + 0.035 * height * toward));
+    let vectors = step.part_force_n.iter().map(|f| {
+        let length = (f.length() * scale).min(1.25 * LONGEST_ARROW * height);
+        single(f.normalize_or_zero() * length)
+    });
+    let arrows = Arrows3D::from_vectors(vectors)
+        .with_origins(origins)
+        .with_radii([0.0045 * height as f32])
+        .with_colors([Color::from_rgb(238, 240, 243)]);
+    open.log(paths::FORCE_ARROWS, &arrows)
+}
+
+fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    open.at(step.index, 5);
+    let draped = open.garment.with_positions(step.draped.to_vec());
+    open.log(paths::DRAPE, &meshes::shape(&draped))?;
+    open.at(step.index, 6);
+    for overlay in step.overlays {
+        let branch =
+            if overlay.name == "error" { paths::ERROR.to_owned() } else { format!("{}/{}", paths::FIT, overlay.name) };
+        self::overlay(open, &branch, &draped, overlay)?;
+    }
+    Ok(())
+}
+
+fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_>) -> Result<(), RecordError> {
+    let path = format!("{branch}/garment");
+    open.triangles_once(&path)?;
+    let range = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
+    let map = ColourMap::ALARM;
+    let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
+    open.log(&path, &coloured)?;
+    let open_end = overlay.values.iter().any(|&v| v > range.high);
+    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, &format!("{branch}/legend"))
+}
+
+fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    let rows = &step.panel.levels;
+    let high = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
+    let width = high / BINS as f64;
+    let mut counts = vec![vec![0.0; BINS]; rows.len()];
+    for &d in step.distance_m {
+        let bin = ((d / width) as usize).min(BINS - 1);
+        if let Some(level) = rows.iter().position(|row| (row.lower_m..row.upper_m).contains(&d)) {
+            counts[level][bin] += 1.0;
+        }
+    }
+    let centres: Vec<f64> = (0..BINS).map(|b| 100.0 * width * (b as f64 + 0.5)).collect();
+    let shade = |level: usize| {
+        let [r, g, b] = ColourMap::DISTANCE.at((level as f64 + 0.5) / rows.len() as f64);
+        Color::from_rgb(r, g, b)
+    };
+    for (level, row) in rows.iter().enumerate() {
+        // Only the bins the level reaches: empty ones would draw over its neighbours' bars.
+        let held: Vec<usize> = (0..BINS).filter(|&b| counts[level][b] > 0.0).collect();
+        let pick = |of: &[f64]| held.iter().map(|&b| of[b]).collect::<Vec<f64>>();
+        let bars = BarChart::new(pick(&counts[level]))
+            .with_abscissa(pick(&centres))
+            .with_widths(vec![100.0 * width as f32; held.len()])
+            .with_color(shade(level));
+        open.log(&format!("{}/{level:02}", paths::HISTOGRAM), &bars)?;
+        let parts = BarChart::new(vec![row.parts as f64]).with_abscissa(vec![level as f64]).with_color(shade(level));
+        open.log(&format!("{}/{level:02}", paths::LEVEL_PARTS), &parts)?;
+    }
+    for gone in rows.len()..open.levels {
+        for branch in [paths::HISTOGRAM, paths::LEVEL_PARTS] {
+            open.log(&format!("{branch}/{gone:02}"), &Clear::flat())?;
+        }
+    }
+    open.levels = rows.len();
+    Ok(())
+}
+
+fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    open.log("/numbers/part_count", &Scalars::single(step.part_force_n.len() as f64))?;
+    for (stage, ms) in &step.panel.timings_ms {
+        open.log(&format!("{}/{stage}", paths::STAGE_MS), &Scalars::single(*ms))?;
+    }
+    for (leaf, value) in step.scalars {
+        open.log(&format!("{}/{leaf}", paths::NUMBERS), &Scalars::single(*value))?;
+    }
+    open.log(paths::REPORT, &TextDocument::from_markdown(step.panel.markdown()))
+}

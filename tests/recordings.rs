@@ -1,0 +1,228 @@
+//! What a recording holds, and what happens where it cannot be written.
+//!
+//! With `PARTWISE_KEEP=FOLDER` the recordings stay there to be looked at.
+#![cfg(feature = "viewer")]
+
+mod scene;
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+
+use partwise::record::{
+    Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, Sink, StepView, inspect, paths, web,
+};
+use scene::{PAPER_LIKE, Scene, Solved};
+
+/// A folder that goes away with the test, or the one asked for.
+struct Folder {
+    path: PathBuf,
+    _temporary: tempfile::TempDir,
+}
+
+impl Folder {
+    fn new() -> Self {
+        let temporary = tempfile::tempdir().unwrap();
+        let path = std::env::var_os("PARTWISE_KEEP").map_or_else(|| temporary.path().to_owned(), Into::into);
+        Self { path, _temporary: temporary }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+}
+
+fn options(path: &Path, layout: Layout) -> RecordOptions {
+    RecordOptions {
+        sinks: vec![Sink::File(path.to_owned())],
+        name: "flared dress".into(),
+        layout,
+        ..RecordOptions::default()
+    }
+}
+
+fn step<'a>(index: i64, scene: &'a Scene, solved: &'a Solved, overlays: &'a [Overlay<'a>]) -> StepView<'a> {
+    StepView {
+        index,
+        distance_m: &scene.distance_m,
+        part_of_vertex: &solved.part_of_vertex,
+        part_force_n: &solved.part_force_n,
+        draped: &scene.draped,
+        panel: &solved.panel,
+        scalars: &[],
+        overlays,
+    }
+}
+
+fn record_one(path: &Path, fineness: u32) -> RecordSummary {
+    let scene = Scene::new(fineness);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(options(path, Layout::default())).unwrap();
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    recorder.finish().unwrap()
+}
+
+#[test]
+fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
+    let folder = Folder::new();
+    let path = folder.file("one.rrd");
+    let summary = record_one(&path, 2);
+    assert_eq!(summary.path.as_deref(), Some(path.as_path()));
+    assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
+    let contents = inspect::read(&path).unwrap();
+    assert_eq!(contents.recordings, 1);
+    for wanted in paths::ALWAYS {
+        assert!(contents.entities.contains_key(wanted), "{wanted} is missing of {:?}", contents.entities.keys());
+    }
+    for wanted in ["/viewport", "/time_panel", "/selection_panel", "/blueprint_panel"] {
+        assert!(contents.blueprint.contains(wanted), "{wanted} is missing of {:?}", contents.blueprint);
+    }
+    let eyes = contents.blueprint.iter().filter(|p| p.ends_with("/EyeControls3D")).count();
+    assert_eq!(eyes, 4, "one eye a stage");
+    for mesh in [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::DRAPE] {
+        let components = &contents.entities[mesh].components;
+        assert!(components.contains("Mesh3D:vertex_normals"), "{mesh} would be drawn unlit: {components:?}");
+        assert!(components.contains("Mesh3D:triangle_indices"), "{mesh}");
+    }
+    let timelines = &contents.entities[paths::DRAPE].timelines;
+    assert!([paths::TABLE, paths::STAGE].iter().all(|&t| timelines.contains(t)), "{timelines:?}");
+    assert!(contents.entities[paths::BODY].timelines.is_empty(), "the body is logged once for all");
+    let all = contents.entities.values().flat_map(|e| &e.timelines);
+    assert!(all.clone().all(|t| t == paths::TABLE || t == paths::STAGE), "{:?}", all.collect::<Vec<_>>());
+}
+
+/// A port somebody else listens on, for as long as the listener lives.
+fn taken_port() -> (TcpListener, u16) {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    (listener, port)
+}
+
+fn refused(sinks: Vec<Sink>) -> RecordError {
+    Recorder::open(RecordOptions { sinks, ..RecordOptions::default() }).err().expect("it must not open")
+}
+
+#[test]
+fn without_a_sink_nothing_is_made() {
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(RecordOptions::default()).unwrap();
+    assert!(!recorder.is_enabled());
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    assert_eq!(recorder.finish().unwrap(), RecordSummary::default());
+}
+
+#[test]
+fn a_recording_that_is_not_finished_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("half.rrd");
+    let mut recorder = Recorder::open(options(&path, Layout::default())).unwrap();
+    recorder.body(0, &Scene::new(1).body).unwrap();
+    drop(recorder);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_step_that_does_not_fit_the_garment_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(options(&folder.path().join("x.rrd"), Layout::default())).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    let short = StepView { draped: &scene.draped[1..], ..step(0, &scene, &solved, &[]) };
+    let error = recorder.step(&short).unwrap_err();
+    let count = scene.draped.len();
+    assert!(error.to_string().contains(&format!("{} values for {count} vertices", count - 1)), "{error}");
+}
+
+#[test]
+fn an_unwritable_path_is_the_users_mistake_and_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a-file");
+    std::fs::write(&file, "no folder").unwrap();
+    for path in [file.join("x.rrd"), folder.path().to_owned(), PathBuf::from("/proc/none/x.rrd")] {
+        let error = refused(vec![Sink::File(path.clone())]);
+        assert!(matches!(error, RecordError::Unwritable { .. }), "{error}");
+        assert!(error.is_users());
+        assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+    }
+}
+
+#[test]
+fn a_port_in_use_is_named_and_no_file_is_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_listener, port) = taken_port();
+    let serve = |web_port, grpc_port| Sink::Serve { web_port, grpc_port };
+    for (sink, option) in [(serve(Some(port), None), "--web-port"), (serve(None, Some(port)), "--grpc-port")] {
+        let error = refused(vec![Sink::File(folder.path().join("x.rrd")), sink]);
+        assert!(matches!(error, RecordError::PortInUse { .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.contains(&port.to_string()) && text.contains(option), "{text}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn a_viewer_that_is_not_there_is_said_before_anything_is_computed() {
+    let (listener, port) = taken_port();
+    drop(listener);
+    let url = format!("rerun+http://127.0.0.1:{port}/proxy");
+    let error = refused(vec![Sink::Connect(url.clone())]);
+    assert!(matches!(error, RecordError::Unreachable { .. }), "{error}");
+    assert!(error.to_string().contains(&url), "{error}");
+    let error = refused(vec![Sink::Connect("127.0.0.1".into())]);
+    assert!(matches!(error, RecordError::BadUrl { .. }), "{error}");
+}
+
+#[test]
+fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.rrd");
+    let serve = Sink::Serve { web_port: None, grpc_port: None };
+    let mut both = options(&path, Layout { follow: true, ..Layout::default() });
+    both.sinks.push(serve);
+    let mut recorder = Recorder::open(both).unwrap();
+    let url = recorder.web_url().unwrap().to_owned();
+    assert!(url.starts_with("http://127.0.0.1:") && url.contains("?url=rerun%2Bhttp"), "{url}");
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    let page = get(&url);
+    assert!(page.contains("200 OK") && page.contains("<html"), "{page}");
+    recorder.finish().unwrap();
+    assert!(inspect::read(&path).unwrap().entities.contains_key(paths::DRAPE));
+}
+
+#[test]
+fn any_recording_is_served_and_what_is_none_is_refused() {
+    let folder = Folder::new();
+    let path = folder.file("viewed.rrd");
+    record_one(&path, 1);
+    let served = web::serve_file(&path, None, None).unwrap();
+    assert!(served.messages() > 20);
+    assert!(get(served.url()).contains("200 OK"));
+    for (name, content) in [("text.rrd", "not a recording"), ("empty.rrd", "")] {
+        let other = folder.file(name);
+        std::fs::write(&other, content).unwrap();
+        let error = web::serve_file(&other, None, None).err().unwrap();
+        assert!(matches!(error, RecordError::NotARecording { .. }), "{error}");
+    }
+    let error = web::serve_file(&folder.file("none.rrd"), None, None).err().unwrap();
+    assert!(matches!(error, RecordError::Unreadable { .. }), "{error}");
+}
+
+/// The answer to one HTTP request, headers and all.
+fn get(url: &str) -> String {
+    use std::io::{Read as _, Write as _};
+    let (host, path) = url.trim_start_matches("http://").split_once('/').unwrap();
+    let mut stream = std::net::TcpStream::connect(host).unwrap();
+    write!(stream, "GET /{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
