@@ -104,10 +104,10 @@ impl Anatomy {
         };
         let seat = hip / 0.1528;
         let buttock = Ellipsoid {
-            centre: DVec3::new(0.076 * seat, 0.043 * seat, m.hip_height + 0.028 * k),
+            centre: DVec3::new(0.076 * seat, 0.036 * seat, m.hip_height + 0.040 * k),
             // Its lower end stays a little above the crotch, or the seat would close the gap between the legs.
-            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.038 * k),
-            lean: 0.1,
+            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.055 * k),
+            lean: -0.3,
         };
         let (arm, wrist_at, biceps_at) = arm(m, f);
         let (leg, foot) = leg(m, f);
@@ -168,7 +168,7 @@ impl Solid for Legs<'_> {
         };
         let near = one(p.x);
         // The other leg matters only next to the middle.
-        if p.x.abs() > 0.05 { near } else { near.smooth_min(one(-p.x), 0.006) }
+        if p.x.abs() > 0.05 { near } else { near.smooth_min(one(-p.x), 0.03) }
     }
 
     fn at_least(&self, p: DVec3) -> f64 {
@@ -215,7 +215,7 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
         (m.hip_height + 0.02 * k, [0.0, 0.005, 1.00 * hip, 0.59 * hip, 0.62 * hip]),
         (mix(m.hip_height, m.waist_height, 0.5), {
             let r = mix(hip, waist, 0.45);
-            [0.0, 0.002, 1.07 * r, 0.67 * r, 0.65 * r]
+            [0.0, 0.002, 1.07 * r, 0.67 * r, 0.68 * r]
         }),
         (m.waist_height, [0.0, -0.002, 1.12 * waist, 0.74 * waist, 0.73 * waist]),
         (under_z, [0.0, 0.004, 1.09 * under, 0.78 * under, 0.82 * under]),
@@ -290,7 +290,7 @@ fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
 }
 
 /// Half the gap between the thighs where they are closest, m: what the mesh needs to keep them apart.
-const THIGH_GAP: f64 = 0.009;
+const THIGH_GAP: f64 = 0.012;
 
 fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
     let k = m.scale();
@@ -324,7 +324,7 @@ fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
             [mix(knee_x, inner, 0.65), 0.003 * k, 0.92 * r, 1.06 * r, 1.08 * r]
         }),
         (thigh_height(m), [inner, 0.004 * k, 0.88 * thigh, 1.06 * thigh, 1.14 * thigh]),
-        (m.crotch + 0.03 * k, [0.99 * inner, 0.004 * k, 0.87 * thigh, 1.00 * thigh, 1.06 * thigh]),
+        (m.crotch + 0.03 * k, [0.93 * inner, 0.004 * k, 0.89 * thigh, 1.00 * thigh, 1.06 * thigh]),
         (m.crotch + 0.13 * k, [0.84 * inner, 0.002 * k, 0.60 * thigh, 0.72 * thigh, 0.74 * thigh]),
     ];
     let leg = Sweep::upright(2.0, &stations, [0.005, 0.03]);
