@@ -115,7 +115,7 @@ impl Surface for Skin<'_> {
         let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
         // The crotch is a saddle narrower than an edge of the trunk's.
         let crotch = DVec3::new(0.0, self.solid.leg.centre(self.crotch).y, self.crotch);
-        let saddle = 1.0 - 0.5 * (1.0 - smooth_step(0.03, 0.12, p.distance(crotch) / self.scale));
+        let saddle = 1.0 - 0.55 * (1.0 - smooth_step(0.03, 0.12, p.distance(crotch) / self.scale));
         arm.min(ankle).min(head).min(saddle)
     }
 }

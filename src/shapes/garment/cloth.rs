@@ -174,7 +174,7 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let hip = around(section(m.hip_height, m.hip + ease.hip_cm / 100.0), anatomy, m.hip_height);
     if spec.carried_by == Support::Waist {
         // A straight line from waist to hem, unless hip or seat stand out of it.
-        let seat_z = m.hip_height + 0.02;
+        let seat_z = m.hip_height + 0.035;
         let line = skirt(waist, m.waist_height, hem, flare);
         let straight = Profile::new(&[line[0], (m.waist_height, waist)]);
         let widest = |z: f64, body: Section| -> (f64, Section) {
