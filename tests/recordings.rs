@@ -9,7 +9,8 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 
 use partwise::record::{
-    Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, Sink, StepView, inspect, paths, web,
+    Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
+    When, inspect, paths, web,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -90,6 +91,114 @@ fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
     assert!(contents.entities[paths::BODY].timelines.is_empty(), "the body is logged once for all");
     let all = contents.entities.values().flat_map(|e| &e.timelines);
     assert!(all.clone().all(|t| t == paths::TABLE || t == paths::STAGE), "{:?}", all.collect::<Vec<_>>());
+}
+
+#[test]
+fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
+    let folder = Folder::new();
+    let scene = Scene::new(2);
+    let tables: Vec<(String, Vec<f64>)> = [1.0, 0.7, 0.4, 1.6]
+        .iter()
+        .map(|&f| (format!("Table 3 × {f}"), PAPER_LIKE.iter().map(|b| b * f).collect()))
+        .chain([("three levels".to_owned(), vec![2.0, 9.0])])
+        .collect();
+    let record = |name: &str, count: usize| {
+        let layout = Layout {
+            several_tables: count > 1,
+            error: true,
+            compare: tables.iter().take(4).map(|(name, _)| name.clone()).collect(),
+            scatter: true,
+            opens_on: match name {
+                "sweep-side.rrd" => Tab::SideBySide,
+                "sweep-numbers.rrd" => Tab::Numbers,
+                _ => Tab::Stages,
+            },
+            ..Layout::default()
+        };
+        let mut recorder = Recorder::open(options(&folder.file(name), layout)).unwrap();
+        recorder.body(0, &scene.body).unwrap();
+        recorder.garment(0, &scene.garment).unwrap();
+        let mut points = Vec::new();
+        for (i, (name, bounds)) in tables.iter().take(count).enumerate() {
+            let mut solved = scene.solve(name, bounds);
+            let ms = 1.0 + 0.9 * i as f64;
+            solved.panel.timings_ms[3].1 = ms;
+            let error: Vec<f64> = scene.distance_m.iter().map(|d| 1e3 * d / ms).collect();
+            let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len() as f64).sqrt();
+            let overlays = [Overlay { name: "error", unit: "mm", values: &error }];
+            let scalars = [("error/rms_mm", rms)];
+            recorder.step(&StepView { scalars: &scalars, ..step(i as i64, &scene, &solved, &overlays) }).unwrap();
+            let caption = format!("{} PARTs · {ms:.1} ms · {rms:.0} mm", solved.part_force_n.len());
+            let (draped, part_of_vertex) = (&scene.draped, &solved.part_of_vertex);
+            if i < 4 {
+                let chosen = Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, overlay: None };
+                recorder.compare(&chosen).unwrap();
+            }
+            points.push(ScatterPoint { label: name, ms, error_mm: rms, group: 0, named: true });
+        }
+        recorder.scatter(When::Table(0), &points).unwrap();
+        recorder.finish().unwrap()
+    };
+    let one = record("sweep-one.rrd", 1);
+    let five = record("sweep.rrd", 5);
+    if std::env::var_os("PARTWISE_KEEP").is_some() {
+        record("sweep-side.rrd", 5);
+        record("sweep-numbers.rrd", 5);
+    }
+    let contents = inspect::read(&five.path.unwrap()).unwrap();
+    for fixed in [paths::BODY, paths::GARMENT, paths::PARTS, paths::DRAPE, "/error/garment"] {
+        assert!(contents.entities[fixed].components.contains("Mesh3D:triangle_indices"), "{fixed}");
+    }
+    assert_eq!(contents.entities[paths::BODY].rows, 1);
+    assert_eq!(contents.entities[paths::DISTANCE].rows, 2, "the distance is the same for every table");
+    for path in ["/numbers/part_count", "/numbers/ms/mechanics", "/numbers/error/rms_mm", paths::ROWS] {
+        assert!(contents.entities[path].timelines.contains(paths::TABLE), "{path}");
+    }
+    for slot in 0..4 {
+        assert!(contents.entities.contains_key(&format!("{}/{slot}/garment", paths::COMPARE)));
+    }
+    assert!(contents.entities.contains_key("/scatter/points"));
+    // A vertex of a further table costs its drape (24 bytes) and colours; triangles and positions as loaded are 24 + 24
+    // for each of five meshes and thirteen times that for the cells, and must not come again.
+    let per_vertex = (five.raw_bytes - one.raw_bytes) / (4 * scene.garment.positions.len() as u64);
+    assert!(per_vertex < 700, "{per_vertex} bytes a vertex and table");
+    assert!(five.bytes as f64 <= 1.3 * five.raw_bytes as f64, "{} of {} bytes", five.bytes, five.raw_bytes);
+}
+
+#[test]
+fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
+    let folder = Folder::new();
+    let scene = Scene::new(2);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let fit = vec!["strain".to_owned(), "pressure".to_owned()];
+    let layout = Layout { iterations: true, fit, opens_on: Tab::Solver, ..Layout::default() };
+    let mut recorder = Recorder::open(options(&folder.file("solver.rrd"), layout)).unwrap();
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    for i in 0..40 {
+        let left = 0.8f64.powi(i);
+        let mix = |(&a, &b): (&glam::DVec3, &glam::DVec3)| a.lerp(b, 1.0 - left);
+        let at: Vec<glam::DVec3> = scene.garment.positions.iter().zip(&scene.draped).map(mix).collect();
+        recorder.iteration(i.into(), 2.0 + left, left, (i % 4 == 0).then_some(at.as_slice())).unwrap();
+    }
+    let strain: Vec<f64> = scene.draped.iter().map(|p| 8.0 * (1.4 - p.z).max(0.0)).collect();
+    let pressure: Vec<f64> = scene.distance_m.iter().map(|d| (0.02 - d).max(0.0) * 60.0).collect();
+    let overlays = [
+        Overlay { name: "strain", unit: "%", values: &strain },
+        Overlay { name: "pressure", unit: "kPa", values: &pressure },
+    ];
+    recorder.step(&step(0, &scene, &solved, &overlays)).unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    for path in [paths::ENERGY, paths::RESIDUAL] {
+        assert_eq!(contents.entities[path].rows, 40);
+        assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);
+    }
+    assert!(contents.entities[paths::DRAPE].timelines.contains(paths::ITERATION));
+    for name in ["strain", "pressure"] {
+        for leaf in ["garment", "legend/bar", "legend/ticks"] {
+            assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");
+        }
+    }
 }
 
 /// A port somebody else listens on, for as long as the listener lives.

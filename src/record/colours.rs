@@ -15,7 +15,8 @@ pub const CLOTH: Rgb = [196, 202, 210];
 /// The displaced garment.
 pub const DRAPED: Rgb = [118, 176, 228];
 
-const HUES: usize = 12;
+/// Hues of the palette; its first so many entries are of one lightness.
+pub const HUES: usize = 12;
 /// Colours this far apart (see `difference`) are told apart at a glance; farther is no better.
 const FAR_ENOUGH: u32 = 12_000;
 

@@ -8,6 +8,8 @@ use super::colour_map::{ColourMap, Range};
 use super::meshes::{rerun_colours, single};
 use super::{Open, RecordError};
 
+/// Texts in a view. Without a colour of their own Rerun gives each path another.
+pub(super) const TEXT: Color = Color(rerun::Rgba32(0xE6E9_ECFF));
 /// Bands of the strip.
 const BANDS: u32 = 48;
 /// Numbers along the strip, the ends included.
@@ -53,7 +55,7 @@ impl Legend<'_> {
         open.log(&format!("{path}/bar"), &bar)?;
 
         // The viewer writes a text under its point.
-        let mut places = vec![at(0.5, 3.2)];
+        let mut places = vec![at(0.5, 4.0)];
         let mut labels = vec![format!("{}, {}", self.title, self.unit)];
         for tick in 0..TICKS {
             let t = f64::from(tick) / f64::from(TICKS - 1);
@@ -67,12 +69,8 @@ impl Legend<'_> {
 }
 
 /// Points with a text each, drawn as text alone.
-fn texts(places: Vec<[f32; 3]>, labels: Vec<String>) -> Points3D {
-    Points3D::new(places)
-        .with_labels(labels)
-        .with_radii([0.0])
-        .with_colors([Color::from_rgb(225, 228, 232)])
-        .with_show_labels(true)
+pub(super) fn texts(places: Vec<[f32; 3]>, labels: Vec<String>) -> Points3D {
+    Points3D::new(places).with_labels(labels).with_radii([0.0]).with_show_labels(true)
 }
 
 /// Three significant digits, without trailing zeros.

@@ -18,9 +18,10 @@
 //! | `/levels/parts/<level>` | BarChart | PARTs of each level | `table` |
 //! | `/numbers/<name>` | Scalars | PART count, error, ... | `table` |
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
-//! | `/solver/energy`, `/solver/residual` | Scalars | J; residual over weight | `iteration` |
-//! | `/compare/<slot>/garment`, `.../title` | Mesh3D, TextDocument | 2–6 chosen tables side by side | – |
-//! | `/scatter/...` | Points2D, LineStrips2D | time against error, a point per table | – |
+//! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
+//! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
+//! | `/compare/<slot>/garment`, `.../caption` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
+//! | `/scatter/points`, `.../names`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
 
 /// The body.
 pub const BODY: &str = "/body";
@@ -52,12 +53,16 @@ pub const HISTOGRAM: &str = "/levels/histogram";
 pub const LEVEL_PARTS: &str = "/levels/parts";
 /// Scalars over `table`.
 pub const NUMBERS: &str = "/numbers";
+/// The same numbers, a row per table.
+pub const ROWS: &str = "/rows";
 /// Times of the stages over `table`, ms.
 pub const STAGE_MS: &str = "/numbers/ms";
 /// Energy over `iteration`, J.
 pub const ENERGY: &str = "/solver/energy";
 /// Residual over weight over `iteration`.
 pub const RESIDUAL: &str = "/solver/residual";
+/// Its decimal logarithm, for the plot.
+pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";
 /// The chosen tables, side by side.
 pub const COMPARE: &str = "/compare";
 /// Time against error.

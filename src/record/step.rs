@@ -1,7 +1,10 @@
 //! One step of the timeline `table`: the PARTs of a range table, their forces, the drape, and what was measured.
 
 use glam::DVec3;
-use rerun::{Arrows3D, BarChart, Clear, Color, Scalars, TextDocument};
+use rerun::components::{Scalar, Text};
+use rerun::{
+    AnyValues, Arrows3D, BarChart, Clear, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument,
+};
 
 use super::colour_map::{ColourMap, Range};
 use super::colours::{self, colour_parts};
@@ -231,12 +234,35 @@ fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
 }
 
 fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
-    open.log("/numbers/part_count", &Scalars::single(step.part_force_n.len() as f64))?;
-    for (stage, ms) in &step.panel.timings_ms {
-        open.log(&format!("{}/{stage}", paths::STAGE_MS), &Scalars::single(*ms))?;
+    let parts = ("part_count", "PARTs", step.part_force_n.len() as f64);
+    series(open, "/numbers/part_count", parts.1, 0, parts.2)?;
+    let mut row = vec![(parts.0.to_owned(), parts.2)];
+    for (i, (stage, ms)) in step.panel.timings_ms.iter().enumerate() {
+        series(open, &format!("{}/{stage}", paths::STAGE_MS), stage, i, *ms)?;
+        row.push((format!("{stage}_ms"), *ms));
     }
-    for (leaf, value) in step.scalars {
-        open.log(&format!("{}/{leaf}", paths::NUMBERS), &Scalars::single(*value))?;
+    for (i, (leaf, value)) in step.scalars.iter().enumerate() {
+        series(open, &format!("{}/{leaf}", paths::NUMBERS), leaf, i, *value)?;
+        row.push((leaf.replace('/', "_"), *value));
     }
+    let mut cells = AnyValues::default().with_component::<Text>("table", [step.panel.table.as_str()]);
+    for (name, value) in row {
+        // A column without a name cannot be shown.
+        if let Ok(column) = ComponentIdentifier::try_new(name) {
+            cells = cells.with_component::<Scalar>(column, [value]);
+        }
+    }
+    open.log(paths::ROWS, &cells)?;
     open.log(paths::REPORT, &TextDocument::from_markdown(step.panel.markdown()))
+}
+
+/// A scalar, drawn as a line with a dot at each step: one step alone is then seen too.
+fn series(open: &Open, path: &str, name: &str, place: usize, value: f64) -> Result<(), RecordError> {
+    if open.first_use(path) {
+        let [r, g, b] = colours::palette()[place % colours::HUES];
+        let colour = Color::from_rgb(r, g, b);
+        open.log_fixed(path, &SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([2.0]))?;
+        open.log_fixed(path, &SeriesPoints::new().with_names([name]).with_colors([colour]).with_marker_sizes([4.0]))?;
+    }
+    open.log(path, &Scalars::single(value))
 }

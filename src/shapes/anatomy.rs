@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::jet::Jet;
 use super::measures::Measures;
-use super::solid::{Ellipsoid, Section, Solid, Sweep};
+use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
 /// Angle of the arms from the vertical, radians: enough for a sleeve under the arm, as dress forms and A poses have it.
 const ARM_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
@@ -96,16 +96,17 @@ impl Anatomy {
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
         let (swell, protrusion) = (cup.powf(0.35), 0.031 * cup.powf(0.8));
-        let breast_radii = DVec3::new(0.066, 0.060, 0.072) * swell * (bust / 0.14).sqrt();
+        let breast_radii = DVec3::new(0.062, 0.060, 0.070) * swell * (bust / 0.14).sqrt();
         let breast = Ellipsoid {
-            centre: DVec3::new(0.53 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
+            centre: DVec3::new(0.50 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
             radii: breast_radii,
             lean: 0.25,
         };
         let seat = hip / 0.1528;
         let buttock = Ellipsoid {
-            centre: DVec3::new(0.075 * seat, 0.043 * seat, m.hip_height + 0.005 * k),
-            radii: DVec3::new(0.083, 0.079, 0.095) * seat,
+            centre: DVec3::new(0.076 * seat, 0.043 * seat, m.hip_height + 0.028 * k),
+            // Its lower end stays a little above the crotch, or the seat would close the gap between the legs.
+            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.038 * k),
             lean: 0.1,
         };
         let (arm, wrist_at, biceps_at) = arm(m, f);
@@ -126,51 +127,74 @@ impl Anatomy {
         Self { trunk, breast, buttock, neck, cranium, jaw, arm, leg, foot, wrist_at, biceps_at, neck_at }
     }
 
-    /// Trunk, bust, seat and the root of the neck.
+    /// Trunk, bust, seat and neck.
     #[must_use]
     pub fn torso(&self, p: DVec3) -> Jet {
         let mut field = self.trunk.at(p);
         for side in [1.0, -1.0] {
-            field = field.smooth_min(sided(&self.breast, p, side), 0.075);
-            field = field.smooth_min(sided(&self.buttock, p, side), 0.07);
+            field = Sided::new(&self.breast, side).join(field, p, 0.075);
+            field = Sided::new(&self.buttock, side).join(field, p, 0.07);
         }
-        field.smooth_min(self.neck.at(p), 0.06)
+        self.neck.join(field, p, 0.06)
     }
 
-    /// Both arms.
+    /// The arm on the side of `p`.
     #[must_use]
-    pub fn arms(&self, p: DVec3) -> Jet {
-        sided(&self.arm, p, p.x.signum())
+    pub fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
+        Sided::new(&self.arm, p.x)
     }
 
-    /// Both legs with their feet, flat on the floor.
+    /// Trunk, neck and legs.
     #[must_use]
-    pub fn legs(&self, p: DVec3) -> Jet {
+    pub fn torso_and_legs(&self, p: DVec3) -> Jet {
+        Legs(self).join(self.torso(p), p, 0.035)
+    }
+
+    /// Everything but the head.
+    #[must_use]
+    pub fn below_the_head(&self, p: DVec3) -> Jet {
+        self.arm_at(p).join(self.torso_and_legs(p), p, 0.045)
+    }
+}
+
+/// Both legs with their feet, flat on the floor.
+struct Legs<'a>(&'a Anatomy);
+
+impl Solid for Legs<'_> {
+    fn at(&self, p: DVec3) -> Jet {
         let one = |side: f64| {
-            let limb = sided(&self.leg, p, side).smooth_min(sided(&self.foot, p, side), 0.05);
-            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.015)
+            let limb = Sided::new(&self.0.foot, side).join(Sided::new(&self.0.leg, side).at(p), p, 0.05);
+            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.035)
         };
-        one(1.0).smooth_min(one(-1.0), 0.006)
+        let near = one(p.x);
+        // The other leg matters only next to the middle.
+        if p.x.abs() > 0.05 { near } else { near.smooth_min(one(-p.x), 0.006) }
     }
 
-    /// The head.
-    #[must_use]
-    pub fn head(&self, p: DVec3) -> Jet {
-        self.cranium.at(p).smooth_min(self.jaw.at(p), 0.07)
+    fn at_least(&self, p: DVec3) -> f64 {
+        let leg = &self.0.leg;
+        (p.z - leg.range().1).max(0.0)
+    }
+}
+
+/// The head.
+struct Head<'a>(&'a Anatomy);
+
+impl Solid for Head<'_> {
+    fn at(&self, p: DVec3) -> Jet {
+        self.0.cranium.at(p).smooth_min(self.0.jaw.at(p), 0.07)
+    }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        // The smooth joint adds at most a sixth of its width.
+        (self.0.cranium.at_least(p).min(self.0.jaw.at_least(p)) - 0.012).max(0.0)
     }
 }
 
 impl Solid for Anatomy {
     fn at(&self, p: DVec3) -> Jet {
-        self.torso(p).smooth_min(self.arms(p), 0.045).smooth_min(self.legs(p), 0.035).smooth_min(self.head(p), 0.035)
+        Head(self).join(self.below_the_head(p), p, 0.035)
     }
-}
-
-/// A left part's field, or its mirror image's for a negative `side`.
-fn sided(part: &dyn Solid, p: DVec3, side: f64) -> Jet {
-    let mirror = DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0);
-    let jet = part.at(p * mirror);
-    Jet::new(jet.value, jet.gradient * mirror)
 }
 
 fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
@@ -259,10 +283,10 @@ fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
         oval(wrist, 0.88 * w, 1.12 * w),
         oval(wrist + 0.04 * k, 0.017 * k, 0.034 * k),
         oval(wrist + 0.085 * k, 0.0155 * k, 0.040 * k),
-        oval(wrist + 0.13 * k, 0.0125 * k, 0.034 * k),
-        oval(wrist + 0.175 * k, 0.009 * k, 0.021 * k),
+        oval(wrist + 0.13 * k, 0.0135 * k, 0.034 * k),
+        oval(wrist + 0.175 * k, 0.0115 * k, 0.023 * k),
     ];
-    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.004]), wrist, biceps)
+    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.009]), wrist, biceps)
 }
 
 /// Half the gap between the thighs where they are closest, m: what the mesh needs to keep them apart.
@@ -313,11 +337,11 @@ fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
         step(-0.02, 0.031, 0.050),
         step(0.03, 0.034, 0.058),
         step(0.08, 0.040, 0.042),
-        step(0.13, 0.046, 0.026),
-        step(0.165, 0.044, 0.017),
-        step(0.195, 0.034, 0.012),
+        step(0.13, 0.046, 0.029),
+        step(0.165, 0.044, 0.021),
+        step(0.195, 0.036, 0.017),
     ];
-    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.008, 0.007]);
+    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.01, 0.011]);
     (leg, foot)
 }
 

@@ -109,7 +109,7 @@ impl Surface for Skin<'_> {
         let t = self.solid.arm.along(mirrored) / self.solid.wrist_at;
         let off_axis = (mirrored - self.solid.arm.centre(t * self.solid.wrist_at)).length();
         let on_arm = 1.0 - smooth_step(0.10, 0.16, off_axis / self.scale);
-        let arm = 1.0 - 0.45 * on_arm * smooth_step(0.1, 0.95, t);
+        let arm = 1.0 - 0.52 * on_arm * smooth_step(0.1, 0.95, t);
         let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / self.scale));
         let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
         arm.min(ankle).min(head)

@@ -25,28 +25,52 @@ pub struct Layout {
     pub scatter: bool,
     /// The recording is watched while it grows: the cursor follows the newest step.
     pub follow: bool,
+    /// The tab shown when the recording opens.
+    pub opens_on: Tab,
+}
+
+/// The tabs of a recording.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Tab {
+    /// All stages of one table, and the numbers of all tables below.
+    #[default]
+    Stages,
+    /// The chosen tables.
+    SideBySide,
+    /// Speed against error, and the rows of numbers.
+    Numbers,
+    /// Strain and pressure.
+    Fit,
+    /// Energy and residual over the iterations.
+    Solver,
 }
 
 impl Layout {
     pub(crate) fn time_panel(&self) -> TimePanel {
-        TimePanel { timeline: paths::TABLE, follow: self.follow }
+        let timeline = if self.opens_on == Tab::Solver { paths::ITERATION } else { paths::TABLE };
+        TimePanel { timeline, follow: self.follow }
     }
 
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
-        let mut tabs = vec![self.stages(eye)];
+        let mut tabs = vec![(Tab::Stages, self.stages(eye))];
         if !self.compare.is_empty() {
-            tabs.push(self.side_by_side(eye));
+            tabs.push((Tab::SideBySide, self.side_by_side(eye)));
         }
-        if !self.fit.is_empty() || self.error {
-            tabs.push(self.fit(eye));
+        if self.several_tables || self.scatter {
+            tabs.push((Tab::Numbers, self.numbers()));
+        }
+        if !self.fit.is_empty() {
+            tabs.push((Tab::Fit, self.fit(eye)));
         }
         if self.iterations {
-            tabs.push(solver(eye));
+            tabs.push((Tab::Solver, solver(eye)));
         }
-        match tabs.pop() {
-            Some(only) if tabs.is_empty() => only,
-            last => Node::Tabs(tabs.into_iter().chain(last).collect()),
+        let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
+        let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
+        match nodes.pop() {
+            Some(only) if nodes.is_empty() => only,
+            last => Node::Tabs(open, nodes.into_iter().chain(last).collect()),
         }
     }
 
@@ -77,15 +101,16 @@ impl Layout {
                 below.push((1.0, View::plot("Error, mm", &["/numbers/error"]).into()));
             }
         }
-        let mut rows = vec![(3.0, top), (1.0, Node::Row("Levels", below))];
-        if self.several_tables {
-            let mut last: Vec<(f32, Node)> = vec![(2.0, View::rows("Numbers", &[paths::NUMBERS], paths::TABLE).into())];
-            if self.scatter {
-                last.insert(0, (1.0, View::plane("Time against error", &[paths::SCATTER]).into()));
-            }
-            rows.push((1.0, Node::Row("Numbers", last)));
+        Node::Column("Stages", vec![(3.0, top), (1.0, Node::Row("Levels", below))])
+    }
+
+    fn numbers(&self) -> Node {
+        let rows = View::rows("Numbers", &[paths::ROWS], paths::TABLE);
+        let mut views: Vec<(f32, Node)> = vec![(1.0, rows.into())];
+        if self.scatter {
+            views.insert(0, (1.6, View::plane("Time against error", &[paths::SCATTER]).into()));
         }
-        Node::Column("Stages", rows)
+        Node::Column("Numbers", views)
     }
 
     fn side_by_side(&self, eye: &Eye) -> Node {
@@ -102,9 +127,6 @@ impl Layout {
             let path = format!("{}/{name}", paths::FIT);
             views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
         }
-        if self.error {
-            views.push((1.0, View::spatial("Error", &[paths::BODY, paths::ERROR], eye).into()));
-        }
         Node::Row("Fit", views)
     }
 }
@@ -112,7 +134,7 @@ impl Layout {
 fn solver(eye: &Eye) -> Node {
     let plots = vec![
         (1.0, View::plot("Energy, J", &[paths::ENERGY]).into()),
-        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL]).into()),
+        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10]).into()),
     ];
     Node::Row(
         "Solver (timeline: iteration)",

@@ -27,8 +27,8 @@ pub(crate) enum Node {
     Row(&'static str, Vec<(f32, Node)>),
     /// One above the other, with the share of the height each.
     Column(&'static str, Vec<(f32, Node)>),
-    /// One at a time; the first is shown when the recording opens.
-    Tabs(Vec<Node>),
+    /// One at a time; the one with this index is shown when the recording opens.
+    Tabs(usize, Vec<Node>),
 }
 
 impl From<View> for Node {
@@ -105,7 +105,7 @@ fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<([u8
         }
         Node::Row(name, nodes) => (name, ContainerKind::Horizontal, nodes.iter().map(|(s, n)| (*s, n)).collect()),
         Node::Column(name, nodes) => (name, ContainerKind::Vertical, nodes.iter().map(|(s, n)| (*s, n)).collect()),
-        Node::Tabs(nodes) => ("", ContainerKind::Tabs, nodes.iter().map(|n| (1.0, n)).collect()),
+        Node::Tabs(_, nodes) => ("", ContainerKind::Tabs, nodes.iter().map(|n| (1.0, n)).collect()),
     };
     let mut paths = Vec::with_capacity(children.len());
     for (_, child) in &children {
@@ -120,8 +120,8 @@ fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<([u8
     container = match kind {
         ContainerKind::Horizontal => container.with_col_shares(shares.map(ColumnShare::from)),
         ContainerKind::Vertical => container.with_row_shares(shares.map(RowShare::from)),
-        ContainerKind::Tabs => match paths.first() {
-            Some(first) => container.with_active_tab(first.as_str()),
+        ContainerKind::Tabs => match paths.get(if let Node::Tabs(open, _) = node { *open } else { 0 }) {
+            Some(open) => container.with_active_tab(open.as_str()),
             None => container,
         },
         ContainerKind::Grid => container,

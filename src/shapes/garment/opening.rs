@@ -55,10 +55,10 @@ impl<'a> Opening<'a> {
             // Under the arm the side seam begins a little below the armpit, outside the chest.
             let lowest = m.axilla - 0.035;
             let chest = anatomy.trunk.section(m.axilla)[2];
-            let lower = DVec3::new(chest + 0.008, 0.0, lowest);
+            let lower = DVec3::new(chest + 0.016, 0.0, lowest);
             let along = lower - upper;
             let normal = DVec3::new(-along.z, 0.0, along.x).normalize();
-            openings.push(Self::Armholes { point: upper, normal, lowest: lowest - 0.04 });
+            openings.push(Self::Armholes { point: upper, normal, lowest: lowest - 0.03 });
         }
         openings
     }
@@ -100,7 +100,7 @@ impl<'a> Opening<'a> {
             Self::Armholes { point, normal, lowest } => {
                 let beyond = Jet::new((left - *point).dot(*normal), *normal * mirror);
                 let above = Jet::new(p.z - lowest, DVec3::Z);
-                -((-beyond).max(-above))
+                -((-beyond).smooth_max(-above, 0.06))
             }
             Self::Cuffs { form, end } => {
                 let along = form.arm.along(left) - end;
