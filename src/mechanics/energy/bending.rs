@@ -1,105 +1,233 @@
-//! Bending: the cost of curvature across each inner edge.
+//! Bending: the cost of the cloth's second derivatives along weft and warp.
 //!
-//! Quadratic bending of an inextensible surface (Bergou, Wardetzky, Harmon, Zorin, Grinspun: "A quadratic bending model
-//! for inextensible surfaces", SGP 2006). For an inner edge (x₀, x₁) with opposite corners x₂, x₃,
+//! A quadratic fitted over the flattened ring of each inner vertex gives x_uu, x_uv and x_vv as fixed combinations of
+//! the ring's positions. For a cloth that bends without stretching |x_uu|, |x_vv| are its curvatures, and
 //!
-//! E = ½ · 3B/(A₀ + A₁) · |Σ c_i x_i|²,
+//! E = Σ ½ A_i (B_u |x_uu|² + H |x_uv|² + B_v |x_vv|²), H = 4 B_45 − B_u − B_v,
 //!
-//! c₀ = cot α₀₃ + cot α₀₄, c₁ = cot α₀₁ + cot α₀₂, c₂ = −cot α₀₁ − cot α₀₃, c₃ = −cot α₀₂ − cot α₀₄, with α₀₁, α₀₂ the rest
-//! angles at x₀ and α₀₃, α₀₄ those at x₁, in the first and second triangle. Summed over edges it approximates ½ ∫ B κ² dA on
-//! a developable surface. The Hessian is constant: a scalar per pair of vertices times the identity.
+//! is a thin plate's energy whose stiffness towards weft, bias and warp is the measured B_u, B_45, B_v: exact for a
+//! cylinder in any direction on any mesh. It is quadratic in x (as in Bergou, Wardetzky, Harmon, Zorin, Grinspun: "A quadratic
+//! bending model for inextensible surfaces", SGP 2006), so its Hessian is constant: a scalar per pair of vertices. One
+//! hinge per edge would be cheaper, but bends up to three times too stiffly, by how the edges happen to run.
 //!
-//! B is a fabric's stiffness in the direction across the edge, from its three measured directions by
-//! B(φ) = a + b cos 2φ + c cos 4φ, φ the angle of that direction from the weft.
+//! A triangle without an inner vertex (a corner, a belt one triangle wide) is in no ring; its edges take a hinge,
+//! ½ 2B/(A₀ + A₁) |Σ c_i x_i|² with the cotangent weights c_i of the same paper and the factor that a mesh of equilateral
+//! triangles needs.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | A₀, A₁ | rest areas of the two triangles | m² |
-//! | B | bending stiffness | N·m |
-//! | c_i | cotangent weights | – |
+//! | A_i | rest area, each triangle's shared among its inner vertices | m² |
+//! | B_u, B_45, B_v | bending stiffness along weft, bias and warp | N·m |
+//! | x_uu, x_uv, x_vv | second derivatives of the position | 1/m |
 //!
-//! Limits: the energy is exact in the limit of isometric deformation and flat rest; the direction of bending is that
-//! across the mesh edge, so a strongly orthotropic fabric bends as the mean over the edges a fold crosses.
+//! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
 
 use glam::{DVec2, DVec3};
 
-/// One inner edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hinge {
-    /// x₀, x₁ (the edge), x₂, x₃ (the opposite corners).
-    pub vertices: [u32; 4],
-    /// Cotangent weights c_i.
-    pub weights: [f64; 4],
-    /// 3B/(A₀ + A₁), N/m.
-    pub stiffness: f64,
+use super::fan::Fan;
+use crate::fabric::Fabric;
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+/// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
+/// zero; a good ring changes by less than this.
+const RIDGE: f64 = 1e-6;
+
+/// A floor for H as a share of B_u + B_v, so that a saddle always costs something.
+const LEAST_TWIST: f64 = 0.1;
+
+/// All bending elements of a cloth, as rows of weights over a few vertices each.
+#[derive(Debug, Clone, Default)]
+pub struct Bending {
+    elements: Vec<Element>,
+    vertices: Vec<u32>,
+    weights: Vec<DVec3>,
 }
 
-/// A triangle as a hinge sees it: the edge's two ends and the opposite corner, flat.
+/// One ring or hinge: its part of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
 #[derive(Debug, Clone, Copy)]
-pub struct Wing {
-    /// Edge ends and opposite corner in the triangle's flat frame, m.
-    pub corners: [DVec2; 3],
+struct Element {
+    start: u32,
+    end: u32,
+    stiffness: DVec3,
 }
 
-impl Wing {
-    fn cotangents(&self) -> [f64; 2] {
-        let [a, b, c] = self.corners;
-        let cot = |p: DVec2, q: DVec2| p.dot(q) / p.perp_dot(q).abs();
-        [cot(b - a, c - a), cot(a - b, c - b)]
-    }
-
-    fn area(&self) -> f64 {
-        let [a, b, c] = self.corners;
-        0.5 * (b - a).perp_dot(c - a).abs()
-    }
-
-    /// cos 2φ and cos 4φ of the direction across the edge.
-    fn across(&self) -> [f64; 2] {
-        let edge = (self.corners[1] - self.corners[0]).normalize_or_zero();
-        // Turning by 90 degrees changes the sign of cos 2φ and not that of cos 4φ.
-        let cos2 = -(edge.x * edge.x - edge.y * edge.y);
-        [cos2, 2.0 * cos2 * cos2 - 1.0]
-    }
-}
-
-impl Hinge {
-    /// From both triangles' flat frames and the stiffness along weft, bias and warp (N·m).
+impl Bending {
+    /// Rings and hinges of a mesh in its rest shape.
     #[must_use]
-    pub fn new(vertices: [u32; 4], wings: [Wing; 2], bending_nm: [f64; 3]) -> Self {
-        let [[c01, c03], [c02, c04]] = [wings[0].cotangents(), wings[1].cotangents()];
-        let weights = [c03 + c04, c01 + c02, -c01 - c03, -c02 - c04];
-        let [weft, bias, warp] = bending_nm;
-        let (p, q) = (wings[0].across(), wings[1].across());
-        let (cos2, cos4) = (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]));
-        let b =
-            0.25 * (weft + 2.0 * bias + warp) + 0.5 * (weft - warp) * cos2 + 0.25 * (weft - 2.0 * bias + warp) * cos4;
-        Self { vertices, weights, stiffness: 3.0 * b / (wings[0].area() + wings[1].area()) }
+    pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabric: &Fabric) -> Self {
+        let [weft, bias, warp] = fabric.bending_nm;
+        let twist = (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp));
+        let stiffness = DVec3::new(weft, twist, warp);
+        let fans = Fan::all(mesh, rest);
+        let mut bending = Self::default();
+        let mut share = vec![0.0; mesh.vertex_count()];
+        let mut bare = vec![false; mesh.triangles.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            let corners = voronoi(rest.corners[t]);
+            let inner = || triangle.iter().zip(corners).filter(|&(&v, _)| fans[v as usize].is_some());
+            let sum: f64 = inner().map(|(_, part)| part).sum();
+            bare[t] = sum == 0.0;
+            let [a, b, c] = rest.corners[t];
+            let area = 0.5 * (b - a).perp_dot(c - a).abs();
+            for (&v, part) in inner() {
+                share[v as usize] += area * part / sum;
+            }
+        }
+        for (v, fan) in fans.iter().enumerate() {
+            if let Some(fan) = fan {
+                bending.push_ring(v as u32, fan, stiffness * share[v]);
+            }
+        }
+        let mean = 0.25 * (weft + 2.0 * bias + warp);
+        let inner = topology.edges.iter().zip(&topology.edge_triangles).zip(&topology.edge_valence);
+        for ((&edge, &[s, t]), &valence) in inner {
+            if valence > 1 && (bare[s as usize] || bare[t as usize]) {
+                bending.push_hinge(mesh, rest, edge, [s, t], mean);
+            }
+        }
+        bending
     }
 
-    /// Σ c_i x_i, m.
-    #[must_use]
-    pub fn curvature_vector(&self, x: &[DVec3]) -> DVec3 {
-        self.vertices.iter().zip(&self.weights).map(|(&v, &w)| x[v as usize] * w).sum()
+    fn push_ring(&mut self, centre: u32, fan: &Fan, stiffness: DVec3) {
+        let Some(weights) = second_derivatives(&fan.spokes) else { return };
+        let start = self.vertices.len() as u32;
+        self.vertices.push(centre);
+        self.weights.push(-weights.iter().copied().sum::<DVec3>());
+        self.vertices.extend(&fan.ring);
+        self.weights.extend(weights);
+        self.elements.push(Element { start, end: self.vertices.len() as u32, stiffness });
+    }
+
+    fn push_hinge(&mut self, mesh: &TriMesh, rest: &RestShape, [a, b]: [u32; 2], wings: [u32; 2], b_mean: f64) {
+        let mut weights = [0.0; 4];
+        let mut vertices = [a, b, a, b];
+        let mut area = 0.0;
+        for (k, t) in wings.map(|t| t as usize).into_iter().enumerate() {
+            let at = |v: u32| mesh.triangles[t].iter().position(|&c| c == v);
+            let (Some(i), Some(j)) = (at(a), at(b)) else { return };
+            let tip = 3 - i - j;
+            let [p, q, r] = [i, j, tip].map(|c| rest.corners[t][c]);
+            let cot = |s: DVec2, t: DVec2| s.dot(t) / s.perp_dot(t).abs();
+            let (at_a, at_b) = (cot(q - p, r - p), cot(p - q, r - q));
+            weights[0] += at_b;
+            weights[1] += at_a;
+            weights[2 + k] = -at_a - at_b;
+            vertices[2 + k] = mesh.triangles[t][tip];
+            area += 0.5 * (q - p).perp_dot(r - p).abs();
+        }
+        let start = self.vertices.len() as u32;
+        self.vertices.extend(vertices);
+        self.weights.extend(weights.map(|w| DVec3::X * w));
+        self.elements.push(Element { start, end: start + 4, stiffness: DVec3::X * (2.0 * b_mean / area) });
+    }
+
+    fn parts(&self, e: &Element) -> (&[u32], &[DVec3]) {
+        let range = e.start as usize..e.end as usize;
+        (&self.vertices[range.clone()], &self.weights[range])
+    }
+
+    /// x_uu, x_uv, x_vv of one element.
+    fn derivatives(&self, e: &Element, x: &[DVec3]) -> [DVec3; 3] {
+        let (vertices, weights) = self.parts(e);
+        let mut d = [DVec3::ZERO; 3];
+        for (&v, w) in vertices.iter().zip(weights) {
+            let p = x[v as usize];
+            d[0] += p * w.x;
+            d[1] += p * w.y;
+            d[2] += p * w.z;
+        }
+        d
     }
 
     /// Energy, J.
     #[must_use]
     pub fn energy(&self, x: &[DVec3]) -> f64 {
-        0.5 * self.stiffness * self.curvature_vector(x).length_squared()
+        self.elements.iter().map(|e| Self::cost(e, &self.derivatives(e, x))).sum()
+    }
+
+    fn cost(e: &Element, d: &[DVec3; 3]) -> f64 {
+        0.5 * e.stiffness.dot(DVec3::from(d.map(|k| k.length_squared())))
     }
 
     /// Adds the gradient, N; returns the energy.
     pub fn add_gradient(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
-        let k = self.curvature_vector(x);
-        for (&v, &w) in self.vertices.iter().zip(&self.weights) {
-            gradient[v as usize] += k * (w * self.stiffness);
+        let mut energy = 0.0;
+        for e in &self.elements {
+            let d = self.derivatives(e, x);
+            energy += Self::cost(e, &d);
+            let [p, q, r] = [d[0] * e.stiffness.x, d[1] * e.stiffness.y, d[2] * e.stiffness.z];
+            let (vertices, weights) = self.parts(e);
+            for (&v, w) in vertices.iter().zip(weights) {
+                gradient[v as usize] += p * w.x + q * w.y + r * w.z;
+            }
         }
-        0.5 * self.stiffness * k.length_squared()
+        energy
     }
 
-    /// The Hessian's scalar for the local pair (i, j), N/m.
-    #[must_use]
-    pub fn hessian(&self, i: usize, j: usize) -> f64 {
-        self.stiffness * self.weights[i] * self.weights[j]
+    /// Every pair of vertices that bend together, each once per element, the first not before the second.
+    pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.hessian().map(|(pair, _)| pair)
     }
+
+    /// The Hessian's scalars, N/m: each pair of an element once, the diagonal included.
+    pub fn hessian(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        self.elements.iter().flat_map(|e| {
+            let (vertices, weights) = self.parts(e);
+            let row = move |i: usize| {
+                (0..=i).map(move |j| ([vertices[i], vertices[j]], (weights[i] * e.stiffness).dot(weights[j])))
+            };
+            (0..vertices.len()).flat_map(row)
+        })
+    }
+}
+
+/// Each corner's part of a triangle: its Voronoi cell, or halves and quarters where that leaves the triangle (Meyer,
+/// Desbrun, Schröder, Barr: "Discrete differential-geometry operators for triangulated 2-manifolds", 2003). A third each would
+/// weigh vertices by their valence, and a strip would bend more where the light ones lie.
+fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
+    let side = |i: usize| (corners[(i + 2) % 3] - corners[(i + 1) % 3]).length_squared();
+    let squares = [side(0), side(1), side(2)];
+    let total: f64 = squares.iter().sum();
+    if let Some(obtuse) = (0..3).find(|&i| 2.0 * squares[i] > total) {
+        return std::array::from_fn(|i| if i == obtuse { 0.5 } else { 0.25 });
+    }
+    // Cell of corner i: (b² cot B + c² cot C)/8 with cot B = (a² + c² − b²)/4A; over A, up to the factor common to all.
+    let part = |i: usize| {
+        let (b, c) = (squares[(i + 1) % 3], squares[(i + 2) % 3]);
+        b * (total - 2.0 * b) + c * (total - 2.0 * c)
+    };
+    let parts = [part(0), part(1), part(2)];
+    parts.map(|p| p / parts.iter().sum::<f64>())
+}
+
+/// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre takes minus their sum.
+fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
+    let scale = spokes.iter().map(|p| p.length()).sum::<f64>() / spokes.len() as f64;
+    // f(p) − f(0) = g·p + ½ f_uu p_u² + f_uv p_u p_v + ½ f_vv p_v², near spokes counting more.
+    let rows: Vec<([f64; 5], f64)> = spokes
+        .iter()
+        .map(|p| {
+            let q = *p / scale;
+            ([q.x, q.y, 0.5 * q.x * q.x, q.x * q.y, 0.5 * q.y * q.y], 1.0 / q.length_squared())
+        })
+        .collect();
+    let mut normal = [[0.0; 5]; 5];
+    for (row, weight) in &rows {
+        for i in 0..5 {
+            for j in 0..5 {
+                normal[i][j] += weight * row[i] * row[j];
+            }
+        }
+    }
+    let trace: f64 = (0..5).map(|i| normal[i][i]).sum();
+    // None on the gradient, so that a flat cloth, however it lies, has no curvature.
+    for (i, row) in normal.iter_mut().enumerate().skip(2) {
+        row[i] += RIDGE * trace;
+    }
+    let inverse = faer::Mat::from_fn(5, 5, |i, j| normal[i][j]);
+    let factor = faer::linalg::solvers::Llt::new(inverse.as_ref(), faer::Side::Lower).ok()?;
+    let right = faer::Mat::from_fn(5, rows.len(), |i, k| rows[k].1 * rows[k].0[i]);
+    let fit = faer::linalg::solvers::Solve::solve(&factor, &right);
+    let per_area = 1.0 / (scale * scale);
+    Some((0..rows.len()).map(|k| DVec3::new(fit[(2, k)], fit[(3, k)], fit[(4, k)]) * per_area).collect())
 }

@@ -9,7 +9,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::bending::{Hinge, Wing};
+use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
 use super::gravity;
@@ -85,8 +85,8 @@ pub struct Cloth {
     pub pattern: Pattern,
     /// The triangles' rest data.
     pub triangles: Vec<Triangle>,
-    /// The inner edges.
-    pub hinges: Vec<Hinge>,
+    /// The rings that bend.
+    pub bending: Bending,
     stiffness: Stiffness,
     triangle_slots: Vec<[Slot; 6]>,
     bending_blocks: Vec<f64>,
@@ -130,12 +130,12 @@ impl Cloth {
             *h |= area == 0.0;
         }
         let masses: Vec<f64> = areas.iter().map(|a| a * fabric.density_kg_per_m2).collect();
-        let hinges = hinges(mesh, topology, rest, fabric);
+        let bending = Bending::new(mesh, topology, rest, fabric);
         let free: Vec<u32> = (0..n as u32).filter(|&v| !is_held[v as usize]).collect();
         if free.is_empty() {
             return Err(EnergyError::NothingFree { count: n });
         }
-        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &hinges));
+        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &bending));
         let mut unknown = vec![HELD; n];
         for (i, &v) in order.iter().enumerate() {
             unknown[v as usize] = i as u32;
@@ -151,7 +151,7 @@ impl Cloth {
             unknown,
             pattern: Pattern::default(),
             triangles,
-            hinges,
+            bending,
             stiffness: Stiffness::new(fabric),
             triangle_slots: Vec::new(),
             bending_blocks: Vec::new(),
@@ -163,7 +163,7 @@ impl Cloth {
     /// Builds the pattern, the triangles' slots in it and bending's constant blocks.
     fn lay_out(&mut self, topology: &Topology) {
         let u = &self.unknown;
-        let edges = topology.edges.iter().copied().chain(self.hinges.iter().map(|h| [h.vertices[2], h.vertices[3]]));
+        let edges = topology.edges.iter().copied().chain(self.bending.pairs());
         let pairs = edges.map(|[a, b]| (u[a as usize], u[b as usize])).filter(|&(i, j)| i != HELD && j != HELD);
         let pattern = Pattern::new(self.order.len(), pairs);
         let slot = |a: u32, b: u32| pattern.slot(u[a as usize], u[b as usize]);
@@ -176,14 +176,10 @@ impl Cloth {
             })
             .collect();
         self.bending_blocks = vec![0.0; pattern.rows.len()];
-        for hinge in &self.hinges {
-            for i in 0..4 {
-                for j in 0..=i {
-                    let s = slot(hinge.vertices[i], hinge.vertices[j]);
-                    if s.block != HELD {
-                        self.bending_blocks[s.block as usize] += hinge.hessian(i, j);
-                    }
-                }
+        for ([a, b], scalar) in self.bending.hessian() {
+            let s = slot(a, b);
+            if s.block != HELD {
+                self.bending_blocks[s.block as usize] += scalar;
             }
         }
         self.pattern = pattern;
@@ -210,7 +206,7 @@ impl Cloth {
     #[must_use]
     pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
         let membrane: f64 = self.triangles.iter().map(|t| t.energy(&self.stiffness, x)).sum();
-        let bending: f64 = self.hinges.iter().map(|h| h.energy(x)).sum();
+        let bending = self.bending.energy(x);
         gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
     }
 
@@ -220,7 +216,7 @@ impl Cloth {
         gradient.resize(x.len(), DVec3::ZERO);
         gravity::add_gradient(&self.masses, gradient);
         let membrane: f64 = self.triangles.iter().map(|t| t.add_gradient(&self.stiffness, x, gradient)).sum();
-        let bending: f64 = self.hinges.iter().map(|h| h.add_gradient(x, gradient)).sum();
+        let bending = self.bending.add_gradient(x, gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
         for (g, &held) in gradient.iter_mut().zip(&self.held) {
@@ -271,32 +267,16 @@ impl Cloth {
     }
 }
 
-/// The inner edges as hinges; an edge of three or more triangles bends between its first two only.
-fn hinges(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabric: &Fabric) -> Vec<Hinge> {
-    let wing = |t: u32, a: u32, b: u32| {
-        let corners = mesh.triangles[t as usize];
-        let at = |v: u32| corners.iter().position(|&c| c == v);
-        let (i, j) = (at(a)?, at(b)?);
-        let k = 3 - i - j;
-        let flat = rest.corners[t as usize];
-        Some((corners[k], Wing { corners: [flat[i], flat[j], flat[k]] }))
-    };
-    let inner =
-        topology.edges.iter().zip(&topology.edge_triangles).zip(&topology.edge_valence).filter(|&(_, &v)| v > 1);
-    inner
-        .filter_map(|((&[a, b], &[s, t]), _)| {
-            let ((c, first), (d, second)) = (wing(s, a, b)?, wing(t, a, b)?);
-            Some(Hinge::new([a, b, c, d], [first, second], fabric.bending_nm))
-        })
-        .collect()
-}
-
 /// Which vertices share a block with each.
-fn block_neighbours(n: usize, topology: &Topology, hinges: &[Hinge]) -> Vec<Vec<u32>> {
+fn block_neighbours(n: usize, topology: &Topology, bending: &Bending) -> Vec<Vec<u32>> {
     let mut neighbours: Vec<Vec<u32>> = (0..n as u32).map(|v| topology.neighbours(v).to_vec()).collect();
-    for [_, _, c, d] in hinges.iter().map(|h| h.vertices) {
-        neighbours[c as usize].push(d);
-        neighbours[d as usize].push(c);
+    for [a, b] in bending.pairs() {
+        neighbours[a as usize].push(b);
+        neighbours[b as usize].push(a);
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
     }
     neighbours
 }

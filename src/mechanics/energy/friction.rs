@@ -28,6 +28,10 @@ use super::membrane::outer;
 /// tangential spring of a vertex under its own weight is some hundred times softer than a jersey.
 pub const ELASTIC_SLIP: f64 = 5e-4;
 
+/// Share of ε from which a hold counts as slipping in the Hessian: a dragged anchor is left at ε exactly, up to rounding,
+/// and as a spring it would let the vertex creep by a fraction of ε a step.
+const YIELDED: f64 = 0.999;
+
 /// One vertex's hold on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hold {
@@ -106,7 +110,7 @@ impl Friction {
             let u = h.slip(x);
             let y = u.length();
             let tangent = DMat3::IDENTITY - outer(h.normal, h.normal);
-            let block = if y < ELASTIC_SLIP {
+            let block = if y < YIELDED * ELASTIC_SLIP {
                 tangent * (h.limit / ELASTIC_SLIP)
             } else {
                 (tangent - outer(u / y, u / y)) * (h.limit / y)

@@ -1,6 +1,6 @@
 //! One energy for the whole drape: E(x) = gravity + membrane + bending + contact + friction.
 //!
-//! [`Cloth`] holds what does not change while a garment settles: rest shape, masses, hinges, the held vertices and the
+//! [`Cloth`] holds what does not change while a garment settles: rest shape, masses, bending rings, the held vertices and the
 //! pattern of the Hessian. [`Contacts`] holds what does: which vertices touch the body, and how they hold on to it.
 //! Forces are −∇E. Every Hessian here is positive semi-definite, so a Newton step always descends.
 //!
@@ -8,13 +8,14 @@
 //! |---|---|---|
 //! | gravity | [`gravity`] | Σ m g z |
 //! | membrane | [`membrane`] | Σ A ψ(F), orthotropic |
-//! | bending | [`bending`] | Σ ½ 3B/(A₀+A₁) \|Σ c x\|² |
+//! | bending | [`bending`] | Σ ½ A (B_u \|x_uu\|² + H \|x_uv\|² + B_v \|x_vv\|²) |
 //! | contact | [`contact`] | Σ ½ κ A (h − q)² |
 //! | friction | [`friction`] | Σ μ N φ(\|u\|) |
 
 pub mod bending;
 mod cloth;
 pub mod contact;
+pub mod fan;
 pub mod friction;
 pub mod gravity;
 pub mod membrane;

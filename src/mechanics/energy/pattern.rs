@@ -1,6 +1,6 @@
 //! Where the Hessian's 3×3 blocks are: a symmetric sparse pattern over the free vertices, built once a garment.
 //!
-//! Two free vertices share a block if a triangle or a hinge holds both. Unknowns are numbered in the order of
+//! Two free vertices share a block if a triangle or a bending element holds both. Unknowns are numbered in the order of
 //! elimination ([`ordering`](super::ordering)), columns ascending, lower half only: block (i, j) with i ≥ j.
 
 /// Marks a vertex that is held, and a block that falls away with it.

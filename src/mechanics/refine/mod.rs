@@ -19,7 +19,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-pub use newton::refine;
+pub use newton::{refine, refine_with};
 pub use solver::{SolveError, Solver};
 
 /// When to stop, and how carefully to go.

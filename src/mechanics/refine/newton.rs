@@ -27,8 +27,11 @@ pub fn refine(
     refine_with(cloth, contacts, start, options, observer)
 }
 
-/// [`refine`] with contacts made by the caller.
-pub(crate) fn refine_with(
+/// [`refine`] with contacts made by the caller: [`Contacts::none`] for a cloth that hangs free.
+///
+/// # Errors
+/// As [`refine`].
+pub fn refine_with(
     cloth: &Cloth,
     mut contacts: Contacts<'_>,
     start: Vec<DVec3>,

@@ -1,0 +1,7 @@
+//! The drape against closed forms: a hanging strip, a cantilever, and Coulomb's slip angle.
+
+mod bench;
+mod cantilever;
+mod friction;
+mod strip;
+mod threads;

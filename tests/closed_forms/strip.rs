@@ -1,0 +1,40 @@
+//! A strip hung by one end stretches by ρ g L²/2k.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+use partwise::GRAVITY;
+use partwise::mechanics::energy::{Cloth, Contacts};
+use partwise::mechanics::refine::{RefineOptions, Stop, refine_with};
+use partwise::mesh::{RestShape, Topology};
+
+use crate::bench::{fabric, rectangle};
+
+/// Elongation over ρ g L²/2k of a strip 60 × 10 cm in cells of 10 cm / `across`.
+fn elongation_ratio(across: usize, stretch: f64) -> f64 {
+    let (length, density) = (0.6, 0.2);
+    let mesh = rectangle(DVec3::X * 0.1, DVec3::NEG_Z * length, across, 6 * across);
+    let held: Vec<u32> = (0..=across as u32).collect();
+    let fabric = fabric(density, stretch, 0.3, 1e-5, 0.0);
+    let cloth =
+        Cloth::new(&mesh, &Topology::new(&mesh), &RestShape::from_edges(&mesh).unwrap(), &fabric, &held).unwrap();
+    let options = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
+    let end =
+        refine_with(&cloth, Contacts::none(), mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(()));
+    let end = end.unwrap();
+    assert_eq!(end.stop, Stop::Converged, "residual {:e}", end.residual_over_weight);
+    assert!(end.history.windows(2).all(|w| w[1].energy <= w[0].energy), "the energy rose");
+    let hem = &end.positions[end.positions.len() - across - 1..];
+    let lowest = hem.iter().map(|p| p.z).sum::<f64>() / hem.len() as f64;
+    (-lowest - length) / (density * GRAVITY * length * length / (2.0 * stretch))
+}
+
+#[test]
+fn a_strip_stretches_as_its_closed_form_at_three_resolutions() {
+    for across in [2, 4, 8] {
+        for stretch in [60.0, 4000.0] {
+            let ratio = elongation_ratio(across, stretch);
+            assert!((ratio - 1.0).abs() < 0.02, "{across} cells across, k {stretch}: {ratio}");
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Gradient and Hessian of each term by central differences.
+
+use glam::DVec3;
+use partwise::distance::Body;
+use partwise::mechanics::energy::{Cloth, Contacts, Friction, gravity, membrane::Stiffness};
+use partwise::mesh::TriMesh;
+
+use crate::patch::{cloth, deformed, fabric, jitters, sheet};
+
+/// Moves of 1e-6 m: rounding of an energy of 1e-2 J over it is 1e-12 N, truncation less.
+const H: f64 = 1e-6;
+
+/// Checks `gradient` against differences of `energy` along three directions over all vertices.
+fn check_gradient(x: &[DVec3], energy: impl Fn(&[DVec3]) -> f64, gradient: &[DVec3], what: &str) {
+    for k in 0..3 {
+        let d: Vec<DVec3> = (0..x.len()).map(|i| jitters(1000 * (k + 1) + i)).collect();
+        let at = |s: f64| energy(&x.iter().zip(&d).map(|(p, d)| *p + *d * (s * H)).collect::<Vec<_>>());
+        let measured = (at(1.0) - at(-1.0)) / (2.0 * H);
+        let computed: f64 = gradient.iter().zip(&d).map(|(g, d)| g.dot(*d)).sum();
+        let scale = gradient.iter().map(|g| g.length()).sum::<f64>();
+        assert!((measured - computed).abs() < 1e-6 * scale, "{what}: {measured} measured, {computed} computed");
+        assert!(scale > 0.0, "{what}: the test must not sit at a zero");
+    }
+}
+
+#[test]
+fn membrane_gradient() {
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let stiffness = Stiffness::new(&fabric());
+    // Stretched, and crushed and folded over: the energy itself is smooth in both.
+    let stretched = deformed(&mesh);
+    let crushed: Vec<DVec3> = stretched.iter().map(|p| DVec3::new(0.6 * p.x, p.y, 0.7 * p.z)).collect();
+    for x in [&stretched, &crushed] {
+        let mut gradient = vec![DVec3::ZERO; x.len()];
+        for t in &cloth.triangles {
+            t.add_gradient(&stiffness, x, &mut gradient);
+        }
+        check_gradient(x, |x| cloth.triangles.iter().map(|t| t.energy(&stiffness, x)).sum(), &gradient, "membrane");
+    }
+}
+
+#[test]
+fn bending_gradient() {
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let x = deformed(&mesh);
+    let mut gradient = vec![DVec3::ZERO; x.len()];
+    cloth.bending.add_gradient(&x, &mut gradient);
+    check_gradient(&x, |x| cloth.bending.energy(x), &gradient, "bending");
+}
+
+#[test]
+fn gravity_gradient() {
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let mut gradient = vec![DVec3::ZERO; mesh.vertex_count()];
+    gravity::add_gradient(&cloth.masses, &mut gradient);
+    check_gradient(&mesh.positions, |x| gravity::energy(&cloth.masses, x), &gradient, "gravity");
+}
+
+/// A block whose upper half of y < 0.8 mm the sheet grazes.
+fn block() -> Body {
+    let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let place = |p: DVec3| DVec3::new(p.x - 0.5, p.y - 1.0, p.z - 0.5);
+    Body::new(&TriMesh::new((0..8).map(|i| place(corner(i))).collect(), triangles)).unwrap()
+}
+
+/// The sheet with part of it within the offset of the block's face y = 0.
+fn grazing(mesh: &TriMesh) -> Vec<DVec3> {
+    deformed(mesh).iter().map(|p| DVec3::new(p.x, 0.3 * p.y + 6e-4, p.z)).collect()
+}
+
+#[test]
+fn contact_gradient() {
+    let (mesh, body) = (sheet(), block());
+    let cloth = cloth(&mesh, &[]);
+    let x = grazing(&mesh);
+    let contacts = cloth.contacts(&body, &x);
+    let touching = contacts.touches().len();
+    assert!(touching > 5 && touching < x.len(), "{touching} touch");
+    let mut gradient = vec![DVec3::ZERO; x.len()];
+    contacts.add_gradient(&mut gradient);
+    let energy = |x: &[DVec3]| {
+        let mut moved = contacts.clone();
+        moved.update(x);
+        moved.energy()
+    };
+    check_gradient(&x, energy, &gradient, "contact");
+}
+
+#[test]
+fn friction_gradient() {
+    let (mesh, body) = (sheet(), block());
+    let cloth = cloth(&mesh, &[]);
+    let anchored = cloth.contacts(&body, &grazing(&mesh));
+    // Some stick, some slip.
+    let x: Vec<DVec3> = grazing(&mesh).iter().enumerate().map(|(i, p)| *p + jitters(i + 7) * 6e-4).collect();
+    let mut gradient = vec![DVec3::ZERO; x.len()];
+    anchored.friction.add_gradient(&x, &mut gradient);
+    check_gradient(&x, |x| anchored.friction.energy(x), &gradient, "friction");
+}
+
+/// Checks ∇²E d against differences of ∇E, over the free vertices.
+fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
+    let mut blocks = Vec::new();
+    cloth.hessian(x, contacts, &mut blocks);
+    let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(i + 5000)).collect();
+    let mut product = Vec::new();
+    cloth.multiply(&blocks, &d, &mut product);
+    let at = |s: f64| {
+        let mut y = x.to_vec();
+        for (&v, d) in cloth.order.iter().zip(&d) {
+            y[v as usize] += *d * (s * H);
+        }
+        let mut moved = contacts.clone();
+        moved.update(&y);
+        let mut gradient = Vec::new();
+        cloth.gradient(&y, &moved, &mut gradient);
+        gradient
+    };
+    let (forth, back) = (at(1.0), at(-1.0));
+    let (mut error, mut scale) = (0.0, 0.0);
+    for (&v, p) in cloth.order.iter().zip(&product) {
+        let measured = (forth[v as usize] - back[v as usize]) / (2.0 * H);
+        error += (measured - *p).length_squared();
+        scale += p.length_squared();
+    }
+    assert!(error.sqrt() < tolerance * scale.sqrt(), "relative error {:.1e}", (error / scale).sqrt());
+}
+
+#[test]
+fn hessian_of_a_flat_stretched_sheet_is_exact() {
+    // Without shear the Hessian drops nothing: stretched along both axes, on a face, a few vertices held.
+    let (mesh, body) = (sheet(), block());
+    let cloth = cloth(&mesh, &[0, 7, 20]);
+    let x: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(1.05 * p.x, 5e-4, 1.08 * p.z)).collect();
+    let mut contacts = cloth.contacts(&body, &x);
+    check_hessian(&cloth, &x, &contacts, 1e-6);
+    contacts.friction = Friction::none();
+    check_hessian(&cloth, &x, &contacts, 1e-6);
+}
+
+#[test]
+fn hessian_of_a_sheared_bent_sheet_is_near() {
+    // What is dropped within the plane is the shear strain (3 %) times the shear stiffness.
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    check_hessian(&cloth, &deformed(&mesh), &Contacts::none(), 0.02);
+}
+
+#[test]
+fn hessian_is_never_negative() {
+    let (mesh, body) = (sheet(), block());
+    let cloth = cloth(&mesh, &[]);
+    for squeeze in [1.1, 0.9, 0.5, 0.1] {
+        let x: Vec<DVec3> =
+            grazing(&mesh).iter().map(|p| DVec3::new(squeeze * p.x, p.y, (2.0 - squeeze) * p.z)).collect();
+        let contacts = cloth.contacts(&body, &x);
+        let mut blocks = Vec::new();
+        cloth.hessian(&x, &contacts, &mut blocks);
+        for k in 0..40 {
+            let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(100 * k + i)).collect();
+            let mut product = Vec::new();
+            cloth.multiply(&blocks, &d, &mut product);
+            let curvature: f64 = product.iter().zip(&d).map(|(p, d)| p.dot(*d)).sum();
+            assert!(curvature > 0.0, "squeezed to {squeeze}: {curvature}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Rigid motion, hand-worked values, and sums that must balance.
+
+use glam::{DQuat, DVec3};
+use partwise::mechanics::energy::{Contacts, EnergyError, membrane::Stiffness};
+use partwise::mesh::RestShape;
+use partwise::{GRAVITY, mechanics::energy::Cloth, mesh::Topology};
+
+use crate::patch::{cloth, deformed, fabric, sheet};
+
+/// Membrane plus bending: the cloth's own energy.
+fn elastic(cloth: &Cloth, x: &[DVec3]) -> f64 {
+    let stiffness = Stiffness::new(&fabric());
+    cloth.triangles.iter().map(|t| t.energy(&stiffness, x)).sum::<f64>() + cloth.bending.energy(x)
+}
+
+#[test]
+fn a_rigid_motion_costs_nothing() {
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 1.3);
+    let moved = |x: &[DVec3]| x.iter().map(|p| turn * *p + DVec3::new(3.0, -2.0, 5.0)).collect::<Vec<_>>();
+    assert!(elastic(&cloth, &mesh.positions) < 1e-18);
+    assert!(elastic(&cloth, &moved(&mesh.positions)) < 1e-18);
+    let x = deformed(&mesh);
+    let (here, there) = (elastic(&cloth, &x), elastic(&cloth, &moved(&x)));
+    assert!((here - there).abs() < 1e-9 * here, "{here} and {there}");
+}
+
+#[test]
+fn internal_forces_have_no_resultant_and_no_moment() {
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let x = deformed(&mesh);
+    let mut gradient = Vec::new();
+    cloth.gradient(&x, &Contacts::none(), &mut gradient);
+    let (mut force, mut moment, mut scale) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    for ((g, p), m) in gradient.iter().zip(&x).zip(&cloth.masses) {
+        let internal = *g - DVec3::Z * (m * GRAVITY);
+        force += internal;
+        moment += p.cross(internal);
+        scale += internal.length();
+    }
+    assert!(force.length() < 1e-12 * scale, "{force}");
+    assert!(moment.length() < 1e-12 * scale, "{moment}");
+}
+
+#[test]
+fn a_stretched_square_costs_what_the_formula_says() {
+    // 5 % along the weft alone: ½ k_u/(1 − ν²) s² per area.
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let x: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(1.05 * p.x, p.y, p.z)).collect();
+    let area: f64 = cloth.areas.iter().sum();
+    let expected = 0.5 * 90.0 / (1.0 - 0.0625) * 0.05 * 0.05 * area;
+    assert!((elastic(&cloth, &x) - expected).abs() < 1e-9 * expected);
+}
+
+#[test]
+fn a_cylinder_costs_what_its_direction_says() {
+    // Rolled about an axis at 90, 45 and 0 degrees from the weft the curvature runs along weft, bias and warp:
+    // ½ B/r² per area, whatever the mesh. The sheet is uneven, so its edges run in no special direction; its two corner
+    // triangles (4 % of it) are in no ring.
+    let mesh = sheet();
+    let cloth = cloth(&mesh, &[]);
+    let r = 0.2;
+    let area: f64 = cloth.areas.iter().sum();
+    for (degrees, b) in [(0.0, 2e-5), (45.0, 5e-5), (90.0, 9e-5)] {
+        let along = DVec3::new(f64::to_radians(degrees).cos(), 0.0, f64::to_radians(degrees).sin());
+        let roll = |p: &DVec3| {
+            let s = p.dot(along);
+            *p - along * s + along * (r * (s / r).sin()) + DVec3::Y * (r * (1.0 - (s / r).cos()))
+        };
+        let x: Vec<DVec3> = mesh.positions.iter().map(roll).collect();
+        let expected = 0.5 * b / (r * r) * area;
+        let computed = cloth.bending.energy(&x);
+        assert!((computed / expected - 1.0).abs() < 0.06, "{degrees} degrees: {computed} for {expected}");
+    }
+}
+
+#[test]
+fn wrong_data_is_refused_with_its_place() {
+    let mesh = sheet();
+    let topology = Topology::new(&mesh);
+    let rest = RestShape::from_edges(&mesh).unwrap();
+    let held = Cloth::new(&mesh, &topology, &rest, &fabric(), &[99]).unwrap_err();
+    assert!(matches!(held, EnergyError::Held { vertex: 99, count: 36 }), "{held}");
+    let mut flat = rest.clone();
+    flat.corners[3][2] = flat.corners[3][1];
+    let degenerate = Cloth::new(&mesh, &topology, &flat, &fabric(), &[]).unwrap_err();
+    assert!(matches!(degenerate, EnergyError::Degenerate { triangle: 3 }), "{degenerate}");
+    flat.corners.pop();
+    assert!(matches!(Cloth::new(&mesh, &topology, &flat, &fabric(), &[]), Err(EnergyError::RestCount { .. })));
+    let all: Vec<u32> = (0..36).collect();
+    assert!(matches!(Cloth::new(&mesh, &topology, &rest, &fabric(), &all), Err(EnergyError::NothingFree { .. })));
+}
