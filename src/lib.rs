@@ -24,6 +24,7 @@ pub mod record;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;
+pub mod wrinkles;
 
 pub use glam::DVec3;
 

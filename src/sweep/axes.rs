@@ -4,24 +4,21 @@ use std::collections::BTreeMap;
 
 use toml::{Spanned, Value};
 
+use super::bodies::{body, dress_form};
+use super::choice::{BodyChoice, FabricChoice, Input, ModelChoice, Refine, TableChoice};
 use super::error::PlanError;
 use super::file::{At, Grid, Single, Source, number};
+use super::garments::garments;
 use super::inputs::Inputs;
-use super::point::{BodyChoice, FabricChoice, Input, ModelChoice, Point, Refine, TableChoice};
+use super::point::Point;
 use super::tables::{default_table, tables};
 use crate::fabric::Fabric;
-use crate::shapes::garment::TABLE_4_SIZES;
-use crate::shapes::{BUILT_IN, BodySpec, GarmentRequest, GarmentSpec};
 
-/// The body where a sweep names none.
-pub const DEFAULT_BODY: &str = "form";
-/// The garment where a sweep names none.
-pub const DEFAULT_GARMENT: &str = "low-cut-dress";
 /// The fabric where a sweep names none.
 pub const DEFAULT_FABRIC: &str = "interlock";
-/// Points a plan may have: a larger grid is a slip of the pen (at a millisecond a point it takes a quarter of an hour, and
-/// its rows fill half a gigabyte).
-const LIMIT: usize = 1_000_000;
+/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and its
+/// points take 200 MB of memory).
+const LIMIT: usize = 100_000;
 
 /// The values of every axis.
 pub(super) struct Axes {
@@ -130,14 +127,15 @@ impl Axes {
     }
 }
 
+/// Reads one axis after the other.
 #[derive(Clone, Copy)]
-struct Axis<'a> {
-    source: Source<'a>,
+pub(super) struct Axis<'a> {
+    pub(super) source: Source<'a>,
 }
 
 impl Axis<'_> {
     /// The values of an axis: of the grid's list, or the base's one; `None` where neither has it.
-    fn of<T>(
+    pub(super) fn of<T>(
         self,
         base: &Option<At>,
         grid: &Option<Spanned<Vec<At>>>,
@@ -156,120 +154,12 @@ impl Axis<'_> {
     }
 }
 
-/// Garments, each at every size.
-fn garments(axis: Axis<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Vec<Input>, PlanError> {
-    let source = axis.source;
-    let garments = axis.of(&base.garment, &grid.garments, "garments", |v| {
-        let label = source.text(v, "garment", "a name, name@vertices or a file")?;
-        if !Inputs::names_a_file(&label) {
-            let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
-            known.map_err(|e| PlanError::Shape { place: source.place(v), key: "garment", source: e })?;
-        }
-        inputs.input(&label, &source.place(v))
-    })?;
-    let garments = garments.unwrap_or_else(|| vec![Input::built_in(DEFAULT_GARMENT)]);
-    let sized = garments.iter().find(|g| g.file.is_some() || g.label.contains('@'));
-    let sizes = axis.of(&base.size, &grid.sizes, "sizes", |v| match (sized, v.get_ref().as_str()) {
-        (Some(garment), _) => {
-            let expected = "no sizes where a garment has its own, as {}; write name@vertices for each instead";
-            Err(source.wrong(v, "size", expected.replace("{}", &garment.label)))
-        }
-        (None, Some("larger")) => Ok(Size::OfTable4(0)),
-        (None, Some("smaller")) => Ok(Size::OfTable4(1)),
-        (None, _) => {
-            let expected = "a number of vertices, at least 4, or \"larger\" or \"smaller\" of the paper's two";
-            source.count(v, "size", 4, expected).map(Size::Vertices)
-        }
-    })?;
-    let Some(sizes) = sizes else { return Ok(garments) };
-    let at_sizes = |g: &Input| sizes.iter().map(|size| g.at(size.of(&g.label))).collect::<Vec<_>>();
-    Ok(garments.iter().flat_map(at_sizes).collect())
-}
-
-/// How many vertices a garment shall have.
-#[derive(Clone, Copy)]
-enum Size {
-    Vertices(usize),
-    /// The first or second size of the paper's Table 4.
-    OfTable4(usize),
-}
-
-impl Size {
-    fn of(self, garment: &str) -> Option<usize> {
-        match self {
-            Self::Vertices(count) => Some(count),
-            Self::OfTable4(which) => {
-                let place = BUILT_IN.iter().position(|name| *name == garment)?;
-                Some(TABLE_4_SIZES[place][which])
-            }
-        }
-    }
-}
-
 fn default_fabric() -> Result<Vec<FabricChoice>, PlanError> {
     let label = DEFAULT_FABRIC.to_owned();
     match Fabric::by_name(&label) {
         Ok(fabric) => Ok(vec![FabricChoice { label, fabric }]),
         Err(source) => Err(PlanError::Fabric { place: "the default".to_owned(), source }),
     }
-}
-
-fn dress_form() -> BodyChoice {
-    BodyChoice {
-        label: DEFAULT_BODY.to_owned(),
-        input: Input::built_in(DEFAULT_BODY),
-        measurements: BodySpec::default(),
-    }
-}
-
-/// A body by name, file, or measurements.
-fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<BodyChoice, PlanError> {
-    let expected = "\"form\", an OBJ file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
-                    optional name = \"...\" and of = (one of these)";
-    let place = source.place(value);
-    let table = match value.get_ref() {
-        Value::String(label) => return named_body(source, value, label, expected, inputs),
-        Value::Table(table) => table,
-        _ => return Err(source.wrong(value, "body", expected)),
-    };
-    let text = |key| table.get(key).map(|v: &Value| v.as_str().ok_or_else(|| source.wrong(value, "body", expected)));
-    let (name, of) = (text("name").transpose()?, text("of").transpose()?.unwrap_or(DEFAULT_BODY));
-    let mut body = named_body(source, value, of, expected, inputs)?;
-    for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
-        let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
-        let changed = body.measurements.with(measure, cm);
-        body.measurements = changed.map_err(|e| PlanError::Shape { place: place.clone(), key: "body", source: e })?;
-        body.label = format!("{} {measure}={cm}", body.label);
-    }
-    body.label = name.map_or(body.label, str::to_owned);
-    match body.measurements.measures() {
-        Ok(_) => Ok(body),
-        Err(source) => Err(PlanError::Shape { place, key: "body", source }),
-    }
-}
-
-/// The form, as it comes or from a file of measurements, or a mesh.
-fn named_body(
-    source: Source<'_>,
-    value: &At,
-    label: &str,
-    expected: &str,
-    inputs: &mut Inputs,
-) -> Result<BodyChoice, PlanError> {
-    let place = source.place(value);
-    let body = BodyChoice { label: label.to_owned(), ..dress_form() };
-    if label == DEFAULT_BODY {
-        return Ok(body);
-    }
-    if !Inputs::names_a_file(label) {
-        return Err(source.wrong(value, "body", expected));
-    }
-    if label.ends_with(".toml") {
-        let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
-        let measurements = spec.map_err(|source| PlanError::Shape { place, key: "body", source })?;
-        return Ok(BodyChoice { measurements, ..body });
-    }
-    Ok(BodyChoice { input: inputs.input(label, &place)?, ..body })
 }
 
 /// No extent, one, or a cascade from coarse to fine.

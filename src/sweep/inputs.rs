@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::choice::Input;
 use super::error::PlanError;
-use super::point::Input;
 
 /// Reader of the files a sweep names; paths count from the folder of the sweep file.
 #[derive(Debug)]

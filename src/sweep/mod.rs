@@ -4,13 +4,16 @@
 //! the rows in a [`Store`]; [`merge`] joins the stores of shards. Equal plans give equal rows, whatever was interrupted,
 //! however many jobs and shards there were, timings aside.
 //!
-//! [`tables`] documents how a file names range tables, [`file`] all its keys, [`plan`] the order of points, [`point`] what their
+//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points, [`point`] what their
 //! ids are made of, [`store`] the files.
 
 mod axes;
+mod bodies;
+mod choice;
 mod disk;
 mod error;
 pub mod file;
+mod garments;
 mod inputs;
 mod journal;
 mod lines;
@@ -25,14 +28,17 @@ pub mod store;
 pub mod tables;
 mod timing;
 
-pub use axes::{DEFAULT_BODY, DEFAULT_FABRIC, DEFAULT_GARMENT};
+pub use axes::DEFAULT_FABRIC;
+pub use bodies::DEFAULT_BODY;
+pub use choice::{BodyChoice, FabricChoice, Input, ModelChoice, Refine, TableChoice, TableRule};
 pub use disk::Append;
 pub use error::{MergeError, PlanError, StoreError};
+pub use garments::DEFAULT_GARMENT;
 pub use journal::Medium;
 pub use manifest::{Listed, Manifest, Shard};
 pub use merge::{join, merge};
 pub use plan::Plan;
-pub use point::{BodyChoice, FabricChoice, Input, ModelChoice, Point, Refine, TableChoice, TableRule};
+pub use point::{Point, VERSION};
 pub use row::{COLUMNS, Measures, Row, Status};
 pub use run::{Outcome, Progress, Run, run_missing, sweep};
 pub use solve::{PointError, Solve, Solved, result_hash};

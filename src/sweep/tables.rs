@@ -15,10 +15,10 @@
 use serde::Deserialize;
 use toml::Value;
 
+use super::choice::{TableChoice, TableRule};
 use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
-use super::point::{TableChoice, TableRule};
 use crate::range_table::{RangeTable, TableError};
 
 /// The name of the paper's table.

@@ -69,6 +69,15 @@ fn the_papers_sizes_go_by_name() {
 }
 
 #[test]
+fn points_of_one_garment_and_body_share_a_scene() {
+    let plan = parse(
+        "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { a = 1 }]",
+    );
+    let scenes: BTreeSet<_> = plan.points.iter().map(partwise::sweep::Point::scene_id).collect();
+    assert_eq!((plan.points.len(), scenes.len()), (24, 8));
+}
+
+#[test]
 fn equal_points_are_left_out_and_said() {
     let plan =
         parse("name = \"n\"\n[grid]\ntables = [\"table-3\", { scale = [1, 2] }]\nextents_cm = [0, \"none\", 0.0, 5]");

@@ -28,7 +28,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-pub use blend::blend;
+pub use blend::{blend, smooth_translations, sweeps_for};
 pub use clearance::push_out;
 pub use nodes::CoarseMesh;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, PartResult, Stage};
@@ -125,7 +125,8 @@ fn stage(
     let coarse_shape = coarse_rest(mesh, topology, rest, &parts, &coarse);
     let held_nodes: Vec<u32> =
         (0..parts.len() as u32).filter(|&p| is_held[coarse.node_vertex[p as usize] as usize]).collect();
-    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, fabric, &held_nodes)?;
+    let fabric = softened(fabric, mesh, options.coarse_strain);
+    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, &fabric, &held_nodes)?;
     load(&mut cloth, garment, &parts);
     let setup = began.elapsed();
 
@@ -168,6 +169,20 @@ fn stage(
     });
     result.parts = parts;
     Ok(())
+}
+
+/// The fabric with its membrane no stiffer than its own hanging weight asks for: see [`CoupledOptions::coarse_strain`].
+fn softened(fabric: &Fabric, mesh: &TriMesh, strain: f64) -> Fabric {
+    let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
+    let most = fabric.density_kg_per_m2 * crate::GRAVITY * height / strain;
+    // No height or no strain asked for: as stiff as it is.
+    let cap = |k: f64| if most > 0.0 { k.min(most) } else { k };
+    Fabric {
+        stretch_weft_n_per_m: cap(fabric.stretch_weft_n_per_m),
+        stretch_warp_n_per_m: cap(fabric.stretch_warp_n_per_m),
+        shear_n_per_m: cap(fabric.shear_n_per_m),
+        ..fabric.clone()
+    }
 }
 
 /// Gives each node the mass and the area of its whole PART: the coarse triangles end at the nodes.
@@ -215,11 +230,6 @@ fn carry_loose(parts: &Parts, coarse: &CoarseMesh, displacement: &mut [DVec3]) -
         }
         left.retain(|&p| !known[p as usize]);
     }
-}
-
-/// Sweeps that smooth over half a PART: m sweeps spread a weight by about √m edges, and a PART of n vertices is √n wide.
-fn sweeps_for(vertices: usize, parts: usize) -> usize {
-    (0.5 * vertices as f64 / parts.max(1) as f64).ceil().clamp(2.0, 200.0) as usize
 }
 
 /// F⁰, F¹ and F² of each node at rest.

@@ -56,6 +56,9 @@ pub struct CoupledOptions {
     pub max_steps: usize,
     /// Damping ε to begin with, 1/s².
     pub damping: f64,
+    /// Strain that the coarse cloth may have where it hangs by its whole height: its membrane stiffness is at most ρ g H over
+    /// this. Flat triangles of stiff cloth can only fold along their edges, which is no way for cloth to fall.
+    pub coarse_strain: f64,
 }
 
 impl Default for CoupledOptions {
@@ -67,7 +70,8 @@ impl Default for CoupledOptions {
             // A preview is millimetres off whatever the coarse cloth does: ten times the tolerance of a drape.
             tolerance: 1e-2,
             max_steps: 60,
-            damping: 30.0,
+            damping: 3.0,
+            coarse_strain: 0.01,
         }
     }
 }
