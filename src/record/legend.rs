@@ -70,7 +70,7 @@ impl Legend<'_> {
 
 /// Points with a text each, drawn as text alone.
 pub(super) fn texts(places: Vec<[f32; 3]>, labels: Vec<String>) -> Points3D {
-    Points3D::new(places).with_labels(labels).with_radii([0.0]).with_show_labels(true)
+    Points3D::new(places).with_labels(labels).with_radii([0.0]).with_colors([TEXT]).with_show_labels(true)
 }
 
 /// Three significant digits, without trailing zeros.

@@ -154,10 +154,10 @@ impl Recorder {
     ) -> Result<(), RecordError> {
         self.timed(|open| {
             open.at_iteration(iteration);
-            open.log(paths::ENERGY, &Scalars::single(energy_j))?;
+            step::series(open, paths::ENERGY, "energy", 1, energy_j)?;
             open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
             // Plots have no logarithmic axis.
-            open.log(paths::RESIDUAL_LOG10, &Scalars::single(residual_over_weight.log10()))?;
+            step::series(open, paths::RESIDUAL_LOG10, "residual over weight, log10", 0, residual_over_weight.log10())?;
             match positions {
                 Some(x) if x.len() == open.garment.positions.len() => {
                     let moved = open.garment.with_positions(x.to_vec());

@@ -257,7 +257,7 @@ fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
 }
 
 /// A scalar, drawn as a line with a dot at each step: one step alone is then seen too.
-fn series(open: &Open, path: &str, name: &str, place: usize, value: f64) -> Result<(), RecordError> {
+pub(super) fn series(open: &Open, path: &str, name: &str, place: usize, value: f64) -> Result<(), RecordError> {
     if open.first_use(path) {
         let [r, g, b] = colours::palette()[place % colours::HUES];
         let colour = Color::from_rgb(r, g, b);

@@ -85,7 +85,7 @@ pub enum When {
 }
 
 /// Width and height of the picture, in its own units.
-const PICTURE: [f64; 2] = [360.0, 180.0];
+const PICTURE: [f64; 2] = [440.0, 170.0];
 
 /// A logarithmic axis over whole decades.
 struct Axis {
