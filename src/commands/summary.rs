@@ -24,6 +24,7 @@ pub(crate) struct Summary {
     vertices: usize,
     triangles: usize,
     part_count: usize,
+    level_part_count: usize,
     singleton_parts: usize,
     parts_per_level: Vec<usize>,
     level_bounds_cm: Vec<[Option<f64>; 2]>,
@@ -32,6 +33,9 @@ pub(crate) struct Summary {
     unassigned_vertices: usize,
     contact_parts: usize,
     displacement_rms_mm: f64,
+    energy_j: Option<f64>,
+    residual_over_weight: Option<f64>,
+    refine_steps: Option<usize>,
     penetrating_vertices: usize,
     penetration_mm: f64,
     /// Milliseconds of `load`, `distance`, `segment`, `mechanics`, `record`.
@@ -68,6 +72,7 @@ impl Summary {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
             part_count: drape.parts.parts.len(),
+            level_part_count: drape.level_part_count,
             singleton_parts: drape.parts.singletons,
             parts_per_level: drape.parts.parts_per_level.clone(),
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
@@ -76,12 +81,16 @@ impl Summary {
             unassigned_vertices: drape.parts.unassigned,
             contact_parts: drape.outcomes.iter().filter(|o| o.contact).count(),
             displacement_rms_mm: 1e3 * rms,
+            energy_j: drape.state.as_ref().map(|s| s.energy),
+            residual_over_weight: drape.state.as_ref().map(|s| s.residual_over_weight),
+            refine_steps: drape.state.as_ref().map(|s| s.steps),
             penetrating_vertices: drape.penetrating_vertices,
             penetration_mm: 1e3 * drape.penetration,
             timings_ms: BTreeMap::from([
                 ("distance", ms(drape.times.distance)),
                 ("segment", ms(drape.times.segment)),
                 ("mechanics", ms(drape.times.mechanics)),
+                ("refine", ms(drape.times.refine)),
             ]),
             warnings: drape.warnings.clone(),
             outputs: Vec::new(),
@@ -110,9 +119,12 @@ impl Summary {
             "stage two   model {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
             self.model, self.fabric, self.contact_parts, self.displacement_rms_mm
         );
+        if let (Some(steps), Some(residual)) = (self.refine_steps, self.residual_over_weight) {
+            let _ = writeln!(out, "refined     {steps} steps, residual {residual:.1e} of the weight");
+        }
         let _ = writeln!(out, "inside the body at the end: {} vertices", self.penetrating_vertices);
         let _ = writeln!(out, "\n{}", self.levels_table());
-        let order = ["load", "distance", "segment", "mechanics", "record"];
+        let order = ["load", "distance", "segment", "mechanics", "refine", "record"];
         let times: Vec<String> =
             order.iter().filter_map(|stage| self.timings_ms.get(stage).map(|t| format!("{stage} {t:.1}"))).collect();
         let _ = writeln!(out, "milliseconds: {}", times.join(", "));
@@ -147,7 +159,7 @@ impl Summary {
                 fact("inside the body", format!("{} vertices", self.penetrating_vertices)),
             ],
             fabric: fabric_facts(fabric),
-            timings_ms: ["load", "distance", "segment", "mechanics"]
+            timings_ms: ["load", "distance", "segment", "mechanics", "refine"]
                 .iter()
                 .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))
                 .collect(),

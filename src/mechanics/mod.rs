@@ -1,6 +1,7 @@
 //! Mechanics: what moves the PARTs and the cloth.
 
 pub mod coupled;
+pub mod cusick;
 pub mod energy;
 pub mod paper;
 pub mod refine;

@@ -17,10 +17,11 @@ mod extent;
 mod join;
 mod representable;
 mod seams;
+mod seeding;
 
-pub(crate) use extent::nearest_seeds;
 pub use representable::representable_rms_m;
 pub use seams::Seam;
+pub(crate) use seeding::nearest_seeds;
 
 use rayon::prelude::*;
 

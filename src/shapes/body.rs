@@ -68,7 +68,7 @@ impl DressForm {
         let tags = vec![0; rough.positions.len()];
         // A closed surface of genus 0 has two triangles for each vertex but two.
         let density = Density::Vertices(triangles / 2 + 2);
-        let skin = Skin { solid: &self.anatomy, head: m.stature - 0.2 * m.scale(), scale: m.scale() };
+        let skin = Skin { solid: &self.anatomy, head: m.stature - 0.2 * m.scale(), crotch: m.crotch, scale: m.scale() };
         let (mut mesh, _) = remesh(&rough, tags, &skin, density).ok_or(ShapeError::NotManifold { what: "body" })?;
         self.correct(&mut mesh);
         Ok(mesh)
@@ -91,10 +91,11 @@ impl DressForm {
     }
 }
 
-/// The surface of the form, finer at wrists, hands, ankles and neck than on the trunk.
+/// The surface of the form, finer at wrists, hands, ankles, head and crotch than on the trunk.
 struct Skin<'a> {
     solid: &'a Anatomy,
     head: f64,
+    crotch: f64,
     scale: f64,
 }
 
@@ -112,7 +113,10 @@ impl Surface for Skin<'_> {
         let arm = 1.0 - 0.52 * on_arm * smooth_step(0.1, 0.95, t);
         let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / self.scale));
         let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
-        arm.min(ankle).min(head)
+        // The crotch is a saddle narrower than an edge of the trunk's.
+        let crotch = DVec3::new(0.0, self.solid.leg.centre(self.crotch).y, self.crotch);
+        let saddle = 1.0 - 0.55 * (1.0 - smooth_step(0.03, 0.12, p.distance(crotch) / self.scale));
+        arm.min(ankle).min(head).min(saddle)
     }
 }
 

@@ -101,8 +101,8 @@ pub(crate) fn onto_edge(solid: &dyn Solid, h: impl Fn(DVec3) -> Jet, mut p: DVec
         let (f, h) = (solid.at(p), h(p));
         let (ff, hh, fh) = (f.gradient.length_squared(), h.gradient.length_squared(), f.gradient.dot(h.gradient));
         let determinant = ff * hh - fh * fh;
-        if determinant < 1e-4 * ff * hh {
-            // Surface and opening touch: no crossing to go to, so the surface comes first.
+        if determinant <= 1e-4 * ff * hh {
+            // Surface and opening touch, or the opening has no edge near: no crossing to go to, so the surface comes first.
             return onto_surface(solid, p);
         }
         let a = (f.value * hh - h.value * fh) / determinant;

@@ -1,6 +1,6 @@
 //! One row of a sweep: the same fixed columns in CSV and in JSON lines.
 //!
-//! Figures are kept to nine significant digits, and below 1e-14 as 0: far finer than any of them means, and with so few
+//! Figures are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
 //! digits every reader's parser gives back the same bits, so that rows that were read and written again do not drift.
 //! The identity of results, bit for bit, is `result_hash`'s task.
 //!
@@ -267,8 +267,8 @@ pub(super) fn csv_header() -> String {
     format!("{}\n", COLUMNS.join(","))
 }
 
-/// Nine significant digits, 0 below 1e-14.
+/// Nine significant digits, 0 below 1e-12.
 fn figure(value: f64) -> f64 {
     let rounded = format!("{value:.8e}").parse().unwrap_or(value);
-    if f64::abs(rounded) < 1e-14 { 0.0 } else { rounded }
+    if f64::abs(rounded) < 1e-12 { 0.0 } else { rounded }
 }

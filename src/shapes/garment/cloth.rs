@@ -16,9 +16,9 @@ use crate::shapes::solid::{Section, Sided, Solid, Sweep};
 
 /// Least distance between the undraped garment and the body, m. The field is off by up to a third at the shoulders, and a mesh's
 /// chords cut corners, so that 3 mm remain everywhere.
-pub(super) const CLEARANCE: f64 = 0.007;
+pub(super) const CLEARANCE: f64 = 0.006;
 /// Width over which body and tubes are joined, m.
-const BLEND: f64 = 0.03;
+const BLEND: f64 = 0.015;
 /// Exponent of the tubes' sections, near an ellipse.
 const EXPONENT: f64 = 2.2;
 /// What the tubes extend beyond their last opening, m, so that the opening cuts them cleanly.
@@ -117,13 +117,13 @@ fn widened(section: Section, by: f64) -> Section {
     [cu, cv, a + by, front + by, back + by]
 }
 
-/// The section widened evenly to a girth, and further where the body at height `z` would come nearer than the clearance.
-fn with_girth(section: Section, girth: f64, anatomy: &Anatomy, z: f64) -> Section {
+/// The section widened evenly to a girth, but at least by the clearance.
+fn with_girth(section: Section, girth: f64) -> Section {
     let mut by = 0.0;
     for _ in 0..20 {
         by += (girth - perimeter(widened(section, by))) / std::f64::consts::TAU;
     }
-    around(widened(section, by.max(CLEARANCE)), anatomy, z)
+    widened(section, by.max(CLEARANCE))
 }
 
 /// The section scaled until the body at height `z` lies inside it with the clearance.
@@ -167,13 +167,14 @@ fn skirt(from: Section, z0: f64, hem: f64, flare: f64) -> Vec<(f64, Section)> {
 fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let (m, anatomy) = (&form.measures, &form.anatomy);
     let ease = &spec.ease;
-    let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch + 0.03), girth, anatomy, z);
+    let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch + 0.03), girth);
     let flare = spec.flare_cm / 100.0;
     let waist = section(m.waist_height, m.waist + ease.waist_cm / 100.0);
-    let hip = section(m.hip_height, m.hip + ease.hip_cm / 100.0);
+    // Hip and seat stay inside, so that the cloth falls from them without showing them.
+    let hip = around(section(m.hip_height, m.hip + ease.hip_cm / 100.0), anatomy, m.hip_height);
     if spec.carried_by == Support::Waist {
         // A straight line from waist to hem, unless hip or seat stand out of it.
-        let seat_z = m.hip_height + 0.02;
+        let seat_z = m.hip_height + 0.035;
         let line = skirt(waist, m.waist_height, hem, flare);
         let straight = Profile::new(&[line[0], (m.waist_height, waist)]);
         let widest = |z: f64, body: Section| -> (f64, Section) {

@@ -1,0 +1,79 @@
+//! The specimen: a disc meshed in rings of nearly equilateral triangles, without the part between the plates.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::{PLATE_RADIUS, SPECIMEN_RADIUS};
+use crate::mesh::TriMesh;
+
+/// The flat specimen.
+#[derive(Debug, Clone)]
+pub struct Specimen {
+    /// Its mesh, at z = 0.
+    pub mesh: TriMesh,
+    /// The vertices between the plates.
+    pub held: Vec<u32>,
+    /// The vertices of the rim, in order.
+    pub rim: Range<usize>,
+}
+
+/// With `rows` rows of cells from the plates' edge to the rim.
+///
+/// The last held ring lies half a cell outside the plates' edge: a ring of vertices bends for half a cell to either
+/// side, so the clamp of the discrete cloth is where that of the test is.
+#[must_use]
+pub fn specimen(rows: usize) -> Specimen {
+    let cell = (SPECIMEN_RADIUS - PLATE_RADIUS) / (rows as f64 + 0.5);
+    let mut mesh = TriMesh::default();
+    let mut rings: Vec<Range<usize>> = Vec::new();
+    for k in 0..rows + 2 {
+        let radius = SPECIMEN_RADIUS - cell * (rows + 1 - k) as f64;
+        // Equilateral triangles are 2/√3 of their height wide.
+        let count = (TAU * radius / (cell * 2.0 / 3f64.sqrt())).round().max(6.0) as usize;
+        let start = mesh.positions.len();
+        let offset = 0.5 * (k % 2) as f64;
+        mesh.positions.extend((0..count).map(|i| {
+            let (sin, cos) = (TAU * (i as f64 + offset) / count as f64).sin_cos();
+            DVec3::new(radius * cos, radius * sin, 0.0)
+        }));
+        if let Some(inner) = rings.last() {
+            zip(inner.clone(), start..start + count, [0.5 * ((k + 1) % 2) as f64, offset], &mut mesh.triangles);
+        }
+        rings.push(start..start + count);
+    }
+    Specimen { mesh, held: (0..rings[1].end as u32).collect(), rim: rings[rows + 1].clone() }
+}
+
+/// Triangles between two rings: always the shorter way around, seen from above counter-clockwise.
+fn zip(inner: Range<usize>, outer: Range<usize>, offsets: [f64; 2], triangles: &mut Vec<[u32; 3]>) {
+    let (n, m) = (inner.len(), outer.len());
+    let (mut i, mut j) = (0, 0);
+    while i < n || j < m {
+        let a = (inner.start + i % n) as u32;
+        let b = (outer.start + j % m) as u32;
+        let next = |k: usize, offset: f64, count: usize| (k as f64 + 1.0 + offset) / count as f64;
+        if i == n || (j < m && next(j, offsets[1], m) <= next(i, offsets[0], n)) {
+            j += 1;
+            triangles.push([a, b, (outer.start + j % m) as u32]);
+        } else {
+            i += 1;
+            triangles.push([a, b, (inner.start + i % n) as u32]);
+        }
+    }
+}
+
+/// The start: waves of two to nine folds, half a millimetre each at the rim, since a perfectly flat cloth need not
+/// choose how to fold. Phases are a golden angle apart, so that none is favoured.
+pub(super) fn waved(flat: &Specimen) -> Vec<DVec3> {
+    let golden = TAU * (1.0 - 1.0 / 1.618_033_988_749_895);
+    let wave = |p: &DVec3| {
+        let r = (p.truncate().length() - PLATE_RADIUS).max(0.0) / (SPECIMEN_RADIUS - PLATE_RADIUS);
+        let theta = p.y.atan2(p.x);
+        let sum: f64 = (2..10).map(|n| (f64::from(n) * (theta + golden * f64::from(n))).cos()).sum();
+        *p + DVec3::Z * (5e-4 * r * r * sum)
+    };
+    let (held, free) = flat.mesh.positions.split_at(flat.held.len());
+    held.iter().copied().chain(free.iter().map(wave)).collect()
+}
