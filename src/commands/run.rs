@@ -99,9 +99,9 @@ impl RunArgs {
                 console::note(&format!("look at it: {url}"));
             }
             if self.watch {
-                self.keep_watching(&mut recorder)?
+                self.keep_watching(&mut recorder)?;
             } else {
-                interrupt::wait()
+                interrupt::wait();
             }
             if let Some(path) = recorder.finish()?.path {
                 console::note(&format!("recording: {}", path.display()));
