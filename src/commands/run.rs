@@ -179,11 +179,10 @@ impl RunArgs {
         recorder.body(index, &scene.body_mesh)?;
         recorder.garment(index, &scene.garment)?;
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
-        let fit = solved.drape.state.as_ref().map(|s| &s.fit);
         let mut overlays = Vec::new();
-        if let Some(fit) = fit {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &fit.strain_percent });
-            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa });
+        if let Some(state) = &solved.drape.state {
+            overlays.push(Overlay { name: "strain", unit: "%", values: &state.strain_percent });
+            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
         let mut scalars = Vec::new();
         if let Some(assessment) = &solved.assessment {

@@ -4,6 +4,8 @@
 
 mod bench;
 mod cantilever;
+mod cusick;
+mod fit;
 mod friction;
 mod strip;
 mod threads;
