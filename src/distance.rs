@@ -182,4 +182,26 @@ mod tests {
         assert!(Body::new_open(&open).is_ok());
         assert!(matches!(Body::new(&TriMesh::default()), Err(DistanceError::Empty)));
     }
+
+    #[test]
+    fn triangles_without_area_in_the_body_do_no_harm() {
+        // The top of the cube with a vertex in the middle of its diagonal, used by one side alone: a triangle without
+        // area closes the gap.
+        let mut mesh = cube();
+        mesh.positions.push(DVec3::new(0.5, 0.5, 1.0));
+        // Triangles 2 and 3 are the top, [4, 5, 7] and [4, 7, 6].
+        mesh.triangles.extend([[4, 5, 8], [8, 5, 7], [4, 8, 7]]);
+        mesh.triangles.remove(2);
+        let body = Body::new(&mesh).unwrap();
+        for (x, expected) in [
+            (DVec3::new(0.25, 0.25, 1.5), 0.5),
+            (DVec3::new(0.5, 0.5, 1.25), 0.25),
+            (DVec3::new(0.5, 0.5, 0.75), -0.25),
+            (DVec3::new(0.75, 0.75, 0.9), -0.1),
+        ] {
+            let near = body.nearest(x);
+            assert!((near.signed_distance - expected).abs() < 1e-12, "{x}: {near:?}");
+            assert!((near.normal - DVec3::Z).length() < 1e-12, "{x}: {near:?}");
+        }
+    }
 }

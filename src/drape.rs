@@ -1,1 +1,336 @@
-//! To come.
+//! All stages in order, each timed: distance → PARTs → mechanics → draped garment.
+//!
+//! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
+//! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use crate::distance::{Body, SurfacePoint};
+use crate::fabric::Fabric;
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::fit::{Fit, fit};
+use crate::mechanics::paper::{self, PaperError, PaperOptions, PartForces};
+use crate::mechanics::refine::{self, RefineOptions, Refined, SolveError, Step, Stop};
+use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::parts::{Parts, segment};
+use crate::range_table::RangeTable;
+
+/// What is draped over what; stays the same while tables and fabrics vary.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The body's surface, m.
+    pub body_mesh: TriMesh,
+    /// The same, ready for distance queries.
+    pub body: Body,
+    /// The garment as placed, undraped, m.
+    pub garment: TriMesh,
+    /// Its connectivity.
+    pub topology: Topology,
+    /// Its rest shape.
+    pub rest: RestShape,
+    /// Vertices that stay where they are worn (a waistband's edge).
+    pub held: Vec<u32>,
+}
+
+/// The two models of stage two.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Model {
+    /// Equations (2) to (9) as read in [`paper`]: every PART for itself.
+    Paper(PaperOptions),
+    /// All PARTs at once, as the nodes of a coarse cloth: see [`coupled`].
+    Coupled(CoupledOptions),
+}
+
+impl Model {
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Paper(_) => "paper",
+            Self::Coupled(_) => "coupled",
+        }
+    }
+}
+
+/// How far to go at full resolution after stage two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Refine {
+    /// At most this many Newton steps; 0 is the two-stage scheme alone.
+    Steps(usize),
+    /// Until the residual force is under 1e-3 of the weight: the reference drape.
+    #[default]
+    Converged,
+}
+
+impl std::fmt::Display for Refine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Steps(n) => write!(f, "{n}"),
+            Self::Converged => f.write_str("converged"),
+        }
+    }
+}
+
+impl std::str::FromStr for Refine {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "converged" => Ok(Self::Converged),
+            steps => steps
+                .parse()
+                .map(Self::Steps)
+                .map_err(|_| format!("found `{text}`, expected a number of steps or `converged`")),
+        }
+    }
+}
+
+/// The dials of one run.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The range table of stage one.
+    pub table: RangeTable,
+    /// PARTs with fewer vertices join a neighbour; 1 keeps the paper's definition.
+    pub min_part: usize,
+    /// The model of stage two.
+    pub model: Model,
+    /// Steps at full resolution.
+    pub refine: Refine,
+    /// The cloth.
+    pub fabric: Fabric,
+}
+
+/// How long each stage took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StageTimes {
+    /// Closest points on the body.
+    pub distance: Duration,
+    /// Equation (1): levels to connected PARTs.
+    pub segment: Duration,
+    /// Stage two.
+    pub mechanics: Duration,
+    /// Newton steps at full resolution, setting them up included.
+    pub refine: Duration,
+}
+
+/// The outcome of stage two for one PART.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartOutcome {
+    /// Resultant force F, N.
+    pub force_n: DVec3,
+    /// Displacement D, m.
+    pub displacement: DVec3,
+    /// Whether the body carries it.
+    pub contact: bool,
+}
+
+/// Where the cloth stands at full resolution.
+#[derive(Debug, Clone)]
+pub struct ClothState {
+    /// Energy, J.
+    pub energy: f64,
+    /// ‖∇E‖₂ over free vertices, over the garment's weight.
+    pub residual_over_weight: f64,
+    /// Newton steps done.
+    pub steps: usize,
+    /// Why they ended.
+    pub stop: Stop,
+    /// Every step, the start first.
+    pub history: Vec<refine::Record>,
+    /// Strain and pressure.
+    pub fit: Fit,
+}
+
+/// What came out, stage by stage.
+#[derive(Debug, Clone)]
+pub struct Drape {
+    /// Closest points on the body, per garment vertex, before draping.
+    pub surface: Vec<SurfacePoint>,
+    /// Unsigned distances to the body, m.
+    pub distance: Vec<f64>,
+    /// The PARTs of stage one; cut to an extent where the model does so.
+    pub parts: Parts,
+    /// How many PARTs the range table alone made.
+    pub level_part_count: usize,
+    /// Stage two, per PART.
+    pub outcomes: Vec<PartOutcome>,
+    /// The garment after stage two, before any step at full resolution, m.
+    pub preview: Vec<DVec3>,
+    /// The displaced garment, m.
+    pub positions: Vec<DVec3>,
+    /// The cloth at full resolution; the equations of the paper alone need none.
+    pub state: Option<ClothState>,
+    /// Pairs of triangles of the displaced garment that cross: cloth through cloth, which no model here prevents.
+    pub self_intersecting_pairs: usize,
+    /// Vertices of the displaced garment inside the body.
+    pub penetrating_vertices: usize,
+    /// How deep the deepest of them is, m.
+    pub penetration: f64,
+    /// Stage times.
+    pub times: StageTimes,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Why nothing came out.
+#[derive(Debug, thiserror::Error)]
+pub enum DrapeError {
+    /// The equations refused their input.
+    #[error(transparent)]
+    Paper(#[from] PaperError),
+    /// The PARTs could not be solved together.
+    #[error(transparent)]
+    Coupled(#[from] CoupledError),
+    /// The cloth cannot be set up at full resolution.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The cloth cannot be solved at full resolution.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+/// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is told of each and may end
+/// them.
+///
+/// # Errors
+/// [`DrapeError`] where a constant of the fabric or an option cannot be used.
+pub fn drape(
+    scene: &Scene,
+    settings: &Settings,
+    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+) -> Result<Drape, DrapeError> {
+    let mut times = StageTimes::default();
+    let surface = timed(&mut times.distance, || scene.body.nearest_all(&scene.garment.positions));
+    // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
+    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
+    let parts = timed(&mut times.segment, || {
+        let parts = segment(&scene.topology, &distance, &settings.table);
+        if settings.min_part > 1 { parts.join_small(&scene.topology, &scene.garment, settings.min_part) } else { parts }
+    });
+    let mut warnings = unassigned_warning(&parts);
+    let level_part_count = parts.len();
+    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts))?;
+    warnings.extend(stage.warnings);
+    let refined = timed(&mut times.refine, || refine_further(scene, settings, &stage.positions, observer))?;
+    let (positions, state) = match refined {
+        None => (stage.positions.clone(), None),
+        Some((cloth, Refined { positions, energy, residual_over_weight, steps, history, stop })) => {
+            let fit = fit(&cloth, &scene.body, &positions);
+            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
+        }
+    };
+    warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+    let inside =
+        scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
+    let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
+    Ok(Drape {
+        surface,
+        distance,
+        parts: stage.parts,
+        level_part_count,
+        outcomes: stage.outcomes,
+        preview: stage.positions,
+        state,
+        self_intersecting_pairs: self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len(),
+        positions,
+        penetrating_vertices,
+        penetration,
+        times,
+        warnings,
+    })
+}
+
+struct StageTwo {
+    parts: Parts,
+    outcomes: Vec<PartOutcome>,
+    positions: Vec<DVec3>,
+    warnings: Vec<String>,
+}
+
+fn stage_two(
+    scene: &Scene,
+    settings: &Settings,
+    surface: &[SurfacePoint],
+    parts: Parts,
+) -> Result<StageTwo, DrapeError> {
+    let Scene { garment: mesh, topology, body, rest, held, .. } = scene;
+    let fabric = &settings.fabric;
+    match &settings.model {
+        Model::Paper(options) => {
+            let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
+            let outcome =
+                |p: &PartForces| PartOutcome { force_n: p.resultant, displacement: p.displacement, contact: p.contact };
+            Ok(StageTwo {
+                parts,
+                outcomes: result.parts.iter().map(outcome).collect(),
+                positions: result.positions,
+                warnings: result.warnings.iter().map(ToString::to_string).collect(),
+            })
+        }
+        Model::Coupled(options) => {
+            let garment = Garment { mesh, topology, rest, fabric, held };
+            let result = coupled::solve(&garment, body, &parts, &mesh.positions, options)?;
+            let outcome = |p: &coupled::PartResult| PartOutcome {
+                force_n: p.reaction,
+                displacement: p.displacement,
+                contact: p.in_contact,
+            };
+            Ok(StageTwo {
+                outcomes: result.part_results.iter().map(outcome).collect(),
+                parts: result.parts,
+                positions: result.positions,
+                warnings: result.warnings,
+            })
+        }
+    }
+}
+
+/// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
+fn refine_further(
+    scene: &Scene,
+    settings: &Settings,
+    start: &[DVec3],
+    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+) -> Result<Option<(Cloth, Refined)>, DrapeError> {
+    let max_steps = match settings.refine {
+        Refine::Steps(0) if matches!(settings.model, Model::Paper(_)) => return Ok(None),
+        Refine::Steps(n) => Some(n),
+        Refine::Converged => None,
+    };
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
+    let options = RefineOptions { max_steps, ..RefineOptions::default() };
+    let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, observer)?;
+    Ok(Some((cloth, refined)))
+}
+
+fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
+    let unsettled = asked == Refine::Converged && matches!(state.stop, Stop::Stalled | Stop::StepsDone);
+    unsettled.then(|| {
+        format!(
+            "the drape has not settled: after {} steps the residual is {:.1e} of the weight, expected under 1e-3",
+            state.steps, state.residual_over_weight
+        )
+    })
+}
+
+fn unassigned_warning(parts: &Parts) -> Vec<String> {
+    if parts.unassigned == 0 {
+        return Vec::new();
+    }
+    vec![format!(
+        "{} vertices lie in no level of the range table and stay where they are; widen its first or last row",
+        parts.unassigned
+    )]
+}
+
+fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let out = work();
+    *slot = start.elapsed();
+    out
+}

@@ -12,6 +12,7 @@
 //! [`accuracy`] measures a result against a reference. Only `record` knows Rerun; only the binary knows clap.
 
 pub mod accuracy;
+pub mod assess;
 pub mod distance;
 pub mod drape;
 pub mod fabric;
@@ -22,6 +23,9 @@ pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod shapes;
+pub mod sweep;
+pub mod table_search;
+pub mod wrinkles;
 
 pub use glam::DVec3;
 

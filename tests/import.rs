@@ -185,6 +185,47 @@ fn a_closed_body_faces_outward_and_an_open_one_is_refused_unless_allowed() {
 }
 
 #[test]
+fn a_body_of_loose_faces_is_told_to_be_welded_and_a_scene_to_be_chosen_from() {
+    // Each face of the box with its own four corners, as formats without shared vertices write it.
+    let corners: Vec<String> = inward_box().lines().filter(|l| l.starts_with('v')).map(str::to_owned).collect();
+    let mut loose = String::new();
+    for line in inward_box().lines().filter(|l| l.starts_with('f')) {
+        for v in line.split_whitespace().skip(1) {
+            loose += &format!("{}\n", corners[v.parse::<usize>().unwrap() - 1]);
+        }
+        loose += "f -4 -3 -2 -1\n";
+    }
+    let upright = ImportOptions { up: Some(Axis::Y), ..ImportOptions::default() };
+    let (_folder, path) = file(&loose);
+    let said = import_body(&path, &upright).unwrap_err().to_string();
+    assert!(said.contains("24 boundary edges in 6 loops") && said.contains("try --weld"), "{said}");
+    let welded = import_body(&path, &ImportOptions { weld: true, ..upright.clone() }).unwrap();
+    assert!(welded.report.is_closed() && welded.mesh.vertex_count() == 8);
+
+    let scene = format!("g body\n{}g scarf\nv 0 9 9\nv 1 9 9\nv 0 9 8\nf -1 -2 -3\n", inward_box());
+    let (_folder, path) = file(&scene);
+    let said = import_body(&path, &upright).unwrap_err().to_string();
+    assert!(said.contains("2 groups") && said.contains("--body-group"), "{said}");
+    assert!(import_body(&path, &ImportOptions { group: Some("body".to_owned()), ..upright }).is_ok());
+}
+
+#[test]
+fn a_garment_inside_out_is_turned_to_face_away_from_the_body() {
+    let (_folder, path) = file(&inward_box());
+    let body = import_body(&path, &ImportOptions { up: Some(Axis::Y), ..ImportOptions::default() }).unwrap();
+    let distance = partwise::distance::Body::new(&body.mesh).unwrap();
+    // A square before the body (outward is towards -y there) that faces it, and one behind that faces away.
+    let text = "v 1 0.2 2\nv 2 0.2 2\nv 2 0.2 4\nv 1 0.2 4\nv 1 -4 2\nv 2 -4 2\nv 2 -4 4\nv 1 -4 4\n\
+                f 1 2 3 4\nf 5 6 7 8\n";
+    let options = ImportOptions { unit: Some(Unit::Dm), up: Some(Axis::Z), ..METRES };
+    let mut garment = read_with(text, &options).unwrap();
+    garment.face_away_from(&distance);
+    assert!(garment.report.repairs.contains(&Repair::TurnedOutward { components: 1 }));
+    let normals: Vec<f64> = (0..4).map(|t| garment.mesh.double_area_vector(t).y.signum()).collect();
+    assert_eq!(normals, [1.0, 1.0, -1.0, -1.0]);
+}
+
+#[test]
 fn an_export_gives_faces_groups_and_texture_back() {
     let text = format!(
         "mtllib a.mtl\n{SQUARE}v 2 0 0\nv 2 1 0\nvt 0 0\nvt 1 0\nvt 0.1 0.7\nvt 0 1\no dress\ng front\nusemtl red\n\
@@ -206,6 +247,11 @@ fn an_export_gives_faces_groups_and_texture_back() {
         assert!((p - q).length() < 1e-15);
     }
     assert_eq!(again.mesh.triangles, imported.mesh.triangles);
+    // What did not move is written as it was read, digit for digit.
+    write_imported(&path, &imported, &imported.mesh.positions).unwrap();
+    let same = fs::read_to_string(&path).unwrap();
+    let vertices = |text: &str| text.lines().filter(|l| l.starts_with("v ")).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(vertices(&same), vertices(&text));
     let short = write_imported(&path, &imported, &moved[1..]);
     assert!(matches!(short, Err(MeshError::WrongCount { found: 5, expected: 6 })));
 }

@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::Path;
 
+use partwise::mesh::export::write_mesh;
 use partwise::mesh::import::{Beside, ImportOptions, import_body, import_garment};
-use partwise::mesh::{Axis, Frame, MeshError, Unit};
+use partwise::mesh::{Axis, Frame, MeshError, TriMesh, Unit};
 
 fn refusal(name: &str, bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
@@ -78,6 +79,17 @@ fn a_missing_file_and_a_folder_are_told_apart() {
     assert!(matches!(missing, MeshError::Unreadable { .. }) && missing.to_string().contains("no/such/body.obj"));
     let folder = tempfile::tempdir().unwrap();
     assert!(read(folder.path()).to_string().contains("folder"));
+}
+
+#[test]
+fn a_path_that_cannot_be_written_is_named_and_nothing_is_left_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = TriMesh::new(vec![glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Y], vec![[0, 1, 2]]);
+    for path in [folder.path().join("missing/out.obj"), folder.path().to_owned()] {
+        let said = write_mesh(&path, &mesh).unwrap_err().to_string();
+        assert!(said.contains(&path.display().to_string()) && said.contains("cannot be written"), "{said}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

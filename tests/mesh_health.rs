@@ -129,6 +129,24 @@ fn dents_are_pushed_out_without_turning_a_triangle_over() {
 }
 
 #[test]
+fn the_same_bits_come_out_on_one_thread_and_on_three() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let body_mesh = sphere(0.5, 40);
+            let body = Body::new(&body_mesh).unwrap();
+            let garment = tube(31, 120, 0.3, |turn, z| 0.5 + 0.02 * (5.0 * turn).sin() + 0.1 * z);
+            let (pushed, report) = push_out(&garment, &body, 0.0);
+            assert_eq!(report.left_inside, 0, "{report}");
+            (Fit::new(&garment, &body_mesh, &body), pushed, report)
+        })
+    };
+    let one = run(1);
+    assert!(one.0.crossing_pairs > 100);
+    assert_eq!(one, run(3));
+}
+
+#[test]
 fn a_garment_that_is_outside_is_left_as_it_is() {
     let body = Body::new(&sphere(0.5, 30)).unwrap();
     let garment = tube(11, 40, 0.3, |_, _| 0.5002);

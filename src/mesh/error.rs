@@ -114,7 +114,7 @@ pub enum MeshError {
     /// The body has holes.
     #[error(
         "{file}: the body is not closed: {edges} boundary edges in {loops} loops, the first at vertices {a} and {b} of \
-         the file; expected a closed surface, which alone has an inside. Fill the holes, or take --open-body to go by \
+         the file; expected a closed surface, which alone has an inside. {hint}Fill the holes, or take --open-body to go by \
          the normals alone",
         file = file.display()
     )]
@@ -129,6 +129,8 @@ pub enum MeshError {
         a: usize,
         /// Its second vertex.
         b: usize,
+        /// What else may help with this file; empty or a sentence with a space behind it.
+        hint: String,
     },
     /// Two meshes that should correspond do not.
     #[error("{file}: not the topology of {other}: {difference}; expected the same vertices and faces in the same order", file = file.display(), other = other.display())]

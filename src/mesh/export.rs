@@ -62,8 +62,12 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
         count += 1;
         *slot = count;
         let v = source.mesh_vertex[file_vertex];
-        // A vertex of degenerate faces alone is in no triangle and stays where it was.
-        let p = positions.get(v as usize).map_or(source.positions[file_vertex], |&p| frame.to_file(p));
+        // What did not move keeps its digits, a unit apart or not; so does a vertex of degenerate faces alone, which is
+        // in no triangle.
+        let p = match (positions.get(v as usize), imported.mesh.positions.get(v as usize)) {
+            (Some(now), Some(then)) if now != then => frame.to_file(*now),
+            _ => source.positions[file_vertex],
+        };
         write_vertex(&mut text, p);
     }
     count = 0;

@@ -7,14 +7,16 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
+use super::TriMesh;
 use super::draft::Draft;
 use super::error::MeshError;
-use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around};
+use super::facing::face_outward;
+use super::frame::{Axis, Frame, Unit};
+use super::frame_guess::{guess_frame, guess_frame_around};
 use super::report::{MeshReport, Remark, Repair};
 use super::scan::Face;
 use super::source::{ObjSource, RawObj};
 use super::topology::{NONE, Topology};
-use super::{TriMesh, winding};
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -122,11 +124,28 @@ fn body_from(raw: RawObj, options: &ImportOptions) -> Result<Imported, MeshError
         if !options.open_body {
             let number = imported.source.file_vertices();
             let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
-            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b });
+            let hint = open_hint(&imported.report, options);
+            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b, hint });
         }
         imported.report.remarks.push(Remark::Open { edges, loops });
     }
     Ok(imported)
+}
+
+/// What may close a body that came in open: its seams joined, or the body alone taken out of a scene.
+fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
+    let apart = report.remarks.iter().find_map(|remark| match remark {
+        Remark::Coincident { vertices } => Some(*vertices),
+        _ => None,
+    });
+    let mut hint = String::new();
+    if let Some(vertices) = apart {
+        hint += &format!("{vertices} vertices lie exactly on another: try --weld. ");
+    }
+    if report.groups > 1 && options.group.is_none() {
+        hint += &format!("The file has {} groups: choose the body with --body-group. ", report.groups);
+    }
+    hint
 }
 
 fn garment_from(raw: RawObj, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
@@ -246,56 +265,4 @@ fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
     let name = |&g: &u32| names.get(g as usize).map_or(UNGROUPED, String::as_str).to_owned();
     let place = |g: &u32| used.partition_point(|u| u < g) as u32;
     (used.iter().map(name).collect(), group.iter().map(place).collect())
-}
-
-impl Imported {
-    /// Turns triangles so that neighbours agree, and notes what the topology shows.
-    fn make_agree(&mut self, coincident: usize) {
-        let (turn, _, turned) = winding::agree(&self.mesh);
-        (0..turn.len()).filter(|&t| turn[t]).for_each(|t| self.turn(t));
-        let topology = Topology::new(&self.mesh);
-        let loops = topology.boundary_loops();
-        let report = &mut self.report;
-        report.components = topology.components().1;
-        report.boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
-        report.boundary_loops = loops.len();
-        if turned.to_agree > 0 {
-            report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });
-        }
-        let findings = super::health::Findings::new(&self.mesh, &topology);
-        let mut note = |count: usize, remark: Remark| {
-            if count > 0 {
-                report.remarks.push(remark);
-            }
-        };
-        note(coincident, Remark::Coincident { vertices: coincident });
-        note(findings.non_manifold_edges, Remark::NonManifold { edges: findings.non_manifold_edges });
-        note(findings.pinched_vertices, Remark::Pinched { vertices: findings.pinched_vertices });
-        note(findings.no_area, Remark::NoArea { triangles: findings.no_area });
-        note(turned.one_sided, Remark::OneSided { patches: turned.one_sided });
-    }
-
-    /// Turns one triangle round, its texture coordinates with it.
-    pub(super) fn turn(&mut self, t: usize) {
-        self.mesh.triangles[t].swap(1, 2);
-        if let Some(corners) = &mut self.texture[t] {
-            corners.swap(1, 2);
-        }
-    }
-}
-
-/// Turns the connected parts that enclose a negative volume.
-fn face_outward(imported: &mut Imported) {
-    let (component, count) = Topology::new(&imported.mesh).components();
-    let inward: Vec<bool> =
-        winding::signed_volumes(&imported.mesh, &component, count).iter().map(|&volume| volume < 0.0).collect();
-    for t in 0..imported.mesh.triangles.len() {
-        if inward[component[imported.mesh.triangles[t][0] as usize] as usize] {
-            imported.turn(t);
-        }
-    }
-    let components = inward.iter().filter(|&&turned| turned).count();
-    if components > 0 {
-        imported.report.repairs.push(Repair::TurnedOutward { components });
-    }
 }

@@ -7,8 +7,10 @@
 mod draft;
 pub mod error;
 pub mod export;
+mod facing;
 pub mod fit;
 pub mod frame;
+pub mod frame_guess;
 pub mod health;
 pub mod import;
 pub mod polygon;

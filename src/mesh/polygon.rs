@@ -92,6 +92,7 @@ fn smallest_angle(t: [DVec2; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn lift(points: &[(f64, f64)]) -> Vec<DVec3> {
         // A slanted plane, so that nothing depends on the axes.
@@ -142,5 +143,18 @@ mod tests {
         assert!(triangulate(&lift(&[(0.0, 0.0), (1.0, 0.0)])).is_empty());
         assert_eq!(triangulate(&lift(&[(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])).len(), 2);
         assert_eq!(triangulate(&[DVec3::ONE; 6]).len(), 4);
+    }
+
+    proptest! {
+        /// A star seen from its middle: any radii, turns ascending.
+        #[test]
+        fn star_shaped_polygons_are_covered_once(radii in prop::collection::vec(0.1..2.0f64, 3..24)) {
+            let n = radii.len();
+            let step = std::f64::consts::TAU / n as f64;
+            let points: Vec<_> =
+                radii.iter().enumerate().map(|(i, r)| (r * (i as f64 * step).cos(), r * (i as f64 * step).sin())).collect();
+            let expected = (0..n).map(|i| 0.5 * radii[i] * radii[(i + 1) % n] * step.sin()).sum();
+            assert_covers(&points, expected);
+        }
     }
 }

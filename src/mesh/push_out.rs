@@ -31,6 +31,9 @@ const TRIES: u32 = 5;
 const ROUNDS: usize = 24;
 /// Averages taken in one round.
 const SWEEPS: usize = 4;
+/// The bound is at least this (m), whatever the thickness: a micrometre is far above the rounding of distances at body
+/// size, so that "outside" is unmistakable.
+const LEAST: f64 = 1e-6;
 /// Share of the thickness by which the bound may be missed: rounding of the last step.
 const SLACK: f64 = 1e-6;
 
@@ -93,9 +96,12 @@ impl fmt::Display for PushOutReport {
     }
 }
 
-/// The garment with no vertex inside the body, each that was at least `thickness` (m) away from it.
+/// The garment with no vertex inside the body: those that were are at least `thickness` (m) away from it now.
+/// Vertices that start outside, however near, are only moved along with a neighbour, and never nearer than they were or
+/// than `thickness`.
 #[must_use]
 pub fn push_out(garment: &TriMesh, body: &Body, thickness: f64) -> (TriMesh, PushOutReport) {
+    let thickness = thickness.max(LEAST);
     let q: Vec<f64> = body.nearest_all(&garment.positions).iter().map(|near| near.signed_distance).collect();
     let inside: Vec<u32> = (0..q.len() as u32).filter(|&v| q[v as usize] < 0.0).collect();
     let mut report = PushOutReport {

@@ -138,7 +138,10 @@ impl Topology {
             }
         }
         let mut loops = Vec::new();
-        while let Some((&start, _)) = links.iter().find(|(_, ends)| !ends.is_empty()) {
+        // Everything before the last start is used up: looked through once, not once a loop.
+        let mut from = 0;
+        while let Some(start) = links.range(from..).find(|(_, ends)| !ends.is_empty()).map(|(&start, _)| start) {
+            from = start;
             let mut cycle = vec![start];
             let mut at = start;
             while let Some(ends) = links.get_mut(&at).filter(|ends| !ends.is_empty()) {

@@ -30,6 +30,10 @@ pub fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
 
 /// Positive, zero or negative: where `p` lies against the plane of the triangle.
 fn side(t: [DVec3; 3], p: DVec3) -> f64 {
+    // Neighbours share corners. The determinant is zero then, but to find that out exactly takes all its digits.
+    if t.contains(&p) || t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+        return 0.0;
+    }
     let [a, b, c, p] = [t[0], t[1], t[2], p].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
     orient3d(a, b, c, p)
 }

@@ -9,18 +9,26 @@
 //! Limits: a path along edges is up to 15 % longer than the geodesic on a regular triangulation, so pieces come out that much
 //! smaller than asked, never larger. Non-positive extents make every vertex a PART; an infinite one or NaN cuts nothing.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use crate::mesh::{Topology, TriMesh};
 
-use super::{Part, Parts, UNASSIGNED};
+use super::seeding::nearest_seeds;
+use super::{Parts, UNASSIGNED};
 
 impl Parts {
     /// The same PARTs, each cut until none is wider than `extent_m` metres along the cloth.
     #[must_use]
     pub fn cut_to_extent(&self, mesh: &TriMesh, topology: &Topology, extent_m: f64) -> Self {
-        let pieces = self.map(|number, part| self.nearest_seeds(number, part, mesh, topology, extent_m));
+        let mut place = vec![0u32; self.part_of_vertex.len()];
+        for part in &self.parts {
+            for (&v, i) in part.vertices.iter().zip(0..) {
+                place[v as usize] = i;
+            }
+        }
+        let pieces = self.map(|number, part| {
+            let inside = |w: u32| self.part_of_vertex[w as usize] == number as u32;
+            let local = |w: u32| inside(w).then(|| place[w as usize] as usize);
+            nearest_seeds(&part.vertices, local, mesh, topology, (extent_m, usize::MAX)).unwrap_or_default()
+        });
         let mut label = vec![UNASSIGNED; self.part_of_vertex.len()];
         let mut level_of_label = Vec::new();
         for (part, (seed_of_vertex, seeds)) in self.parts.iter().zip(&pieces) {
@@ -32,70 +40,5 @@ impl Parts {
         }
         let level_of = |label: u32| level_of_label[label as usize];
         Self::from_labels(topology, &label, level_of, self.parts_per_level.len(), self.hole_vertices)
-    }
-
-    /// The nearest seed of each vertex of a PART, and how many seeds there are.
-    fn nearest_seeds(
-        &self,
-        number: usize,
-        part: &Part,
-        mesh: &TriMesh,
-        topology: &Topology,
-        extent_m: f64,
-    ) -> (Vec<u32>, usize) {
-        let local = |v: u32| part.vertices.binary_search(&v).ok();
-        let mut distance = vec![f64::INFINITY; part.vertices.len()];
-        let mut seed_of_vertex = vec![0u32; part.vertices.len()];
-        let mut seeds = 0;
-        let mut next = 0;
-        let mut heap: BinaryHeap<Reverse<(Order, usize)>> = BinaryHeap::new();
-        loop {
-            distance[next] = 0.0;
-            seed_of_vertex[next] = seeds as u32;
-            heap.push(Reverse((Order(0.0), next)));
-            while let Some(Reverse((Order(d), i))) = heap.pop() {
-                if d > distance[i] {
-                    continue;
-                }
-                let v = part.vertices[i];
-                for &w in topology.neighbours(v) {
-                    if self.part_of_vertex[w as usize] != number as u32 {
-                        continue;
-                    }
-                    let Some(j) = local(w) else { continue };
-                    let far = d + mesh.positions[v as usize].distance(mesh.positions[w as usize]);
-                    if far < distance[j] {
-                        distance[j] = far;
-                        seed_of_vertex[j] = seeds as u32;
-                        heap.push(Reverse((Order(far), j)));
-                    }
-                }
-            }
-            seeds += 1;
-            // The first of the farthest, so ties do not depend on the order of a parallel search.
-            let farthest = |best: usize, i: usize| if distance[i] > distance[best] { i } else { best };
-            next = (0..distance.len()).fold(0, farthest);
-            if distance[next] <= 0.5 * extent_m || distance[next] == 0.0 || extent_m.is_nan() {
-                return (seed_of_vertex, seeds);
-            }
-        }
-    }
-}
-
-/// A finite, non-negative distance with a total order, for the heap.
-#[derive(PartialEq, Clone, Copy)]
-struct Order(f64);
-
-impl Eq for Order {}
-
-impl PartialOrd for Order {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Order {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0)
     }
 }

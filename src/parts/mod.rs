@@ -15,9 +15,13 @@
 
 mod extent;
 mod join;
+mod representable;
 mod seams;
+mod seeding;
 
+pub use representable::representable_rms_m;
 pub use seams::Seam;
+pub(crate) use seeding::nearest_seeds;
 
 use rayon::prelude::*;
 

@@ -13,6 +13,7 @@
 //! there are reported as unassigned.
 
 mod error;
+pub mod families;
 mod format;
 
 pub use error::{BoundProblem, TableError};

@@ -1,1 +1,222 @@
-//! To come.
+//! The recording: every stage of a drape as Rerun shows it. The only module that knows Rerun.
+//!
+//! Results come in as plain meshes and slices; [`paths`] lists what a recording holds. Triangles are logged once, later
+//! steps send only what changed. Without a sink nothing is made: see [`Recorder::disabled`].
+
+pub mod blueprint;
+pub mod colour_map;
+pub mod colours;
+pub mod error;
+pub mod eye;
+pub mod inspect;
+mod legend;
+mod meshes;
+mod open;
+pub mod panel;
+pub mod paths;
+pub mod sinks;
+pub mod step;
+pub mod sweep;
+pub mod web;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use glam::DVec3;
+use rerun::{Scalars, TextDocument};
+
+pub use blueprint::layout::{Layout, Tab};
+pub use error::RecordError;
+pub use panel::{LevelRow, Panel};
+pub use sinks::Sink;
+pub use step::{Overlay, StepView};
+pub use sweep::{Chosen, ScatterPoint, When};
+
+use crate::mesh::TriMesh;
+use open::Open;
+
+/// Where to record, under which name, and what will come.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordOptions {
+    /// Where it goes. None: nothing is recorded.
+    pub sinks: Vec<Sink>,
+    /// Name of the recording in the viewer (`low-cut dress, Table 3`).
+    pub name: String,
+    /// What will come, hence which views there are.
+    pub layout: Layout,
+    /// Where the wearer looks to (horizontal).
+    pub front: DVec3,
+    /// Whether meshes may be replaced later (`--watch`): they are then logged at a step instead of once for all.
+    pub replaceable: bool,
+}
+
+impl Default for RecordOptions {
+    fn default() -> Self {
+        Self {
+            sinks: Vec::new(),
+            name: String::new(),
+            layout: Layout::default(),
+            front: DVec3::NEG_Y,
+            replaceable: false,
+        }
+    }
+}
+
+/// What a finished recording came to.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RecordSummary {
+    /// The file, where there is one.
+    pub path: Option<PathBuf>,
+    /// Its size, bytes.
+    pub bytes: u64,
+    /// Bytes of positions, colours and the rest that were logged, before encoding and compression.
+    pub raw_bytes: u64,
+    /// Time spent here, ms.
+    pub log_ms: f64,
+}
+
+/// A recording in the making.
+pub struct Recorder {
+    open: Option<Box<Open>>,
+}
+
+impl Recorder {
+    /// A recorder that makes nothing and costs nothing.
+    #[must_use]
+    pub fn disabled() -> Self {
+        Self { open: None }
+    }
+
+    /// Opens every sink, or none.
+    ///
+    /// # Errors
+    /// An unwritable file, a port in use, a viewer that is not there.
+    pub fn open(options: RecordOptions) -> Result<Self, RecordError> {
+        if options.sinks.is_empty() {
+            return Ok(Self::disabled());
+        }
+        Ok(Self { open: Some(Box::new(Open::new(options)?)) })
+    }
+
+    /// Whether anything is recorded.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// The address of the web viewer, where one is served.
+    #[must_use]
+    pub fn web_url(&self) -> Option<&str> {
+        self.open.as_ref()?.web.as_ref().map(web::WebViewer::url)
+    }
+
+    /// The body. `index` is the step it belongs to where meshes are replaceable.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn body(&mut self, index: i64, body: &TriMesh) -> Result<(), RecordError> {
+        self.timed(|open| open.take_body(index, body))
+    }
+
+    /// The garment as loaded; with the first one the layout is sent.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
+        self.timed(|open| open.take_garment(index, garment))
+    }
+
+    /// One range table's result.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn step(&mut self, step: &StepView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| {
+            step.check(open.garment.positions.len())?;
+            step::log(open, step)?;
+            open.flush_live()
+        })
+    }
+
+    /// Puts a message above the text panel of a step that stays as it is: what is wrong with a file just edited.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn notice(&mut self, index: i64, message: &str) -> Result<(), RecordError> {
+        self.timed(|open| {
+            open.at(index, 6);
+            let quoted = message.replace('\n', "\n> ");
+            let text = format!("> ⚠ **{quoted}**\n\nBelow: the last result that could be solved.\n\n{}", open.report);
+            open.log(paths::REPORT, &TextDocument::from_markdown(text))?;
+            open.flush_live()
+        })
+    }
+
+    /// One iteration of the solver: energy in J, residual over weight, and the mesh every so often.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn iteration(
+        &mut self,
+        iteration: i64,
+        energy_j: f64,
+        residual_over_weight: f64,
+        positions: Option<&[DVec3]>,
+    ) -> Result<(), RecordError> {
+        self.timed(|open| {
+            open.at_iteration(iteration);
+            step::series(open, paths::ENERGY, "energy", 1, energy_j)?;
+            open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
+            // Plots have no logarithmic axis.
+            step::series(open, paths::RESIDUAL_LOG10, "residual over weight, log10", 0, residual_over_weight.log10())?;
+            match positions {
+                Some(x) if x.len() == open.garment.positions.len() => {
+                    let moved = open.garment.with_positions(x.to_vec());
+                    open.log(paths::DRAPE, &meshes::shape(&moved))
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    /// One of the tables chosen to stand side by side.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn compare(&mut self, chosen: &Chosen<'_>) -> Result<(), RecordError> {
+        self.timed(|open| sweep::chosen(open, chosen))
+    }
+
+    /// All points of speed against error so far.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn scatter(&mut self, when: When, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
+        self.timed(|open| sweep::scatter(open, when, points))
+    }
+
+    /// Sends what is left, closes the file and gives it its name.
+    ///
+    /// # Errors
+    /// A file that could not be completed, a viewer that went away.
+    pub fn finish(mut self) -> Result<RecordSummary, RecordError> {
+        self.open.take().map_or_else(|| Ok(RecordSummary::default()), Open::finish)
+    }
+
+    fn timed(&mut self, log: impl FnOnce(&mut Open) -> Result<(), RecordError>) -> Result<(), RecordError> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let started = Instant::now();
+        let result = log(open);
+        open.spent += started.elapsed();
+        result
+    }
+}
+
+impl Drop for Recorder {
+    /// A recording that was not finished leaves no file.
+    fn drop(&mut self) {
+        if let Some(open) = self.open.take() {
+            open.discard();
+        }
+    }
+}

@@ -10,11 +10,9 @@
 use glam::DVec3;
 
 use super::jet::Jet;
+use super::limbs::{arm, leg};
 use super::measures::Measures;
-use super::solid::{Ellipsoid, Section, Solid, Sweep};
-
-/// Angle of the arms from the vertical, radians: enough for a sleeve under the arm, as dress forms and A poses have it.
-const ARM_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
+use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
 /// Correction of each girth's radius, 1 to begin with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,11 +75,11 @@ pub struct Anatomy {
     pub neck_at: f64,
 }
 
-fn radius(girth: f64, factor: f64) -> f64 {
+pub(super) fn radius(girth: f64, factor: f64) -> f64 {
     girth * factor / std::f64::consts::TAU
 }
 
-fn mix(a: f64, b: f64, t: f64) -> f64 {
+pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
@@ -96,17 +94,18 @@ impl Anatomy {
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
         let (swell, protrusion) = (cup.powf(0.35), 0.031 * cup.powf(0.8));
-        let breast_radii = DVec3::new(0.066, 0.060, 0.072) * swell * (bust / 0.14).sqrt();
+        let breast_radii = DVec3::new(0.062, 0.060, 0.070) * swell * (bust / 0.14).sqrt();
         let breast = Ellipsoid {
-            centre: DVec3::new(0.53 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
+            centre: DVec3::new(0.50 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
             radii: breast_radii,
             lean: 0.25,
         };
         let seat = hip / 0.1528;
         let buttock = Ellipsoid {
-            centre: DVec3::new(0.075 * seat, 0.043 * seat, m.hip_height + 0.005 * k),
-            radii: DVec3::new(0.083, 0.079, 0.095) * seat,
-            lean: 0.1,
+            centre: DVec3::new(0.076 * seat, 0.036 * seat, m.hip_height + 0.040 * k),
+            // Its lower end stays a little above the crotch, or the seat would close the gap between the legs.
+            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.055 * k),
+            lean: -0.3,
         };
         let (arm, wrist_at, biceps_at) = arm(m, f);
         let (leg, foot) = leg(m, f);
@@ -126,51 +125,74 @@ impl Anatomy {
         Self { trunk, breast, buttock, neck, cranium, jaw, arm, leg, foot, wrist_at, biceps_at, neck_at }
     }
 
-    /// Trunk, bust, seat and the root of the neck.
+    /// Trunk, bust, seat and neck.
     #[must_use]
     pub fn torso(&self, p: DVec3) -> Jet {
         let mut field = self.trunk.at(p);
         for side in [1.0, -1.0] {
-            field = field.smooth_min(sided(&self.breast, p, side), 0.075);
-            field = field.smooth_min(sided(&self.buttock, p, side), 0.07);
+            field = Sided::new(&self.breast, side).join(field, p, 0.075);
+            field = Sided::new(&self.buttock, side).join(field, p, 0.07);
         }
-        field.smooth_min(self.neck.at(p), 0.06)
+        self.neck.join(field, p, 0.06)
     }
 
-    /// Both arms.
+    /// The arm on the side of `p`.
     #[must_use]
-    pub fn arms(&self, p: DVec3) -> Jet {
-        sided(&self.arm, p, p.x.signum())
+    pub fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
+        Sided::new(&self.arm, p.x)
     }
 
-    /// Both legs with their feet, flat on the floor.
+    /// Trunk, neck and legs.
     #[must_use]
-    pub fn legs(&self, p: DVec3) -> Jet {
+    pub fn torso_and_legs(&self, p: DVec3) -> Jet {
+        Legs(self).join(self.torso(p), p, 0.05)
+    }
+
+    /// Everything but the head.
+    #[must_use]
+    pub fn below_the_head(&self, p: DVec3) -> Jet {
+        self.arm_at(p).join(self.torso_and_legs(p), p, 0.065)
+    }
+}
+
+/// Both legs with their feet, flat on the floor.
+struct Legs<'a>(&'a Anatomy);
+
+impl Solid for Legs<'_> {
+    fn at(&self, p: DVec3) -> Jet {
         let one = |side: f64| {
-            let limb = sided(&self.leg, p, side).smooth_min(sided(&self.foot, p, side), 0.05);
-            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.015)
+            let limb = Sided::new(&self.0.foot, side).join(Sided::new(&self.0.leg, side).at(p), p, 0.05);
+            limb.smooth_max(-Jet::new(p.z, DVec3::Z), 0.035)
         };
-        one(1.0).smooth_min(one(-1.0), 0.006)
+        let near = one(p.x);
+        // The other leg matters only next to the middle.
+        if p.x.abs() > 0.05 { near } else { near.smooth_min(one(-p.x), 0.03) }
     }
 
-    /// The head.
-    #[must_use]
-    pub fn head(&self, p: DVec3) -> Jet {
-        self.cranium.at(p).smooth_min(self.jaw.at(p), 0.07)
+    fn at_least(&self, p: DVec3) -> f64 {
+        let leg = &self.0.leg;
+        (p.z - leg.range().1).max(0.0)
+    }
+}
+
+/// The head.
+struct Head<'a>(&'a Anatomy);
+
+impl Solid for Head<'_> {
+    fn at(&self, p: DVec3) -> Jet {
+        self.0.cranium.at(p).smooth_min(self.0.jaw.at(p), 0.07)
+    }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        // The smooth joint adds at most a sixth of its width.
+        (self.0.cranium.at_least(p).min(self.0.jaw.at_least(p)) - 0.012).max(0.0)
     }
 }
 
 impl Solid for Anatomy {
     fn at(&self, p: DVec3) -> Jet {
-        self.torso(p).smooth_min(self.arms(p), 0.045).smooth_min(self.legs(p), 0.035).smooth_min(self.head(p), 0.035)
+        Head(self).join(self.below_the_head(p), p, 0.035)
     }
-}
-
-/// A left part's field, or its mirror image's for a negative `side`.
-fn sided(part: &dyn Solid, p: DVec3, side: f64) -> Jet {
-    let mirror = DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0);
-    let jet = part.at(p * mirror);
-    Jet::new(jet.value, jet.gradient * mirror)
 }
 
 fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
@@ -187,11 +209,11 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let top = m.cervicale - 0.018 * k;
     let front = 0.70 * mix(under, bust, 0.35);
     let stations: [(f64, Section); 11] = [
-        (m.crotch + 0.036 * k, [0.0, 0.005, 0.92 * hip, 0.52 * hip, 0.56 * hip]),
+        (m.crotch + 0.036 * k, [0.0, 0.005, 0.84 * hip, 0.50 * hip, 0.54 * hip]),
         (m.hip_height + 0.02 * k, [0.0, 0.005, 1.00 * hip, 0.59 * hip, 0.62 * hip]),
         (mix(m.hip_height, m.waist_height, 0.5), {
             let r = mix(hip, waist, 0.45);
-            [0.0, 0.002, 1.07 * r, 0.67 * r, 0.65 * r]
+            [0.0, 0.002, 1.07 * r, 0.67 * r, 0.68 * r]
         }),
         (m.waist_height, [0.0, -0.002, 1.12 * waist, 0.74 * waist, 0.73 * waist]),
         (under_z, [0.0, 0.004, 1.09 * under, 0.78 * under, 0.82 * under]),
@@ -202,7 +224,7 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
         (m.acromion + 0.012 * k, [0.0, 0.025, 0.66 * shoulder, 0.36 * chest, 0.44 * chest]),
         (top, [0.0, 0.027, 0.95 * neck, 0.30 * chest, 0.34 * chest]),
     ];
-    (Sweep::upright(2.3, &stations, [0.02, 0.01]), front - 0.008)
+    (Sweep::upright(2.3, &stations, [0.025, 0.01]), front - 0.008)
 }
 
 /// Height of the underbust girth, m: a third of the way from the bust to the waist.
@@ -212,7 +234,7 @@ pub fn underbust_height(m: &Measures) -> f64 {
 }
 
 /// Half the distance between the ends of the shoulders, m: half the neck's base plus the shoulder, seen from the front.
-fn shoulder_half(m: &Measures) -> f64 {
+pub(super) fn shoulder_half(m: &Measures) -> f64 {
     // The shoulder slopes by 22 degrees or so, and starts where the neck's base is 1.15 times the middle's girth.
     let by_length = 0.927 * m.shoulder_length + 1.15 * m.neck / std::f64::consts::TAU;
     // A wide chest needs wide shoulders, or the arms would start inside it.
@@ -235,90 +257,6 @@ fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
         (0.18 * k, ring(0.9)),
     ];
     (Sweep::new(DVec3::new(0.0, 0.027, m.cervicale - 0.072 * k), axes, 2.0, &stations, [0.01, 0.02]), at)
-}
-
-fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
-    let k = m.scale();
-    let (b, w) = (radius(m.biceps, f.biceps), radius(m.wrist, f.wrist));
-    let t = DVec3::new(ARM_ANGLE.sin(), -0.07, -ARM_ANGLE.cos()).normalize();
-    let u = t.cross(DVec3::Y).normalize();
-    let v = u.cross(t);
-    let origin = DVec3::new(shoulder_half(m) - 0.012 * k, 0.022, m.acromion - 0.038 * k);
-    let wrist = m.arm_length - 0.02 * k;
-    let biceps = 0.37 * wrist;
-    let oval = |s: f64, thick: f64, wide: f64| (s, [0.0, 0.0, thick, wide, wide]);
-    let stations = [
-        oval(-0.035 * k, 0.62 * b, 0.85 * b),
-        oval(0.015 * k, 0.98 * b, 1.08 * b),
-        oval(0.055 * k, 1.10 * b, 1.14 * b),
-        oval(0.20 * wrist, 1.04 * b, 1.06 * b),
-        oval(biceps, b, b),
-        oval(0.54 * wrist, 0.92 * mix(w, b, 0.62), 0.95 * mix(w, b, 0.62)),
-        oval(0.66 * wrist, 0.93 * mix(w, b, 0.66), mix(w, b, 0.66)),
-        oval(0.84 * wrist, 0.93 * mix(w, b, 0.28), 1.05 * mix(w, b, 0.28)),
-        oval(wrist, 0.88 * w, 1.12 * w),
-        oval(wrist + 0.04 * k, 0.017 * k, 0.034 * k),
-        oval(wrist + 0.085 * k, 0.0155 * k, 0.040 * k),
-        oval(wrist + 0.13 * k, 0.0125 * k, 0.034 * k),
-        oval(wrist + 0.175 * k, 0.009 * k, 0.021 * k),
-    ];
-    (Sweep::new(origin, [u, v, t], 2.0, &stations, [0.02, 0.004]), wrist, biceps)
-}
-
-/// Half the gap between the thighs where they are closest, m: what the mesh needs to keep them apart.
-const THIGH_GAP: f64 = 0.009;
-
-fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
-    let k = m.scale();
-    let thigh = radius(m.thigh, f.thigh);
-    let knee = radius(m.knee, f.knee);
-    let calf = radius(m.calf, f.calf);
-    let ankle = radius(m.ankle, f.ankle);
-    let inner = 0.88 * thigh + THIGH_GAP;
-    let foot_x = (0.085 * k).max(1.1 * calf + 0.01);
-    let knee_x = mix(inner, foot_x, 0.45).max(knee + 0.008);
-    let calf_z = calf_height(m);
-    let stations: [(f64, Section); 11] = [
-        (0.005 * k, [foot_x, 0.02 * k, 0.95 * ankle, 1.0 * ankle, 1.15 * ankle]),
-        (ankle_height(m), [foot_x, 0.019 * k, 0.93 * ankle, 1.02 * ankle, 1.12 * ankle]),
-        (mix(ankle_height(m), calf_z, 0.45), {
-            let r = mix(ankle, calf, 0.42);
-            [foot_x, 0.020 * k, 0.97 * r, 0.95 * r, 1.06 * r]
-        }),
-        (calf_z, [mix(foot_x, knee_x, 0.6), 0.017 * k, 0.98 * calf, 0.92 * calf, 1.10 * calf]),
-        (m.knee_height - 0.055 * k, {
-            let r = mix(calf, knee, 0.5);
-            [mix(foot_x, knee_x, 0.85), 0.012 * k, 0.97 * r, 0.98 * r, 1.02 * r]
-        }),
-        (m.knee_height, [knee_x, 0.006 * k, 0.98 * knee, 1.06 * knee, 0.98 * knee]),
-        (m.knee_height + 0.07 * k, {
-            let r = mix(knee, thigh, 0.33);
-            [mix(knee_x, inner, 0.25), 0.005 * k, 0.96 * r, 1.04 * r, 1.03 * r]
-        }),
-        (mix(m.knee_height, m.crotch, 0.6), {
-            let r = mix(knee, thigh, 0.72);
-            [mix(knee_x, inner, 0.65), 0.003 * k, 0.92 * r, 1.06 * r, 1.08 * r]
-        }),
-        (thigh_height(m), [inner, 0.004 * k, 0.88 * thigh, 1.06 * thigh, 1.14 * thigh]),
-        (m.crotch + 0.03 * k, [0.99 * inner, 0.004 * k, 0.87 * thigh, 1.00 * thigh, 1.06 * thigh]),
-        (m.crotch + 0.13 * k, [0.84 * inner, 0.002 * k, 0.60 * thigh, 0.72 * thigh, 0.74 * thigh]),
-    ];
-    let leg = Sweep::upright(2.0, &stations, [0.005, 0.03]);
-    // The foot points forward and 7 degrees outward.
-    let t = DVec3::new(0.12, -0.993, 0.0).normalize();
-    let origin = DVec3::new(foot_x, 0.022 * k, 0.012 * k);
-    let step = |s: f64, half: f64, high: f64| (s * k, [0.0, 0.0, half * k, 0.03 * k, high * k]);
-    let stations = [
-        step(-0.045, 0.024, 0.030),
-        step(-0.02, 0.031, 0.050),
-        step(0.03, 0.034, 0.058),
-        step(0.08, 0.040, 0.042),
-        step(0.13, 0.046, 0.026),
-        step(0.165, 0.044, 0.017),
-        step(0.195, 0.034, 0.012),
-    ];
-    let foot = Sweep::new(origin, [DVec3::Z.cross(t), DVec3::Z, t], 2.2, &stations, [0.008, 0.007]);
-    (leg, foot)
 }
 
 /// Height of the thigh girth, m: the first at which the legs are apart.

@@ -14,6 +14,8 @@ use crate::mesh::{Topology, TriMesh};
 
 /// Newton steps of a projection; the relaxation before it moves a vertex by a fraction of an edge.
 const STEPS: usize = 3;
+/// A Newton step this short, m, is the last: the next one is of the order of its square over a body's curvature.
+const CLOSE: f64 = 1e-4;
 
 /// The mesh without the parts where `h` is positive, and its tags with `tag` on the new boundary. Only the component
 /// with the most vertices is kept.
@@ -86,7 +88,7 @@ pub(crate) fn onto_surface(solid: &dyn Solid, mut p: DVec3) -> DVec3 {
         let f = solid.at(p);
         let step = f.value / f.gradient.length_squared().max(0.05);
         p -= step * f.gradient;
-        if step.abs() < 1e-6 {
+        if step.abs() < CLOSE {
             break;
         }
     }
@@ -99,8 +101,8 @@ pub(crate) fn onto_edge(solid: &dyn Solid, h: impl Fn(DVec3) -> Jet, mut p: DVec
         let (f, h) = (solid.at(p), h(p));
         let (ff, hh, fh) = (f.gradient.length_squared(), h.gradient.length_squared(), f.gradient.dot(h.gradient));
         let determinant = ff * hh - fh * fh;
-        if determinant < 1e-4 * ff * hh {
-            // Surface and opening touch: no crossing to go to, so the surface comes first.
+        if determinant <= 1e-4 * ff * hh {
+            // Surface and opening touch, or the opening has no edge near: no crossing to go to, so the surface comes first.
             return onto_surface(solid, p);
         }
         let a = (f.value * hh - h.value * fh) / determinant;

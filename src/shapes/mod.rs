@@ -12,6 +12,7 @@ pub mod fitting;
 pub mod garment;
 pub mod girth;
 pub mod jet;
+mod limbs;
 pub mod measures;
 pub mod profile;
 mod remesh;

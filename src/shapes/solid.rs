@@ -21,6 +21,23 @@ use super::profile::Profile;
 pub trait Solid: Sync {
     /// The field and its gradient at `p`, m.
     fn at(&self, p: DVec3) -> Jet;
+
+    /// A lower bound of the distance to `p`, cheaper than the field, m.
+    fn at_least(&self, p: DVec3) -> f64 {
+        let _ = p;
+        0.0
+    }
+
+    /// `field` joined with this solid over the width `k`, the solid left out where it is too far to matter: where its
+    /// least distance is over one and a half times what could, for the field is a distance only to first order.
+    fn join(&self, field: Jet, p: DVec3, k: f64) -> Jet {
+        if self.at_least(p) > 1.5 * (field.value.max(0.0) + k) { field } else { field.smooth_min(self.at(p), k) }
+    }
+}
+
+/// Distance of `p` to the box from `low` to `high`, 0 inside, m.
+fn box_distance(p: DVec3, low: DVec3, high: DVec3) -> f64 {
+    (low - p).max(p - high).max(DVec3::ZERO).length()
 }
 
 /// The channels of a sweep's profile: c_u, c_v, a, b₋, b₊, m.
@@ -34,6 +51,19 @@ pub struct Sweep {
     exponent: f64,
     profile: Profile<5>,
     rounding: [f64; 2],
+    box_low: DVec3,
+    box_high: DVec3,
+}
+
+/// The box of the stations' sections in the sweep's frame, with a tenth more for what the curve does between them.
+fn section_box(stations: &[(f64, Section)]) -> (DVec3, DVec3) {
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
+    for &(t, [cu, cv, a, below, above]) in stations {
+        low = low.min(DVec3::new(cu - 1.1 * a, cv - 1.1 * below, t));
+        high = high.max(DVec3::new(cu + 1.1 * a, cv + 1.1 * above, t));
+    }
+    (low, high)
 }
 
 impl Sweep {
@@ -47,7 +77,8 @@ impl Sweep {
         stations: &[(f64, Section)],
         rounding: [f64; 2],
     ) -> Self {
-        Self { origin, axes, exponent, profile: Profile::new(stations), rounding }
+        let (box_low, box_high) = section_box(stations);
+        Self { origin, axes, exponent, profile: Profile::new(stations), rounding, box_low, box_high }
     }
 
     /// Upright: u is x, v is y and t is z.
@@ -59,7 +90,7 @@ impl Sweep {
     /// A sweep along the same axis with other sections.
     #[must_use]
     pub fn with_stations(&self, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
-        Self { profile: Profile::new(stations), rounding, ..self.clone() }
+        Self::new(self.origin, self.axes, self.exponent, stations, rounding)
     }
 
     /// The coordinate of `p` along the axis, m.
@@ -73,6 +104,12 @@ impl Sweep {
     pub fn centre(&self, t: f64) -> DVec3 {
         let [cu, cv, ..] = self.profile.values(t);
         self.origin + cu * self.axes[0] + cv * self.axes[1] + t * self.axes[2]
+    }
+
+    /// First and last coordinate of the stations, m.
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        self.profile.range()
     }
 
     /// Direction of the axis.
@@ -114,6 +151,12 @@ impl Solid for Sweep {
         let high = t - last;
         side.smooth_max(low, 3.0 * self.rounding[0]).smooth_max(high, 3.0 * self.rounding[1])
     }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        let local = p - self.origin;
+        let [u, v, t] = self.axes.map(|axis| local.dot(axis));
+        box_distance(DVec3::new(u, v, t), self.box_low, self.box_high)
+    }
 }
 
 /// An ellipsoid along given axes.
@@ -140,6 +183,38 @@ impl Solid for Ellipsoid {
         let rho2 = Jet::new(d.length_squared(), 2.0 * d);
         let rho = rho2.sqrt();
         (rho - rho.over(r)).to_distance()
+    }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        // Leaning moves the ends by lean × height.
+        let half = self.radii + DVec3::new(0.0, self.lean.abs() * self.radii.z, 0.0);
+        box_distance(p, self.centre - half, self.centre + half)
+    }
+}
+
+/// A part of the left side, or its mirror image on the right.
+#[derive(Debug, Clone, Copy)]
+pub struct Sided<'a, S> {
+    part: &'a S,
+    mirror: DVec3,
+}
+
+impl<'a, S: Solid> Sided<'a, S> {
+    /// The part itself for a `side` that is not negative, else its mirror image in x = 0.
+    #[must_use]
+    pub fn new(part: &'a S, side: f64) -> Self {
+        Self { part, mirror: DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0) }
+    }
+}
+
+impl<S: Solid> Solid for Sided<'_, S> {
+    fn at(&self, p: DVec3) -> Jet {
+        let jet = self.part.at(p * self.mirror);
+        Jet::new(jet.value, jet.gradient * self.mirror)
+    }
+
+    fn at_least(&self, p: DVec3) -> f64 {
+        self.part.at_least(p * self.mirror)
     }
 }
 

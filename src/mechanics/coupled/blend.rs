@@ -44,6 +44,27 @@ pub fn blend(
     sweeps: usize,
 ) -> Vec<DVec3> {
     let maps = affine_maps(parts, coarse, x, node_displacement);
+    let field = sweep(topology, parts, &maps, sweeps);
+    field.iter().zip(x).map(|(map, &x)| map.offset + map.gradient * x).collect()
+}
+
+/// One translation a PART, blended as [`blend`] blends by default: what translations can hold.
+#[must_use]
+pub fn smooth_translations(topology: &Topology, parts: &Parts, translation: &[DVec3]) -> Vec<DVec3> {
+    let maps: Vec<Affine> = translation.iter().map(|&offset| Affine { offset, gradient: DMat3::ZERO }).collect();
+    let sweeps = sweeps_for(parts.part_of_vertex.len(), parts.len());
+    sweep(topology, parts, &maps, sweeps).iter().map(|map| map.offset).collect()
+}
+
+/// Sweeps that smooth over half a PART: m sweeps spread a weight by about √m edges, and a PART of n vertices is √n wide.
+/// At least two, or the seams stay creases; at most two hundred, for PARTs of thousands of vertices that hold no drape anyway.
+#[must_use]
+pub fn sweeps_for(vertices: usize, parts: usize) -> usize {
+    (0.5 * vertices as f64 / parts.max(1) as f64).ceil().clamp(2.0, 200.0) as usize
+}
+
+/// The maps at the vertices after m sweeps.
+fn sweep(topology: &Topology, parts: &Parts, maps: &[Affine], sweeps: usize) -> Vec<Affine> {
     let still = Affine { offset: DVec3::ZERO, gradient: DMat3::ZERO };
     let mut field: Vec<Affine> =
         parts.part_of_vertex.iter().map(|&p| if p == UNASSIGNED { still } else { maps[p as usize] }).collect();
@@ -66,7 +87,7 @@ pub fn blend(
             })
             .collect();
     }
-    field.iter().zip(x).map(|(map, &x)| map.offset + map.gradient * x).collect()
+    field
 }
 
 /// The affine map of each PART.

@@ -22,24 +22,31 @@ mod clearance;
 mod nodes;
 mod options;
 mod rest;
+mod settle;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
 
-pub use blend::blend;
+pub use blend::{blend, smooth_translations, sweeps_for};
 pub use clearance::push_out;
 pub use nodes::CoarseMesh;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, PartResult, Stage};
 pub use rest::coarse_rest;
 
-use super::energy::{Cloth, Contacts, gravity};
-use super::refine::{RefineOptions, refine};
+use super::energy::{Cloth, Contacts, Friction, gravity};
 use crate::distance::Body;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::Parts;
+use settle::{Goal, settle};
+
+/// Distance a node keeps from the body, m: room for the body's roundness between nodes and for the softness of the contact.
+const COARSE_OFFSET: f64 = 2e-3;
+
+/// Contact stiffness of the coarse cloth, N/m³: 200 Pa, some ten times what a dress weighs on its shoulders, take up a
+/// millimetre.
+const COARSE_CONTACT: f64 = 2e5;
 
 /// What is draped.
 #[derive(Debug, Clone, Copy)]
@@ -125,18 +132,22 @@ fn stage(
     let coarse_shape = coarse_rest(mesh, topology, rest, &parts, &coarse);
     let held_nodes: Vec<u32> =
         (0..parts.len() as u32).filter(|&p| is_held[coarse.node_vertex[p as usize] as usize]).collect();
-    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, fabric, &held_nodes)?;
+    let fabric = softened(fabric, mesh, options.coarse_strain);
+    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, &fabric, &held_nodes)?;
+    let fine_offset = cloth.offset;
     load(&mut cloth, garment, &parts);
     let setup = began.elapsed();
 
     let began = Instant::now();
-    let newton = RefineOptions {
-        max_steps: Some(options.max_steps),
+    let goal = Goal {
         tolerance: options.tolerance,
+        max_steps: options.max_steps,
         damping: options.damping,
-        ..RefineOptions::default()
+        least_move_m: options.least_move_m,
     };
-    let settled = refine(&cloth, body, nodes.positions.clone(), &newton, &mut |_| ControlFlow::Continue(()))?;
+    let mut contacts = soft_contacts(&mut cloth, body, &nodes.positions);
+    let settled = settle(&cloth, &mut contacts, nodes.positions.clone(), goal)?;
+    let last = settled.history.last().copied();
     let solve = began.elapsed();
 
     let began = Instant::now();
@@ -149,25 +160,41 @@ fn stage(
             *x += *u;
         }
     }
-    result.pushed_out = push_out(body, &is_held, cloth.offset, &mut result.positions);
+    result.pushed_out = push_out(body, &is_held, fine_offset, &mut result.positions);
     let blend = began.elapsed();
 
-    result.part_results = balance(&cloth, body, &settled.positions);
-    warn(result, &parts, &coarse, stranded, extent_m, options, settled.residual_over_weight);
+    result.part_results = balance(&cloth, &contacts, &settled.positions);
+    let residual = last.map_or(0.0, |h| h.residual_over_weight);
+    warn(result, &parts, &coarse, stranded, extent_m, options, residual);
     result.stages.push(Stage {
         extent_m,
         part_count: parts.len(),
         triangle_count: coarse.triangles.len(),
-        steps: settled.steps,
-        residual_over_weight: settled.residual_over_weight,
-        energy: settled.energy,
+        steps: last.map_or(0, |h| h.iteration),
+        residual_over_weight: residual,
+        energy: last.map_or(0.0, |h| h.energy),
         positions: result.positions.clone(),
+        history: settled.history,
         setup,
         solve,
         blend,
     });
     result.parts = parts;
     Ok(())
+}
+
+/// The fabric with its membrane no stiffer than its own hanging weight asks for: see [`CoupledOptions::coarse_strain`].
+fn softened(fabric: &Fabric, mesh: &TriMesh, strain: f64) -> Fabric {
+    let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
+    let most = fabric.density_kg_per_m2 * crate::GRAVITY * height / strain;
+    // No height or no strain asked for: as stiff as it is.
+    let cap = |k: f64| if most > 0.0 { k.min(most) } else { k };
+    Fabric {
+        stretch_weft_n_per_m: cap(fabric.stretch_weft_n_per_m),
+        stretch_warp_n_per_m: cap(fabric.stretch_warp_n_per_m),
+        shear_n_per_m: cap(fabric.shear_n_per_m),
+        ..fabric.clone()
+    }
 }
 
 /// Gives each node the mass and the area of its whole PART: the coarse triangles end at the nodes.
@@ -217,14 +244,18 @@ fn carry_loose(parts: &Parts, coarse: &CoarseMesh, displacement: &mut [DVec3]) -
     }
 }
 
-/// Sweeps that smooth over half a PART: m sweeps spread a weight by about √m edges, and a PART of n vertices is √n wide.
-fn sweeps_for(vertices: usize, parts: usize) -> usize {
-    (0.5 * vertices as f64 / parts.max(1) as f64).ceil().clamp(2.0, 200.0) as usize
+/// Contact as a coarse node feels it: see [`settle`].
+fn soft_contacts<'b>(cloth: &mut Cloth, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+    cloth.offset = cloth.offset.max(COARSE_OFFSET);
+    let friction = Friction::new(cloth.friction);
+    let mut contacts = Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset, COARSE_CONTACT, friction);
+    contacts.update(x);
+    contacts.friction_refresh(x);
+    contacts
 }
 
 /// F⁰, F¹ and F² of each node at rest.
-fn balance(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<PartResult> {
-    let contacts = cloth.contacts(body, x);
+fn balance(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<PartResult> {
     let mut all = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut all);
     let mut weight = vec![DVec3::ZERO; x.len()];

@@ -11,13 +11,14 @@ use crate::shapes::anatomy::{Anatomy, underbust_height};
 use crate::shapes::body::DressForm;
 use crate::shapes::fitting::ray;
 use crate::shapes::jet::Jet;
-use crate::shapes::solid::{Section, Solid, Sweep};
+use crate::shapes::profile::Profile;
+use crate::shapes::solid::{Section, Sided, Solid, Sweep};
 
 /// Least distance between the undraped garment and the body, m. The field is off by up to a third at the shoulders, and a mesh's
 /// chords cut corners, so that 3 mm remain everywhere.
-pub(super) const CLEARANCE: f64 = 0.007;
+pub(super) const CLEARANCE: f64 = 0.006;
 /// Width over which body and tubes are joined, m.
-const BLEND: f64 = 0.03;
+const BLEND: f64 = 0.015;
 /// Exponent of the tubes' sections, near an ellipse.
 const EXPONENT: f64 = 2.2;
 /// What the tubes extend beyond their last opening, m, so that the opening cuts them cleanly.
@@ -44,21 +45,17 @@ struct Under<'a> {
 
 impl Solid for Under<'_> {
     fn at(&self, p: DVec3) -> Jet {
-        let trunk = self.form.torso(p).smooth_min(self.form.legs(p), 0.035);
-        if self.arms { trunk.smooth_min(self.form.arms(p), 0.045) } else { trunk }
+        if self.arms { self.form.below_the_head(p) } else { self.form.torso_and_legs(p) }
     }
 }
 
 impl Solid for Cloth<'_> {
     fn at(&self, p: DVec3) -> Jet {
-        let under = Under { form: self.form, arms: self.arms }.at(p) - CLEARANCE;
         let mut cloth = self.tube.at(p);
         if let Some(sleeve) = &self.sleeve {
-            let mirror = DVec3::new(p.x.signum(), 1.0, 1.0);
-            let arm = sleeve.at(p * mirror);
-            cloth = cloth.smooth_min(Jet::new(arm.value, arm.gradient * mirror), 0.04);
+            cloth = Sided::new(sleeve, p.x).join(cloth, p, 0.05);
         }
-        cloth.smooth_min(under, BLEND)
+        cloth.smooth_min(Under { form: self.form, arms: self.arms }.at(p) - CLEARANCE, BLEND)
     }
 }
 
@@ -129,6 +126,43 @@ fn with_girth(section: Section, girth: f64) -> Section {
     widened(section, by.max(CLEARANCE))
 }
 
+/// The section scaled until the body at height `z` lies inside it with the clearance.
+fn around(section: Section, anatomy: &Anatomy, z: f64) -> Section {
+    let [cu, cv, a, front, back] = section;
+    let under = Under { form: anatomy, arms: false };
+    let centre = anatomy.trunk.centre(z);
+    let mut scale: f64 = 1.0;
+    for i in 0..24 {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 24.0).sin_cos();
+        let r = CLEARANCE + ray(&under, centre, DVec3::new(cos, sin, 0.0), 0.11);
+        let (x, y) = (r * cos - cu, centre.y + r * sin - cv);
+        let b = if y < 0.0 { front } else { back };
+        let level = (x / a).abs().powf(EXPONENT) + (y / b).abs().powf(EXPONENT);
+        scale = scale.max(level.powf(1.0 / EXPONENT));
+    }
+    [cu, cv, scale * a, scale * front, scale * back]
+}
+
+/// Stations of a skirt from beyond the hem up to just below `from` at height `z0`: it opens linearly until its girth
+/// has grown by the flare, and the more flare the rounder the hem.
+fn skirt(from: Section, z0: f64, hem: f64, flare: f64) -> Vec<(f64, Section)> {
+    let round = (perimeter(from) + flare) / std::f64::consts::TAU;
+    // A flare of 60 cm makes the hem a circle; less leaves it the body's oval.
+    let roundness = (flare / 0.6).min(1.0);
+    let low = hem - BEYOND;
+    (0..5)
+        .map(|i| {
+            let z = low + (z0 - low) * f64::from(i) / 5.0;
+            let t = (z0 - z) / (z0 - hem);
+            let part = |i: usize| {
+                let oval = from[i] + flare / std::f64::consts::TAU;
+                from[i] + t * (oval + roundness * (round - oval) - from[i])
+            };
+            (z, [0.0, from[1], part(2), part(3), part(4)])
+        })
+        .collect()
+}
+
 /// Skirt and bodice: from beyond the hem up to the armpits, or to above the waist.
 fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let (m, anatomy) = (&form.measures, &form.anatomy);
@@ -136,56 +170,54 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch + 0.03), girth);
     let flare = spec.flare_cm / 100.0;
     let waist = section(m.waist_height, m.waist + ease.waist_cm / 100.0);
-    let hip = section(m.hip_height, m.hip + ease.hip_cm / 100.0);
-    let mut stations: Vec<(f64, Section)> = Vec::new();
-    // From `from` at `z0` the section opens linearly to a round one with the hem's girth.
-    let open = |from: Section, z0: f64, stations: &mut Vec<(f64, Section)>| {
-        let girth = perimeter(from) + flare;
-        let round = girth / std::f64::consts::TAU;
-        let low = hem - BEYOND;
-        for i in 0..5 {
-            let z = low + (z0 - low) * f64::from(i) / 5.0;
-            let t = (z0 - z) / (z0 - hem);
-            // The more flare, the rounder the hem.
-            let target: [f64; 3] = if flare > 0.3 {
-                [round, round, round]
-            } else {
-                [
-                    from[2] + flare / std::f64::consts::TAU,
-                    from[3] + flare / std::f64::consts::TAU,
-                    from[4] + flare / std::f64::consts::TAU,
-                ]
-            };
-            let part = |i: usize| from[i + 2] + t * (target[i] - from[i + 2]);
-            stations.push((z, [0.0, from[1], part(0), part(1), part(2)]));
-        }
-    };
+    // Hip and seat stay inside, so that the cloth falls from them without showing them.
+    let hip = around(section(m.hip_height, m.hip + ease.hip_cm / 100.0), anatomy, m.hip_height);
     if spec.carried_by == Support::Waist {
-        open(waist, m.waist_height, &mut stations);
-        stations.push((m.waist_height, waist));
-        stations.push((m.waist_height + 0.04, waist));
+        // A straight line from waist to hem, unless hip or seat stand out of it.
+        let seat_z = m.hip_height + 0.035;
+        let line = skirt(waist, m.waist_height, hem, flare);
+        let straight = Profile::new(&[line[0], (m.waist_height, waist)]);
+        let widest = |z: f64, body: Section| -> (f64, Section) {
+            let plain = straight.values(z);
+            (z, std::array::from_fn(|i| if i < 2 { plain[i] } else { plain[i].max(body[i]) }))
+        };
+        let (_, seat) = widest(seat_z, around(hip, anatomy, seat_z));
+        let grown = perimeter(seat) - perimeter(waist);
+        let mut stations = skirt(seat, seat_z, hem, (flare - grown).max(0.0));
+        let high = high_hip(m.hip_height, m.waist_height);
+        stations.extend([(seat_z, seat), widest(high, around(straight.values(high), anatomy, high))]);
+        stations.extend([(m.waist_height, waist), (m.waist_height + 0.04, waist)]);
         return Sweep::upright(EXPONENT, &stations, [0.005, 0.005]);
     }
-    if hem < m.hip_height - 0.10 {
-        open(hip, m.hip_height - 0.02, &mut stations);
+    let mut stations = if hem < m.hip_height - 0.10 {
+        skirt(hip, m.hip_height - 0.02, hem, flare)
     } else {
-        stations.push((hem.min(m.hip_height) - BEYOND, hip));
-    }
+        vec![(hem.min(m.hip_height) - BEYOND, hip)]
+    };
     let under_z = underbust_height(m);
     let bust = section(m.bust_height, m.bust + ease.bust_cm / 100.0);
     let mut underbust = section(under_z, m.underbust + 0.5 * (ease.bust_cm + ease.waist_cm) / 100.0);
     // Cloth hangs off the bust: below it, it comes back only part of the way.
     underbust[3] = underbust[3].max(0.5 * (underbust[3] + bust[3]));
-    let axilla = section(m.axilla - 0.01, 0.5 * (m.bust + m.underbust) + (ease.bust_cm + 4.0) / 100.0);
+    let axilla_z = m.axilla - 0.01;
+    let axilla = section(
+        axilla_z,
+        0.5 * (m.bust + m.underbust) + (ease.bust_cm + if spec.sleeves.is_some() { 4.0 } else { 0.0 }) / 100.0,
+    );
     stations.extend([
         (m.hip_height, hip),
         (m.waist_height, waist),
         (under_z, underbust),
         (m.bust_height, bust),
-        (m.axilla - 0.01, axilla),
-        (m.axilla + 0.025, widened(axilla, -0.006)),
+        (axilla_z, axilla),
+        (axilla_z + 0.035, widened(axilla, -0.006)),
     ]);
     Sweep::upright(EXPONENT, &stations, [0.005, 0.02])
+}
+
+/// Where the high hip is: a little over half the way from the hip up to the waist.
+fn high_hip(hip: f64, waist: f64) -> f64 {
+    hip + (waist - hip) * 0.6
 }
 
 /// The left sleeve.
@@ -200,7 +232,8 @@ fn sleeve(s: &Sleeves, anatomy: &Anatomy, arm_length: f64) -> Sweep {
             let by = upper + (lower - upper) * (t / end).min(1.0);
             let round = 0.5 * (a + 0.5 * (below + above));
             let soft = |r: f64| 0.5 * (r + round) + by;
-            (t, [cu, cv, soft(a), soft(below), soft(above)])
+            // It lies on top of the arm and hangs below it, so that its head does not stand off the shoulder.
+            (t, [cu - 0.75 * (by - CLEARANCE), cv, soft(a), soft(below), soft(above)])
         })
         .collect();
     anatomy.arm.with_stations(&stations, [0.01, 0.005])

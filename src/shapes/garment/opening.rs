@@ -13,6 +13,9 @@ const NECKLINE_EXPONENT: f64 = 2.2;
 /// Half the width over which a neckline's depth goes over from front to back, m: the shoulder's thickness.
 const SHOULDER_HALF: f64 = 0.035;
 
+/// How far an armhole stands off the arm's own radius where it leaves the shoulder, m.
+const ARMHOLE_ROOM: f64 = 0.03;
+
 /// One opening.
 #[derive(Debug, Clone)]
 pub(super) enum Opening<'a> {
@@ -22,10 +25,10 @@ pub(super) enum Opening<'a> {
     Waistband(f64),
     /// Around the neck.
     Neckline { half_width: f64, front: f64, back: f64, shoulder: DVec3 },
-    /// Around each arm's root, without sleeves: beyond a slanted plane and above a height.
-    Armholes { point: DVec3, normal: DVec3, lowest: f64 },
+    /// Around each arm's root, without sleeves: beyond a slanted plane, and not far from the arm.
+    Armholes { form: &'a Anatomy, point: DVec3, normal: DVec3, radius: f64 },
     /// Around each arm: beyond a distance along it, near it.
-    Cuffs { form: &'a Anatomy, end: f64 },
+    Cuffs { form: &'a Anatomy, end: f64, radius: f64 },
 }
 
 impl<'a> Opening<'a> {
@@ -47,18 +50,22 @@ impl<'a> Opening<'a> {
             });
         }
         if let Some(sleeves) = &spec.sleeves {
-            openings.push(Self::Cuffs { form: anatomy, end: sleeve_end(sleeves, anatomy, m.arm_length) });
+            let end = sleeve_end(sleeves, anatomy, m.arm_length);
+            // The sleeve hangs below the arm by most of its ease; past the end nothing else may come this near.
+            let [.., wide] = anatomy.arm.section(end);
+            let radius = wide.max(0.045) + 1.75 * sleeves.cuff_ease_cm / 100.0 / std::f64::consts::TAU + 0.03;
+            openings.push(Self::Cuffs { form: anatomy, end, radius });
         } else {
             let width = spec.neckline.map_or(0.18, |n| n.width_cm / 100.0);
             let strap = spec.strap_cm.unwrap_or(4.0) / 100.0;
             let upper = DVec3::new(0.5 * width + strap, 0.0, cloth.top);
-            // Under the arm the side seam begins a little below the armpit, outside the chest.
-            let lowest = m.axilla - 0.035;
+            // Under the arm the opening begins a little below the armpit, outside the chest.
             let chest = anatomy.trunk.section(m.axilla)[2];
-            let lower = DVec3::new(chest + 0.008, 0.0, lowest);
-            let along = lower - upper;
+            let along = DVec3::new(chest + 0.016, 0.0, m.axilla - 0.035) - upper;
             let normal = DVec3::new(-along.z, 0.0, along.x).normalize();
-            openings.push(Self::Armholes { point: upper, normal, lowest: lowest - 0.04 });
+            let root = anatomy.arm.section(0.06 * m.scale());
+            let radius = root[2].max(root[3]) + ARMHOLE_ROOM;
+            openings.push(Self::Armholes { form: anatomy, point: upper, normal, radius });
         }
         openings
     }
@@ -97,18 +104,22 @@ impl<'a> Opening<'a> {
                 let r = (x.abs_powf(n) + below.abs_powf(n)).abs_powf(1.0 / n);
                 (-r + 1.0) * half_width.min(front.min(*back))
             }
-            Self::Armholes { point, normal, lowest } => {
+            Self::Armholes { form, point, normal, radius } => {
                 let beyond = Jet::new((left - *point).dot(*normal), *normal * mirror);
-                let above = Jet::new(p.z - lowest, DVec3::Z);
-                -((-beyond).max(-above))
+                let off_axis = off_arm(form, left, mirror);
+                -((-beyond).smooth_max(off_axis - *radius, 0.05))
             }
-            Self::Cuffs { form, end } => {
+            Self::Cuffs { form, end, radius } => {
                 let along = form.arm.along(left) - end;
-                let off_axis = (left - form.arm.centre(form.arm.along(left))).length();
-                // 20 cm around the wrist there is nothing but the sleeve and the hand.
-                let near = 0.2 - off_axis;
-                if along < near { Jet::new(along, form.arm.direction() * mirror) } else { Jet::constant(near) }
+                let near = -off_arm(form, left, mirror) + *radius;
+                if along < near.value { Jet::new(along, form.arm.direction() * mirror) } else { near }
             }
         }
     }
+}
+
+/// Distance from the left arm's axis, m; the gradient is that of the mirrored point.
+fn off_arm(form: &Anatomy, left: DVec3, mirror: DVec3) -> Jet {
+    let away = left - form.arm.centre(form.arm.along(left));
+    Jet::new(away.length(), away.normalize_or_zero() * mirror)
 }

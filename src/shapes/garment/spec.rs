@@ -141,7 +141,7 @@ impl GarmentSpec {
         };
         check("length_cm", self.length_cm, 15.0, 160.0)?;
         check("ease.bust_cm", self.ease.bust_cm, 4.0, 80.0)?;
-        check("ease.waist_cm", self.ease.waist_cm, if self.carried_by == Support::Waist { 2.0 } else { 4.0 }, 100.0)?;
+        check("ease.waist_cm", self.ease.waist_cm, 4.0, 100.0)?;
         check("ease.hip_cm", self.ease.hip_cm, 4.0, 100.0)?;
         check("flare_cm", self.flare_cm, 0.0, 400.0)?;
         check("fullness", self.fullness, 0.0, 3.0)?;

@@ -1,0 +1,241 @@
+//! References on disk: a converged drape is paid for once.
+//!
+//! The key of a reference is the BLAKE3 hash of everything it depends on: the crate's version and the file format's, the
+//! garment's positions and triangles, the rest shape, the fabric, the body, the held vertices, the start and the solver's
+//! options. Numbers enter by their bits, lists with their lengths, so two inputs never share a key by running together.
+//!
+//! A file holds: 8 bytes of magic, the key, then little-endian u64 steps and vertex count, f64 energy (J), residual over weight
+//! and seconds, 3 f64 a vertex (m), and the BLAKE3 hash of all before it. It is written beside its final name and renamed,
+//! so a reader never sees half of one. A file that does not match its hash, its key or its garment is no error: the reference
+//! is computed again, and the caller gets a warning to show.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use crate::fabric::Fabric;
+use crate::mesh::{RestShape, TriMesh};
+
+/// First bytes of a file; the digit is the format's version and part of every key.
+const MAGIC: &[u8; 8] = b"PWREF\x001\n";
+
+/// Length of a BLAKE3 hash.
+const HASH: usize = blake3::OUT_LEN;
+
+/// What a reference depends on.
+#[derive(Debug, Clone, Copy)]
+pub struct ReferenceInput<'a> {
+    /// The garment.
+    pub garment: &'a TriMesh,
+    /// Its rest shape.
+    pub rest: &'a RestShape,
+    /// Its fabric.
+    pub fabric: &'a Fabric,
+    /// The body.
+    pub body: &'a TriMesh,
+    /// Vertices that do not move.
+    pub held: &'a [u32],
+    /// Where the solve starts, m.
+    pub start: &'a [DVec3],
+    /// The solver's options, written out in full.
+    pub options: &'a str,
+}
+
+/// The name of a reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReferenceKey(blake3::Hash);
+
+impl ReferenceKey {
+    /// Hashes everything a reference depends on.
+    #[must_use]
+    pub fn new(input: &ReferenceInput<'_>) -> Self {
+        let mut hash = Hasher(blake3::Hasher::new());
+        hash.bytes(MAGIC);
+        hash.bytes(env!("CARGO_PKG_VERSION").as_bytes());
+        for mesh in [input.garment, input.body] {
+            hash.points(&mesh.positions);
+            hash.length(mesh.triangles.len());
+            mesh.triangles.iter().flatten().for_each(|v| hash.raw(&v.to_le_bytes()));
+        }
+        hash.length(input.rest.corners.len());
+        for corner in input.rest.corners.iter().flatten() {
+            hash.number(corner.x);
+            hash.number(corner.y);
+        }
+        let f = input.fabric;
+        let constants = [f.density_kg_per_m2, f.thickness_m, f.stretch_weft_n_per_m, f.stretch_warp_n_per_m];
+        constants.iter().for_each(|&c| hash.number(c));
+        [f.shear_n_per_m, f.poisson, f.friction].iter().chain(&f.bending_nm).for_each(|&c| hash.number(c));
+        hash.length(input.held.len());
+        input.held.iter().for_each(|v| hash.raw(&v.to_le_bytes()));
+        hash.points(input.start);
+        hash.bytes(input.options.as_bytes());
+        Self(hash.0.finalize())
+    }
+
+    /// File name in the cache.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        format!("{}.drape", self.0.to_hex())
+    }
+}
+
+struct Hasher(blake3::Hasher);
+
+impl Hasher {
+    fn raw(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+    fn length(&mut self, n: usize) {
+        self.raw(&(n as u64).to_le_bytes());
+    }
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.length(bytes.len());
+        self.raw(bytes);
+    }
+    fn number(&mut self, x: f64) {
+        self.raw(&x.to_bits().to_le_bytes());
+    }
+    fn points(&mut self, points: &[DVec3]) {
+        self.length(points.len());
+        points.iter().flat_map(DVec3::to_array).for_each(|x| self.number(x));
+    }
+}
+
+/// A converged drape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// Vertex positions, m.
+    pub positions: Vec<DVec3>,
+    /// Energy, J.
+    pub energy_j: f64,
+    /// Residual force over weight.
+    pub residual_over_weight: f64,
+    /// Steps it took.
+    pub steps: u64,
+    /// Seconds it took when it was computed.
+    pub seconds: f64,
+}
+
+/// A reference and how it was come by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The reference.
+    pub reference: Reference,
+    /// Whether it was on disk.
+    pub cached: bool,
+    /// What went wrong with the disk, if anything: worth showing, not worth stopping for.
+    pub warnings: Vec<String>,
+}
+
+/// A directory of references.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReferenceCache {
+    directory: PathBuf,
+}
+
+impl ReferenceCache {
+    /// References in `directory`, which is made when the first is written.
+    #[must_use]
+    pub fn new(directory: impl Into<PathBuf>) -> Self {
+        Self { directory: directory.into() }
+    }
+
+    /// The user's cache: `$XDG_CACHE_HOME/partwise/references`, or under `~/.cache`; `None` where neither variable is set.
+    #[must_use]
+    pub fn in_user_cache() -> Option<Self> {
+        let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|p| p.is_absolute());
+        let base = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
+        Some(Self::new(base.join("partwise").join("references")))
+    }
+
+    /// Where the references are.
+    #[must_use]
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// The reference of `key` for a garment of `vertices`: from disk, or else computed and kept.
+    ///
+    /// # Errors
+    /// Whatever `compute` fails with; the disk's failures are warnings.
+    pub fn get_or_compute<E>(
+        &self,
+        key: &ReferenceKey,
+        vertices: usize,
+        compute: impl FnOnce() -> Result<Reference, E>,
+    ) -> Result<Found, E> {
+        let path = self.directory.join(key.file_name());
+        let mut warnings = Vec::new();
+        match std::fs::read(&path) {
+            Ok(bytes) => match decode(&bytes, key, vertices) {
+                Some(reference) => return Ok(Found { reference, cached: true, warnings }),
+                None => {
+                    warnings.push(format!("a cached reference is damaged and was computed again: {}", path.display()));
+                }
+            },
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+            Err(e) => warnings.push(format!("a cached reference cannot be read ({e}): {}", path.display())),
+        }
+        let reference = compute()?;
+        if let Err(e) = self.write(&path, &encode(&reference, key)) {
+            warnings.push(format!("the reference cannot be kept for the next run ({e}): {}", path.display()));
+        }
+        Ok(Found { reference, cached: false, warnings })
+    }
+
+    fn write(&self, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+        std::fs::create_dir_all(&self.directory)?;
+        // The process's own name, so that two runs never write into one file.
+        let temporary = path.with_extension(format!("{}.part", std::process::id()));
+        let written = std::fs::File::create(&temporary).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        let renamed = written.and_then(|()| std::fs::rename(&temporary, path));
+        if renamed.is_err() {
+            // Nothing to add if this fails too: the first error is the one to tell.
+            let _ = std::fs::remove_file(&temporary);
+        }
+        renamed
+    }
+}
+
+fn encode(reference: &Reference, key: &ReferenceKey) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(key.0.as_bytes());
+    bytes.extend(reference.steps.to_le_bytes());
+    bytes.extend((reference.positions.len() as u64).to_le_bytes());
+    let numbers = [reference.energy_j, reference.residual_over_weight, reference.seconds];
+    let all = numbers.into_iter().chain(reference.positions.iter().flat_map(DVec3::to_array));
+    bytes.extend(all.flat_map(f64::to_le_bytes));
+    let sum = blake3::hash(&bytes);
+    bytes.extend(sum.as_bytes());
+    bytes
+}
+
+fn decode(bytes: &[u8], key: &ReferenceKey, vertices: usize) -> Option<Reference> {
+    let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(HASH)?)?;
+    if blake3::hash(body).as_bytes() != sum {
+        return None;
+    }
+    let rest = body.strip_prefix(MAGIC)?.strip_prefix(key.0.as_bytes())?;
+    let words: Vec<u64> = rest.chunks_exact(8).filter_map(|c| c.try_into().ok()).map(u64::from_le_bytes).collect();
+    let (head, positions) = words.split_at_checked(5)?;
+    if head[1] != vertices as u64 || positions.len() != 3 * vertices {
+        return None;
+    }
+    let number = |i: usize| f64::from_bits(head[i]);
+    let positions: Vec<DVec3> = positions
+        .chunks_exact(3)
+        .map(|c| DVec3::new(f64::from_bits(c[0]), f64::from_bits(c[1]), f64::from_bits(c[2])))
+        .collect();
+    Some(Reference {
+        positions,
+        energy_j: number(2),
+        residual_over_weight: number(3),
+        steps: head[0],
+        seconds: number(4),
+    })
+}

@@ -1,0 +1,199 @@
+//! A drape against its references: how far it is from where it would settle, and from the canonical drape.
+//!
+//! The *own continuation* is the drape refined to convergence from the very result (`accuracy.rms_mm`); the *canonical drape*
+//! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it
+//! and drapes from starts perturbed by a millimetre (`accuracy.canonical_spread_mm`): a garment has several equilibria, and an
+//! error under the spread says nothing. References are kept on disk under their content hash; see
+//! [`reference`](crate::accuracy::reference).
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
+use crate::accuracy::{self, Accuracy, AccuracyError, Comparison};
+use crate::drape::{Drape, Scene, Settings};
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::refine::{RefineOptions, SolveError, Step, Stop, refine};
+use crate::wrinkles::{self, Wrinkles};
+
+/// Amplitude of a perturbed start, m: below what a hand could place, above what rounding makes.
+const PERTURBATION: f64 = 1e-3;
+
+/// Why a drape could not be assessed.
+#[derive(Debug, thiserror::Error)]
+pub enum AssessError {
+    /// The cloth cannot be set up.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The reference cannot be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The two cannot be compared.
+    #[error(transparent)]
+    Accuracy(#[from] AccuracyError),
+    /// The caller stopped it.
+    #[error("interrupted while a reference was refined")]
+    Interrupted,
+}
+
+/// What is asked of an assessment.
+#[derive(Debug, Clone, Default)]
+pub struct AssessOptions {
+    /// Where references are kept; `None` computes them anew.
+    pub cache: Option<ReferenceCache>,
+    /// Perturbed starts for the spread of the canonical drape.
+    pub spread_starts: u64,
+}
+
+/// A drape, assessed.
+#[derive(Debug, Clone)]
+pub struct Assessment {
+    /// All figures.
+    pub accuracy: Accuracy,
+    /// Distance of each vertex to its own continuation, mm.
+    pub error_mm: Vec<f64>,
+    /// The canonical drape.
+    pub canonical: Reference,
+    /// Both measures of the folds.
+    pub wrinkles: Wrinkles,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Finds or makes the references of `drape` and measures it against them.
+///
+/// # Errors
+/// [`AssessError`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
+pub fn assess(
+    scene: &Scene,
+    settings: &Settings,
+    drape: &Drape,
+    options: &AssessOptions,
+    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+) -> Result<Assessment, AssessError> {
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
+    let mut references = References { scene, settings, cloth: &cloth, options, warnings: Vec::new() };
+    let own = references.from(&drape.positions, observer)?;
+    let canonical = references.from(&scene.garment.positions, observer)?;
+    let mut spread = Vec::new();
+    for seed in 1..=options.spread_starts {
+        let start = perturbed(&scene.garment.positions, &scene.held, seed);
+        spread.push(accuracy::rms_mm(&references.from(&start, observer)?.positions, &canonical.positions));
+    }
+    let warnings = references.warnings;
+    let mut measured = accuracy::compare(&Comparison {
+        mesh: &scene.garment,
+        topology: &scene.topology,
+        cloth: &cloth,
+        body: &scene.body,
+        parts: Some(&drape.parts),
+        start: &scene.garment.positions,
+        result: &drape.positions,
+        reference: &own.positions,
+    })?;
+    measured.canonical_rms_mm = Some(accuracy::rms_mm(&drape.positions, &canonical.positions));
+    measured.canonical_spread_mm =
+        (!spread.is_empty()).then(|| (spread.iter().map(|s| s * s).sum::<f64>() / spread.len() as f64).sqrt());
+    let moved: Vec<DVec3> = drape.outcomes.iter().map(|o| o.displacement).collect();
+    Ok(Assessment {
+        error_mm: accuracy::vertex_errors(&drape.positions, &own.positions).iter().map(|e| 1e3 * e).collect(),
+        wrinkles: wrinkles::measure(&scene.garment, &scene.topology, &drape.parts, &moved, &drape.positions),
+        accuracy: measured,
+        canonical,
+        warnings,
+    })
+}
+
+/// Start positions moved by up to a millimetre along each axis, the same for the same seed on any machine.
+#[must_use]
+pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
+    let mut state = seed;
+    let mut noise = || {
+        // SplitMix64 (Steele, Lea, Flood 2014): three lines, the same bits everywhere.
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut moved: Vec<DVec3> =
+        positions.iter().map(|&p| p + PERTURBATION * DVec3::new(noise(), noise(), noise())).collect();
+    for &v in held {
+        moved[v as usize] = positions[v as usize];
+    }
+    moved
+}
+
+struct References<'a> {
+    scene: &'a Scene,
+    settings: &'a Settings,
+    cloth: &'a Cloth,
+    options: &'a AssessOptions,
+    warnings: Vec<String>,
+}
+
+impl References<'_> {
+    fn from(
+        &mut self,
+        start: &[DVec3],
+        observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+    ) -> Result<Reference, AssessError> {
+        let solver = RefineOptions::default();
+        let key = ReferenceKey::new(&ReferenceInput {
+            garment: &self.scene.garment,
+            rest: &self.scene.rest,
+            fabric: &self.settings.fabric,
+            body: &self.scene.body_mesh,
+            held: &self.scene.held,
+            start,
+            options: &format!("{solver:?}"),
+        });
+        let mut compute = || {
+            let began = Instant::now();
+            let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, observer)?;
+            if refined.stop == Stop::Interrupted {
+                return Err(AssessError::Interrupted);
+            }
+            Ok(Reference {
+                energy_j: refined.energy,
+                residual_over_weight: refined.residual_over_weight,
+                steps: refined.steps as u64,
+                seconds: began.elapsed().as_secs_f64(),
+                positions: refined.positions,
+            })
+        };
+        let reference = match &self.options.cache {
+            None => compute()?,
+            Some(cache) => {
+                let found = cache.get_or_compute(&key, start.len(), &mut compute)?;
+                self.warnings.extend(found.warnings);
+                found.reference
+            }
+        };
+        if reference.residual_over_weight >= solver.tolerance {
+            self.warnings.push(format!(
+                "a reference stopped at a residual of {:.1e} of the weight, expected under {:.0e}: errors against it are rough",
+                reference.residual_over_weight, solver.tolerance
+            ));
+        }
+        Ok(reference)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_perturbed_start_is_near_and_repeatable_and_holds_what_is_held() {
+        let start = vec![DVec3::new(0.1, 0.2, 0.3); 50];
+        let moved = perturbed(&start, &[7], 3);
+        assert_eq!(moved, perturbed(&start, &[7], 3));
+        assert_ne!(moved, perturbed(&start, &[7], 4));
+        assert_eq!(moved[7], start[7]);
+        let farthest = moved.iter().zip(&start).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
+        assert!(farthest > 0.5 * PERTURBATION && farthest <= PERTURBATION, "{farthest}");
+    }
+}

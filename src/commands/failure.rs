@@ -1,0 +1,45 @@
+//! Exit codes: 2 for what the user can mend, 1 for the rest.
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use partwise::distance::DistanceError;
+use partwise::fabric::FabricError;
+use partwise::mechanics::paper::PaperError;
+use partwise::mesh::MeshError;
+use partwise::mesh::rest::RestError;
+use partwise::range_table::TableError;
+use partwise::record::RecordError;
+use partwise::shapes::ShapeError;
+
+/// A mistake in what the user gave that no library error describes.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct UserError(String);
+
+impl UserError {
+    /// The mistake as an error to return.
+    pub(crate) fn new(message: impl Into<String>) -> anyhow::Error {
+        Self(message.into()).into()
+    }
+}
+
+/// What the program ends with after this error.
+pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.chain().any(users_own) { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+fn users_own(cause: &(dyn Error + 'static)) -> bool {
+    let recording = cause.downcast_ref::<RecordError>().is_some_and(|e| {
+        !matches!(e, RecordError::Incomplete { .. } | RecordError::Mismatch { .. } | RecordError::Rerun(_))
+    });
+    recording
+        || cause.is::<UserError>()
+        || cause.is::<MeshError>()
+        || cause.is::<RestError>()
+        || cause.is::<DistanceError>()
+        || cause.is::<TableError>()
+        || cause.is::<FabricError>()
+        || cause.is::<ShapeError>()
+        || cause.is::<PaperError>()
+}

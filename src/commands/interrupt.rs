@@ -1,0 +1,27 @@
+//! Ctrl-C: the first asks the work in hand to stop and keep what is done, the second ends the program.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static REQUESTED: AtomicBool = AtomicBool::new(false);
+
+/// Listens from now on. Where no handler can be set, Ctrl-C just ends the program, as it would have.
+pub(crate) fn listen() {
+    let _ = ctrlc::set_handler(|| {
+        if REQUESTED.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+        super::console::note("interrupted: keeping what is done (again to quit at once)");
+    });
+}
+
+/// Whether Ctrl-C was pressed.
+pub(crate) fn requested() -> bool {
+    REQUESTED.load(Ordering::SeqCst)
+}
+
+/// Blocks until Ctrl-C.
+pub(crate) fn wait() {
+    while !requested() {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+}

@@ -1,0 +1,88 @@
+//! The command line: one file per subcommand, its arguments beside its code.
+
+mod assets;
+mod check;
+mod console;
+mod failure;
+mod inputs;
+mod interrupt;
+mod measurements;
+mod run;
+mod sinks;
+mod stages;
+mod summary;
+mod view;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+const LONG_ABOUT: &str = "\
+Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun \
+viewer.
+
+Stage one cuts the garment into PARTs: connected areas whose distance to the body falls in one row of a range table. \
+Stage two balances gravity, the body's reaction and the pull of neighbouring PARTs, and gives every PART a displacement. \
+Fewer PARTs are faster, more are truer: the range table is the dial.
+
+Without a subcommand, `partwise` is `partwise run`.";
+
+const EXAMPLES: &str = "\
+Examples:
+  partwise                                        drape the low-cut dress, leave recordings/low-cut-dress.rrd
+  partwise view recordings/low-cut-dress.rrd      look at it in a browser
+  partwise --garment flared-skirt@3613 --spawn    another garment and size, straight into the native viewer
+  partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and said
+  partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
+  partwise --format json --threads 1              one JSON object on stdout, for scripts
+
+Exit codes: 0 done, 2 something you gave cannot be used, 1 anything else, 130 interrupted (what was done is kept).";
+
+#[derive(Debug, Parser)]
+#[command(
+    name = "partwise",
+    version,
+    about = "Drape a garment over a body by the two-stage PART model, every stage in Rerun",
+    long_about = LONG_ABOUT,
+    after_help = EXAMPLES,
+    args_conflicts_with_subcommands = true
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Drape one garment and record every stage (the default)
+    Run(Box<run::RunArgs>),
+    /// Report the health of a body and a garment, and how they lie about each other, without draping
+    Check(Box<check::CheckArgs>),
+    /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
+    Assets(assets::AssetsArgs),
+    /// Open a recording in the bundled web viewer
+    View(view::ViewArgs),
+}
+
+/// Parses the arguments, runs the command, prints what went wrong.
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        None => cli.run.execute(),
+        Some(Command::Run(args)) => args.execute(),
+        Some(Command::Check(args)) => args.execute(),
+        Some(Command::Assets(args)) => args.execute(),
+        Some(Command::View(args)) => args.execute(),
+    };
+    match outcome {
+        Ok(()) if interrupt::requested() => ExitCode::from(130),
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            console::error(&error);
+            failure::exit_code(&error)
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Where the recording goes: arguments shared by every command that records.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use partwise::record::Sink;
+
+/// The sinks of a recording; several at once are fine.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Recording")]
+pub(crate) struct SinkArgs {
+    /// Write the recording to this file [default: recordings/GARMENT.rrd]
+    #[arg(long, value_name = "FILE", conflicts_with = "no_save")]
+    pub(crate) save: Option<PathBuf>,
+    /// Write no recording file
+    #[arg(long)]
+    pub(crate) no_save: bool,
+    /// Open the native Rerun viewer (`rerun` must be on the PATH)
+    #[arg(long)]
+    pub(crate) spawn: bool,
+    /// Stream to a viewer that is already running, e.g. rerun+http://127.0.0.1:9876/proxy
+    #[arg(long, value_name = "URL")]
+    pub(crate) connect: Option<String>,
+    /// Serve the bundled web viewer on 127.0.0.1 and print its address
+    #[arg(long)]
+    pub(crate) serve: bool,
+    /// Port of the served page [default: any free one]
+    #[arg(long, value_name = "PORT")]
+    pub(crate) web_port: Option<u16>,
+    /// Port the served page reads the data from [default: any free one]
+    #[arg(long, value_name = "PORT")]
+    pub(crate) grpc_port: Option<u16>,
+}
+
+impl SinkArgs {
+    /// The sinks asked for; `name` names the file where the user did not.
+    pub(crate) fn sinks(&self, name: &str) -> Vec<Sink> {
+        let mut sinks = Vec::new();
+        if !self.no_save {
+            let default = || PathBuf::from("recordings").join(format!("{name}.rrd"));
+            sinks.push(Sink::File(self.save.clone().unwrap_or_else(default)));
+        }
+        if self.spawn {
+            sinks.push(Sink::Spawn);
+        }
+        if let Some(url) = &self.connect {
+            sinks.push(Sink::Connect(url.clone()));
+        }
+        if self.serve {
+            sinks.push(Sink::Serve { web_port: self.web_port, grpc_port: self.grpc_port });
+        }
+        sinks
+    }
+}

@@ -1,0 +1,77 @@
+//! An imported mesh made to face one way: neighbours agree, a body faces outward, a garment away from its body.
+
+use super::fit::facing_body;
+use super::health::Findings;
+use super::import::Imported;
+use super::report::{Remark, Repair};
+use super::topology::Topology;
+use super::winding;
+use crate::distance::Body;
+
+impl Imported {
+    /// Turns the connected parts of a garment that face the body, so that normals point away from it, and says so.
+    pub fn face_away_from(&mut self, body: &Body) {
+        let facing = facing_body(&self.mesh, body);
+        let topology = Topology::new(&self.mesh);
+        let (component, count) = topology.components();
+        let mut turned = vec![false; count];
+        for t in (0..facing.len()).filter(|&t| facing[t]) {
+            turned[component[self.mesh.triangles[t][0] as usize] as usize] = true;
+            self.turn(t);
+        }
+        let components = turned.iter().filter(|&&turned| turned).count();
+        if components > 0 {
+            self.report.repairs.push(Repair::TurnedOutward { components });
+        }
+    }
+
+    /// Turns triangles so that neighbours agree, and notes what the topology shows.
+    pub(super) fn make_agree(&mut self, coincident: usize) {
+        let (turn, _, turned) = winding::agree(&self.mesh);
+        (0..turn.len()).filter(|&t| turn[t]).for_each(|t| self.turn(t));
+        let topology = Topology::new(&self.mesh);
+        let loops = topology.boundary_loops();
+        let report = &mut self.report;
+        report.components = topology.components().1;
+        report.boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+        report.boundary_loops = loops.len();
+        if turned.to_agree > 0 {
+            report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });
+        }
+        let findings = Findings::new(&self.mesh, &topology);
+        let mut note = |count: usize, remark: Remark| {
+            if count > 0 {
+                report.remarks.push(remark);
+            }
+        };
+        note(coincident, Remark::Coincident { vertices: coincident });
+        note(findings.non_manifold_edges, Remark::NonManifold { edges: findings.non_manifold_edges });
+        note(findings.pinched_vertices, Remark::Pinched { vertices: findings.pinched_vertices });
+        note(findings.no_area, Remark::NoArea { triangles: findings.no_area });
+        note(turned.one_sided, Remark::OneSided { patches: turned.one_sided });
+    }
+
+    /// Turns one triangle round, its texture coordinates with it.
+    fn turn(&mut self, t: usize) {
+        self.mesh.triangles[t].swap(1, 2);
+        if let Some(corners) = &mut self.texture[t] {
+            corners.swap(1, 2);
+        }
+    }
+}
+
+/// Turns the connected parts that enclose a negative volume.
+pub(super) fn face_outward(imported: &mut Imported) {
+    let (component, count) = Topology::new(&imported.mesh).components();
+    let inward: Vec<bool> =
+        winding::signed_volumes(&imported.mesh, &component, count).iter().map(|&volume| volume < 0.0).collect();
+    for t in 0..imported.mesh.triangles.len() {
+        if inward[component[imported.mesh.triangles[t][0] as usize] as usize] {
+            imported.turn(t);
+        }
+    }
+    let components = inward.iter().filter(|&&turned| turned).count();
+    if components > 0 {
+        imported.report.repairs.push(Repair::TurnedOutward { components });
+    }
+}

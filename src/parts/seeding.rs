@@ -1,0 +1,117 @@
+//! Seeds spread over one connected piece of cloth by farthest points, distances by Dijkstra along its edges.
+//!
+//! Ties go to the lowest vertex throughout. What it is for, and its source, stands in `extent`. Moving the seeds to the middle of
+//! their pieces (Lloyd's relaxation) was tried on five garments at five extents: it often broke the extent, and where it did not
+//! it took 0 to 6 % off the representable error for up to three times the time, so it was left out.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::mesh::{Topology, TriMesh};
+
+/// The nearest seed of each of these connected vertices, and how many seeds it takes for none to be farther than half of
+/// `extent_m`. `local` is the place of a vertex in the list, `None` for others; with more than `most` seeds it gives up.
+pub(crate) fn nearest_seeds(
+    vertices: &[u32],
+    local: impl Fn(u32) -> Option<usize>,
+    mesh: &TriMesh,
+    topology: &Topology,
+    (extent_m, most): (f64, usize),
+) -> Option<(Vec<u32>, usize)> {
+    let graph = Graph::new(vertices, local, mesh, topology);
+    let mut spread = Spread::new(vertices.len());
+    let (mut next, mut seeds) = (0, 0);
+    loop {
+        spread.start(seeds, next);
+        spread.flow(&graph);
+        seeds += 1;
+        let distance;
+        (next, distance) = spread.farthest();
+        if distance <= 0.5 * extent_m || distance == 0.0 || extent_m.is_nan() {
+            return Some((spread.seed_of_vertex, seeds));
+        }
+        if seeds >= most {
+            return None;
+        }
+    }
+}
+
+/// The edges inside the piece, by place in its list.
+struct Graph {
+    start: Vec<usize>,
+    /// Neighbour and length, m.
+    edges: Vec<(usize, f64)>,
+}
+
+impl Graph {
+    fn new(vertices: &[u32], local: impl Fn(u32) -> Option<usize>, mesh: &TriMesh, topology: &Topology) -> Self {
+        let mut graph = Self { start: vec![0], edges: Vec::new() };
+        for &v in vertices {
+            let x = mesh.positions[v as usize];
+            let inside = topology.neighbours(v).iter().filter_map(|&w| Some((local(w)?, w)));
+            graph.edges.extend(inside.map(|(j, w)| (j, x.distance(mesh.positions[w as usize]))));
+            graph.start.push(graph.edges.len());
+        }
+        graph
+    }
+}
+
+/// How far every vertex is from its nearest seed, and which that is.
+struct Spread {
+    distance: Vec<f64>,
+    seed_of_vertex: Vec<u32>,
+    heap: BinaryHeap<Reverse<(Metres, usize)>>,
+}
+
+impl Spread {
+    fn new(vertices: usize) -> Self {
+        Self { distance: vec![f64::INFINITY; vertices], seed_of_vertex: vec![0; vertices], heap: BinaryHeap::new() }
+    }
+
+    /// Puts a seed at a vertex.
+    fn start(&mut self, seed: usize, at: usize) {
+        self.distance[at] = 0.0;
+        self.seed_of_vertex[at] = seed as u32;
+        self.heap.push(Reverse((Metres(0.0), at)));
+    }
+
+    /// Dijkstra's algorithm from the seeds put since the last time, over what they are nearer to.
+    fn flow(&mut self, graph: &Graph) {
+        while let Some(Reverse((Metres(d), i))) = self.heap.pop() {
+            if d > self.distance[i] {
+                continue;
+            }
+            for &(j, length) in &graph.edges[graph.start[i]..graph.start[i + 1]] {
+                if d + length < self.distance[j] {
+                    self.distance[j] = d + length;
+                    self.seed_of_vertex[j] = self.seed_of_vertex[i];
+                    self.heap.push(Reverse((Metres(d + length), j)));
+                }
+            }
+        }
+    }
+
+    /// The vertex farthest from all seeds, and how far, m.
+    fn farthest(&self) -> (usize, f64) {
+        let farther = |best: (usize, f64), (i, &d): (usize, &f64)| if d > best.1 { (i, d) } else { best };
+        self.distance.iter().enumerate().fold((0, 0.0), farther)
+    }
+}
+
+/// A finite, non-negative distance with a total order, for the heap.
+#[derive(PartialEq, Clone, Copy)]
+struct Metres(f64);
+
+impl Eq for Metres {}
+
+impl PartialOrd for Metres {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Metres {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}

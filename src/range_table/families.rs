@@ -1,0 +1,190 @@
+//! Families of range tables made by rule, to sweep over: scaled, merged or split, quantile and geometric ones.
+//!
+//! Each yields a checked table whose name and source say how it was made. Bounds are centimetres.
+
+use super::{GapRule, Level, METRES_PER_CM, RangeTable, TableError};
+
+impl RangeTable {
+    /// The same table with every bound times `factor`; an open end stays open.
+    ///
+    /// # Errors
+    /// [`TableError::Family`] for a factor that is not positive and finite.
+    pub fn scaled(&self, factor: f64) -> Result<Self, TableError> {
+        if !(factor.is_finite() && factor > 0.0) {
+            let expected = "a positive, finite number";
+            return Err(TableError::Family {
+                what: "the factor of a scaled table",
+                found: factor.to_string(),
+                expected,
+            });
+        }
+        let scale = |l: &Level| Level { lower_cm: l.lower_cm * factor, upper_cm: l.upper_cm * factor };
+        let made = Self::new(format!("{} × {factor}", self.name), self.gap, self.levels.iter().map(scale).collect())?;
+        Ok(made.with_source(format!("every bound of \"{}\" times {factor}", self.name)))
+    }
+
+    /// The table, its holes given away, merged or split into `count` levels. Merging keeps the bounds at evenly spaced ranks;
+    /// splitting halves the widest finite level again and again, the lowest of equals first.
+    ///
+    /// # Errors
+    /// [`TableError::Family`] for no levels, or for more where no finite level is left to split.
+    pub fn with_level_count(&self, count: usize) -> Result<Self, TableError> {
+        let levels = self.effective_levels();
+        let mut bounds: Vec<f64> = levels.iter().map(|l| l.lower_cm).collect();
+        bounds.extend(levels.last().map(|l| l.upper_cm));
+        let refuse = |expected| TableError::Family { what: "the number of levels", found: count.to_string(), expected };
+        if count == 0 {
+            return Err(refuse("at least 1"));
+        }
+        let from = levels.len();
+        if count < from {
+            // Rank i of the new table is rank i·from/count of the old one, rounded; first and last stay.
+            bounds = (0..=count).map(|i| bounds[(2 * i * from + count) / (2 * count)]).collect();
+        }
+        while bounds.len() < count + 1 {
+            let widest = |best: Option<(usize, f64)>, (i, w): (usize, &[f64])| match best {
+                Some((_, width)) if w[1] - w[0] <= width => best,
+                _ if w[1].is_infinite() => best,
+                _ => Some((i, w[1] - w[0])),
+            };
+            let found = bounds.windows(2).enumerate().fold(None, widest);
+            let (i, width) = found.ok_or_else(|| refuse("1, because the only level is open and cannot be halved"))?;
+            bounds.insert(i + 1, bounds[i] + 0.5 * width);
+        }
+        let verb = if count < from { "merged" } else { "split" };
+        let made = Self::from_bounds(format!("{}, {count} levels", self.name), &bounds)?;
+        Ok(made.with_source(format!("\"{}\" {verb} from {from} to {count} levels", self.name)))
+    }
+
+    /// About `count` levels that hold equal shares of a sample of distances (m, counted unsigned). Bounds lie halfway between
+    /// two neighbouring distances; where the sample repeats a value there are fewer levels than asked for.
+    ///
+    /// # Errors
+    /// [`TableError::Family`] for no levels or a sample without a finite distance.
+    pub fn quantiles(distances_m: &[f64], count: usize) -> Result<Self, TableError> {
+        if count == 0 {
+            return Err(TableError::Family { what: "the number of levels", found: "0".into(), expected: "at least 1" });
+        }
+        let inner = quantile_bounds_cm(distances_m, count);
+        if !distances_m.iter().any(|d| d.is_finite()) {
+            let what = "the sample of a quantile table";
+            return Err(TableError::Family { what, found: "no finite distance".into(), expected: "at least one" });
+        }
+        let bounds: Vec<f64> = std::iter::once(0.0).chain(inner).chain([f64::INFINITY]).collect();
+        let levels = bounds.len() - 1;
+        let made = Self::from_bounds(format!("{levels} quantile levels"), &bounds)?;
+        Ok(made.with_source(format!("equal shares of {} distances", distances_m.len())))
+    }
+
+    /// `count` levels whose bounds grow by a constant ratio from `first_cm`, the upper value of the first level, to `last_cm`,
+    /// the lower value of the open last one.
+    ///
+    /// # Errors
+    /// [`TableError::Family`] for fewer than three levels or bounds that do not grow.
+    pub fn geometric(first_cm: f64, last_cm: f64, count: usize) -> Result<Self, TableError> {
+        if count < 3 {
+            let (what, expected) = ("the number of levels of a geometric table", "at least 3");
+            return Err(TableError::Family { what, found: count.to_string(), expected });
+        }
+        if !(first_cm > 0.0 && last_cm > first_cm && last_cm.is_finite()) {
+            let found = format!("{first_cm} to {last_cm}");
+            let expected = "0 < first < last, in centimetres";
+            return Err(TableError::Family { what: "the bounds of a geometric table", found, expected });
+        }
+        let steps = (count - 2) as f64;
+        let ratio = last_cm / first_cm;
+        let inner = (0..count - 1).map(|i| first_cm * ratio.powf(i as f64 / steps));
+        let bounds: Vec<f64> = std::iter::once(0.0).chain(inner).chain([f64::INFINITY]).collect();
+        let made = Self::from_bounds(format!("{count} geometric levels, {first_cm} to {last_cm} cm"), &bounds)?;
+        Ok(made.with_source(format!("bounds grow by the factor {:.4}", ratio.powf(1.0 / steps))))
+    }
+
+    /// A table from its inner bounds, from 0 to open.
+    ///
+    /// # Errors
+    /// As [`RangeTable::new`].
+    pub fn from_inner_bounds(name: impl Into<String>, inner_cm: &[f64]) -> Result<Self, TableError> {
+        let bounds: Vec<f64> = std::iter::once(0.0).chain(inner_cm.iter().copied()).chain([f64::INFINITY]).collect();
+        let table = Self::from_bounds(name, &bounds)?;
+        Ok(Self { gap: GapRule::default(), ..table })
+    }
+}
+
+/// At most `shares − 1` bounds (cm, ascending, distinct, above 0) between equal shares of the distances, each halfway between
+/// two neighbouring ones so that none lies on a bound.
+#[must_use]
+pub fn quantile_bounds_cm(distances_m: &[f64], shares: usize) -> Vec<f64> {
+    let mut sorted: Vec<f64> = distances_m.iter().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let mut bounds = Vec::new();
+    for i in 1..shares {
+        let rank = i * sorted.len() / shares;
+        if rank == 0 || sorted[rank] <= sorted[rank - 1] {
+            continue;
+        }
+        let bound = 0.5 * (sorted[rank - 1] + sorted[rank]) / METRES_PER_CM;
+        if bound > bounds.last().copied().unwrap_or(0.0) {
+            bounds.push(bound);
+        }
+    }
+    bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scaling_keeps_the_hole_and_the_open_end() {
+        let half = RangeTable::table_3().scaled(0.5).unwrap();
+        assert_eq!(half.name, "Table 3 × 0.5");
+        assert_eq!(half.holes_cm(), [[1.5, 1.75]]);
+        assert_eq!(half.levels[18], Level { lower_cm: 5.5, upper_cm: f64::INFINITY });
+        assert!(RangeTable::table_3().scaled(0.0).is_err());
+        assert!(RangeTable::table_3().scaled(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn levels_merge_and_split_to_any_number() {
+        let table = RangeTable::table_3();
+        for count in 1..60 {
+            let made = table.with_level_count(count).unwrap();
+            assert_eq!(made.levels.len(), count);
+            assert!(made.holes_cm().is_empty());
+            assert_eq!((made.levels[0].lower_cm, made.levels[count - 1].upper_cm), (0.0, f64::INFINITY));
+        }
+        // 4.5–7 cm is the widest finite level of Table 3, 2.5–3.5 (with its hole) would be cut after 7–9.
+        let split = table.with_level_count(20).unwrap();
+        assert!(split.levels.contains(&Level { lower_cm: 4.5, upper_cm: 5.75 }));
+        assert!(table.with_level_count(0).is_err());
+        assert!(RangeTable::from_bounds("open", &[0.0, f64::INFINITY]).unwrap().with_level_count(2).is_err());
+    }
+
+    #[test]
+    fn quantile_levels_hold_equal_shares() {
+        let d: Vec<f64> = (0..1000).map(|i| 1e-5 * f64::from(i * i)).collect();
+        let table = RangeTable::quantiles(&d, 8).unwrap();
+        assert_eq!(table.levels.len(), 8);
+        for level in 0..8 {
+            assert_eq!(d.iter().filter(|&&d| table.level_of(d) == Some(level)).count(), 125);
+        }
+        // A repeated value cannot be cut.
+        assert_eq!(RangeTable::quantiles(&[0.01; 50], 8).unwrap().levels.len(), 1);
+        assert_eq!(RangeTable::quantiles(&[0.01, 0.01, -0.02], 5).unwrap().levels.len(), 2);
+        assert!(RangeTable::quantiles(&[], 3).is_err());
+        assert!(RangeTable::quantiles(&[0.1], 0).is_err());
+    }
+
+    #[test]
+    fn geometric_bounds_grow_by_one_ratio() {
+        let table = RangeTable::geometric(0.1, 10.0, 6).unwrap();
+        assert_eq!(table.levels.len(), 6);
+        for pair in table.levels[1..5].windows(2) {
+            let ratio = pair[1].lower_cm / pair[0].lower_cm;
+            assert!((ratio - 100f64.powf(0.25)).abs() < 1e-12, "{ratio}");
+        }
+        assert!((table.levels[5].lower_cm - 10.0).abs() < 1e-12);
+        assert!(RangeTable::geometric(0.0, 10.0, 6).is_err());
+        assert!(RangeTable::geometric(0.1, 10.0, 2).is_err());
+    }
+}

@@ -1,0 +1,81 @@
+//! Where the 3D views look from: the front, slightly above and to one side, with the whole garment in the view.
+//!
+//! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of what must be seen, m; a = width over
+//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + half the depth;
+//! h includes the colour bar under the hem.
+//!
+//! Limits: the viewer's views have any shape; a is what the layout gives them in a window of 16:10.
+
+use glam::DVec3;
+
+use crate::mesh::TriMesh;
+
+/// The viewer's own field of view (`Eye::DEFAULT_FOV_Y`, Rerun 0.36), degrees.
+const FIELD_OF_VIEW_DEG: f64 = 55.0;
+/// How far above the horizontal the eye stands, degrees.
+const ELEVATION_DEG: f64 = 7.0;
+/// How far to the garment's left the eye stands, degrees: enough to see depth.
+const AZIMUTH_DEG: f64 = 18.0;
+/// Air around what must be seen.
+const MARGIN: f64 = 1.14;
+/// Room for the colour bar and its numbers under the garment, relative to the larger of its half extents.
+const LEGEND_HEIGHT: f64 = 0.30;
+
+/// An eye and the directions of its picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Eye {
+    /// Where it stands, m.
+    pub position: DVec3,
+    /// What it looks at, m.
+    pub target: DVec3,
+    /// Unit vector to the right in its picture.
+    pub right: DVec3,
+    /// Unit vector upwards in its picture.
+    pub up: DVec3,
+    /// Half the garment's width along `right`, m.
+    pub half_width: f64,
+    /// Half the garment's height along `up`, m.
+    pub half_height: f64,
+    /// Centre of the garment, m.
+    pub centre: DVec3,
+    /// Unit vector from the garment to the eye.
+    pub toward: DVec3,
+    /// Half the garment's depth along `toward`, m.
+    pub half_depth: f64,
+}
+
+impl Eye {
+    /// The eye for a garment whose wearer looks along `front` (horizontal), in views of the given width over height.
+    /// `None` for a garment without vertices.
+    #[must_use]
+    pub fn on(garment: &TriMesh, front: DVec3, aspect: f64) -> Option<Self> {
+        let forward = DVec3::new(front.x, front.y, 0.0).try_normalize().unwrap_or(DVec3::NEG_Y);
+        let side = DVec3::Z.cross(forward);
+        let (sin, cos) = AZIMUTH_DEG.to_radians().sin_cos();
+        let flat = forward * cos + side * sin;
+        let (sin, cos) = ELEVATION_DEG.to_radians().sin_cos();
+        let toward = flat * cos + DVec3::Z * sin;
+        let right = DVec3::Z.cross(toward).try_normalize()?;
+        let up = toward.cross(right);
+        let extent = |axis: DVec3| {
+            let along = garment.positions.iter().map(|p| p.dot(axis));
+            along.fold(None, |range: Option<(f64, f64)>, v| {
+                let (low, high) = range.unwrap_or((v, v));
+                Some((low.min(v), high.max(v)))
+            })
+        };
+        let (left_end, right_end) = extent(right)?;
+        let (low, high) = extent(up)?;
+        let (back, near) = extent(toward)?;
+        let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
+        let centre = right * middle((left_end, right_end)) + up * middle((low, high)) + toward * middle((back, near));
+        let (half_width, half_height) = (0.5 * (right_end - left_end), 0.5 * (high - low));
+        let legend = LEGEND_HEIGHT * half_height.max(half_width);
+        let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
+        let fit = ((half_height + 0.5 * legend) / tan).max(half_width / (tan * aspect));
+        let half_depth = 0.5 * (near - back);
+        let target = centre - up * (0.5 * legend);
+        let position = target + toward * (MARGIN * fit + half_depth);
+        Some(Self { position, target, right, up, half_width, half_height, centre, toward, half_depth })
+    }
+}

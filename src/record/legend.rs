@@ -1,0 +1,126 @@
+//! Colour bars: a strip under the hem, in the plane of the picture, with numbers and the unit.
+//!
+//! A strip in the scene is seen in every view, screenshot and web page; a legend in a view of its own costs the room of one.
+
+use rerun::{Color, Mesh3D, Points3D};
+
+use super::colour_map::{ColourMap, Range};
+use super::meshes::{rerun_colours, single};
+use super::{Open, RecordError};
+
+/// Texts in a view: white reads on the box the viewer draws behind them, dark or light. Without a colour of their own Rerun
+/// gives each path another.
+pub(super) const TEXT: Color = Color(rerun::Rgba32(0xFFFF_FFFF));
+/// Bands of the strip.
+const BANDS: u32 = 48;
+
+/// What a colour bar says.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Legend<'a> {
+    /// Quantity.
+    pub(crate) title: &'a str,
+    /// Unit of the numbers.
+    pub(crate) unit: &'a str,
+    /// The map.
+    pub(crate) map: ColourMap,
+    /// The numbers at its ends.
+    pub(crate) range: Range,
+    /// Whether values beyond the upper end exist (they take its colour): the last number then reads "≥".
+    pub(crate) open_end: bool,
+}
+
+impl Legend<'_> {
+    /// Logs `{path}/bar` and `{path}/ticks` under the garment.
+    pub(crate) fn log(&self, open: &Open, path: &str) -> Result<(), RecordError> {
+        let eye = &open.eye;
+        let size = eye.half_height.max(eye.half_width);
+        let (length, thickness) = (1.5 * eye.half_width.max(0.4 * eye.half_height), 0.045 * size);
+        // In front of the legs: in the plane of the garment's nearest point.
+        let start = eye.centre + eye.toward * eye.half_depth
+            - eye.up * (eye.half_height + 0.19 * size)
+            - eye.right * (0.5 * length);
+        let at = |along: f64, above: f64| single(start + eye.right * (along * length) + eye.up * (above * thickness));
+        let mut corners = Vec::new();
+        let mut colours = Vec::new();
+        let mut triangles = Vec::new();
+        for band in 0..BANDS {
+            let (low, high) = (f64::from(band) / f64::from(BANDS), f64::from(band + 1) / f64::from(BANDS));
+            corners.extend([at(low, 0.0), at(high, 0.0), at(high, 1.0), at(low, 1.0)]);
+            colours.extend([self.map.at(0.5 * (low + high)); 4]);
+            triangles.extend([[4 * band, 4 * band + 1, 4 * band + 2], [4 * band, 4 * band + 2, 4 * band + 3]]);
+        }
+        // No normals: the strip is to keep its colours in any light.
+        let bar = Mesh3D::new(corners).with_triangle_indices(triangles).with_vertex_colors(rerun_colours(colours));
+        open.log(&format!("{path}/bar"), &bar)?;
+
+        // The viewer writes a text under its point.
+        let mut places = vec![at(0.5, 4.0)];
+        let mut labels = vec![format!("{}, {}", self.title, self.unit)];
+        let steps = steps(self.range.high);
+        for tick in 0..=steps {
+            let t = f64::from(tick) / f64::from(steps);
+            let value = self.range.low + t * (self.range.high - self.range.low);
+            let bound = if self.open_end && tick == steps { "≥ " } else { "" };
+            places.push(at(t, 0.0));
+            labels.push(format!("{bound}{}", number(value)));
+        }
+        open.log(&format!("{path}/ticks"), &texts(places, labels))
+    }
+}
+
+/// Into how many steps from zero a round number falls so that each is round too.
+fn steps(high: f64) -> u32 {
+    let mantissa = high / 10f64.powf(high.log10().floor());
+    match (2.0 * mantissa).round() as u32 {
+        3 | 6 | 12 => 3,
+        5 | 10 => 5,
+        _ => 4,
+    }
+}
+
+/// Points with a text each, drawn as text alone.
+pub(super) fn texts(places: Vec<[f32; 3]>, labels: Vec<String>) -> Points3D {
+    Points3D::new(places).with_labels(labels).with_radii([0.0]).with_colors([TEXT]).with_show_labels(true)
+}
+
+/// Three significant digits, without trailing zeros.
+pub(crate) fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    if digits == 9 {
+        return format!("{value:.2e}");
+    }
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{number, steps};
+
+    #[test]
+    fn ticks_are_round() {
+        for (high, expected) in
+            [(1.0, 4), (1.5, 3), (2.0, 4), (2.5, 5), (30.0, 3), (0.4, 4), (5.0, 5), (0.6, 3), (80.0, 4)]
+        {
+            assert_eq!(steps(high), expected, "{high}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.25, "1.25"),
+            (12.5, "12.5"),
+            (2500.0, "2500"),
+            (0.015, "0.015"),
+            (3.0, "3"),
+            (1e-9, "1.00e-9"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! The state of a recording that goes somewhere: its stream, what was logged already, and how to log more.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder};
+
+use super::error::RecordError;
+use super::eye::Eye;
+use super::meshes::{self, CellMesh};
+use super::sinks::{OpenSinks, Target};
+use super::web::WebViewer;
+use super::{RecordOptions, RecordSummary, blueprint, colours, inspect, paths};
+use crate::mesh::TriMesh;
+
+/// How long the last data may take to reach viewers.
+const LAST_FLUSH: Duration = Duration::from_secs(10);
+
+/// The state of a recording that goes somewhere.
+pub(crate) struct Open {
+    pub(super) stream: RecordingStream,
+    targets: Vec<Target>,
+    pub(super) web: Option<WebViewer>,
+    pub(super) options: RecordOptions,
+    body: TriMesh,
+    pub(super) garment: TriMesh,
+    pub(super) cells: CellMesh,
+    pub(super) eye: Eye,
+    pub(super) distance: Vec<f64>,
+    pub(super) vertex_colour: Vec<u8>,
+    pub(super) levels: usize,
+    /// The text panel as last logged, Markdown.
+    pub(super) report: String,
+    seen: RefCell<BTreeSet<String>>,
+    laid_out: bool,
+    raw_bytes: Cell<u64>,
+    pub(super) spent: Duration,
+}
+
+impl Open {
+    /// Opens every sink, or none.
+    pub(super) fn new(options: RecordOptions) -> Result<Self, RecordError> {
+        let started = Instant::now();
+        let OpenSinks { sinks, targets, web } = OpenSinks::open(&options.sinks)?;
+        let stream = RecordingStreamBuilder::new("partwise").recording_name(options.name.as_str()).set_sinks(sinks)?;
+        // Steps are counted by our own timelines; wall-clock columns would only cost bytes.
+        stream.set_log_tick_enabled(false);
+        stream.set_log_time_enabled(false);
+        Ok(Self {
+            stream,
+            targets,
+            web,
+            options,
+            body: TriMesh::default(),
+            garment: TriMesh::default(),
+            cells: CellMesh::new(&TriMesh::default()),
+            eye: Eye::default(),
+            distance: Vec::new(),
+            vertex_colour: Vec::new(),
+            levels: 0,
+            report: String::new(),
+            seen: RefCell::new(BTreeSet::new()),
+            laid_out: false,
+            raw_bytes: Cell::new(0),
+            spent: started.elapsed(),
+        })
+    }
+
+    /// Sets the step and the stage of what is logged next.
+    pub(super) fn at(&self, index: i64, stage: i64) {
+        self.stream.reset_time();
+        self.stream.set_time_sequence(paths::TABLE, index);
+        self.stream.set_time_sequence(paths::STAGE, stage);
+    }
+
+    /// Sets the iteration of what is logged next.
+    pub(super) fn at_iteration(&self, iteration: i64) {
+        self.stream.reset_time();
+        self.stream.set_time_sequence(paths::ITERATION, iteration);
+    }
+
+    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordError> {
+        self.log_as(path, false, what)
+    }
+
+    /// Logs a mesh once for all, or at the step where it may be replaced.
+    pub(super) fn log_mesh(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordError> {
+        self.log_as(path, !self.options.replaceable, what)
+    }
+
+    /// Logs what never changes, a style.
+    pub(super) fn log_fixed(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordError> {
+        self.log_as(path, true, what)
+    }
+
+    /// Whether nothing asked for this path yet, since the garment came.
+    pub(super) fn first_use(&self, path: &str) -> bool {
+        self.seen.borrow_mut().insert(path.to_owned())
+    }
+
+    fn log_as(&self, path: &str, fixed: bool, what: &dyn AsComponents) -> Result<(), RecordError> {
+        let batches = what.as_serialized_batches();
+        let bytes: usize = batches.iter().map(|b| b.array.to_data().get_slice_memory_size().unwrap_or(0)).sum();
+        self.raw_bytes.set(self.raw_bytes.get() + bytes as u64);
+        Ok(self.stream.log_serialized_batches(path, fixed, batches)?)
+    }
+
+    /// Takes the body; the one already shown is not sent again.
+    pub(super) fn take_body(&mut self, index: i64, body: &TriMesh) -> Result<(), RecordError> {
+        if self.body == *body {
+            return Ok(());
+        }
+        body.clone_into(&mut self.body);
+        self.at(index, 0);
+        self.log_mesh(paths::BODY, &meshes::plain(body, colours::BODY))
+    }
+
+    /// Takes the garment, and lays the views out with the first.
+    pub(super) fn take_garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
+        if self.garment == *garment {
+            return Ok(());
+        }
+        self.garment = garment.clone();
+        self.cells = CellMesh::new(garment);
+        self.distance.clear();
+        self.vertex_colour.clear();
+        self.seen.borrow_mut().clear();
+        if let Some(eye) = Eye::on(garment, self.options.front, blueprint::layout::ASPECT) {
+            self.eye = eye;
+            if !self.laid_out {
+                blueprint::send(&self.stream, &self.options.layout.root(&eye), self.options.layout.time_panel())?;
+                self.laid_out = true;
+            }
+        }
+        self.at(index, 1);
+        self.log_mesh(paths::GARMENT, &meshes::plain(garment, colours::CLOTH))?;
+        self.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
+        self.log_mesh(paths::PARTS, &self.cells.shape())?;
+        self.log_mesh(paths::FORCE, &self.cells.shape())?;
+        self.triangles_once(paths::DRAPE)?;
+        let [r, g, b] = colours::DRAPED;
+        let colour = rerun::Mesh3D::update_fields().with_albedo_factor(rerun::Rgba32::from_rgb(r, g, b));
+        self.log_mesh(paths::DRAPE, &colour)
+    }
+
+    /// Logs the garment's triangles to a path that does not have them yet.
+    pub(super) fn triangles_once(&self, path: &str) -> Result<(), RecordError> {
+        if !self.first_use(path) {
+            return Ok(());
+        }
+        let triangles = rerun::Mesh3D::update_fields().with_triangle_indices(self.garment.triangles.iter().copied());
+        self.log_mesh(path, &triangles)
+    }
+
+    /// Sends the step on where someone watches.
+    pub(super) fn flush_live(&self) -> Result<(), RecordError> {
+        if !self.options.layout.follow {
+            return Ok(());
+        }
+        self.stream
+            .flush_with_timeout(LAST_FLUSH)
+            .map_err(|e| RecordError::Incomplete { reason: format!("a viewer does not take the data: {e}") })
+    }
+
+    pub(super) fn finish(mut self: Box<Self>) -> Result<RecordSummary, RecordError> {
+        let started = Instant::now();
+        let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
+        // Dropping the sinks ends the file with its footer.
+        self.stream.disconnect();
+        let mut summary = RecordSummary::default();
+        for Target { part, path } in std::mem::take(&mut self.targets) {
+            let unwritable = |source| RecordError::Unwritable { path: path.clone(), source };
+            inspect::check_complete(&part).inspect_err(|_| {
+                let _ = std::fs::remove_file(&part);
+            })?;
+            std::fs::rename(&part, &path).map_err(unwritable)?;
+            summary.bytes = std::fs::metadata(&path).map_err(unwritable)?.len();
+            summary.path = Some(path);
+        }
+        flushed.map_err(|e| RecordError::Incomplete { reason: e.to_string() })?;
+        summary.raw_bytes = self.raw_bytes.get();
+        summary.log_ms = (self.spent + started.elapsed()).as_secs_f64() * 1e3;
+        Ok(summary)
+    }
+
+    /// Takes back what was begun.
+    pub(super) fn discard(self: Box<Self>) {
+        self.stream.disconnect();
+        for target in &self.targets {
+            let _ = std::fs::remove_file(&target.part);
+        }
+    }
+}

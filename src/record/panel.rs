@@ -1,0 +1,124 @@
+//! The text panel: what was run, on what, with which result and how fast, as Markdown.
+
+use std::fmt::Write as _;
+
+use super::legend::number;
+
+/// Version of the viewer the recording is made for.
+pub const RERUN_VERSION: &str = "0.36.3";
+
+/// One row of the range table as solved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelRow {
+    /// Lower value, m.
+    pub lower_m: f64,
+    /// Upper value, m; infinite for the last level.
+    pub upper_m: f64,
+    /// Vertices in it.
+    pub vertices: usize,
+    /// PARTs in it.
+    pub parts: usize,
+}
+
+/// Everything the text panel shows. Empty pieces are left out.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Panel {
+    /// Headline: garment and body.
+    pub title: String,
+    /// Name of the range table.
+    pub table: String,
+    /// Its levels, nearest first.
+    pub levels: Vec<LevelRow>,
+    /// Facts in two columns: vertices, PARTs, singletons, model, error, ...
+    pub facts: Vec<(String, String)>,
+    /// The fabric: constant and value with unit.
+    pub fabric: Vec<(String, String)>,
+    /// Time of each stage, ms.
+    pub timings_ms: Vec<(String, f64)>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// The command that makes this recording.
+    pub command_line: String,
+}
+
+impl Panel {
+    /// The panel as Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = String::new();
+        if !self.title.is_empty() {
+            line(&mut text, format_args!("## {}\n", self.title));
+        }
+        two_columns(&mut text, "Drape", "", self.facts.iter().map(|(k, v)| (k.as_str(), v.clone())));
+        for warning in &self.warnings {
+            line(&mut text, format_args!("> ⚠ {warning}\n"));
+        }
+        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
+        if !self.levels.is_empty() {
+            line(&mut text, format_args!("**{}**\n", self.table));
+            line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
+            for (i, row) in self.levels.iter().enumerate() {
+                let range = range_cm(row.lower_m, row.upper_m);
+                line(&mut text, format_args!("| {i} | {range} | {} | {} |", row.vertices, row.parts));
+            }
+            text.push('\n');
+        }
+        two_columns(&mut text, "Fabric", "", self.fabric.iter().map(|(k, v)| (k.as_str(), v.clone())));
+        if !self.command_line.is_empty() {
+            line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));
+        }
+        let own = env!("CARGO_PKG_VERSION");
+        line(&mut text, format_args!("partwise {own} · Rerun {RERUN_VERSION}"));
+        text
+    }
+}
+
+/// A range in centimetres as the paper prints it.
+#[must_use]
+pub fn range_cm(lower_m: f64, upper_m: f64) -> String {
+    // 100 × a centimetre bound read from a table is off by an ulp; a micrometre is far below any bound.
+    let cm = |m: f64| number((m * 1e6).round() / 1e4);
+    if upper_m.is_finite() { format!("{} – {}", cm(lower_m), cm(upper_m)) } else { format!("{} –", cm(lower_m)) }
+}
+
+fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterator<Item = (&'a str, String)>) {
+    let mut rows = rows.peekable();
+    if rows.peek().is_none() {
+        return;
+    }
+    line(text, format_args!("| **{title}** | {unit} |\n|:--|--:|"));
+    for (name, value) in rows {
+        line(text, format_args!("| {name} | {value} |"));
+    }
+    text.push('\n');
+}
+
+fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{content}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_panel_holds_what_it_is_given_and_no_empty_tables() {
+        let panel = Panel {
+            title: "skirt on body".into(),
+            table: "Table 3".into(),
+            levels: vec![
+                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2 },
+                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1 },
+            ],
+            timings_ms: vec![("distance".into(), 12.345)],
+            command_line: "partwise run --garment skirt".into(),
+            ..Panel::default()
+        };
+        let text = panel.markdown();
+        for piece in ["| 0 | 0 – 0.06 | 4 | 2 |", "| 1 | 0.06 – | 9 | 1 |", "| distance | 12.3 |", "partwise run"] {
+            assert!(text.contains(piece), "{piece} in {text}");
+        }
+        assert!(!text.contains("Fabric"));
+    }
+}

@@ -1,0 +1,93 @@
+//! Where everything lies in a recording: the entity paths, the timelines and the fields.
+//!
+//! | path | archetype | what | changes with |
+//! |---|---|---|---|
+//! | `/body` | Mesh3D | the body, as given | mesh file |
+//! | `/garment` | Mesh3D | the garment as loaded | mesh file |
+//! | `/distance/garment` | Mesh3D | distance to the body as colour | mesh file |
+//! | `/distance/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar, cm | mesh file |
+//! | `/parts/garment` | Mesh3D | colour per PART, each vertex showing its own cell | `table` |
+//! | `/force/garment` | Mesh3D | resultant per PART as colour | `table` |
+//! | `/force/arrows` | Arrows3D | one arrow per PART | `table` |
+//! | `/force/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar | `table` |
+//! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
+//! | `/fit/<name>/garment`, `.../legend/...` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
+//! | `/error/garment`, `/error/legend/...` | Mesh3D | distance to the reference drape | `table` |
+//! | `/report` | TextDocument | table, fabric, counts, timings, command line, versions | `table` |
+//! | `/levels/histogram/<level>` | BarChart | how many vertices lie how far off, split by level | `table` |
+//! | `/levels/parts/<level>` | BarChart | PARTs of each level | `table` |
+//! | `/numbers/<name>` | Scalars | PART count, error, ... | `table` |
+//! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
+//! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
+//! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
+//! | `/compare/<slot>/garment`, `.../caption` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
+//! | `/scatter/points`, `.../names`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
+
+/// The body.
+pub const BODY: &str = "/body";
+/// The garment as loaded.
+pub const GARMENT: &str = "/garment";
+/// The garment coloured by its distance to the body.
+pub const DISTANCE: &str = "/distance/garment";
+/// Colour bar of the distance.
+pub const DISTANCE_LEGEND: &str = "/distance/legend";
+/// The garment coloured by PART.
+pub const PARTS: &str = "/parts/garment";
+/// The garment coloured by the resultant force of each PART.
+pub const FORCE: &str = "/force/garment";
+/// One arrow per PART.
+pub const FORCE_ARROWS: &str = "/force/arrows";
+/// Colour bar of the force.
+pub const FORCE_LEGEND: &str = "/force/legend";
+/// The displaced garment.
+pub const DRAPE: &str = "/drape/garment";
+/// Strain, pressure and other per-vertex values, one branch each.
+pub const FIT: &str = "/fit";
+/// Distance to the reference drape.
+pub const ERROR: &str = "/error";
+/// The text panel.
+pub const REPORT: &str = "/report";
+/// Distances split by level.
+pub const HISTOGRAM: &str = "/levels/histogram";
+/// PARTs of each level.
+pub const LEVEL_PARTS: &str = "/levels/parts";
+/// Scalars over `table`.
+pub const NUMBERS: &str = "/numbers";
+/// The same numbers, a row per table.
+pub const ROWS: &str = "/rows";
+/// Times of the stages over `table`, ms.
+pub const STAGE_MS: &str = "/numbers/ms";
+/// Energy over `iteration`, J.
+pub const ENERGY: &str = "/solver/energy";
+/// Residual over weight over `iteration`.
+pub const RESIDUAL: &str = "/solver/residual";
+/// Its decimal logarithm, for the plot.
+pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";
+/// The chosen tables, side by side.
+pub const COMPARE: &str = "/compare";
+/// Time against error.
+pub const SCATTER: &str = "/scatter";
+
+/// One step per range table (or per reload under `--watch`).
+pub const TABLE: &str = "table";
+/// The stages of one run: body 0, garment 1, distance 2, PARTs 3, force 4, drape 5, fit and error 6.
+pub const STAGE: &str = "stage";
+/// The iterations of the solver.
+pub const ITERATION: &str = "iteration";
+
+/// Paths that every recording of one drape holds, whatever its options.
+pub const ALWAYS: [&str; 13] = [
+    BODY,
+    GARMENT,
+    DISTANCE,
+    "/distance/legend/bar",
+    "/distance/legend/ticks",
+    PARTS,
+    FORCE,
+    FORCE_ARROWS,
+    "/force/legend/bar",
+    "/force/legend/ticks",
+    DRAPE,
+    REPORT,
+    "/numbers/part_count",
+];

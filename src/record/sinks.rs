@@ -1,0 +1,183 @@
+//! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser, standard output; several at once.
+//!
+//! Rerun's own sinks report most failures late or only to the log, so each is tried before the first result is sent: a
+//! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is written as
+//! `FILE.part` and gets its name when it is complete.
+
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rerun::external::re_uri::ProxyUri;
+use rerun::grpc_server::GrpcServerSink;
+use rerun::sink::{FileSink, FileSinkError, GrpcSink, LogSink};
+use rerun::{MemoryLimit, ServerOptions};
+
+use super::error::RecordError;
+use super::panel::RERUN_VERSION;
+use super::web::WebViewer;
+
+/// How long a viewer has to answer.
+const ANSWER: Duration = Duration::from_secs(3);
+/// Port of a spawned native viewer: Rerun's own default.
+const VIEWER_PORT: u16 = 9876;
+/// History a server keeps for viewers that connect late; beyond it the oldest steps go first, static data never.
+const HISTORY_BYTES: u64 = 1 << 30;
+
+/// One place a recording goes to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sink {
+    /// An `.rrd` file; missing folders are made.
+    File(PathBuf),
+    /// The native viewer, started if none listens on Rerun's port yet.
+    Spawn,
+    /// A viewer elsewhere, `rerun+http://HOST:PORT/proxy`.
+    Connect(String),
+    /// The bundled web viewer on 127.0.0.1; `None` takes any free port.
+    Serve {
+        /// Port of the page.
+        web_port: Option<u16>,
+        /// Port of the data.
+        grpc_port: Option<u16>,
+    },
+    /// Standard output, as an `.rrd` stream.
+    Stdout,
+}
+
+/// A file in the making.
+#[derive(Debug)]
+pub(crate) struct Target {
+    /// Where it is written.
+    pub(crate) part: PathBuf,
+    /// Where it goes when complete.
+    pub(crate) path: PathBuf,
+}
+
+/// All sinks of a recording, open.
+#[derive(Default)]
+pub(crate) struct OpenSinks {
+    pub(crate) sinks: Vec<Box<dyn LogSink>>,
+    pub(crate) targets: Vec<Target>,
+    pub(crate) web: Option<WebViewer>,
+}
+
+impl OpenSinks {
+    /// Opens every sink, or none: on an error what was begun is taken back.
+    pub(crate) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
+        let mut open = Self::default();
+        for sink in sinks {
+            if let Err(error) = open.add(sink) {
+                open.sinks.clear();
+                for target in &open.targets {
+                    // Nothing was promised yet; a leftover that cannot be removed is no further error.
+                    let _ = std::fs::remove_file(&target.part);
+                }
+                return Err(error);
+            }
+        }
+        Ok(open)
+    }
+
+    fn add(&mut self, sink: &Sink) -> Result<(), RecordError> {
+        match sink {
+            Sink::File(path) => {
+                let (sink, target) = file(path)?;
+                self.sinks.push(Box::new(sink));
+                self.targets.push(target);
+            }
+            Sink::Spawn => self.sinks.push(Box::new(spawn()?)),
+            Sink::Connect(url) => self.sinks.push(Box::new(connect(url)?)),
+            Sink::Serve { web_port, grpc_port } => {
+                // The page first: its port is checked before a server thread runs.
+                let web_port = free_port(*web_port, "--web-port")?;
+                let (sink, grpc_port) = serve(*grpc_port)?;
+                self.sinks.push(Box::new(sink));
+                self.web = Some(WebViewer::start(web_port, grpc_port)?);
+            }
+            Sink::Stdout => {
+                let sink = FileSink::stdout()
+                    .map_err(|e| RecordError::Incomplete { reason: format!("standard output: {e}") })?;
+                self.sinks.push(Box::new(sink));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn file(path: &Path) -> Result<(FileSink, Target), RecordError> {
+    let unwritable = |source: std::io::Error| RecordError::Unwritable { path: path.to_owned(), source };
+    if path.is_dir() {
+        return Err(unwritable(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+    }
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(unwritable)?;
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let sink = FileSink::new(&part).map_err(|error| match error {
+        FileSinkError::CreateFile { source, .. } | FileSinkError::SpawnThread(source) => unwritable(source),
+        FileSinkError::LogMsgEncode(error) => unwritable(std::io::Error::other(error)),
+    })?;
+    Ok((sink, Target { part, path: path.to_owned() }))
+}
+
+fn spawn() -> Result<GrpcSink, RecordError> {
+    let no_viewer = |reason: String| RecordError::NoViewer { reason, version: RERUN_VERSION };
+    let options = rerun::SpawnOptions {
+        port: VIEWER_PORT,
+        wait_for_bind: true,
+        hide_welcome_screen: true,
+        extra_args: vec!["--bind=127.0.0.1".to_owned()],
+        ..rerun::SpawnOptions::default()
+    };
+    let info = rerun::spawn(&options).map_err(|error| match error {
+        rerun::SpawnError::ExecutableNotFoundInPath { executable_name, .. } => {
+            no_viewer(format!("there is no `{executable_name}` in PATH"))
+        }
+        other => no_viewer(other.to_string()),
+    })?;
+    connect(&format!("rerun+http://127.0.0.1:{}/proxy", info.port)).map_err(|error| no_viewer(error.to_string()))
+}
+
+fn connect(url: &str) -> Result<GrpcSink, RecordError> {
+    let bad = |reason: String| RecordError::BadUrl { url: url.to_owned(), reason };
+    let uri: ProxyUri = url.parse().map_err(|e: rerun::external::re_uri::Error| bad(e.to_string()))?;
+    let unreachable = |reason: String| RecordError::Unreachable { url: url.to_owned(), reason };
+    let host = uri.origin.host.to_string();
+    let addresses: Vec<SocketAddr> = (host.as_str(), uri.origin.port)
+        .to_socket_addrs()
+        .map_err(|e| unreachable(format!("the name {host} cannot be resolved ({e})")))?
+        .collect();
+    // Rerun's client connects in the background and says nothing when nobody is there.
+    let dialled = addresses.iter().map(|a| TcpStream::connect_timeout(a, ANSWER)).find(Result::is_ok);
+    if dialled.is_none() {
+        let tried: Vec<String> = addresses.iter().map(ToString::to_string).collect();
+        return Err(unreachable(format!("nothing listens at {}", tried.join(", "))));
+    }
+    let sink = GrpcSink::new(uri);
+    sink.flush_blocking(ANSWER).map_err(|e| unreachable(format!("something listens, but is no Rerun viewer ({e})")))?;
+    Ok(sink)
+}
+
+/// Starts the server that viewers fetch the recording from.
+pub(crate) fn serve(port: Option<u16>) -> Result<(GrpcServerSink, u16), RecordError> {
+    let port = free_port(port, "--grpc-port")?;
+    let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(HISTORY_BYTES), ..ServerOptions::default() };
+    let failed = |reason: String| RecordError::Server { what: "the recording", port, reason };
+    let sink = GrpcServerSink::new("127.0.0.1", port, options).map_err(|e| failed(e.to_string()))?;
+    // A server that could not bind ends its thread without a word; the first flush finds out.
+    sink.flush_blocking(ANSWER).map_err(|e| failed(e.to_string()))?;
+    Ok((sink, port))
+}
+
+/// A free port on 127.0.0.1: the one asked for, or any.
+pub(crate) fn free_port(port: Option<u16>, option: &'static str) -> Result<u16, RecordError> {
+    let asked = port.unwrap_or(0);
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, asked)).map_err(|source| RecordError::PortInUse {
+        port: asked,
+        option,
+        source,
+    })?;
+    listener.local_addr().map(|a| a.port()).map_err(|source| RecordError::PortInUse { port: asked, option, source })
+}

@@ -1,0 +1,95 @@
+//! Files that survive a crash: replaced whole or not at all, or grown line by line with nothing half-written kept.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use super::error::StoreError;
+
+/// Where lines are appended: a file, or what a test puts in its place.
+pub trait Append: Send {
+    /// Appends and returns once the bytes are on the disk, not before.
+    ///
+    /// # Errors
+    /// What the system says; part of the bytes may have been written.
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Cuts back to this length, bytes.
+    ///
+    /// # Errors
+    /// What the system says.
+    fn cut(&mut self, length: u64) -> io::Result<()>;
+}
+
+impl Append for File {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.write_all(bytes)?;
+        self.sync_data()
+    }
+
+    fn cut(&mut self, length: u64) -> io::Result<()> {
+        self.set_len(length)?;
+        self.seek(SeekFrom::Start(length)).map(|_| ())
+    }
+}
+
+/// Opens a file to append to, made if it is not there.
+pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
+    let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
+    let at_end = opened.and_then(|mut file| file.seek(SeekFrom::End(0)).map(|_| file));
+    at_end.map_err(|source| StoreError::Io { path: path.to_owned(), doing: "cannot be opened for writing", source })
+}
+
+/// The file's bytes, or nothing where there is no file.
+pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(StoreError::Io { path: path.to_owned(), doing: "cannot be read", source }),
+    }
+}
+
+/// Writes a file beside its place and renames it: whoever looks, and whatever breaks, sees the old or the new one.
+pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".new");
+    let beside = Path::new(&beside);
+    let write = || {
+        let mut file = File::create(beside)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(beside, path)
+    };
+    write().map_err(|source| {
+        // Best effort: on a full disk the half-written file is in the way of everything else.
+        let _ = fs::remove_file(beside);
+        StoreError::Io { path: path.to_owned(), doing: "cannot be written", source }
+    })?;
+    sync_folder(path);
+    Ok(())
+}
+
+/// Makes a rename last through a power cut where the system can (a folder cannot be opened everywhere).
+fn sync_folder(path: &Path) {
+    if let Some(Ok(folder)) = path.parent().map(File::open) {
+        let _ = folder.sync_all();
+    }
+}
+
+/// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
+/// that), replaced otherwise.
+pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
+    let found = read_if_there(path)?;
+    match found {
+        Some(found) if found == text => Ok(()),
+        Some(found) if found.starts_with(text) => {
+            let cut = open_end(path)?.cut(text.len() as u64);
+            cut.map_err(|source| StoreError::Io {
+                path: path.to_owned(),
+                doing: "a torn line cannot be cut off",
+                source,
+            })
+        }
+        _ => replace(path, text),
+    }
+}

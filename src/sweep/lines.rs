@@ -1,0 +1,56 @@
+//! Rows as text and back, one a line; and which lines a crash can have torn.
+
+use std::path::Path;
+
+use super::disk;
+use super::error::StoreError;
+use super::manifest::Manifest;
+use super::row::{Row, csv_header, csv_line, json_line};
+
+/// The rows as JSON lines.
+pub(super) fn json_text(rows: &[Row]) -> Vec<u8> {
+    rows.iter().flat_map(json_line).collect()
+}
+
+/// The rows as CSV.
+pub(super) fn csv_text(rows: &[Row]) -> Vec<u8> {
+    csv_header().into_bytes().into_iter().chain(rows.iter().flat_map(csv_line)).collect()
+}
+
+/// The rows of a sweep. A bad last line was torn and is left out; the id counts, not the number, so that rows find their place.
+pub(super) fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
+    let bytes = disk::read_if_there(path)?.unwrap_or_default();
+    let places = manifest.places();
+    let mut rows: Vec<Row> = Vec::new();
+    let mut seen = vec![false; manifest.points.len()];
+    let mut bad: Option<(usize, String)> = None;
+    for (i, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+        // Only the last line can lack its end, and only the last may be bad: then it was torn.
+        if let Some((line, message)) = bad {
+            return Err(StoreError::Damaged { path: path.to_owned(), line, message });
+        }
+        let parsed = match line.strip_suffix(b"\n") {
+            None => Err("the line has no end".to_owned()),
+            Some(line) => serde_json::from_slice::<Row>(line).map_err(|e| e.to_string()),
+        };
+        match parsed {
+            Err(message) => bad = Some((i + 1, message)),
+            Ok(mut row) => {
+                // The id counts, not the number: a crash while rows are adopted leaves new numbers beside the old plan.
+                let place = places.get(row.point.as_str());
+                let Some(&place) = place.filter(|&&i| !std::mem::replace(&mut seen[i], true)) else {
+                    let message =
+                        if place.is_some() { "its point has a row before" } else { "its point is not in plan.json" };
+                    return Err(StoreError::Damaged {
+                        path: path.to_owned(),
+                        line: i + 1,
+                        message: message.to_owned(),
+                    });
+                };
+                row.index = place;
+                rows.push(row);
+            }
+        }
+    }
+    Ok(rows)
+}

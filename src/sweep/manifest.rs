@@ -1,0 +1,160 @@
+//! What a folder of rows belongs to: the sweep's identity, its points, and the shard.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::disk;
+use super::error::{PlanError, StoreError};
+use super::plan::Plan;
+use super::point::{VERSION, content_id};
+
+/// Name of the manifest in a sweep's folder.
+pub(super) const MANIFEST: &str = "plan.json";
+
+/// A share of a sweep: every n-th point, so that the shares cost about the same whatever axis is slow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// Share `index` (from 1) of `count`.
+    ///
+    /// # Errors
+    /// [`PlanError::Shard`] unless 1 ≤ index ≤ count.
+    pub fn new(index: usize, count: usize) -> Result<Self, PlanError> {
+        if index == 0 || index > count {
+            return Err(PlanError::Shard { found: format!("{index}/{count}") });
+        }
+        Ok(Self { index, count })
+    }
+
+    /// Whether the point of this number is in the share.
+    #[must_use]
+    pub fn holds(self, point: usize) -> bool {
+        point % self.count == self.index - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = PlanError;
+
+    fn from_str(text: &str) -> Result<Self, PlanError> {
+        let wrong = || PlanError::Shard { found: text.to_owned() };
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let number = |t: &str| t.trim().parse().map_err(|_| wrong());
+        Self::new(number(index)?, number(count)?)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = PlanError;
+
+    fn try_from(text: String) -> Result<Self, PlanError> {
+        text.parse()
+    }
+}
+
+/// A point as the manifest lists it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Listed {
+    /// Content hash.
+    pub id: String,
+    /// What it is, for people.
+    pub label: String,
+}
+
+/// The identity of a sweep and all its points, whatever the shard.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// The sweep's name.
+    pub name: String,
+    /// The program's version.
+    pub partwise: String,
+    /// Hash of the points, ids and labels, in order.
+    pub plan: String,
+    /// The share of the points that belongs here; none for all of them.
+    pub shard: Option<Shard>,
+    /// Every point of the sweep, in order.
+    pub points: Vec<Listed>,
+}
+
+impl Manifest {
+    /// Of a plan, or of a share of it.
+    #[must_use]
+    pub fn of(plan: &Plan, shard: Option<Shard>) -> Self {
+        let points: Vec<Listed> = plan.points.iter().map(|p| Listed { id: p.id.clone(), label: p.label() }).collect();
+        Self { name: plan.name.clone(), partwise: VERSION.to_owned(), plan: content_id(&points), shard, points }
+    }
+
+    /// How many points belong here.
+    #[must_use]
+    pub fn share(&self) -> usize {
+        (0..self.points.len()).filter(|&i| self.holds(i)).count()
+    }
+
+    /// Whether the point of this number belongs here.
+    #[must_use]
+    pub fn holds(&self, point: usize) -> bool {
+        self.shard.is_none_or(|s| s.holds(point))
+    }
+
+    /// The number of each point by its id.
+    pub(super) fn places(&self) -> BTreeMap<&str, usize> {
+        self.points.iter().enumerate().map(|(i, p)| (p.id.as_str(), i)).collect()
+    }
+
+    /// The sweep in a few words: what two that differ are told apart by.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let Self { name, partwise, plan, points, .. } = self;
+        let shard = self.shard.map_or(String::new(), |s| format!(", shard {s}"));
+        format!(
+            "sweep \"{name}\" of partwise {partwise}, {} points, plan {}{shard}",
+            points.len(),
+            &plan[..plan.len().min(8)]
+        )
+    }
+
+    /// Reads the manifest of a folder; `None` where there is none.
+    pub(super) fn read(folder: &Path) -> Result<Option<Self>, StoreError> {
+        let path = folder.join(MANIFEST);
+        let Some(bytes) = disk::read_if_there(&path)? else { return Ok(None) };
+        match serde_json::from_slice(&bytes) {
+            Ok(manifest) => Ok(Some(manifest)),
+            Err(e) => Err(StoreError::Damaged { path, line: e.line(), message: e.to_string() }),
+        }
+    }
+
+    /// Writes it, whole or not at all.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), StoreError> {
+        let path = folder.join(MANIFEST);
+        let mut text = serde_json::to_string_pretty(self).map_err(|e| StoreError::Io {
+            path: path.clone(),
+            doing: "cannot be written",
+            source: e.into(),
+        })?;
+        text.push('\n');
+        disk::make(&path, text.as_bytes())
+    }
+}

@@ -1,0 +1,103 @@
+//! From a sweep file to its points.
+//!
+//! # Order
+//! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, smallest PART, refinement, seed,
+//! options (the last fastest), each axis in the order written; then the single points as written. A point that equals an earlier one in
+//! all that determines its result (Table 3 scaled by 1, say) is left out, and [`Plan::notes`] says so.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use super::axes::Axes;
+use super::error::PlanError;
+use super::file::{Grid, Source};
+use super::inputs::Inputs;
+use super::point::Point;
+
+/// All points of a sweep, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The sweep's name.
+    pub name: String,
+    /// What it is for; can be empty.
+    pub about: String,
+    /// Timed passes of each point, at least 1.
+    pub repeats: usize,
+    /// Passes before those.
+    pub warm_up: usize,
+    /// The points.
+    pub points: Vec<Point>,
+    /// What the user should know: points left out.
+    pub notes: Vec<String>,
+}
+
+impl Plan {
+    /// Reads a sweep file; the files it names count from its folder.
+    ///
+    /// # Errors
+    /// [`PlanError`] with file, line, what was found and what was expected.
+    pub fn read(path: &Path) -> Result<Self, PlanError> {
+        let name = path.display().to_string();
+        let text = fs::read_to_string(path).map_err(|source| PlanError::Read {
+            place: name.clone(),
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// The plan of a sweep file's text; `name` only serves the messages, `folder` is where its paths count from.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, name: &str, folder: &Path) -> Result<Self, PlanError> {
+        let source = Source { text, name };
+        let file = source.parse()?;
+        let repeats = "a whole number of passes, at least 1";
+        let warm_up = "a whole number of passes, 0 for none";
+        let repeats = file.repeats.as_ref().map_or(Ok(1), |v| source.count(v, "repeats", 1, repeats))?;
+        let warm_up = file.warm_up.as_ref().map_or(Ok(0), |v| source.count(v, "warm_up", 0, warm_up))?;
+        let mut inputs = Inputs::new(folder);
+        let mut points = Vec::new();
+        if let Some(grid) = &file.grid {
+            Axes::read(source, &file.base, grid, &mut inputs)?.expand(&mut points, name)?;
+        }
+        for single in &file.points {
+            let single = single.clone().or(&file.base);
+            let axes = Axes::read(source, &single, &Grid::default(), &mut inputs)?;
+            if let (Some(table), true) = (&single.table, axes.tables.len() > 1) {
+                return Err(source.wrong(
+                    table,
+                    "table",
+                    "one table for one point; lists belong into [grid] as tables",
+                ));
+            }
+            axes.expand(&mut points, name)?;
+        }
+        if points.is_empty() {
+            return Err(PlanError::Empty { name: name.to_owned() });
+        }
+        let (points, notes) = distinct(points);
+        Ok(Self { name: file.name, about: file.about, repeats, warm_up, points, notes })
+    }
+}
+
+/// Gives the points their numbers, leaving out what is there already.
+fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let (mut kept, mut notes): (Vec<Point>, Vec<String>) = (Vec::with_capacity(points.len()), Vec::new());
+    for point in points {
+        if let Some(&first) = seen.get(&point.id) {
+            notes.push(format!(
+                "point left out, the same as point {first} ({}): {}",
+                kept[first].label(),
+                point.label()
+            ));
+            continue;
+        }
+        seen.insert(point.id.clone(), kept.len());
+        kept.push(Point { index: kept.len(), ..point });
+    }
+    (kept, notes)
+}

@@ -1,0 +1,141 @@
+//! Runs the points of a plan that have no row yet, several at a time, and puts each row on disk as it comes.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use super::error::StoreError;
+use super::manifest::{Manifest, Shard};
+use super::plan::Plan;
+use super::row::{Row, Status};
+use super::solve::{Solve, row_of};
+use super::store::{Existing, Store};
+
+/// How far a sweep is.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress<'a> {
+    /// Points of this sweep or shard.
+    pub total: usize,
+    /// Rows on disk, those found there included.
+    pub done: usize,
+    /// Rows found there at the start: what time is left counts without them.
+    pub skipped: usize,
+    /// Rows that are errors.
+    pub failed: usize,
+    /// The row just written; none in the first call, before any work.
+    pub row: Option<&'a Row>,
+}
+
+/// How a sweep is run; nothing here changes a result.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// Points at a time, at least 1. More than one makes the timings of all of them worse.
+    pub jobs: usize,
+    /// Set to stop: points in hand are finished, no others begun.
+    pub stop: &'a AtomicBool,
+    /// Called before the first point, and after every row by the thread that wrote it, one at a time.
+    pub progress: &'a (dyn Fn(Progress<'_>) + Sync),
+}
+
+/// What became of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Points of this sweep or shard.
+    pub total: usize,
+    /// Rows found at the start.
+    pub skipped: usize,
+    /// Rows that are errors: not 0 means a non-zero exit.
+    pub failed: usize,
+    /// Whether it was stopped before the end.
+    pub stopped: bool,
+    /// All rows so far, in the plan's order.
+    pub rows: Vec<Row>,
+}
+
+/// Opens the folder, runs what is missing, and puts the files in order: the whole of `partwise sweep`.
+///
+/// # Errors
+/// [`StoreError`] as [`Store::open`] and [`Store::append`]: rows written before stay intact. A failed point is no error
+/// but a row.
+pub fn sweep<S: Solve>(
+    plan: &Plan,
+    shard: Option<Shard>,
+    folder: &Path,
+    existing: Existing,
+    run: &Run<'_>,
+    solver: &S,
+) -> Result<Outcome, StoreError> {
+    let mut store = Store::open(folder, Manifest::of(plan, shard), existing)?;
+    let skipped = store.rows().len();
+    run_missing(plan, &mut store, run, solver)?;
+    let total = store.manifest().share();
+    let rows = store.finish()?;
+    let failed = count_failed(&rows);
+    Ok(Outcome { total, skipped, failed, stopped: rows.len() < total, rows })
+}
+
+/// Runs the points of `plan` that `store` lacks. Each thread puts its row on disk before it takes up another point, so that a
+/// crash loses no more than the points in hand, one a job.
+///
+/// # Errors
+/// [`StoreError::Write`] when a row cannot be written; the points in hand are then lost, the rows before are not.
+pub fn run_missing<S: Solve>(plan: &Plan, store: &mut Store, run: &Run<'_>, solver: &S) -> Result<(), StoreError> {
+    let todo: Vec<_> = plan.points.iter().filter(|p| store.lacks(p.index)).collect();
+    let skipped = store.rows().len();
+    let progress = Progress {
+        total: store.manifest().share(),
+        done: skipped,
+        skipped,
+        failed: count_failed(store.rows()),
+        row: None,
+    };
+    (run.progress)(progress);
+    let next = AtomicUsize::new(0);
+    let broken = AtomicBool::new(false);
+    let desk = Mutex::new(Desk { store, progress, written: Ok(()) });
+    let work = || {
+        while !run.stop.load(Ordering::SeqCst) && !broken.load(Ordering::SeqCst) {
+            let Some(point) = todo.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
+            let Some(row) = row_of(point, solver, plan.warm_up, plan.repeats) else { break };
+            if !desk.lock().unwrap_or_else(PoisonError::into_inner).take(row, run) {
+                broken.store(true, Ordering::SeqCst);
+            }
+        }
+    };
+    // Threads of their own, not rayon's: a point uses rayon itself, and a rayon thread that waits for its share may take
+    // up another point in the meantime, which would spoil timings and deadlock solvers that hold a lock.
+    thread::scope(|scope| {
+        for _ in 0..run.jobs.clamp(1, todo.len().max(1)) {
+            scope.spawn(work);
+        }
+    });
+    desk.into_inner().unwrap_or_else(PoisonError::into_inner).written
+}
+
+/// Where finished points are handed in, one at a time.
+struct Desk<'a> {
+    store: &'a mut Store,
+    progress: Progress<'static>,
+    written: Result<(), StoreError>,
+}
+
+impl Desk<'_> {
+    /// Writes a row; false once one could not be written: then no more are taken.
+    fn take(&mut self, row: Row, run: &Run<'_>) -> bool {
+        if self.written.is_ok() {
+            let failed = usize::from(row.status == Status::Error);
+            self.written = self.store.append(row);
+            if self.written.is_ok() {
+                self.progress.done += 1;
+                self.progress.failed += failed;
+                (run.progress)(Progress { row: self.store.rows().last(), ..self.progress });
+            }
+        }
+        self.written.is_ok()
+    }
+}
+
+fn count_failed(rows: &[Row]) -> usize {
+    rows.iter().filter(|r| r.status == Status::Error).count()
+}

@@ -1,0 +1,212 @@
+//! The rows of a sweep on disk, one folder a sweep or a shard.
+//!
+//! | file | what it is |
+//! |---|---|
+//! | `plan.json` | whose rows these are ([`Manifest`]) |
+//! | `rows.jsonl` | the truth: a line a row, appended and synced after every point |
+//! | `rows.csv` | the same rows and columns, made from the lines; mended from them on resume |
+//! | `lock` | held by the process that writes; the system lets go of it when the process dies |
+//!
+//! While a sweep runs, rows stand in the order in which points finished; at the end both files are put into the plan's
+//! order, each by one rename. A torn last line (a killed process, a full disk) is dropped on resume and its point computed
+//! again; a bad line with good ones after it is no accident of ours and is refused. On resume points that failed are tried
+//! again unless asked otherwise: what failed for want of memory or room deserves it.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use super::disk::{self, make};
+use super::error::StoreError;
+use super::journal::{Journal, Medium, take_lock};
+use super::lines::{csv_text, json_text, read_rows};
+use super::manifest::{MANIFEST, Manifest};
+use super::row::{Row, Status, csv_line, json_line};
+
+/// Name of the JSON lines in a sweep's folder.
+pub const JSON_LINES: &str = "rows.jsonl";
+/// Name of the CSV in a sweep's folder.
+pub const CSV: &str = "rows.csv";
+const LOCK: &str = "lock";
+
+/// How to treat rows that are there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Existing {
+    /// Rows there are an error.
+    #[default]
+    Refuse,
+    /// Go on: what is done is skipped. A folder without rows is started.
+    Resume {
+        /// Compute failed points again.
+        retry_failed: bool,
+        /// Where the rows are another plan's, keep those of points the two have in common instead of refusing.
+        adopt: bool,
+    },
+}
+
+impl Existing {
+    /// `--resume`: failed points are tried again, another plan's rows refused.
+    pub const RESUME: Self = Self::Resume { retry_failed: true, adopt: false };
+}
+
+/// The rows of one sweep, open for writing.
+pub struct Store {
+    manifest: Manifest,
+    folder: PathBuf,
+    rows: Vec<Row>,
+    done: Vec<bool>,
+    json: Journal,
+    csv: Journal,
+    _lock: File,
+}
+
+impl std::fmt::Debug for Store {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Store").field("folder", &self.folder).field("rows", &self.rows.len()).finish_non_exhaustive()
+    }
+}
+
+impl Store {
+    /// Opens the folder for the rows of `manifest`, made if it is not there.
+    ///
+    /// # Errors
+    /// [`StoreError`]: rows already there or another plan's, a lock held, a damaged line, a disk that will not.
+    pub fn open(folder: &Path, manifest: Manifest, existing: Existing) -> Result<Self, StoreError> {
+        Self::open_on(folder, manifest, existing, &|file| Box::new(file))
+    }
+
+    /// As [`open`](Self::open), on media other than plain files.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_on(
+        folder: &Path,
+        manifest: Manifest,
+        existing: Existing,
+        medium: &Medium<'_>,
+    ) -> Result<Self, StoreError> {
+        fs::create_dir_all(folder).map_err(|source| StoreError::Io {
+            path: folder.to_owned(),
+            doing: "cannot be made a folder",
+            source,
+        })?;
+        let lock = take_lock(&folder.join(LOCK))?;
+        let rows = match Manifest::read(folder)? {
+            None if disk::read_if_there(&folder.join(JSON_LINES))?.is_some_and(|bytes| !bytes.is_empty()) => {
+                return Err(StoreError::Orphans { path: folder.join(JSON_LINES) });
+            }
+            None => Vec::new(),
+            Some(found) => left_over(folder, &found, &manifest, existing)?,
+        };
+        let (json_path, csv_path) = (folder.join(JSON_LINES), folder.join(CSV));
+        // The rows of another plan go before its manifest does: a crash between the two leaves a plan with fewer rows.
+        make(&json_path, &json_text(&rows))?;
+        manifest.write(folder)?;
+        make(&csv_path, &csv_text(&rows))?;
+        let mut done = vec![false; manifest.points.len()];
+        for row in &rows {
+            done[row.index] = true;
+        }
+        let json = Journal::open(json_path, medium)?;
+        let csv = Journal::open(csv_path, medium)?;
+        Ok(Self { manifest, folder: folder.to_owned(), rows, done, json, csv, _lock: lock })
+    }
+
+    /// Whose rows these are.
+    #[must_use]
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The rows so far, in the order in which they were written.
+    #[must_use]
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Whether the point of this number belongs here and has no row yet.
+    #[must_use]
+    pub fn lacks(&self, point: usize) -> bool {
+        self.manifest.holds(point) && self.done.get(point) == Some(&false)
+    }
+
+    /// Puts a row on disk, in both files; returns when it is there.
+    ///
+    /// # Errors
+    /// [`StoreError::Write`]; all rows before stay intact. A second row for a point is refused as damage.
+    pub fn append(&mut self, row: Row) -> Result<(), StoreError> {
+        if !self.lacks(row.index) || self.manifest.points[row.index].id != row.point {
+            let (path, line) = (self.json.path.clone(), self.rows.len() + 1);
+            return Err(StoreError::Damaged { path, line, message: format!("point {} was not asked for", row.index) });
+        }
+        self.json.append(&json_line(&row), self.rows.len())?;
+        // From here on the row counts as written: the CSV is mended from the lines if it fails.
+        let csv = csv_line(&row);
+        self.done[row.index] = true;
+        self.rows.push(row);
+        self.csv.append(&csv, self.rows.len())
+    }
+
+    /// Puts many rows at once, whole or none: what joining shards needs.
+    pub(super) fn extend(&mut self, rows: Vec<Row>) -> Result<(), StoreError> {
+        self.rows.extend(rows);
+        disk::replace(&self.json.path, &json_text(&self.rows))?;
+        disk::replace(&self.csv.path, &csv_text(&self.rows))
+    }
+
+    /// Puts both files into the plan's order. Nothing is written where they are in order already.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`]; the rows stay as they were.
+    pub fn finish(mut self) -> Result<Vec<Row>, StoreError> {
+        if !self.rows.is_sorted_by_key(|r| r.index) {
+            self.rows.sort_by_key(|r| r.index);
+            disk::replace(&self.json.path, &json_text(&self.rows))?;
+            disk::replace(&self.csv.path, &csv_text(&self.rows))?;
+        }
+        Ok(self.rows)
+    }
+}
+
+/// The manifest and rows of a folder nobody need be writing; a torn last line is left out.
+///
+/// # Errors
+/// [`StoreError`] where there is no sweep or a line is damaged.
+pub fn read(folder: &Path) -> Result<(Manifest, Vec<Row>), StoreError> {
+    let manifest = Manifest::read(folder)?.ok_or_else(|| StoreError::Missing { path: folder.join(MANIFEST) })?;
+    let rows = read_rows(&folder.join(JSON_LINES), &manifest)?;
+    Ok((manifest, rows))
+}
+
+/// The rows to go on from.
+fn left_over(folder: &Path, found: &Manifest, wanted: &Manifest, how: Existing) -> Result<Vec<Row>, StoreError> {
+    let path = folder.join(JSON_LINES);
+    let mut rows = read_rows(&path, found)?;
+    let Existing::Resume { retry_failed, adopt } = how else {
+        if rows.is_empty() {
+            return Ok(rows);
+        }
+        return Err(StoreError::Exists { path, rows: rows.len() });
+    };
+    if (&found.plan, &found.partwise, found.shard) != (&wanted.plan, &wanted.partwise, wanted.shard) {
+        if !adopt && !rows.is_empty() {
+            let (found, expected) = (found.identity(), wanted.identity());
+            return Err(StoreError::OtherPlan { path: folder.join(MANIFEST), found, expected });
+        }
+        // A point under another label is another row: it is computed again rather than kept under its old name.
+        let places = wanted.places();
+        rows.retain_mut(|row| {
+            let place = places.get(row.point.as_str()).copied().filter(|&i| wanted.holds(i));
+            let same = place.is_some_and(|i| wanted.points[i] == found.points[row.index]);
+            row.index = place.unwrap_or(row.index);
+            same
+        });
+    }
+    rows.retain(|r| r.status == Status::Ok || !retry_failed);
+    Ok(rows)
+}

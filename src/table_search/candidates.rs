@@ -1,0 +1,81 @@
+//! Candidate bounds: places between two neighbouring distances, as ranks in the sorted distances of all garments.
+//!
+//! Only the rank of a bound matters to which vertices fall on which side, so candidates of equal rank are one. The bound itself is
+//! halfway between its two neighbouring distances.
+
+use super::{Sample, SearchOptions};
+use crate::range_table::METRES_PER_CM;
+
+/// Bounds between which levels may begin and end.
+#[derive(Debug, Clone)]
+pub(super) struct Candidates {
+    /// Distinct unsigned distances of all garments, ascending, m.
+    sorted: Vec<f64>,
+    /// Ranks in `sorted`, ascending, distinct, each from 1 to its length − 1.
+    ranks: Vec<usize>,
+    /// How far apart candidates are, in ranks.
+    spacing: usize,
+}
+
+impl Candidates {
+    /// Evenly spaced ranks, and those of the tables to include.
+    pub(super) fn quantiles(samples: &[Sample<'_>], options: &SearchOptions) -> Self {
+        let mut sorted: Vec<f64> = samples.iter().flat_map(|s| s.distances_m).map(|d| d.abs()).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        sorted.dedup();
+        let count = options.candidates.max(1);
+        let mut ranks: Vec<usize> = (1..=count).map(|i| i * sorted.len() / (count + 1)).collect();
+        for level in options.include.iter().flat_map(crate::range_table::RangeTable::effective_levels) {
+            for bound_cm in [level.lower_cm, level.upper_cm] {
+                ranks.push(rank(&sorted, bound_cm));
+            }
+        }
+        let spacing = sorted.len().div_ceil(count + 1);
+        Self::of(sorted, ranks, spacing)
+    }
+
+    fn of(sorted: Vec<f64>, mut ranks: Vec<usize>, spacing: usize) -> Self {
+        ranks.retain(|&r| r > 0 && r < sorted.len());
+        ranks.sort_unstable();
+        ranks.dedup();
+        Self { sorted, ranks, spacing }
+    }
+
+    /// About `count` ranks around the given bounds, as far as the candidates were apart so far; the bounds themselves stay in.
+    pub(super) fn around(&self, bounds_cm: &[f64], count: usize) -> Self {
+        let each = (count / bounds_cm.len().max(1)).max(2) / 2;
+        let spacing = self.spacing.div_ceil(each);
+        let mut ranks = Vec::new();
+        for &bound_cm in bounds_cm {
+            let centre = rank(&self.sorted, bound_cm);
+            ranks.push(centre);
+            for step in (1..=each).map(|i| i * spacing) {
+                ranks.extend([centre.saturating_sub(step), centre + step]);
+            }
+        }
+        Self::of(self.sorted.clone(), ranks, spacing)
+    }
+
+    /// Number of smallest levels, between neighbouring candidates.
+    pub(super) fn bins(&self) -> usize {
+        self.ranks.len() + 1
+    }
+
+    /// The candidates, cm.
+    pub(super) fn inner_cm(&self) -> Vec<f64> {
+        let halfway = |&r: &usize| 0.5 * (self.sorted[r - 1] + self.sorted[r]) / METRES_PER_CM;
+        self.ranks.iter().map(halfway).collect()
+    }
+
+    /// The smallest level of each distance.
+    pub(super) fn bin_of(&self, distances_m: &[f64]) -> Vec<u32> {
+        let rank_of = |d: f64| self.sorted.partition_point(|&s| s < d);
+        // A distance of rank r, itself the r-th of `sorted`, lies above all candidates up to r.
+        distances_m.iter().map(|d| self.ranks.partition_point(|&c| c <= rank_of(d.abs())) as u32).collect()
+    }
+}
+
+/// How many distances lie below a bound.
+fn rank(sorted: &[f64], bound_cm: f64) -> usize {
+    sorted.partition_point(|&s| s < bound_cm * METRES_PER_CM)
+}

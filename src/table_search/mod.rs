@@ -1,0 +1,246 @@
+//! Search for range tables: the best trade between the number of PARTs and the representable error, which the paper leaves
+//! open (section 3.3: "the proposed scheme cannot provide an optimal solution for the determination of the number of the
+//! levels and range values of each level").
+//!
+//! Both quantities add up over levels: the PARTs of level [a, b) are the connected pieces of the vertices with a ≤ d < b, whatever
+//! the other levels are, and so are their errors, cut to an extent or not. So a table is a path through the candidate
+//! bounds, and the best tables for every number of PARTs come out of one dynamic program,
+//!
+//! ```text
+//! E(b, p) = min over a < b of E(a, p − c(a, b)) + v(a, b)
+//! ```
+//!
+//! exact over all tables whose bounds are candidates. Candidates are quantiles of the distances plus the bounds of given tables
+//! (so the front is never worse than those); later rounds put them close around the best table found.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | c(a, b) | PARTs of level [a, b), over all garments | – |
+//! | v(a, b) | their share of the squared representable error, Σ over garments of weight/vertices · Σ \|u_i − ū_k\|² | m² |
+//! | E(b, p) | least squared error of the vertices below b with p PARTs | m² |
+//!
+//! Source: own; segmentation by dynamic programming goes back to Bellman 1961, "On the approximation of curves by line segments
+//! using dynamic programming", Communications of the ACM 4(6). Limits: the error is of one translation a PART against one
+//! reference drape; O(m² n) for m candidates and n vertices without an extent, m² times a cut with one.
+
+mod candidates;
+mod front;
+mod intervals;
+mod program;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::DVec3;
+
+pub use front::{Front, FrontPoint};
+
+use crate::mesh::{Topology, TriMesh};
+use crate::range_table::RangeTable;
+use candidates::Candidates;
+
+/// One garment to find a table for.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample<'a> {
+    /// The garment, undraped.
+    pub mesh: &'a TriMesh,
+    /// Its connectivity.
+    pub topology: &'a Topology,
+    /// Distance of each vertex from the body, m; its sign does not matter.
+    pub distances_m: &'a [f64],
+    /// Reference displacement of each vertex, undraped to draped, m.
+    pub displacement: &'a [DVec3],
+    /// How much its squared error counts beside the other garments'; only the ratios matter.
+    pub weight: f64,
+}
+
+/// What to search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchOptions {
+    /// Candidate bounds per round. Default 400, with an extent 60: its cost grows with the square, times a cut.
+    pub candidates: usize,
+    /// Most PARTs a table may yield, over all garments together.
+    pub max_parts: usize,
+    /// Cut every PART to this extent, m; `None` for levels alone.
+    pub extent_m: Option<f64>,
+    /// Rounds: the first over quantiles, the others around the best table so far. Default 3.
+    pub rounds: usize,
+    /// Tables whose bounds are candidates too, so that the front is never worse than they are.
+    pub include: Vec<RangeTable>,
+}
+
+impl SearchOptions {
+    /// Defaults for levels alone with a limit of PARTs.
+    #[must_use]
+    pub fn new(max_parts: usize) -> Self {
+        Self { candidates: 400, max_parts, extent_m: None, rounds: 3, include: vec![RangeTable::table_3()] }
+    }
+
+    /// Defaults for levels that are cut to an extent (m).
+    #[must_use]
+    pub fn with_extent(max_parts: usize, extent_m: f64) -> Self {
+        Self { candidates: 60, rounds: 2, extent_m: Some(extent_m), ..Self::new(max_parts) }
+    }
+}
+
+/// How far a search is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Round, from 1.
+    pub round: usize,
+    /// Rounds in all.
+    pub rounds: usize,
+    /// Lower bounds of this round whose levels are evaluated.
+    pub done: usize,
+    /// Lower bounds of this round.
+    pub total: usize,
+}
+
+/// A search that cannot be run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// Nothing to search on.
+    #[error("no garment to tune on, expected at least one")]
+    NoGarment,
+    /// A list that is not one entry per vertex.
+    #[error("garment {garment}: {what} has {found} entries, expected {expected}, one per vertex")]
+    Length {
+        /// Garment number, from 1.
+        garment: usize,
+        /// Which list.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The number of vertices.
+        expected: usize,
+    },
+    /// A weight that is no positive number.
+    #[error("garment {garment} has the weight {found}, expected a positive, finite number")]
+    Weight {
+        /// Garment number, from 1.
+        garment: usize,
+        /// Its weight.
+        found: f64,
+    },
+    /// A distance or displacement that is no number.
+    #[error("garment {garment}: vertex {vertex} has no finite distance and displacement")]
+    NotFinite {
+        /// Garment number, from 1.
+        garment: usize,
+        /// Vertex, from 0.
+        vertex: usize,
+    },
+    /// Even the coarsest table has more PARTs.
+    #[error(
+        "no table tried has {max_parts} PARTs or fewer, not even one single level; allow more PARTs or a larger extent"
+    )]
+    TooFewParts {
+        /// The limit given.
+        max_parts: usize,
+    },
+}
+
+/// What a search found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Search {
+    /// The best tables after each round, never worse than the round before.
+    pub rounds: Vec<Front>,
+}
+
+impl Search {
+    /// The final front.
+    #[must_use]
+    pub fn front(&self) -> &Front {
+        const NONE: &Front = &Front { points: Vec::new() };
+        self.rounds.last().unwrap_or(NONE)
+    }
+}
+
+/// Finds the tables on the Pareto front of PARTs and representable error. The result has the same bits on any number of threads;
+/// `progress` is called from any of them.
+///
+/// # Errors
+/// [`SearchError`] where the samples do not fit together or no table is coarse enough.
+pub fn search(
+    samples: &[Sample<'_>],
+    options: &SearchOptions,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Search, SearchError> {
+    check(samples)?;
+    let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
+    let mut candidates = Candidates::quantiles(samples, options);
+    let mut rounds: Vec<Front> = Vec::new();
+    let round_count = options.rounds.max(1);
+    for round in 1..=round_count {
+        let total = candidates.bins() * samples.len();
+        let done = AtomicUsize::new(0);
+        let step = || {
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(Progress { round, rounds: round_count, done, total });
+        };
+        let bins = candidates.bins();
+        // Row a holds the levels [a, b) for b = a + 1, a + 2, ...
+        let mut costs: Vec<_> = (0..bins).map(|a| vec![intervals::Cost::default(); bins - a]).collect();
+        for sample in samples {
+            let share = sample.weight / (total_weight * sample.distances_m.len() as f64);
+            let bin_of_vertex = candidates.bin_of(sample.distances_m);
+            let found = intervals::costs(sample, &bin_of_vertex, bins, options, &step);
+            for (cost, found) in costs.iter_mut().flatten().zip(found.into_iter().flatten()) {
+                cost.parts = cost.parts.saturating_add(found.parts);
+                cost.error += share * found.error;
+            }
+        }
+        let mut found = program::front(&costs, &candidates.inner_cm(), options.max_parts);
+        found.points.iter_mut().for_each(|p| p.extent_m = options.extent_m);
+        let front = rounds.last().map_or_else(|| found.clone(), |before| before.union(&found));
+        let Some(best) = front.best_within(options.max_parts) else {
+            return Err(SearchError::TooFewParts { max_parts: options.max_parts });
+        };
+        candidates = candidates.around(&best.inner_bounds_cm, options.candidates);
+        rounds.push(front);
+    }
+    Ok(Search { rounds })
+}
+
+/// [`search`] at several extents (`None`: levels alone), and the front over all of them; a point tells its extent. Extents at which
+/// no table is coarse enough add nothing.
+///
+/// # Errors
+/// As [`search`], if no extent yields a table.
+pub fn search_extents(
+    samples: &[Sample<'_>],
+    options: &SearchOptions,
+    extents_m: &[Option<f64>],
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Front, SearchError> {
+    let mut front = Front::default();
+    for &extent_m in extents_m {
+        match search(samples, &SearchOptions { extent_m, ..options.clone() }, progress) {
+            Ok(found) => front = front.union(found.front()),
+            Err(SearchError::TooFewParts { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    if front.points.is_empty() { Err(SearchError::TooFewParts { max_parts: options.max_parts }) } else { Ok(front) }
+}
+
+fn check(samples: &[Sample<'_>]) -> Result<(), SearchError> {
+    if samples.is_empty() {
+        return Err(SearchError::NoGarment);
+    }
+    for (garment, s) in (1..).zip(samples) {
+        let expected = s.mesh.vertex_count();
+        for (what, found) in [("the distances", s.distances_m.len()), ("the displacement", s.displacement.len())] {
+            if found != expected {
+                return Err(SearchError::Length { garment, what, found, expected });
+            }
+        }
+        if !(s.weight.is_finite() && s.weight > 0.0) {
+            return Err(SearchError::Weight { garment, found: s.weight });
+        }
+        let finite = |(d, u): (&f64, &DVec3)| d.is_finite() && u.is_finite();
+        if let Some(vertex) = s.distances_m.iter().zip(s.displacement).position(|pair| !finite(pair)) {
+            return Err(SearchError::NotFinite { garment, vertex });
+        }
+    }
+    Ok(())
+}

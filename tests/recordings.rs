@@ -1,0 +1,359 @@
+//! What a recording holds, and what happens where it cannot be written.
+//!
+//! With `PARTWISE_KEEP=FOLDER` the recordings stay there to be looked at.
+#![cfg(feature = "viewer")]
+
+mod scene;
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+
+use partwise::record::{
+    Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
+    When, inspect, paths, web,
+};
+use scene::{PAPER_LIKE, Scene, Solved};
+
+/// A folder that goes away with the test, or the one asked for.
+struct Folder {
+    path: PathBuf,
+    _temporary: tempfile::TempDir,
+}
+
+impl Folder {
+    fn new() -> Self {
+        let temporary = tempfile::tempdir().unwrap();
+        let path = std::env::var_os("PARTWISE_KEEP").map_or_else(|| temporary.path().to_owned(), Into::into);
+        Self { path, _temporary: temporary }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+}
+
+fn options(path: &Path, layout: Layout) -> RecordOptions {
+    RecordOptions {
+        sinks: vec![Sink::File(path.to_owned())],
+        name: "flared dress".into(),
+        layout,
+        ..RecordOptions::default()
+    }
+}
+
+fn step<'a>(index: i64, scene: &'a Scene, solved: &'a Solved, overlays: &'a [Overlay<'a>]) -> StepView<'a> {
+    StepView {
+        index,
+        distance_m: &scene.distance_m,
+        part_of_vertex: &solved.part_of_vertex,
+        part_force_n: &solved.part_force_n,
+        draped: &scene.draped,
+        panel: &solved.panel,
+        scalars: &[],
+        overlays,
+    }
+}
+
+fn record_one(path: &Path, fineness: u32) -> RecordSummary {
+    let scene = Scene::new(fineness);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(options(path, Layout::default())).unwrap();
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    recorder.finish().unwrap()
+}
+
+#[test]
+fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
+    let folder = Folder::new();
+    let path = folder.file("one.rrd");
+    let summary = record_one(&path, 2);
+    assert_eq!(summary.path.as_deref(), Some(path.as_path()));
+    assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
+    let contents = inspect::read(&path).unwrap();
+    assert_eq!(contents.recordings, 1);
+    for wanted in paths::ALWAYS {
+        assert!(contents.entities.contains_key(wanted), "{wanted} is missing of {:?}", contents.entities.keys());
+    }
+    for wanted in ["/viewport", "/time_panel", "/selection_panel", "/blueprint_panel"] {
+        assert!(contents.blueprint.contains(wanted), "{wanted} is missing of {:?}", contents.blueprint);
+    }
+    let eyes = contents.blueprint.iter().filter(|p| p.ends_with("/EyeControls3D")).count();
+    assert_eq!(eyes, 4, "one eye a stage");
+    for mesh in [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::DRAPE] {
+        let components = &contents.entities[mesh].components;
+        assert!(components.contains("Mesh3D:vertex_normals"), "{mesh} would be drawn unlit: {components:?}");
+        assert!(components.contains("Mesh3D:triangle_indices"), "{mesh}");
+    }
+    let timelines = &contents.entities[paths::DRAPE].timelines;
+    assert!([paths::TABLE, paths::STAGE].iter().all(|&t| timelines.contains(t)), "{timelines:?}");
+    assert!(contents.entities[paths::BODY].timelines.is_empty(), "the body is logged once for all");
+    let all = contents.entities.values().flat_map(|e| &e.timelines);
+    assert!(all.clone().all(|t| t == paths::TABLE || t == paths::STAGE), "{:?}", all.collect::<Vec<_>>());
+}
+
+#[test]
+fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
+    let folder = Folder::new();
+    let scene = Scene::new(2);
+    let tables: Vec<(String, Vec<f64>)> = [1.0, 0.7, 0.4, 1.6]
+        .iter()
+        .map(|&f| (format!("Table 3 × {f}"), PAPER_LIKE.iter().map(|b| b * f).collect()))
+        .chain([("three levels".to_owned(), vec![2.0, 9.0])])
+        .collect();
+    let record = |name: &str, count: usize| {
+        let layout = Layout {
+            several_tables: count > 1,
+            error: true,
+            compare: tables.iter().take(4).map(|(name, _)| name.clone()).collect(),
+            scatter: true,
+            opens_on: match name {
+                "sweep-side.rrd" => Tab::SideBySide,
+                "sweep-numbers.rrd" => Tab::Numbers,
+                _ => Tab::Stages,
+            },
+            ..Layout::default()
+        };
+        let mut recorder = Recorder::open(options(&folder.file(name), layout)).unwrap();
+        recorder.body(0, &scene.body).unwrap();
+        recorder.garment(0, &scene.garment).unwrap();
+        let mut points = Vec::new();
+        for (i, (name, bounds)) in tables.iter().take(count).enumerate() {
+            let mut solved = scene.solve(name, bounds);
+            let ms = 1.0 + 0.9 * i as f64;
+            solved.panel.timings_ms[3].1 = ms;
+            let error: Vec<f64> = scene.distance_m.iter().map(|d| 1e3 * d / ms).collect();
+            let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len() as f64).sqrt();
+            let overlays = [Overlay { name: "error", unit: "mm", values: &error }];
+            let scalars = [("error/rms_mm", rms)];
+            recorder.step(&StepView { scalars: &scalars, ..step(i as i64, &scene, &solved, &overlays) }).unwrap();
+            let caption = format!("{} PARTs · {ms:.1} ms · {rms:.0} mm", solved.part_force_n.len());
+            let (draped, part_of_vertex) = (&scene.draped, &solved.part_of_vertex);
+            if i < 4 {
+                let chosen = Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, overlay: None };
+                recorder.compare(&chosen).unwrap();
+            }
+            points.push(ScatterPoint { label: name, ms, error_mm: rms, group: 0, named: true });
+        }
+        recorder.scatter(When::Table(0), &points).unwrap();
+        recorder.finish().unwrap()
+    };
+    let one = record("sweep-one.rrd", 1);
+    let five = record("sweep.rrd", 5);
+    if std::env::var_os("PARTWISE_KEEP").is_some() {
+        record("sweep-side.rrd", 5);
+        record("sweep-numbers.rrd", 5);
+    }
+    let contents = inspect::read(&five.path.unwrap()).unwrap();
+    for fixed in [paths::BODY, paths::GARMENT, paths::PARTS, paths::DRAPE, "/error/garment"] {
+        assert!(contents.entities[fixed].components.contains("Mesh3D:triangle_indices"), "{fixed}");
+    }
+    assert_eq!(contents.entities[paths::BODY].fixed_rows, 1);
+    assert_eq!(contents.entities[paths::DISTANCE].rows, 1, "the distance is the same for every table");
+    for path in ["/numbers/part_count", "/numbers/ms/mechanics", "/numbers/error/rms_mm", paths::ROWS] {
+        assert!(contents.entities[path].timelines.contains(paths::TABLE), "{path}");
+    }
+    for slot in 0..4 {
+        assert!(contents.entities.contains_key(&format!("{}/{slot}/garment", paths::COMPARE)));
+    }
+    assert!(contents.entities.contains_key("/scatter/points"));
+    // A vertex of a further table costs its drape (24 bytes) and colours; triangles and positions as loaded are 24 + 24
+    // for each of five meshes and thirteen times that for the cells, and must not come again.
+    let per_vertex = (five.raw_bytes - one.raw_bytes) / (4 * scene.garment.positions.len() as u64);
+    assert!(per_vertex < 700, "{per_vertex} bytes a vertex and table");
+    assert!(five.bytes as f64 <= 1.3 * five.raw_bytes as f64, "{} of {} bytes", five.bytes, five.raw_bytes);
+}
+
+#[test]
+fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
+    let folder = Folder::new();
+    let scene = Scene::new(2);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let fit = vec!["strain".to_owned(), "pressure".to_owned()];
+    let layout = Layout { iterations: true, fit, opens_on: Tab::Fit, ..Layout::default() };
+    let mut recorder = Recorder::open(options(&folder.file("solver.rrd"), layout)).unwrap();
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    for i in 0..40 {
+        let left = 0.8f64.powi(i);
+        let mix = |(&a, &b): (&glam::DVec3, &glam::DVec3)| a.lerp(b, 1.0 - left);
+        let at: Vec<glam::DVec3> = scene.garment.positions.iter().zip(&scene.draped).map(mix).collect();
+        recorder.iteration(i.into(), 2.0 + left, left, (i % 4 == 0).then_some(at.as_slice())).unwrap();
+    }
+    let strain: Vec<f64> = scene.draped.iter().map(|p| 8.0 * (1.4 - p.z).max(0.0)).collect();
+    let pressure: Vec<f64> = scene.distance_m.iter().map(|d| (0.02 - d).max(0.0) * 60.0).collect();
+    let overlays = [
+        Overlay { name: "strain", unit: "%", values: &strain },
+        Overlay { name: "pressure", unit: "kPa", values: &pressure },
+    ];
+    recorder.step(&step(0, &scene, &solved, &overlays)).unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    for path in [paths::ENERGY, paths::RESIDUAL] {
+        assert_eq!(contents.entities[path].rows, 40);
+        assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);
+    }
+    assert!(contents.entities[paths::DRAPE].timelines.contains(paths::ITERATION));
+    for name in ["strain", "pressure"] {
+        for leaf in ["garment", "legend/bar", "legend/ticks"] {
+            assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");
+        }
+    }
+}
+
+#[test]
+fn a_watched_recording_takes_new_steps_and_new_meshes() {
+    let folder = Folder::new();
+    let (small, large) = (Scene::new(1), Scene::new(2));
+    let mut options = options(&folder.file("watched.rrd"), Layout { several_tables: true, ..Layout::default() });
+    options.replaceable = true;
+    let mut recorder = Recorder::open(options).unwrap();
+    for (index, scene) in [&small, &small, &large].into_iter().enumerate() {
+        let index = index as i64;
+        let solved = scene.solve("Table 3", &PAPER_LIKE);
+        recorder.body(index, &scene.body).unwrap();
+        recorder.garment(index, &scene.garment).unwrap();
+        recorder.step(&step(index, scene, &solved, &[])).unwrap();
+    }
+    recorder.notice(2, "table.toml, line 4: upper value 3 below lower value 5").unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    assert_eq!(contents.entities[paths::BODY].rows, 1, "the body stayed");
+    assert_eq!(contents.entities[paths::GARMENT].rows, 2, "the garment changed once");
+    assert_eq!(contents.entities[paths::DRAPE].fixed_rows, 0, "what is static cannot be replaced at a step");
+    assert_eq!(contents.entities[paths::REPORT].rows, 4, "three steps and the message");
+}
+
+/// A port somebody else listens on, for as long as the listener lives.
+fn taken_port() -> (TcpListener, u16) {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    (listener, port)
+}
+
+fn refused(sinks: Vec<Sink>) -> RecordError {
+    Recorder::open(RecordOptions { sinks, ..RecordOptions::default() }).err().expect("it must not open")
+}
+
+#[test]
+fn without_a_sink_nothing_is_made() {
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(RecordOptions::default()).unwrap();
+    assert!(!recorder.is_enabled());
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    assert_eq!(recorder.finish().unwrap(), RecordSummary::default());
+}
+
+#[test]
+fn a_recording_that_is_not_finished_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("half.rrd");
+    let mut recorder = Recorder::open(options(&path, Layout::default())).unwrap();
+    recorder.body(0, &Scene::new(1).body).unwrap();
+    drop(recorder);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_step_that_does_not_fit_the_garment_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    let mut recorder = Recorder::open(options(&folder.path().join("x.rrd"), Layout::default())).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    let short = StepView { draped: &scene.draped[1..], ..step(0, &scene, &solved, &[]) };
+    let error = recorder.step(&short).unwrap_err();
+    let count = scene.draped.len();
+    assert!(error.to_string().contains(&format!("{} values for {count} vertices", count - 1)), "{error}");
+}
+
+#[test]
+fn an_unwritable_path_is_the_users_mistake_and_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a-file");
+    std::fs::write(&file, "no folder").unwrap();
+    for path in [file.join("x.rrd"), folder.path().to_owned(), PathBuf::from("/proc/none/x.rrd")] {
+        let error = refused(vec![Sink::File(path.clone())]);
+        assert!(matches!(error, RecordError::Unwritable { .. }), "{error}");
+        assert!(error.is_users());
+        assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+    }
+}
+
+#[test]
+fn a_port_in_use_is_named_and_no_file_is_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_listener, port) = taken_port();
+    let serve = |web_port, grpc_port| Sink::Serve { web_port, grpc_port };
+    for (sink, option) in [(serve(Some(port), None), "--web-port"), (serve(None, Some(port)), "--grpc-port")] {
+        let error = refused(vec![Sink::File(folder.path().join("x.rrd")), sink]);
+        assert!(matches!(error, RecordError::PortInUse { .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.contains(&port.to_string()) && text.contains(option), "{text}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn a_viewer_that_is_not_there_is_said_before_anything_is_computed() {
+    let (listener, port) = taken_port();
+    drop(listener);
+    let url = format!("rerun+http://127.0.0.1:{port}/proxy");
+    let error = refused(vec![Sink::Connect(url.clone())]);
+    assert!(matches!(error, RecordError::Unreachable { .. }), "{error}");
+    assert!(error.to_string().contains(&url), "{error}");
+    let error = refused(vec![Sink::Connect("127.0.0.1".into())]);
+    assert!(matches!(error, RecordError::BadUrl { .. }), "{error}");
+}
+
+#[test]
+fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.rrd");
+    let serve = Sink::Serve { web_port: None, grpc_port: None };
+    let mut both = options(&path, Layout { follow: true, ..Layout::default() });
+    both.sinks.push(serve);
+    let mut recorder = Recorder::open(both).unwrap();
+    let url = recorder.web_url().unwrap().to_owned();
+    assert!(url.starts_with("http://127.0.0.1:") && url.contains("?url=rerun%2Bhttp"), "{url}");
+    let scene = Scene::new(1);
+    let solved = scene.solve("Table 3", &PAPER_LIKE);
+    recorder.body(0, &scene.body).unwrap();
+    recorder.garment(0, &scene.garment).unwrap();
+    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
+    let page = get(&url);
+    assert!(page.contains("200 OK") && page.contains("<html"), "{page}");
+    recorder.finish().unwrap();
+    assert!(inspect::read(&path).unwrap().entities.contains_key(paths::DRAPE));
+}
+
+#[test]
+fn any_recording_is_served_and_what_is_none_is_refused() {
+    let folder = Folder::new();
+    let path = folder.file("viewed.rrd");
+    record_one(&path, 1);
+    let served = web::serve_file(&path, None, None).unwrap();
+    assert!(served.messages() > 20);
+    assert!(get(served.url()).contains("200 OK"));
+    for (name, content) in [("text.rrd", "not a recording"), ("empty.rrd", "")] {
+        let other = folder.file(name);
+        std::fs::write(&other, content).unwrap();
+        let error = web::serve_file(&other, None, None).err().unwrap();
+        assert!(matches!(error, RecordError::NotARecording { .. }), "{error}");
+    }
+    let error = web::serve_file(&folder.file("none.rrd"), None, None).err().unwrap();
+    assert!(matches!(error, RecordError::Unreadable { .. }), "{error}");
+}
+
+/// The answer to one HTTP request, headers and all.
+fn get(url: &str) -> String {
+    use std::io::{Read as _, Write as _};
+    let (host, path) = url.trim_start_matches("http://").split_once('/').unwrap();
+    let mut stream = std::net::TcpStream::connect(host).unwrap();
+    write!(stream, "GET /{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}

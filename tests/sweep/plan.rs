@@ -1,0 +1,211 @@
+//! Sweep files: points, their order and ids, and what bad ones are told.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use partwise::sweep::{Plan, Refine, TableRule};
+
+fn parse(text: &str) -> Plan {
+    Plan::parse(text, "s.toml", Path::new("")).unwrap()
+}
+
+fn message(text: &str) -> String {
+    Plan::parse(text, "s.toml", Path::new("")).unwrap_err().to_string()
+}
+
+#[test]
+fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
+    let plan = parse(
+        r#"
+        name = "order"
+        [base]
+        refine = "converged"
+        [grid]
+        seeds = [3, 1]
+        garments = ["flared-skirt", "pullover-1"]
+        sizes = [900, 500]
+        tables = [{ scale = [2, 0.5] }]
+        [[points]]
+        table = { quantile = 7 }
+        extent_cm = [12, 6]
+        options = { rest = "texture", contact_cm = 0.5 }
+        "#,
+    );
+    let found: Vec<_> =
+        plan.points.iter().map(|p| (p.garment.label.as_str(), p.table.label.as_str(), p.seed)).collect();
+    let skirt = |table, seed| ("flared-skirt@900", table, seed);
+    assert_eq!(
+        found[..5],
+        [
+            skirt("table-3 x2", 3),
+            skirt("table-3 x2", 1),
+            skirt("table-3 x0.5", 3),
+            skirt("table-3 x0.5", 1),
+            ("flared-skirt@500", "table-3 x2", 3)
+        ]
+    );
+    assert_eq!(found[15], ("pullover-1@500", "table-3 x0.5", 1));
+    let last = &plan.points[16];
+    assert_eq!(
+        (last.options_text().as_str(), last.options["rest"].as_str()),
+        ("contact_cm=0.5 rest=texture", "texture")
+    );
+    assert_eq!(
+        (last.refine, last.extent_text().as_str(), &last.table.rule),
+        (Refine::Converged, "12>6", &TableRule::Quantile { levels: 7 })
+    );
+    assert!(plan.points.iter().enumerate().all(|(i, p)| p.index == i && p.refine == Refine::Converged));
+    let ids: BTreeSet<_> = plan.points.iter().map(|p| &p.id).collect();
+    assert_eq!((ids.len(), plan.repeats, plan.warm_up), (17, 1, 0));
+}
+
+#[test]
+fn the_papers_sizes_go_by_name() {
+    let plan =
+        parse("name = \"n\"\n[grid]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nsizes = [\"smaller\", \"larger\"]");
+    let found: Vec<_> = plan.points.iter().map(|p| p.garment.label.as_str()).collect();
+    assert_eq!(found, ["flared-skirt@3613", "flared-skirt@3920", "pullover-1@4710", "pullover-1@5103"]);
+}
+
+#[test]
+fn points_of_one_garment_and_body_share_a_scene() {
+    let plan = parse(
+        "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { a = 1 }]",
+    );
+    let scenes: BTreeSet<_> = plan.points.iter().map(partwise::sweep::Point::scene_id).collect();
+    assert_eq!((plan.points.len(), scenes.len()), (24, 8));
+}
+
+#[test]
+fn equal_points_are_left_out_and_said() {
+    let plan =
+        parse("name = \"n\"\n[grid]\ntables = [\"table-3\", { scale = [1, 2] }]\nextents_cm = [0, \"none\", 0.0, 5]");
+    assert_eq!(plan.points.len(), 4);
+    assert_eq!(plan.notes.len(), 8);
+    assert!(plan.notes[2].contains("the same as point 0") && plan.notes[2].contains("table-3 x1"), "{:?}", plan.notes);
+}
+
+#[test]
+fn ids_are_made_of_contents_not_of_names_or_timings() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.obj", "v 0 0 0");
+    write("b.obj", "v 0 0 0");
+    write("t.toml", "name = \"t\"\nunit = \"cm\"\nlevels = [[0, 1], [1, inf]]");
+    write("u.toml", "# the same\nname = \"u\"\nunit = \"cm\"\nlevels = [[0.0, 1.0], [1.0, inf]]");
+    let id = |text: &str| {
+        let plan = Plan::parse(&format!("name = \"n\"\n{text}\n[[points]]"), "s.toml", folder.path()).unwrap();
+        plan.points[0].id.clone()
+    };
+    assert_eq!(id("[base]\ngarment = \"a.obj\""), id("repeats = 9\nwarm_up = 2\n[base]\ngarment = \"b.obj\""));
+    assert_eq!(id("[base]\ntable = \"t.toml\""), id("[base]\ntable = \"u.toml\""));
+    assert_eq!(id("[base]\nbody = { bust = 92 }"), id("[base]\nbody = { bust = 92.0, name = \"x\", of = \"form\" }"));
+    write("w.toml", "bust_cm = 92");
+    assert_eq!(id("[base]\nbody = { bust = 92 }"), id("[base]\nbody = \"w.toml\""));
+    assert_eq!(id("[base]\nbody = { waist = 75, of = \"w.toml\" }"), id("[base]\nbody = { bust = 92, waist = 75 }"));
+    assert_eq!(id("[base]\ntable = { levels = 38 }").len(), 32);
+    let before = id("[base]\ngarment = \"a.obj\"");
+    write("a.obj", "v 0 0 1");
+    let ids = [
+        before,
+        id("[base]\ngarment = \"a.obj\""),
+        id(""),
+        id("[base]\nseed = 1"),
+        id("[base]\noptions = { a = 1 }"),
+        id("[base]\nbody = { bust = 93 }"),
+    ];
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), 6);
+}
+
+#[test]
+fn table_entries_make_the_tables_they_say() {
+    let plan = parse(
+        r#"
+        name = "tables"
+        [grid]
+        tables = ["table-3", { levels = [5, 38], scale = [0.5, 2] }, { geometric = 4, first_cm = 1, last_cm = 4 }, { quantile = 3, name = "thirds" }]
+        "#,
+    );
+    let distances: Vec<f64> = (0..300).map(|i| 0.0003 * f64::from(i)).collect();
+    let made: Vec<_> = plan.points.iter().map(|p| p.table.resolve(&distances).unwrap()).collect();
+    let names: Vec<_> = made.iter().map(|t| (t.name.as_str(), t.levels.len())).collect();
+    assert_eq!(
+        names,
+        [
+            ("table-3", 19),
+            ("table-3 5 levels x0.5", 5),
+            ("table-3 5 levels x2", 5),
+            ("table-3 38 levels x0.5", 38),
+            ("table-3 38 levels x2", 38),
+            ("geometric 4 1-4 cm", 4),
+            ("thirds", 3),
+        ]
+    );
+    assert_eq!(made[5].levels.iter().map(|l| l.upper_cm).collect::<Vec<_>>(), [1.0, 2.0, 4.0, f64::INFINITY]);
+    assert!(plan.points[6].table.resolve(&[]).is_err());
+}
+
+#[test]
+fn bad_files_are_told_where_what_and_what_to_do() {
+    let point = "name = \"n\"\n[[points]]\n";
+    let grid = "name = \"n\"\n[grid]\n";
+    for (text, start, words) in [
+        ("name = 3".to_owned(), "s.toml:1: ", "expected a string"),
+        ("nom = \"x\"".to_owned(), "s.toml:1: ", "nom"),
+        (format!("{point}colour = 1"), "s.toml:3: ", "colour"),
+        (format!("{grid}table = \"table-3\""), "s.toml:3: ", "tables"),
+        (format!("{grid}tables = \"table-3\""), "s.toml:3: ", "sequence"),
+        (format!("{grid}tables = []"), "s.toml:3: tables: found an empty list", "at least one"),
+        (format!("{grid}seeds = [\n1,\n-2]"), "s.toml:5: seed: found -2", "whole number"),
+        (format!("{grid}tables = [\"table-3\",\n{{ scael = 2 }}]"), "s.toml:4: table: found", "scael"),
+        (format!("{point}table = \"table-4\""), "s.toml:3: table: found \"table-4\"", "\"table-3\", a file"),
+        (
+            format!("{point}table = {{ scale = 0 }}"),
+            "s.toml:3: table: the factor of a scaled table: found 0",
+            "positive",
+        ),
+        (format!("{point}table = {{ scale = [1, 2] }}"), "s.toml:3: table: found", "[grid] as tables"),
+        (format!("{point}table = {{ quantile = 3, scale = 2 }}"), "s.toml:3: table: found", "quantile"),
+        (format!("{point}table = {{ quantile = 0 }}"), "s.toml:3: table: found", "at least 1"),
+        (
+            format!("{point}table = {{ geometric = 2 }}"),
+            "s.toml:3: table: the number of levels of a geometric table: found 2",
+            "at least 3",
+        ),
+        (format!("{point}table = \"no/such.toml\""), "s.toml:3: no/such.toml: cannot be read", "folder"),
+        (format!("{point}garment = \"no.obj\""), "s.toml:3: no.obj: cannot be read", "folder"),
+        (format!("{point}garment = \"flared-skirt@900\"\nsize = 800"), "s.toml:4: size: found 800", "skirt@900"),
+        (format!("{point}garment = \"sari\""), "s.toml:3: garment: there is no garment", "flared-skirt"),
+        (format!("{point}garment = \"flared-skirt@many\""), "s.toml:3: garment: ", "no number of vertices"),
+        (format!("{point}fabric = \"steel\""), "s.toml:3: fabric: no fabric is called `steel`", "jersey"),
+        (format!("{point}fabric = \"no/steel.toml\""), "s.toml:3: no/steel.toml: cannot be read", "folder"),
+        (format!("{point}model = \"rubber\""), "s.toml:3: model: found \"rubber\"", "coupled"),
+        (format!("{point}extent_cm = [3, 6]"), "s.toml:3: extent_cm: found [3, 6]", "falling"),
+        (format!("{point}extent_cm = -1"), "s.toml:3: extent_cm: found -1", "none"),
+        (format!("{point}refine = \"fully\""), "s.toml:3: refine: found \"fully\"", "converged"),
+        (format!("{point}min_part = 0"), "s.toml:3: min_part: found 0", "1 for"),
+        (format!("{point}body = {{ bust = \"wide\" }}"), "s.toml:3: body: found", "centimetres"),
+        (format!("{point}options = {{ a = [1] }}"), "s.toml:3: options: found", "name = value"),
+        (format!("{point}body = {{ chest = 92 }}"), "s.toml:3: body: the spec", "chest"),
+        (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
+        (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),
+        ("name = \"n\"\nrepeats = 0\n[grid]".to_owned(), "s.toml:2: repeats: found 0", "at least 1"),
+        ("name = \"n\"".to_owned(), "s.toml: found no points", "[grid]"),
+    ] {
+        let said = message(&text);
+        assert!(said.starts_with(start) && said.contains(words), "{text}\n-> {said}");
+    }
+    let axis = (0..1001).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
+    let said = message(&format!("{grid}seeds = [{axis}]\nrefine = [{axis}]"));
+    assert!(said.contains("found 1002001 points"), "{said}");
+}
+
+#[test]
+fn the_sweeps_that_come_along_are_sound() {
+    for (file, count) in [("table-3-variations", 50), ("extents-and-refinement", 49), ("tables-by-kind", 52)] {
+        let plan = Plan::read(Path::new(&format!("assets/sweeps/{file}.toml"))).unwrap();
+        assert_eq!((plan.points.len(), plan.notes.len()), (count, 0), "{file}: {:?}", plan.notes);
+        assert!(plan.about.contains(&format!("= {count} points")), "{file}");
+    }
+}

@@ -1,0 +1,204 @@
+//! The table search: against every table there is on a small garment, and against stage one itself on a larger one.
+#![allow(clippy::unwrap_used)] // in what the tests share, too
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::DVec3;
+use partwise::mesh::{Topology, TriMesh};
+use partwise::parts::{Parts, representable_rms_m, segment};
+use partwise::range_table::RangeTable;
+use partwise::table_search::{Front, Sample, SearchError, SearchOptions, search, search_extents};
+use proptest::prelude::*;
+
+/// A sheet of `w` by `h` vertices, 2 cm apart.
+fn sheet(w: usize, h: usize) -> TriMesh {
+    let at = |i: usize, j: usize| (j * w + i) as u32;
+    let positions = (0..w * h).map(|v| DVec3::new(0.02 * (v % w) as f64, 0.02 * (v / w) as f64, 0.0)).collect();
+    let quad = |i: usize, j: usize| {
+        let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+        if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+    };
+    TriMesh::new(positions, (0..h - 1).flat_map(|j| (0..w - 1).flat_map(move |i| quad(i, j))).collect())
+}
+
+/// A sheet with distances and displacements that wave at different rates.
+struct Wavy {
+    mesh: TriMesh,
+    topology: Topology,
+    distances: Vec<f64>,
+    displacement: Vec<DVec3>,
+}
+
+impl Wavy {
+    fn new(w: usize, h: usize, phase: f64) -> Self {
+        let mesh = sheet(w, h);
+        let topology = Topology::new(&mesh);
+        let distance = |x: &DVec3| 0.05 + 0.2 * x.y + 0.01 * (40.0 * x.x + phase).sin();
+        let moved = |x: &DVec3| {
+            let fold = 0.05 * (25.0 * x.x + 10.0 * x.y + phase).cos();
+            DVec3::new(fold, 0.3 * fold, -0.1 * x.y * x.y)
+        };
+        let distances = mesh.positions.iter().map(distance).collect();
+        let displacement = mesh.positions.iter().map(moved).collect();
+        Self { mesh, topology, distances, displacement }
+    }
+
+    fn sample(&self, weight: f64) -> Sample<'_> {
+        let Self { mesh, topology, distances, displacement } = self;
+        Sample { mesh, topology, distances_m: distances, displacement, weight }
+    }
+
+    fn parts(&self, table: &RangeTable, extent_m: Option<f64>) -> Parts {
+        let parts = segment(&self.topology, &self.distances, table);
+        extent_m.map_or_else(|| parts.clone(), |e| parts.cut_to_extent(&self.mesh, &self.topology, e))
+    }
+}
+
+fn is_a_front(front: &Front) {
+    assert!(front.points.windows(2).all(|w| w[0].parts < w[1].parts && w[0].rms_m > w[1].rms_m));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn the_front_is_that_of_all_tables(
+        distances in prop::collection::vec(0u32..9, 20),
+        moves in prop::collection::vec(-1.0f64..1.0, 60),
+        extent in prop::option::of(0.03f64..0.1),
+    ) {
+        let mesh = sheet(5, 4);
+        let topology = Topology::new(&mesh);
+        let distances: Vec<f64> = distances.iter().map(|&d| 0.01 * f64::from(d)).collect();
+        let displacement: Vec<DVec3> = moves.chunks(3).map(DVec3::from_slice).collect();
+        let sample =
+            Sample { mesh: &mesh, topology: &topology, distances_m: &distances, displacement: &displacement, weight: 2.5 };
+        let options = SearchOptions { extent_m: extent, include: Vec::new(), rounds: 1, ..SearchOptions::new(14) };
+        let found = search(&[sample], &options, &|_| {});
+
+        // Up to eight bounds between nine values: 256 tables.
+        let mut best = [f64::INFINITY; 15];
+        for mask in 0u32..256 {
+            let inner: Vec<f64> = (0..8).filter(|b| mask >> b & 1 == 1).map(|b| 0.5 + f64::from(b)).collect();
+            let parts = segment(&topology, &distances, &RangeTable::from_inner_bounds("all", &inner).unwrap());
+            let parts = extent.map_or_else(|| parts.clone(), |e| parts.cut_to_extent(&mesh, &topology, e));
+            if parts.len() <= 14 {
+                let rms = representable_rms_m(&parts, &displacement);
+                best[parts.len()] = rms.min(best[parts.len()]);
+            }
+        }
+        let mut expected = Vec::new();
+        for (parts, &rms) in best.iter().enumerate() {
+            if rms < expected.last().map_or(f64::INFINITY, |&(_, r): &(usize, f64)| r - 1e-12) {
+                expected.push((parts, rms));
+            }
+        }
+        if expected.is_empty() {
+            let refused = matches!(found, Err(SearchError::TooFewParts { max_parts: 14 }));
+            prop_assert!(refused);
+            return Ok(());
+        }
+        let found = found.unwrap();
+        is_a_front(found.front());
+        prop_assert_eq!(found.front().points.len(), expected.len());
+        for (point, (parts, rms)) in found.front().points.iter().zip(expected) {
+            prop_assert_eq!(point.parts, parts);
+            prop_assert!((point.rms_m - rms).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn every_point_is_what_stage_one_makes_of_its_table() {
+    let (a, b) = (Wavy::new(31, 24, 0.0), Wavy::new(17, 28, 1.3));
+    for extent_m in [None, Some(0.1)] {
+        let max_parts = if extent_m.is_some() { 400 } else { 120 };
+        let options = SearchOptions { candidates: 40, extent_m, ..SearchOptions::new(max_parts) };
+        let found = search(&[a.sample(1.0), b.sample(3.0)], &options, &|_| {}).unwrap();
+        is_a_front(found.front());
+        assert!(found.front().points.len() > 10);
+        for point in &found.front().points {
+            let table = point.table("found", "test").unwrap();
+            let cut = [&a, &b].map(|g| g.parts(&table, extent_m));
+            assert_eq!(cut[0].len() + cut[1].len(), point.parts);
+            let e = [(&a, &cut[0]), (&b, &cut[1])].map(|(g, parts)| representable_rms_m(parts, &g.displacement));
+            let rms = ((e[0] * e[0] + 3.0 * e[1] * e[1]) / 4.0).sqrt();
+            assert!((rms - point.rms_m).abs() < 1e-9, "{rms} {}", point.rms_m);
+        }
+    }
+}
+
+#[test]
+fn no_included_table_is_better_and_no_round_is_worse() {
+    let garment = Wavy::new(31, 24, 0.4);
+    let included = RangeTable::table_3().scaled(1.7).unwrap();
+    let parts = garment.parts(&included, None);
+    let rms = representable_rms_m(&parts, &garment.displacement);
+    let options = SearchOptions { candidates: 20, include: vec![included], ..SearchOptions::new(parts.len()) };
+    let found = search(&[garment.sample(1.0)], &options, &|_| {}).unwrap();
+    let best: Vec<f64> = found.rounds.iter().map(|f| f.best_within(parts.len()).unwrap().rms_m).collect();
+    assert!(best[0] <= rms);
+    assert!(best.windows(2).all(|w| w[1] <= w[0]));
+    assert!(best[2] < best[0], "rounds around the best table should find a better one: {best:?}");
+    let front = found.front();
+    let last = front.points.last().unwrap();
+    assert_eq!(front.coarsest_within(last.rms_m), Some(last));
+    assert_eq!(front.best_within(0), None);
+}
+
+#[test]
+fn extents_compete_on_one_front() {
+    let garment = Wavy::new(31, 24, 0.4);
+    let options = SearchOptions { candidates: 25, ..SearchOptions::with_extent(60, 0.2) };
+    let extents = [None, Some(0.01), Some(0.2), Some(0.3)];
+    let front = search_extents(&[garment.sample(1.0)], &options, &extents, &|_| {}).unwrap();
+    is_a_front(&front);
+    for &extent_m in &[None, Some(0.2), Some(0.3)] {
+        let alone = search(&[garment.sample(1.0)], &SearchOptions { extent_m, ..options.clone() }, &|_| {}).unwrap();
+        for point in &alone.front().points {
+            assert!(front.best_within(point.parts).unwrap().rms_m <= point.rms_m);
+        }
+    }
+    for point in &front.points {
+        let parts = garment.parts(&point.table("found", "test").unwrap(), point.extent_m);
+        assert_eq!(parts.len(), point.parts);
+        assert!((representable_rms_m(&parts, &garment.displacement) - point.rms_m).abs() < 1e-9);
+    }
+    let only = search_extents(&[garment.sample(1.0)], &options, &[Some(0.01)], &|_| {});
+    assert_eq!(only, Err(SearchError::TooFewParts { max_parts: 60 }));
+}
+
+#[test]
+fn threads_do_not_change_the_search_and_progress_counts_up() {
+    let garment = Wavy::new(25, 20, 0.0);
+    let run = |threads: usize, extent_m: Option<f64>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let calls = AtomicUsize::new(0);
+        let options = SearchOptions { candidates: 30, extent_m, ..SearchOptions::new(200) };
+        let found = pool.install(|| {
+            search(&[garment.sample(1.0)], &options, &|p| {
+                assert!(p.done <= p.total && p.round <= p.rounds);
+                calls.fetch_add(1, Ordering::Relaxed);
+            })
+        });
+        assert!(calls.into_inner() > 60);
+        format!("{:?}", found.unwrap())
+    };
+    for extent_m in [None, Some(0.08)] {
+        assert_eq!(run(1, extent_m), run(2, extent_m));
+    }
+}
+
+#[test]
+fn what_cannot_be_searched_is_refused() {
+    let garment = Wavy::new(5, 4, 0.0);
+    let refuse = |sample: Sample<'_>, max| search(&[sample], &SearchOptions::new(max), &|_| {}).unwrap_err();
+    assert_eq!(search(&[], &SearchOptions::new(5), &|_| {}), Err(SearchError::NoGarment));
+    let short = Sample { distances_m: &garment.distances[1..], ..garment.sample(1.0) };
+    assert!(matches!(refuse(short, 5), SearchError::Length { garment: 1, found: 19, expected: 20, .. }));
+    assert!(matches!(refuse(garment.sample(0.0), 5), SearchError::Weight { .. }));
+    assert_eq!(refuse(garment.sample(1.0), 0), SearchError::TooFewParts { max_parts: 0 });
+    let mut distances = garment.distances.clone();
+    distances[7] = f64::NAN;
+    let holed = Sample { distances_m: &distances, ..garment.sample(1.0) };
+    assert_eq!(refuse(holed, 5), SearchError::NotFinite { garment: 1, vertex: 7 });
+}
