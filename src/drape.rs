@@ -12,7 +12,7 @@ use crate::distance::{Body, SurfacePoint};
 use crate::fabric::Fabric;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mechanics::fit::{Fit, at_vertices, fit};
+use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::paper::{self, PaperError, PaperOptions, PartForces};
 use crate::mechanics::refine::{self, RefineOptions, Refined, SolveError, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -142,10 +142,8 @@ pub struct ClothState {
     pub stop: Stop,
     /// Every step, the start first.
     pub history: Vec<refine::Record>,
-    /// Strain per triangle and pressure per vertex.
+    /// Strain and pressure.
     pub fit: Fit,
-    /// Largest principal strain around each vertex, percent.
-    pub strain_percent: Vec<f64>,
 }
 
 /// What came out, stage by stage.
@@ -222,9 +220,8 @@ pub fn drape(
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
         Some((cloth, Refined { positions, energy, residual_over_weight, steps, history, stop })) => {
-            let fit = fit(&cloth, &positions, &cloth.contacts(&scene.body, &positions));
-            let strain_percent = at_vertices(&cloth, &fit.strain_percent);
-            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit, strain_percent }))
+            let fit = fit(&cloth, &scene.body, &positions);
+            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));

@@ -181,7 +181,7 @@ impl RunArgs {
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
         let mut overlays = Vec::new();
         if let Some(state) = &solved.drape.state {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &state.strain_percent });
+            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
             overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
         let mut scalars = Vec::new();

@@ -1,105 +1,107 @@
-//! Fit: how a garment pulls and presses where it is worn.
+//! Fit: how far the cloth is stretched and how hard it presses on the body, which is what people in try-on look for.
 //!
-//! Strain is the stretch along weft and warp, s_u = |F_u| − 1 and s_v = |F_v| − 1, and the principal stretch, the largest
-//! singular value of F less one, with F = [F_u F_v] the deformation gradient of a triangle. Pressure is the contact
-//! force of a vertex over its rest area, κ (h − q).
+//! The strain of a triangle is its largest principal one, σ₁ − 1, σ₁² being the larger eigenvalue of FᵀF, with F the
+//! deformation gradient from the rest shape. A vertex shows the mean of its triangles, weighted by their rest areas. The pressure at a
+//! vertex is the contact force κ A (h − q) over its rest area A.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | s_u, s_v | strain along weft and warp | percent |
-//! | p | pressure on the body | kPa |
+//! | F | deformation gradient, columns along weft and warp | – |
+//! | ε | largest principal strain | % outside, – inside |
+//! | p | contact pressure | kPa |
 //!
-//! Limits: pressure is taken where the vertices are; on a bony edge finer than the mesh it is a mean.
+//! Limits: strain that the mesh cannot show (wrinkles finer than an edge) is missing, and so is a negative strain across a
+//! fold. Pressure is that of the penalty at rest; it is smooth over about one edge.
 
 use glam::DVec3;
 
-use super::energy::{Cloth, Contacts};
+use super::energy::Cloth;
+use crate::distance::Body;
 
-/// What a try-on shows.
+/// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// Strain of each triangle along the weft, percent; negative where slack.
-    pub strain_weft_percent: Vec<f64>,
-    /// Strain of each triangle along the warp, percent.
-    pub strain_warp_percent: Vec<f64>,
-    /// Largest principal strain of each triangle, percent.
+    /// Largest principal strain, percent.
     pub strain_percent: Vec<f64>,
-    /// 95th percentile of the largest principal strains, by rest area, percent.
-    pub strain_p95_percent: f64,
-    /// Their maximum, percent.
-    pub strain_max_percent: f64,
-    /// Pressure of each vertex on the body, kPa; zero where it does not touch.
+    /// Contact pressure, kPa.
     pub pressure_kpa: Vec<f64>,
-    /// Greatest pressure, kPa.
+    /// 95th percentile over the triangles of the largest principal strain, percent.
+    pub strain_p95_percent: f64,
+    /// Its largest value, percent.
+    pub strain_max_percent: f64,
+    /// Largest contact pressure, kPa.
     pub pressure_max_kpa: f64,
 }
 
-/// The fit of `cloth` at positions `x` (m); `contacts` must have been updated there.
+/// Measures `cloth` on `body` at `x` (m).
 #[must_use]
-pub fn fit(cloth: &Cloth, x: &[DVec3], contacts: &Contacts) -> Fit {
-    let deformations: Vec<[DVec3; 2]> = cloth.triangles.iter().map(|t| t.deformation(x)).collect();
-    let percent = |stretch: f64| 100.0 * (stretch - 1.0);
-    let strain_percent: Vec<f64> = deformations.iter().map(|&[u, v]| percent(largest_stretch(u, v))).collect();
-    let mut by_strain: Vec<(f64, f64)> =
-        strain_percent.iter().copied().zip(cloth.triangles.iter().map(|t| t.area)).collect();
-    by_strain.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let whole: f64 = by_strain.iter().map(|(_, area)| area).sum();
-    let mut below = 0.0;
-    let p95 = by_strain.iter().find(|(_, area)| {
-        below += area;
-        below >= 0.95 * whole
-    });
+pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Fit {
+    let mut sum = vec![0.0; x.len()];
+    let mut area = vec![0.0; x.len()];
+    let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
+    for triangle in &cloth.triangles {
+        let strain = 100.0 * principal_strain(triangle.deformation(x));
+        strains.push(strain);
+        for v in triangle.vertices {
+            sum[v as usize] += strain * triangle.area;
+            area[v as usize] += triangle.area;
+        }
+    }
+    let strain_percent = sum.iter().zip(&area).map(|(s, a)| if *a > 0.0 { s / a } else { 0.0 }).collect();
     let mut pressure_kpa = vec![0.0; x.len()];
-    for touch in contacts.touches() {
+    for touch in cloth.contacts(body, x).touches() {
         let v = touch.vertex as usize;
         pressure_kpa[v] = 1e-3 * touch.force() / cloth.areas[v];
     }
+    strains.sort_by(f64::total_cmp);
+    let at = |share: f64| strains.get(((strains.len().max(1) - 1) as f64 * share).round() as usize).copied();
     Fit {
-        strain_weft_percent: deformations.iter().map(|[u, _]| percent(u.length())).collect(),
-        strain_warp_percent: deformations.iter().map(|[_, v]| percent(v.length())).collect(),
-        strain_p95_percent: p95.map_or(0.0, |(strain, _)| *strain),
-        strain_max_percent: by_strain.last().map_or(0.0, |(strain, _)| *strain),
+        strain_p95_percent: at(0.95).unwrap_or(0.0),
+        strain_max_percent: at(1.0).unwrap_or(0.0),
         pressure_max_kpa: pressure_kpa.iter().copied().fold(0.0, f64::max),
         strain_percent,
         pressure_kpa,
     }
 }
 
-/// Per vertex, the mean of a triangle quantity over the triangles at it, weighted by rest area; zero at a vertex of none.
+/// Largest singular value of the deformation gradient with these columns, less one.
 #[must_use]
-pub fn at_vertices(cloth: &Cloth, of_triangles: &[f64]) -> Vec<f64> {
-    let mut sum = vec![(0.0, 0.0); cloth.vertex_count()];
-    for (triangle, value) in cloth.triangles.iter().zip(of_triangles) {
-        for v in triangle.vertices {
-            let (total, area) = &mut sum[v as usize];
-            *total += value * triangle.area;
-            *area += triangle.area;
-        }
-    }
-    sum.into_iter().map(|(total, area)| if area > 0.0 { total / area } else { 0.0 }).collect()
-}
-
-/// Largest principal strain of a triangle with deformation gradient [u v]: its largest singular value, less one.
-#[must_use]
-pub fn principal_strain([u, v]: [DVec3; 2]) -> f64 {
-    largest_stretch(u, v) - 1.0
-}
-
-/// Largest singular value of [u v].
-fn largest_stretch(u: DVec3, v: DVec3) -> f64 {
-    let (a, b, c) = (u.length_squared(), v.length_squared(), u.dot(v));
-    (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt()
+pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
+    let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
+    (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt() - 1.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fabric::Fabric;
+    use crate::mesh::{RestShape, Topology, TriMesh};
+
+    /// A box of 1 m with its top at z = 0.
+    fn table() -> TriMesh {
+        let corner = |i: usize| DVec3::new((i & 1) as f64 - 0.5, (i >> 1 & 1) as f64 - 0.5, (i >> 2 & 1) as f64 - 1.0);
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        TriMesh::new((0..8).map(corner).collect(), triangles)
+    }
 
     #[test]
-    fn a_pure_shear_stretches_the_bias() {
-        // Weft and warp keep their length at 60 degrees to each other: the long diagonal stretches to √(1 + cos 60°).
-        let (u, v) = (DVec3::X, DVec3::new(0.5, 0.75f64.sqrt(), 0.0));
-        assert!((largest_stretch(u, v) - 1.5f64.sqrt()).abs() < 1e-12);
-        assert!((largest_stretch(DVec3::X * 1.1, DVec3::Y * 0.9) - 1.1).abs() < 1e-12);
+    fn a_stretched_sheet_pressed_on_a_table_reads_back() {
+        let flat = |s: f64, z: f64| {
+            let at = |x: f64, y: f64| DVec3::new(s * x, y, z);
+            vec![at(-0.1, -0.1), at(0.1, -0.1), at(0.1, 0.1), at(-0.1, 0.1)]
+        };
+        let mesh = TriMesh::new(flat(1.0, 0.1), vec![[0, 1, 2], [0, 2, 3]]);
+        let fabric = Fabric::by_name("jersey").unwrap();
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
+        let body = Body::new(&table()).unwrap();
+        let (depth, stretch) = (0.2e-3, 1.03);
+        let x = flat(stretch, cloth.offset - depth);
+        let fit = fit(&cloth, &body, &x);
+        assert!((fit.strain_p95_percent - 3.0).abs() < 1e-9, "{}", fit.strain_p95_percent);
+        assert!(fit.strain_percent.iter().all(|s| (s - 3.0).abs() < 1e-9));
+        let expected = 1e-3 * cloth.contacts(&body, &x).stiffness() * depth;
+        assert!(fit.pressure_kpa.iter().all(|p| (p - expected).abs() < 1e-9 * expected), "{:?}", fit.pressure_kpa);
     }
 }

@@ -1,4 +1,4 @@
-//! Strain and pressure where both are known.
+//! Pressure where it is known.
 
 use std::ops::ControlFlow;
 
@@ -23,19 +23,10 @@ fn a_cloth_at_rest_presses_with_its_weight() {
     let options = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
     let end = refine(&cloth, &body, mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(end.stop, Stop::Converged);
-    let fit_at_rest = fit(&cloth, &end.positions, &cloth.contacts(&body, &end.positions));
+    let fit_at_rest = fit(&cloth, &body, &end.positions);
     let expected_kpa = 1e-3 * 0.5 * GRAVITY;
     for p in &fit_at_rest.pressure_kpa {
         assert!((p / expected_kpa - 1.0).abs() < 1e-3, "{p} kPa for {expected_kpa}");
     }
     assert!(fit_at_rest.strain_max_percent < 1e-3);
-    // Stretched by 3 % along the weft (x: the cloth lies flat) and 1 % along the warp.
-    let pulled: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(1.03 * p.x, 1.01 * p.y, p.z)).collect();
-    let pulled = fit(&cloth, &pulled, &cloth.contacts(&body, &pulled));
-    let [mut low, mut high] = [pulled.strain_weft_percent[0], pulled.strain_warp_percent[0]];
-    if low > high {
-        std::mem::swap(&mut low, &mut high);
-    }
-    assert!((low - 1.0).abs() < 1e-9 && (high - 3.0).abs() < 1e-9, "{low} {high}");
-    assert!((pulled.strain_p95_percent - 3.0).abs() < 1e-9 && (pulled.strain_max_percent - 3.0).abs() < 1e-9);
 }
