@@ -50,7 +50,7 @@ impl ColourMap {
     /// Dark violet over red to pale yellow: forces.
     pub const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
     /// Pale grey over orange to dark red: errors, strains and pressures, where much is bad.
-    pub const ALARM: Self = Self { lightness: (0.90, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
+    pub const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
 
     /// The colour at `t` in 0–1; outside it the end's, and grey for what is not a number.
     #[must_use]
