@@ -1,6 +1,8 @@
 //! What a recording holds, and what happens where it cannot be written.
 //!
 //! With `PARTWISE_KEEP=FOLDER` the recordings stay there to be looked at.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 #![cfg(feature = "viewer")]
 
 mod scene;
