@@ -1,5 +1,6 @@
 //! What happens where a recording cannot go.
 #![cfg(feature = "viewer")]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
