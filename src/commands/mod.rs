@@ -3,6 +3,7 @@
 mod assets;
 mod check;
 mod console;
+mod cusick;
 mod failure;
 mod inputs;
 mod interrupt;
@@ -61,6 +62,8 @@ enum Command {
     Run(Box<run::RunArgs>),
     /// Report the health of a body and a garment, and how they lie about each other, without draping
     Check(Box<check::CheckArgs>),
+    /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
+    Cusick(cusick::CusickArgs),
     /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
@@ -74,6 +77,7 @@ pub(crate) fn main() -> ExitCode {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
+        Some(Command::Cusick(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };

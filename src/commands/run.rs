@@ -40,6 +40,9 @@ pub(crate) struct RunArgs {
     /// Solve again and stream the next step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
+    /// Leave the solver's steps out of the recording, for a small file
+    #[arg(long, help_heading = "Recording")]
+    no_iterations: bool,
     /// Measure the drape against its own continuation and the canonical drape; references are cached between runs
     #[arg(long, help_heading = "Stages")]
     accuracy: bool,
@@ -124,7 +127,7 @@ impl RunArgs {
             layout: Layout {
                 several_tables: self.watch,
                 follow: self.watch,
-                iterations: !self.watch && solved.snapshots.len() > 1,
+                iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.assessment.is_some(),
                 fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
                 ..Layout::default()
@@ -143,7 +146,7 @@ impl RunArgs {
         let mut snapshots = Vec::new();
         let drape = refining(name, |progress| {
             drape(&inputs.scene, &settings, &mut |step| {
-                let positions = (step.iteration % MESH_EVERY == 0).then(|| step.positions.to_vec());
+                let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
                 snapshots.push(Snapshot {
                     iteration: step.iteration,
                     energy: step.energy,
@@ -167,6 +170,10 @@ impl RunArgs {
             summary.assessed(assessment);
         }
         Ok(Solved { inputs, settings, drape, assessment, snapshots, summary })
+    }
+
+    fn records_iterations(&self) -> bool {
+        !self.watch && !self.no_iterations
     }
 
     fn cache(&self) -> Option<ReferenceCache> {
@@ -199,7 +206,7 @@ impl RunArgs {
             scalars: &scalars,
             overlays: &overlays,
         })?;
-        if !self.watch {
+        if self.records_iterations() {
             for s in &solved.snapshots {
                 let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);
                 recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
