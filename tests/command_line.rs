@@ -182,7 +182,7 @@ fn bad_tables_are_refused_by_file_and_row() {
         ("[[0.0, 1.0], [0.5, 2.0]]", "row 2"),
         ("[[-1.0, 1.0]]", "row 1"),
         ("[[0.0, nan]]", "row 1"),
-        ("[[0.0]]", "line 2"),
+        ("[[0.0]]", "t.toml:2"),
         ("[]", "level"),
     ] {
         bench.write("t.toml", &format!("name = \"t\"\nlevels = {levels}\nunit = \"cm\"\n"));
