@@ -227,9 +227,14 @@ impl Cloth {
         gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
     }
 
-    /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern). `before`: the positions
-    /// the last step was taken from, see [`Triangle::hessian`]; `None` for the Hessian at `x` itself.
-    pub fn hessian(&self, x: &[DVec3], before: Option<&[DVec3]>, contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+    /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
+    pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.hessian_after(None, x, contacts, blocks);
+    }
+
+    /// [`hessian`](Self::hessian) for the step after the one that led from `before` to `x`, with the stress which that
+    /// step predicted: see [`Triangle::hessian`].
+    pub fn hessian_after(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
         blocks.clear();
         blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {

@@ -85,7 +85,7 @@ pub fn refine_with(
             break Stop::StepsDone;
         }
         // After a step, `trial` holds the positions it was taken from.
-        cloth.hessian(&x, (iteration > 0).then_some(&trial), &contacts, &mut blocks);
+        cloth.hessian_after((iteration > 0).then_some(&trial), &x, &contacts, &mut blocks);
         let diagonal: Vec<f64> = masses.iter().map(|m| m * damping).collect();
         solver.factorise(&cloth.pattern, &blocks, &diagonal)?;
         direction.clear();
