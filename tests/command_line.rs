@@ -1,5 +1,7 @@
 //! The command line as a user meets it: what it prints, writes, refuses, and exits with.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use std::fs;
 use std::path::Path;
 use std::process::Output;

@@ -99,9 +99,9 @@ impl RunArgs {
                 console::note(&format!("look at it: {url}"));
             }
             if self.watch {
-                self.keep_watching(&mut recorder)?
+                self.keep_watching(&mut recorder)?;
             } else {
-                interrupt::wait()
+                interrupt::wait();
             }
             if let Some(path) = recorder.finish()?.path {
                 console::note(&format!("recording: {}", path.display()));
@@ -179,11 +179,10 @@ impl RunArgs {
         recorder.body(index, &scene.body_mesh)?;
         recorder.garment(index, &scene.garment)?;
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
-        let fit = solved.drape.state.as_ref().map(|s| &s.fit);
         let mut overlays = Vec::new();
-        if let Some(fit) = fit {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &fit.strain_percent });
-            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa });
+        if let Some(state) = &solved.drape.state {
+            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
+            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
         let mut scalars = Vec::new();
         if let Some(assessment) = &solved.assessment {

@@ -106,7 +106,7 @@ fn friction_gradient() {
 /// Checks ∇²E d against differences of ∇E, over the free vertices.
 fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
     let mut blocks = Vec::new();
-    cloth.hessian(x, contacts, &mut blocks);
+    cloth.hessian(x, None, contacts, &mut blocks);
     let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(i + 5000)).collect();
     let mut product = Vec::new();
     cloth.multiply(&blocks, &d, &mut product);
@@ -160,7 +160,7 @@ fn hessian_is_never_negative() {
             grazing(&mesh).iter().map(|p| DVec3::new(squeeze * p.x, p.y, (2.0 - squeeze) * p.z)).collect();
         let contacts = cloth.contacts(&body, &x);
         let mut blocks = Vec::new();
-        cloth.hessian(&x, &contacts, &mut blocks);
+        cloth.hessian(&x, None, &contacts, &mut blocks);
         for k in 0..40 {
             let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(100 * k + i)).collect();
             let mut product = Vec::new();

@@ -81,7 +81,7 @@ pub(super) fn settle(
         if history.last().is_some_and(|h| h.residual_over_weight < goal.tolerance) {
             break;
         }
-        cloth.hessian(&x, contacts, &mut blocks);
+        cloth.hessian(&x, None, contacts, &mut blocks);
         let diagonal: Vec<f64> = cloth.order.iter().map(|&v| cloth.masses[v as usize] * damping).collect();
         solver.factorise(&cloth.pattern, &blocks, &diagonal)?;
         direction.clear();

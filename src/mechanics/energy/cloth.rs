@@ -227,12 +227,13 @@ impl Cloth {
         gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
     }
 
-    /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
-    pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+    /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern). `before`: the positions
+    /// the last step was taken from, see [`Triangle::hessian`]; `None` for the Hessian at `x` itself.
+    pub fn hessian(&self, x: &[DVec3], before: Option<&[DVec3]>, contacts: &Contacts, blocks: &mut Vec<DMat3>) {
         blocks.clear();
         blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
-            let parts = t.hessian(&self.stiffness, x);
+            let parts = t.hessian(&self.stiffness, x, before);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
