@@ -8,6 +8,7 @@ mod failure;
 mod inputs;
 mod interrupt;
 mod measurements;
+mod readings;
 mod run;
 mod sinks;
 mod stages;
