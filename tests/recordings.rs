@@ -149,8 +149,8 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
     for fixed in [paths::BODY, paths::GARMENT, paths::PARTS, paths::DRAPE, "/error/garment"] {
         assert!(contents.entities[fixed].components.contains("Mesh3D:triangle_indices"), "{fixed}");
     }
-    assert_eq!(contents.entities[paths::BODY].rows, 1);
-    assert_eq!(contents.entities[paths::DISTANCE].rows, 2, "the distance is the same for every table");
+    assert_eq!(contents.entities[paths::BODY].fixed_rows, 1);
+    assert_eq!(contents.entities[paths::DISTANCE].rows, 1, "the distance is the same for every table");
     for path in ["/numbers/part_count", "/numbers/ms/mechanics", "/numbers/error/rms_mm", paths::ROWS] {
         assert!(contents.entities[path].timelines.contains(paths::TABLE), "{path}");
     }
@@ -199,6 +199,28 @@ fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
             assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");
         }
     }
+}
+
+#[test]
+fn a_watched_recording_takes_new_steps_and_new_meshes() {
+    let folder = Folder::new();
+    let (small, large) = (Scene::new(1), Scene::new(2));
+    let mut options = options(&folder.file("watched.rrd"), Layout { several_tables: true, ..Layout::default() });
+    options.replaceable = true;
+    let mut recorder = Recorder::open(options).unwrap();
+    for (index, scene) in [&small, &small, &large].into_iter().enumerate() {
+        let index = index as i64;
+        let solved = scene.solve("Table 3", &PAPER_LIKE);
+        recorder.body(index, &scene.body).unwrap();
+        recorder.garment(index, &scene.garment).unwrap();
+        recorder.step(&step(index, scene, &solved, &[])).unwrap();
+    }
+    recorder.notice(2, "table.toml, line 4: upper value 3 below lower value 5").unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    assert_eq!(contents.entities[paths::BODY].rows, 1, "the body stayed");
+    assert_eq!(contents.entities[paths::GARMENT].rows, 2, "the garment changed once");
+    assert_eq!(contents.entities[paths::DRAPE].fixed_rows, 0, "what is static cannot be replaced at a step");
+    assert_eq!(contents.entities[paths::REPORT].rows, 4, "three steps and the message");
 }
 
 /// A port somebody else listens on, for as long as the listener lives.

@@ -16,8 +16,10 @@ pub struct Entity {
     pub components: BTreeSet<String>,
     /// Timelines it has rows on; none where all is static.
     pub timelines: BTreeSet<String>,
-    /// Rows over all timelines and components.
+    /// Rows with a time.
     pub rows: usize,
+    /// Rows without: logged once for all.
+    pub fixed_rows: usize,
 }
 
 /// The contents of an `.rrd` file.
@@ -49,7 +51,8 @@ pub fn read(path: &Path) -> Result<Contents, RecordError> {
                 continue;
             }
             let entity = contents.entities.entry(name).or_default();
-            entity.rows += chunk.num_rows();
+            let rows = if chunk.is_static() { &mut entity.fixed_rows } else { &mut entity.rows };
+            *rows += chunk.num_rows();
             entity.timelines.extend(chunk.timelines().keys().map(ToString::to_string));
             entity.components.extend(chunk.components().keys().map(ToString::to_string));
         }

@@ -12,8 +12,6 @@ use super::{Open, RecordError};
 pub(super) const TEXT: Color = Color(rerun::Rgba32(0xE6E9_ECFF));
 /// Bands of the strip.
 const BANDS: u32 = 48;
-/// Numbers along the strip, the ends included.
-const TICKS: u32 = 5;
 
 /// What a colour bar says.
 #[derive(Debug, Clone, Copy)]
@@ -57,14 +55,25 @@ impl Legend<'_> {
         // The viewer writes a text under its point.
         let mut places = vec![at(0.5, 4.0)];
         let mut labels = vec![format!("{}, {}", self.title, self.unit)];
-        for tick in 0..TICKS {
-            let t = f64::from(tick) / f64::from(TICKS - 1);
+        let steps = steps(self.range.high);
+        for tick in 0..=steps {
+            let t = f64::from(tick) / f64::from(steps);
             let value = self.range.low + t * (self.range.high - self.range.low);
-            let bound = if self.open_end && tick == TICKS - 1 { "≥ " } else { "" };
+            let bound = if self.open_end && tick == steps { "≥ " } else { "" };
             places.push(at(t, 0.0));
             labels.push(format!("{bound}{}", number(value)));
         }
         open.log(&format!("{path}/ticks"), &texts(places, labels))
+    }
+}
+
+/// Into how many steps from zero a round number falls so that each is round too.
+fn steps(high: f64) -> u32 {
+    let mantissa = high / 10f64.powf(high.log10().floor());
+    match (2.0 * mantissa).round() as u32 {
+        3 | 6 | 12 => 3,
+        5 | 10 => 5,
+        _ => 4,
     }
 }
 
@@ -88,7 +97,16 @@ pub(crate) fn number(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::{number, steps};
+
+    #[test]
+    fn ticks_are_round() {
+        for (high, expected) in
+            [(1.0, 4), (1.5, 3), (2.0, 4), (2.5, 5), (30.0, 3), (0.4, 4), (5.0, 5), (0.6, 3), (80.0, 4)]
+        {
+            assert_eq!(steps(high), expected, "{high}");
+        }
+    }
 
     #[test]
     fn numbers_have_three_digits() {

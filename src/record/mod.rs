@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use glam::DVec3;
-use rerun::Scalars;
+use rerun::{Scalars, TextDocument};
 
 pub use blueprint::layout::{Layout, Tab};
 pub use error::RecordError;
@@ -115,10 +115,7 @@ impl Recorder {
     /// # Errors
     /// What Rerun refuses.
     pub fn body(&mut self, index: i64, body: &TriMesh) -> Result<(), RecordError> {
-        self.timed(|open| {
-            open.at(index, 0);
-            open.log_mesh(paths::BODY, &meshes::plain(body, colours::BODY))
-        })
+        self.timed(|open| open.take_body(index, body))
     }
 
     /// The garment as loaded; with the first one the layout is sent.
@@ -137,6 +134,20 @@ impl Recorder {
         self.timed(|open| {
             step.check(open.garment.positions.len())?;
             step::log(open, step)?;
+            open.flush_live()
+        })
+    }
+
+    /// Puts a message above the text panel of a step that stays as it is: what is wrong with a file just edited.
+    ///
+    /// # Errors
+    /// What Rerun refuses.
+    pub fn notice(&mut self, index: i64, message: &str) -> Result<(), RecordError> {
+        self.timed(|open| {
+            open.at(index, 6);
+            let quoted = message.replace('\n', "\n> ");
+            let text = format!("> ⚠ **{quoted}**\n\nBelow: the last result that could be solved.\n\n{}", open.report);
+            open.log(paths::REPORT, &TextDocument::from_markdown(text))?;
             open.flush_live()
         })
     }

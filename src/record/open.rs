@@ -23,12 +23,15 @@ pub(crate) struct Open {
     targets: Vec<Target>,
     pub(super) web: Option<WebViewer>,
     pub(super) options: RecordOptions,
+    body: TriMesh,
     pub(super) garment: TriMesh,
     pub(super) cells: CellMesh,
     pub(super) eye: Eye,
     pub(super) distance: Vec<f64>,
     pub(super) vertex_colour: Vec<u8>,
     pub(super) levels: usize,
+    /// The text panel as last logged, Markdown.
+    pub(super) report: String,
     seen: RefCell<BTreeSet<String>>,
     laid_out: bool,
     raw_bytes: Cell<u64>,
@@ -49,12 +52,14 @@ impl Open {
             targets,
             web,
             options,
+            body: TriMesh::default(),
             garment: TriMesh::default(),
             cells: CellMesh::new(&TriMesh::default()),
             eye: Eye::default(),
             distance: Vec::new(),
             vertex_colour: Vec::new(),
             levels: 0,
+            report: String::new(),
             seen: RefCell::new(BTreeSet::new()),
             laid_out: false,
             raw_bytes: Cell::new(0),
@@ -101,7 +106,21 @@ impl Open {
         Ok(self.stream.log_serialized_batches(path, fixed, batches)?)
     }
 
+    /// Takes the body; the one already shown is not sent again.
+    pub(super) fn take_body(&mut self, index: i64, body: &TriMesh) -> Result<(), RecordError> {
+        if self.body == *body {
+            return Ok(());
+        }
+        body.clone_into(&mut self.body);
+        self.at(index, 0);
+        self.log_mesh(paths::BODY, &meshes::plain(body, colours::BODY))
+    }
+
+    /// Takes the garment, and lays the views out with the first.
     pub(super) fn take_garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
+        if self.garment == *garment {
+            return Ok(());
+        }
         self.garment = garment.clone();
         self.cells = CellMesh::new(garment);
         self.distance.clear();

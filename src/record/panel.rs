@@ -50,6 +50,10 @@ impl Panel {
             line(&mut text, format_args!("## {}\n", self.title));
         }
         two_columns(&mut text, "Drape", "", self.facts.iter().map(|(k, v)| (k.as_str(), v.clone())));
+        for warning in &self.warnings {
+            line(&mut text, format_args!("> ⚠ {warning}\n"));
+        }
+        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
@@ -60,10 +64,6 @@ impl Panel {
             text.push('\n');
         }
         two_columns(&mut text, "Fabric", "", self.fabric.iter().map(|(k, v)| (k.as_str(), v.clone())));
-        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
-        for warning in &self.warnings {
-            line(&mut text, format_args!("> ⚠ {warning}\n"));
-        }
         if !self.command_line.is_empty() {
             line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));
         }

@@ -11,7 +11,7 @@ use super::colours::{self, colour_parts};
 use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
-use super::panel::Panel;
+use super::panel::{LevelRow, Panel};
 use super::{Open, paths};
 use crate::mesh::TriMesh;
 
@@ -19,7 +19,7 @@ use crate::mesh::TriMesh;
 const LONGEST_ARROW: f64 = 0.16;
 /// Values above this quantile share the last colour: a PART of one vertex can have any force.
 const QUANTILE: f64 = 0.99;
-/// Bins of the distance histogram.
+/// Bars of the distance histogram, about.
 const BINS: usize = 80;
 
 /// A value per vertex of the draped garment.
@@ -196,31 +196,36 @@ fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_
     Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, &format!("{branch}/legend"))
 }
 
+/// Bars of one level: how many vertices lie in each, and its middle and width, m. A level's bars tile its own range, so
+/// that no bar holds vertices of two.
+fn bars(row: &LevelRow, distance_m: &[f64], widest: f64, end: f64) -> Vec<(f64, f64, f64)> {
+    let upper = row.upper_m.min(end.max(row.lower_m + widest));
+    let count = ((upper - row.lower_m) / widest).ceil().max(1.0);
+    let width = (upper - row.lower_m) / count;
+    let mut bars: Vec<(f64, f64, f64)> =
+        (0..count as usize).map(|i| (0.0, row.lower_m + (i as f64 + 0.5) * width, width)).collect();
+    let last = bars.len() - 1;
+    for &d in distance_m.iter().filter(|d| (row.lower_m..row.upper_m).contains(*d)) {
+        bars[(((d - row.lower_m) / width) as usize).min(last)].0 += 1.0;
+    }
+    bars.retain(|bar| bar.0 > 0.0);
+    bars
+}
+
 fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let rows = &step.panel.levels;
-    let high = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
-    let width = high / BINS as f64;
-    let mut counts = vec![vec![0.0; BINS]; rows.len()];
-    for &d in step.distance_m {
-        let bin = ((d / width) as usize).min(BINS - 1);
-        if let Some(level) = rows.iter().position(|row| (row.lower_m..row.upper_m).contains(&d)) {
-            counts[level][bin] += 1.0;
-        }
-    }
-    let centres: Vec<f64> = (0..BINS).map(|b| 100.0 * width * (b as f64 + 0.5)).collect();
+    let end = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
     let shade = |level: usize| {
         let [r, g, b] = ColourMap::DISTANCE.at((level as f64 + 0.5) / rows.len() as f64);
         Color::from_rgb(r, g, b)
     };
     for (level, row) in rows.iter().enumerate() {
-        // Only the bins the level reaches: empty ones would draw over its neighbours' bars.
-        let held: Vec<usize> = (0..BINS).filter(|&b| counts[level][b] > 0.0).collect();
-        let pick = |of: &[f64]| held.iter().map(|&b| of[b]).collect::<Vec<f64>>();
-        let bars = BarChart::new(pick(&counts[level]))
-            .with_abscissa(pick(&centres))
-            .with_widths(vec![100.0 * width as f32; held.len()])
+        let bars = bars(row, step.distance_m, end / BINS as f64, end);
+        let chart = BarChart::new(bars.iter().map(|b| b.0).collect::<Vec<f64>>())
+            .with_abscissa(bars.iter().map(|b| 100.0 * b.1).collect::<Vec<f64>>())
+            .with_widths(bars.iter().map(|b| 100.0 * b.2 as f32).collect::<Vec<f32>>())
             .with_color(shade(level));
-        open.log(&format!("{}/{level:02}", paths::HISTOGRAM), &bars)?;
+        open.log(&format!("{}/{level:02}", paths::HISTOGRAM), &chart)?;
         let parts = BarChart::new(vec![row.parts as f64]).with_abscissa(vec![level as f64]).with_color(shade(level));
         open.log(&format!("{}/{level:02}", paths::LEVEL_PARTS), &parts)?;
     }
@@ -233,7 +238,7 @@ fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     Ok(())
 }
 
-fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
+fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let parts = ("part_count", "PARTs", step.part_force_n.len() as f64);
     series(open, "/numbers/part_count", parts.1, 0, parts.2)?;
     let mut row = vec![(parts.0.to_owned(), parts.2)];
@@ -253,7 +258,8 @@ fn numbers(open: &Open, step: &StepView<'_>) -> Result<(), RecordError> {
         }
     }
     open.log(paths::ROWS, &cells)?;
-    open.log(paths::REPORT, &TextDocument::from_markdown(step.panel.markdown()))
+    open.report = step.panel.markdown();
+    open.log(paths::REPORT, &TextDocument::from_markdown(open.report.as_str()))
 }
 
 /// A scalar, drawn as a line with a dot at each step: one step alone is then seen too.
@@ -265,4 +271,25 @@ pub(super) fn series(open: &Open, path: &str, name: &str, place: usize, value: f
         open.log_fixed(path, &SeriesPoints::new().with_names([name]).with_colors([colour]).with_marker_sizes([4.0]))?;
     }
     open.log(path, &Scalars::single(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_tile_their_level_and_count_every_vertex_once() {
+        let row = |lower_m, upper_m| LevelRow { lower_m, upper_m, vertices: 0, parts: 0 };
+        let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
+        // A narrow level has one bar of its own width.
+        assert_eq!(bars(&row(0.0, 0.01), &distances, 0.02, 0.1), [(3.0, 0.005, 0.01)]);
+        // A wide one is cut evenly; empty bars are left out.
+        let wide = bars(&row(0.01, 0.05), &distances, 0.02, 0.1);
+        assert_eq!(wide.iter().map(|b| b.0).sum::<f64>(), 3.0);
+        assert!(wide.iter().all(|b| (b.2 - 0.02).abs() < 1e-12));
+        // The open level ends at the picture's end; what lies beyond counts in its last bar.
+        let open = bars(&row(0.05, f64::INFINITY), &distances, 0.02, 0.1);
+        assert_eq!(open.len(), 1);
+        assert!(open[0].1 < 0.1);
+    }
 }
