@@ -12,8 +12,10 @@ use crate::distance::{Body, SurfacePoint};
 use crate::fabric::Fabric;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::paper::{self, PaperError, PaperOptions, PartForces};
 use crate::mechanics::refine::{self, RefineOptions, Refined, SolveError, Step, Stop};
+use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::{Parts, segment};
 use crate::range_table::RangeTable;
@@ -140,6 +142,8 @@ pub struct ClothState {
     pub stop: Stop,
     /// Every step, the start first.
     pub history: Vec<refine::Record>,
+    /// Strain and pressure.
+    pub fit: Fit,
 }
 
 /// What came out, stage by stage.
@@ -161,6 +165,8 @@ pub struct Drape {
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
+    /// Pairs of triangles of the displaced garment that cross: cloth through cloth, which no model here prevents.
+    pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.
     pub penetrating_vertices: usize,
     /// How deep the deepest of them is, m.
@@ -213,8 +219,9 @@ pub fn drape(
     let refined = timed(&mut times.refine, || refine_further(scene, settings, &stage.positions, observer))?;
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
-        Some(Refined { positions, energy, residual_over_weight, steps, history, stop }) => {
-            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history }))
+        Some((cloth, Refined { positions, energy, residual_over_weight, steps, history, stop })) => {
+            let fit = fit(&cloth, &scene.body, &positions);
+            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
@@ -228,8 +235,9 @@ pub fn drape(
         level_part_count,
         outcomes: stage.outcomes,
         preview: stage.positions,
-        positions,
         state,
+        self_intersecting_pairs: self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len(),
+        positions,
         penetrating_vertices,
         penetration,
         times,
@@ -288,7 +296,7 @@ fn refine_further(
     settings: &Settings,
     start: &[DVec3],
     observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
-) -> Result<Option<Refined>, DrapeError> {
+) -> Result<Option<(Cloth, Refined)>, DrapeError> {
     let max_steps = match settings.refine {
         Refine::Steps(0) if matches!(settings.model, Model::Paper(_)) => return Ok(None),
         Refine::Steps(n) => Some(n),
@@ -296,7 +304,8 @@ fn refine_further(
     };
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    Ok(Some(refine::refine(&cloth, &scene.body, start.to_vec(), &options, observer)?))
+    let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, observer)?;
+    Ok(Some((cloth, refined)))
 }
 
 fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {

@@ -171,7 +171,7 @@ fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
     let scene = Scene::new(2);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
     let fit = vec!["strain".to_owned(), "pressure".to_owned()];
-    let layout = Layout { iterations: true, fit, opens_on: Tab::Solver, ..Layout::default() };
+    let layout = Layout { iterations: true, fit, opens_on: Tab::Fit, ..Layout::default() };
     let mut recorder = Recorder::open(options(&folder.file("solver.rrd"), layout)).unwrap();
     recorder.body(0, &scene.body).unwrap();
     recorder.garment(0, &scene.garment).unwrap();

@@ -72,17 +72,16 @@ fn triangles_are_well_shaped_and_the_surface_is_smooth() {
     let mesh = dress_form(&BodySpec::default()).unwrap();
     let small = (0..mesh.triangles.len()).filter(|&t| smallest_angle(mesh.corners(t)) < 20.0).count();
     assert!(small * 100 < mesh.triangles.len(), "{small}");
-    // Neighbouring triangles turn by under 70 degrees at soles, finger tips and armpits; only the saddle between the legs, which
-    // is narrower than an edge, is sharper.
-    let saddle = DVec3::new(0.0, 0.0, 0.816);
+    // Neighbouring triangles turn by a few degrees; by more only at finger tips, the soles' edges, and the saddles at crotch and
+    // armpits, where the form is as narrow as an edge is long.
     let topology = Topology::new(&mesh);
     let normal = |t: u32| mesh.double_area_vector(t as usize).normalize();
-    for (edge, &[a, b]) in topology.edges.iter().zip(&topology.edge_triangles) {
-        let turn = normal(a).angle_between(normal(b)).to_degrees();
-        let at = mesh.positions[edge[0] as usize];
-        let limit = if at.distance(saddle) < 0.04 { 100.0 } else { 70.0 };
-        assert!(turn < limit, "{turn} at {at}");
-    }
+    let mut turns: Vec<f64> =
+        topology.edge_triangles.iter().map(|&[a, b]| normal(a).angle_between(normal(b)).to_degrees()).collect();
+    turns.sort_by(f64::total_cmp);
+    let share = |part: f64| turns[(part * turns.len() as f64) as usize];
+    let sharpest = turns[turns.len() - 1];
+    assert!(share(0.5) < 8.0 && share(0.99) < 45.0 && sharpest < 100.0, "{} {} {sharpest}", share(0.5), share(0.99));
 }
 
 fn smallest_angle(c: [DVec3; 3]) -> f64 {

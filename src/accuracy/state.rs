@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::quantile::{MM_PER_M, percentile};
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::fit::principal_strain;
 
 /// Figures of one drape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,7 +45,7 @@ impl State {
         let energy_j = cloth.gradient(x, &contacts, &mut gradient);
         hold(cloth, &contacts, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
-        let strains: Vec<f64> = cloth.triangles.iter().map(|t| largest_strain(t.deformation(x))).collect();
+        let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
         let (penetrating_vertices, depth) = contacts.penetration();
         Self {
             energy_j,
@@ -66,23 +67,16 @@ fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
     }
 }
 
-/// Largest singular value of the deformation gradient, less one.
-fn largest_strain([fu, fv]: [DVec3; 2]) -> f64 {
-    let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
-    let largest = 0.5 * (a + b) + (0.5 * (a - b)).hypot(c);
-    largest.sqrt() - 1.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn strains_of_a_stretch_a_turn_and_a_shear() {
-        assert!((largest_strain([DVec3::X * 1.1, DVec3::Y]) - 0.1).abs() < 1e-15);
-        assert!(largest_strain([DVec3::Y, DVec3::Z]).abs() < 1e-15);
+        assert!((principal_strain([DVec3::X * 1.1, DVec3::Y]) - 0.1).abs() < 1e-15);
+        assert!(principal_strain([DVec3::Y, DVec3::Z]).abs() < 1e-15);
         // Simple shear γ: σ = γ/2 + √(1 + γ²/4).
-        let sheared = largest_strain([DVec3::X, DVec3::new(0.2, 1.0, 0.0)]);
+        let sheared = principal_strain([DVec3::X, DVec3::new(0.2, 1.0, 0.0)]);
         assert!((sheared - (0.1 + 1.01f64.sqrt() - 1.0)).abs() < 1e-15);
     }
 }

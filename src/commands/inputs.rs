@@ -102,6 +102,17 @@ impl InputArgs {
         named.map(Path::new).chain(self.measurements.file()).collect()
     }
 
+    /// The same arguments with body and garment from elsewhere, if given, and nothing pushed out.
+    pub(crate) fn unmended(&self, body: Option<&str>, garment: Option<&str>) -> Self {
+        let own = self.clone();
+        Self {
+            body: body.map_or(own.body, str::to_owned),
+            garment: garment.map_or(own.garment, str::to_owned),
+            no_push_out: true,
+            ..self.clone()
+        }
+    }
+
     /// Reads or makes body and garment.
     pub(crate) fn load(&self) -> anyhow::Result<Inputs> {
         let mut notes = Vec::new();

@@ -1,5 +1,7 @@
 //! The command line: one file per subcommand, its arguments beside its code.
 
+mod assets;
+mod check;
 mod console;
 mod failure;
 mod inputs;
@@ -57,6 +59,10 @@ struct Cli {
 enum Command {
     /// Drape one garment and record every stage (the default)
     Run(Box<run::RunArgs>),
+    /// Report the health of a body and a garment, and how they lie about each other, without draping
+    Check(Box<check::CheckArgs>),
+    /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
+    Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
     View(view::ViewArgs),
 }
@@ -67,6 +73,8 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
+        Some(Command::Check(args)) => args.execute(),
+        Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };
     match outcome {

@@ -6,9 +6,11 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use partwise::accuracy::reference::ReferenceCache;
+use partwise::assess::{AssessOptions, Assessment, assess};
 use partwise::drape::{Drape, Settings, drape};
 use partwise::mechanics::refine::Step;
-use partwise::record::{Layout, RecordOptions, Recorder, StepView};
+use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView};
 
 use super::inputs::{InputArgs, Inputs};
 use super::sinks::SinkArgs;
@@ -38,6 +40,15 @@ pub(crate) struct RunArgs {
     /// Solve again and stream the next step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
+    /// Measure the drape against its own continuation and the canonical drape; references are cached between runs
+    #[arg(long, help_heading = "Stages")]
+    accuracy: bool,
+    /// Under --accuracy: canonical drapes from this many perturbed starts, for the spread between equilibria
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Stages")]
+    spread: u64,
+    /// Under --accuracy: where references are kept [default: the user's cache folder]
+    #[arg(long, value_name = "DIR", help_heading = "Stages")]
+    cache: Option<PathBuf>,
     /// Write the displaced garment as OBJ, with its original faces, groups and texture coordinates
     #[arg(long, value_name = "FILE.obj", help_heading = "Output")]
     export: Option<PathBuf>,
@@ -54,8 +65,21 @@ struct Solved {
     inputs: Inputs,
     settings: Settings,
     drape: Drape,
+    assessment: Option<Assessment>,
+    snapshots: Vec<Snapshot>,
     summary: Summary,
 }
+
+/// The cloth at one of the solver's steps; the mesh every so often.
+struct Snapshot {
+    iteration: usize,
+    energy: f64,
+    residual_over_weight: f64,
+    positions: Option<Vec<DVec3>>,
+}
+
+/// The recording gets the mesh at every so many steps: enough to see it settle, a few megabytes at most.
+const MESH_EVERY: usize = 8;
 
 impl RunArgs {
     /// Runs the command.
@@ -63,7 +87,7 @@ impl RunArgs {
         use_threads(self.threads)?;
         interrupt::listen();
         let mut solved = self.solve()?;
-        let mut recorder = Recorder::open(self.record_options(&solved.inputs))?;
+        let mut recorder = Recorder::open(self.record_options(&solved))?;
         self.record(&mut recorder, &mut solved, 0)?;
         if let Some(path) = &self.export {
             solved.inputs.export(path, &solved.drape.positions)?;
@@ -93,11 +117,18 @@ impl RunArgs {
         Ok(())
     }
 
-    fn record_options(&self, inputs: &Inputs) -> RecordOptions {
+    fn record_options(&self, solved: &Solved) -> RecordOptions {
         RecordOptions {
-            sinks: self.sinks.sinks(&inputs.garment_name),
-            name: inputs.garment_name.clone(),
-            layout: Layout { several_tables: self.watch, follow: self.watch, ..Layout::default() },
+            sinks: self.sinks.sinks(&solved.inputs.garment_name),
+            name: solved.inputs.garment_name.clone(),
+            layout: Layout {
+                several_tables: self.watch,
+                follow: self.watch,
+                iterations: !self.watch && solved.snapshots.len() > 1,
+                error: solved.assessment.is_some(),
+                fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
+                ..Layout::default()
+            },
             replaceable: self.watch,
             ..RecordOptions::default()
         }
@@ -108,11 +139,38 @@ impl RunArgs {
         let inputs = self.input.load()?;
         let settings = self.stages.settings()?;
         let load = start.elapsed();
-        let drape = refining(&inputs.garment_name, |observer| drape(&inputs.scene, &settings, observer))?;
+        let name = &inputs.garment_name;
+        let mut snapshots = Vec::new();
+        let drape = refining(name, |progress| {
+            drape(&inputs.scene, &settings, &mut |step| {
+                let positions = (step.iteration % MESH_EVERY == 0).then(|| step.positions.to_vec());
+                snapshots.push(Snapshot {
+                    iteration: step.iteration,
+                    energy: step.energy,
+                    residual_over_weight: step.residual_over_weight,
+                    positions,
+                });
+                progress(step)
+            })
+        })?;
+        let options = AssessOptions { cache: self.cache(), spread_starts: self.spread };
+        let assessment = if self.accuracy && !interrupt::requested() {
+            let what = format!("{name}: references");
+            Some(refining(&what, |progress| assess(&inputs.scene, &settings, &drape, &options, progress))?)
+        } else {
+            None
+        };
         let mut summary = Summary::new([&inputs.body_name, &inputs.garment_name], &inputs.scene, &settings, &drape);
         summary.timings_ms.insert("load", ms(load));
         summary.warnings.splice(0..0, inputs.warnings.iter().cloned());
-        Ok(Solved { inputs, settings, drape, summary })
+        if let Some(assessment) = &assessment {
+            summary.assessed(assessment);
+        }
+        Ok(Solved { inputs, settings, drape, assessment, snapshots, summary })
+    }
+
+    fn cache(&self) -> Option<ReferenceCache> {
+        self.cache.clone().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
     }
 
     fn record(&self, recorder: &mut Recorder, solved: &mut Solved, index: i64) -> anyhow::Result<()> {
@@ -121,6 +179,17 @@ impl RunArgs {
         recorder.body(index, &scene.body_mesh)?;
         recorder.garment(index, &scene.garment)?;
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
+        let fit = solved.drape.state.as_ref().map(|s| &s.fit);
+        let mut overlays = Vec::new();
+        if let Some(fit) = fit {
+            overlays.push(Overlay { name: "strain", unit: "%", values: &fit.strain_percent });
+            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa });
+        }
+        let mut scalars = Vec::new();
+        if let Some(assessment) = &solved.assessment {
+            overlays.push(Overlay { name: "error", unit: "mm", values: &assessment.error_mm });
+            scalars.push(("error/rms_mm", assessment.accuracy.vertices.rms_mm));
+        }
         recorder.step(&StepView {
             index,
             distance_m: &solved.drape.distance,
@@ -128,9 +197,15 @@ impl RunArgs {
             part_force_n: &forces,
             draped: &solved.drape.positions,
             panel: &solved.summary.panel(&solved.settings.fabric),
-            scalars: &[],
-            overlays: &[],
+            scalars: &scalars,
+            overlays: &overlays,
         })?;
+        if !self.watch {
+            for s in &solved.snapshots {
+                let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);
+                recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
+            }
+        }
         solved.summary.timings_ms.insert("record", ms(start.elapsed()));
         Ok(())
     }
@@ -171,6 +246,7 @@ impl RunArgs {
                 }
                 Err(error) => {
                     console::error(&error);
+                    recorder.notice(index, &format!("{error:#}"))?;
                 }
             }
         }
@@ -187,8 +263,8 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
     }
 }
 
-/// Runs the stages with the solver's progress shown and Ctrl-C heard.
-fn refining<T>(what: &str, work: impl FnOnce(&mut dyn FnMut(&Step<'_>) -> ControlFlow<()>) -> T) -> T {
+/// Runs `work` with the solver's progress shown and Ctrl-C heard.
+pub(crate) fn refining<T>(what: &str, work: impl FnOnce(&mut dyn FnMut(&Step<'_>) -> ControlFlow<()>) -> T) -> T {
     let bar = console::progress(None, what);
     let out = work(&mut |step| {
         bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, Table, presets};
+use partwise::accuracy::Accuracy;
+use partwise::assess::Assessment;
 use partwise::drape::{Drape, Scene, Settings};
 use partwise::fabric::Fabric;
 use partwise::range_table::METRES_PER_CM;
@@ -36,6 +38,15 @@ pub(crate) struct Summary {
     energy_j: Option<f64>,
     residual_over_weight: Option<f64>,
     refine_steps: Option<usize>,
+    strain_p95: Option<f64>,
+    strain_max: Option<f64>,
+    pressure_max_kpa: Option<f64>,
+    self_intersecting_pairs: usize,
+    /// Under `--accuracy`.
+    accuracy: Option<Accuracy>,
+    /// Spearman's rank correlation of the paper's wrinkle measure with the mean curvature, over the seams; under
+    /// `--accuracy`.
+    wrinkle_rank_correlation: Option<f64>,
     penetrating_vertices: usize,
     penetration_mm: f64,
     /// Milliseconds of `load`, `distance`, `segment`, `mechanics`, `record`.
@@ -84,6 +95,12 @@ impl Summary {
             energy_j: drape.state.as_ref().map(|s| s.energy),
             residual_over_weight: drape.state.as_ref().map(|s| s.residual_over_weight),
             refine_steps: drape.state.as_ref().map(|s| s.steps),
+            strain_p95: drape.state.as_ref().map(|s| 1e-2 * s.fit.strain_p95_percent),
+            strain_max: drape.state.as_ref().map(|s| 1e-2 * s.fit.strain_max_percent),
+            pressure_max_kpa: drape.state.as_ref().map(|s| s.fit.pressure_max_kpa),
+            self_intersecting_pairs: drape.self_intersecting_pairs,
+            accuracy: None,
+            wrinkle_rank_correlation: None,
             penetrating_vertices: drape.penetrating_vertices,
             penetration_mm: 1e3 * drape.penetration,
             timings_ms: BTreeMap::from([
@@ -97,6 +114,49 @@ impl Summary {
         }
     }
 
+    /// Adds what an assessment found.
+    pub(crate) fn assessed(&mut self, assessment: &Assessment) {
+        self.accuracy = Some(assessment.accuracy.clone());
+        self.wrinkle_rank_correlation = assessment.wrinkles.rank_correlation;
+        self.warnings.extend(assessment.warnings.iter().cloned());
+    }
+
+    /// Strain, error and what else was measured, in words.
+    fn findings(&self) -> Vec<(&'static str, String)> {
+        let mut found = Vec::new();
+        if let (Some(steps), Some(residual)) = (self.refine_steps, self.residual_over_weight) {
+            found.push(("refined", format!("{steps} steps, residual {residual:.1e} of the weight")));
+        }
+        if let (Some(p95), Some(max)) = (self.strain_p95, self.strain_max) {
+            found.push(("strain", format!("{:.1} % (P95), {:.1} % at most", 1e2 * p95, 1e2 * max)));
+        }
+        if let Some(pressure) = self.pressure_max_kpa {
+            found.push(("pressure", format!("{pressure:.2} kPa at most")));
+        }
+        found.push(("inside the body", format!("{} vertices", self.penetrating_vertices)));
+        found.push(("cloth through cloth", format!("{} pairs of triangles", self.self_intersecting_pairs)));
+        if let Some(accuracy) = &self.accuracy {
+            let canonical = accuracy.canonical_rms_mm.unwrap_or_default();
+            found.push((
+                "error",
+                format!(
+                    "{:.2} mm RMS against its own continuation, {canonical:.1} against the canonical drape",
+                    accuracy.vertices.rms_mm
+                ),
+            ));
+            if let Some(spread) = accuracy.canonical_spread_mm {
+                found.push(("spread", format!("{spread:.1} mm RMS between drapes from perturbed starts")));
+            }
+            if let Some(best) = accuracy.representable_rms_mm {
+                found.push(("representable", format!("{best:.1} mm RMS remain with one displacement a PART")));
+            }
+        }
+        if let Some(rank) = self.wrinkle_rank_correlation {
+            found.push(("wrinkles", format!("rank correlation {rank:.2} of PART jumps with the mean curvature")));
+        }
+        found
+    }
+
     /// One JSON object.
     pub(crate) fn json(&self) -> anyhow::Result<String> {
         Ok(serde_json::to_string(self)?)
@@ -108,7 +168,8 @@ impl Summary {
             format!("{} on {}: {} vertices, {} triangles\n", self.garment, self.body, self.vertices, self.triangles);
         let _ = writeln!(
             out,
-            "stage one   table {}: {} PARTs in {} levels, {} of them single vertices",
+            "{:<20}table {}: {} PARTs in {} levels, {} of them single vertices",
+            "stage one",
             self.table,
             self.part_count,
             self.parts_per_level.iter().filter(|&&n| n > 0).count(),
@@ -116,13 +177,12 @@ impl Summary {
         );
         let _ = writeln!(
             out,
-            "stage two   model {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
-            self.model, self.fabric, self.contact_parts, self.displacement_rms_mm
+            "{:<20}model {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
+            "stage two", self.model, self.fabric, self.contact_parts, self.displacement_rms_mm
         );
-        if let (Some(steps), Some(residual)) = (self.refine_steps, self.residual_over_weight) {
-            let _ = writeln!(out, "refined     {steps} steps, residual {residual:.1e} of the weight");
+        for (name, value) in self.findings() {
+            let _ = writeln!(out, "{name:<20}{value}");
         }
-        let _ = writeln!(out, "inside the body at the end: {} vertices", self.penetrating_vertices);
         let _ = writeln!(out, "\n{}", self.levels_table());
         let order = ["load", "distance", "segment", "mechanics", "refine", "record"];
         let times: Vec<String> =
@@ -150,14 +210,16 @@ impl Summary {
                     parts,
                 })
                 .collect(),
-            facts: vec![
+            facts: [
                 fact("model", self.model.to_owned()),
                 fact("vertices", self.vertices.to_string()),
                 fact("PARTs", format!("{} ({} single vertices)", self.part_count, self.singleton_parts)),
                 fact("touching the body", format!("{} PARTs", self.contact_parts)),
                 fact("moved", format!("{:.1} mm RMS", self.displacement_rms_mm)),
-                fact("inside the body", format!("{} vertices", self.penetrating_vertices)),
-            ],
+            ]
+            .into_iter()
+            .chain(self.findings().into_iter().map(|(name, value)| fact(name, value)))
+            .collect(),
             fabric: fabric_facts(fabric),
             timings_ms: ["load", "distance", "segment", "mechanics", "refine"]
                 .iter()

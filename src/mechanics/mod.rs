@@ -3,5 +3,6 @@
 pub mod coupled;
 pub mod cusick;
 pub mod energy;
+pub mod fit;
 pub mod paper;
 pub mod refine;

@@ -8,8 +8,9 @@ use super::colour_map::{ColourMap, Range};
 use super::meshes::{rerun_colours, single};
 use super::{Open, RecordError};
 
-/// Texts in a view. Without a colour of their own Rerun gives each path another.
-pub(super) const TEXT: Color = Color(rerun::Rgba32(0xE6E9_ECFF));
+/// Texts in a view: white reads on the box the viewer draws behind them, dark or light. Without a colour of their own Rerun
+/// gives each path another.
+pub(super) const TEXT: Color = Color(rerun::Rgba32(0xFFFF_FFFF));
 /// Bands of the strip.
 const BANDS: u32 = 48;
 

@@ -17,8 +17,10 @@ use crate::mesh::TriMesh;
 
 /// Share of the garment's height that the longest arrow takes.
 const LONGEST_ARROW: f64 = 0.16;
-/// Values above this quantile share the last colour: a PART of one vertex can have any force.
+/// Values above this quantile share the last colour.
 const QUANTILE: f64 = 0.99;
+/// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
+const FORCE_QUANTILE: f64 = 0.95;
 /// Bars of the distance histogram, about.
 const BINS: usize = 80;
 
@@ -124,9 +126,9 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let per_vertex =
         |unit: f64| step.part_of_vertex.iter().map(move |&p| unit * step.part_force_n[p as usize].length());
     let (factor, unit) =
-        if Range::to_quantile(per_vertex(1.0), QUANTILE).high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
+        if Range::to_quantile(per_vertex(1.0), FORCE_QUANTILE).high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
     let magnitude: Vec<f64> = per_vertex(factor).collect();
-    let range = Range::to_quantile(magnitude.iter().copied(), QUANTILE);
+    let range = Range::to_quantile(magnitude.iter().copied(), FORCE_QUANTILE);
     let map = ColourMap::FORCE;
     let shades = map.colours(&magnitude, range);
     let mesh = open.cells.colours(|v| shades[v as usize]);

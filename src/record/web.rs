@@ -31,8 +31,7 @@ impl WebViewer {
         let page = config.host_web_viewer().map_err(|e| failed(e.to_string()))?;
         // %2B and the rest: the address of the data is a parameter of the page's.
         let data = format!("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc_port}%2Fproxy");
-        // The scene is made for a dark page; a browser set to light would get half of each.
-        let url = format!("{}/?url={data}&theme=dark", page.server_url());
+        let url = format!("{}/?url={data}", page.server_url());
         Ok(Self { _page: Box::new(page), url })
     }
 

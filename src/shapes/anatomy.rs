@@ -151,7 +151,7 @@ impl Anatomy {
     /// Everything but the head.
     #[must_use]
     pub fn below_the_head(&self, p: DVec3) -> Jet {
-        self.arm_at(p).join(self.torso_and_legs(p), p, 0.045)
+        self.arm_at(p).join(self.torso_and_legs(p), p, 0.065)
     }
 }
 

@@ -68,7 +68,13 @@ impl DressForm {
         let tags = vec![0; rough.positions.len()];
         // A closed surface of genus 0 has two triangles for each vertex but two.
         let density = Density::Vertices(triangles / 2 + 2);
-        let skin = Skin { solid: &self.anatomy, head: m.stature - 0.2 * m.scale(), crotch: m.crotch, scale: m.scale() };
+        let skin = Skin {
+            solid: &self.anatomy,
+            head: m.stature - 0.2 * m.scale(),
+            crotch: m.crotch,
+            axilla: m.axilla,
+            scale: m.scale(),
+        };
         let (mut mesh, _) = remesh(&rough, tags, &skin, density).ok_or(ShapeError::NotManifold { what: "body" })?;
         self.correct(&mut mesh);
         Ok(mesh)
@@ -91,11 +97,12 @@ impl DressForm {
     }
 }
 
-/// The surface of the form, finer at wrists, hands, ankles, head and crotch than on the trunk.
+/// The surface of the form, finer at wrists, hands, ankles, head, crotch and armpits than on the trunk.
 struct Skin<'a> {
     solid: &'a Anatomy,
     head: f64,
     crotch: f64,
+    axilla: f64,
     scale: f64,
 }
 
@@ -113,9 +120,12 @@ impl Surface for Skin<'_> {
         let arm = 1.0 - 0.52 * on_arm * smooth_step(0.1, 0.95, t);
         let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / self.scale));
         let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
-        // The crotch is a saddle narrower than an edge of the trunk's.
+        // Crotch and armpits are saddles narrower than an edge of the trunk's.
         let crotch = DVec3::new(0.0, self.solid.leg.centre(self.crotch).y, self.crotch);
-        let saddle = 1.0 - 0.55 * (1.0 - smooth_step(0.03, 0.12, p.distance(crotch) / self.scale));
+        let pit = self.solid.trunk.centre(self.axilla) + self.solid.trunk.section(self.axilla)[2] * DVec3::X;
+        let saddle =
+            |at: DVec3, finer: f64| 1.0 - finer * (1.0 - smooth_step(0.03, 0.12, mirrored.distance(at) / self.scale));
+        let saddle = saddle(crotch, 0.55).min(saddle(pit, 0.4));
         arm.min(ankle).min(head).min(saddle)
     }
 }

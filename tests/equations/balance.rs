@@ -138,3 +138,19 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(run(&case.surface, &cloth(), &given(f64::NAN, 1.0)), PaperError::Constant { .. }));
     assert!(matches!(run(&case.surface, &cloth(), &given(1.0, -1.0)), PaperError::Constant { .. }));
 }
+
+#[test]
+fn a_garment_that_touches_nowhere_is_carried_where_it_is_nearest() {
+    // Rising from 20 mm to 70 mm over the floor, in levels of 1 cm: only the first is within 5 mm of the nearest vertex.
+    let garment = patch(DVec3::new(0.0, 0.0, 0.02), DVec3::new(0.0866, 0.0, 0.05), DVec3::Y * SIDE, 10, 2);
+    let case = Case::new(garment, &floor(), &[0.0, 3.0, 4.0, 5.0, f64::INFINITY]);
+    let found = case.solve(&PaperOptions::default());
+    assert_eq!(found.parts.iter().map(|p| p.contact).collect::<Vec<_>>(), [true, false, false, false]);
+    close(found.parts[0].anti_force.z, found.weight_n);
+    let PaperWarning::NotTouching { nearest_m, contact_m } = found.warnings[0] else { panic!("{:?}", found.warnings) };
+    close(nearest_m, 0.02);
+    close(contact_m, 0.025);
+    let strict = case.solve(&PaperOptions { untouched: Untouched::Contactless, ..PaperOptions::default() });
+    assert_eq!(strict.contact_parts, 0);
+    assert_eq!(strict.warnings, [PaperWarning::NothingCarries { contact_parts: 0, support: 0.0 }]);
+}

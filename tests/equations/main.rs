@@ -7,8 +7,8 @@ use partwise::GRAVITY;
 use partwise::distance::{Body, SurfacePoint};
 use partwise::fabric::Fabric;
 use partwise::mechanics::paper::{
-    BodyForce, Clearance, Contactless, Cosine, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning, Volume,
-    solve,
+    BodyForce, Clearance, Contactless, Cosine, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning,
+    Untouched, Volume, solve,
 };
 use partwise::mesh::{Topology, TriMesh};
 use partwise::parts::{Parts, segment};
@@ -103,7 +103,8 @@ fn tilted(degrees: f64) -> Case {
 }
 
 fn given(q_f: f64, p_f: f64) -> PaperOptions {
-    PaperOptions { body_force: BodyForce::Given(q_f), line_force: LineForce::Given(p_f), ..PaperOptions::default() }
+    let (body_force, line_force) = (BodyForce::Given(q_f), LineForce::Given(p_f));
+    PaperOptions { body_force, line_force, untouched: Untouched::Contactless, ..PaperOptions::default() }
 }
 
 #[track_caller]

@@ -22,8 +22,8 @@ mod clearance;
 mod nodes;
 mod options;
 mod rest;
+mod settle;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -34,12 +34,19 @@ pub use nodes::CoarseMesh;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, PartResult, Stage};
 pub use rest::coarse_rest;
 
-use super::energy::{Cloth, Contacts, gravity};
-use super::refine::{RefineOptions, refine};
+use super::energy::{Cloth, Contacts, Friction, gravity};
 use crate::distance::Body;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::Parts;
+use settle::{Goal, settle};
+
+/// Distance a node keeps from the body, m: room for the body's roundness between nodes and for the softness of the contact.
+const COARSE_OFFSET: f64 = 2e-3;
+
+/// Contact stiffness of the coarse cloth, N/m³: 200 Pa, some ten times what a dress weighs on its shoulders, take up a
+/// millimetre.
+const COARSE_CONTACT: f64 = 2e5;
 
 /// What is draped.
 #[derive(Debug, Clone, Copy)]
@@ -127,17 +134,20 @@ fn stage(
         (0..parts.len() as u32).filter(|&p| is_held[coarse.node_vertex[p as usize] as usize]).collect();
     let fabric = softened(fabric, mesh, options.coarse_strain);
     let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, &fabric, &held_nodes)?;
+    let fine_offset = cloth.offset;
     load(&mut cloth, garment, &parts);
     let setup = began.elapsed();
 
     let began = Instant::now();
-    let newton = RefineOptions {
-        max_steps: Some(options.max_steps),
+    let goal = Goal {
         tolerance: options.tolerance,
+        max_steps: options.max_steps,
         damping: options.damping,
-        ..RefineOptions::default()
+        least_move_m: options.least_move_m,
     };
-    let settled = refine(&cloth, body, nodes.positions.clone(), &newton, &mut |_| ControlFlow::Continue(()))?;
+    let mut contacts = soft_contacts(&mut cloth, body, &nodes.positions);
+    let settled = settle(&cloth, &mut contacts, nodes.positions.clone(), goal)?;
+    let last = settled.history.last().copied();
     let solve = began.elapsed();
 
     let began = Instant::now();
@@ -150,19 +160,21 @@ fn stage(
             *x += *u;
         }
     }
-    result.pushed_out = push_out(body, &is_held, cloth.offset, &mut result.positions);
+    result.pushed_out = push_out(body, &is_held, fine_offset, &mut result.positions);
     let blend = began.elapsed();
 
-    result.part_results = balance(&cloth, body, &settled.positions);
-    warn(result, &parts, &coarse, stranded, extent_m, options, settled.residual_over_weight);
+    result.part_results = balance(&cloth, &contacts, &settled.positions);
+    let residual = last.map_or(0.0, |h| h.residual_over_weight);
+    warn(result, &parts, &coarse, stranded, extent_m, options, residual);
     result.stages.push(Stage {
         extent_m,
         part_count: parts.len(),
         triangle_count: coarse.triangles.len(),
-        steps: settled.steps,
-        residual_over_weight: settled.residual_over_weight,
-        energy: settled.energy,
+        steps: last.map_or(0, |h| h.iteration),
+        residual_over_weight: residual,
+        energy: last.map_or(0.0, |h| h.energy),
         positions: result.positions.clone(),
+        history: settled.history,
         setup,
         solve,
         blend,
@@ -232,9 +244,18 @@ fn carry_loose(parts: &Parts, coarse: &CoarseMesh, displacement: &mut [DVec3]) -
     }
 }
 
+/// Contact as a coarse node feels it: see [`settle`].
+fn soft_contacts<'b>(cloth: &mut Cloth, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+    cloth.offset = cloth.offset.max(COARSE_OFFSET);
+    let friction = Friction::new(cloth.friction);
+    let mut contacts = Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset, COARSE_CONTACT, friction);
+    contacts.update(x);
+    contacts.friction_refresh(x);
+    contacts
+}
+
 /// F⁰, F¹ and F² of each node at rest.
-fn balance(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<PartResult> {
-    let contacts = cloth.contacts(body, x);
+fn balance(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<PartResult> {
     let mut all = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut all);
     let mut weight = vec![DVec3::ZERO; x.len()];

@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 
 use crate::mechanics::energy::EnergyError;
-use crate::mechanics::refine::SolveError;
+use crate::mechanics::refine::{Record, SolveError};
 use crate::parts::Parts;
 
 /// Why PARTs could not be solved together.
@@ -52,6 +52,8 @@ pub struct CoupledOptions {
     pub blend_sweeps: Option<usize>,
     /// Residual over weight at which a coarse cloth counts as settled.
     pub tolerance: f64,
+    /// A whole Newton step that moves no node by more than this, m, ends a solve as well.
+    pub least_move_m: f64,
     /// Newton steps of each solve at most.
     pub max_steps: usize,
     /// Damping ε to begin with, 1/s².
@@ -69,6 +71,8 @@ impl Default for CoupledOptions {
             blend_sweeps: None,
             // A preview is millimetres off whatever the coarse cloth does: ten times the tolerance of a drape.
             tolerance: 1e-2,
+            // A tenth of the error a preview is meant to have.
+            least_move_m: 1e-3,
             max_steps: 60,
             damping: 3.0,
             coarse_strain: 0.01,
@@ -112,6 +116,8 @@ pub struct Stage {
     pub energy: f64,
     /// Vertices after this stage, m.
     pub positions: Vec<DVec3>,
+    /// Newton's steps on the coarse cloth, the start first.
+    pub history: Vec<Record>,
     /// Time for the PARTs and the coarse cloth.
     pub setup: Duration,
     /// Time for Newton's steps.

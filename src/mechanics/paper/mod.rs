@@ -36,7 +36,7 @@ mod outside;
 mod solve;
 mod volume;
 
-pub use options::{BodyForce, Clearance, Contactless, Cosine, LineForce, PaperOptions, Volume};
+pub use options::{BodyForce, Clearance, Contactless, Cosine, LineForce, PaperOptions, Untouched, Volume};
 pub use solve::solve;
 
 use glam::DVec3;
@@ -67,6 +67,17 @@ pub enum PaperError {
 /// Something the caller should be told; the result stands.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PaperWarning {
+    /// No vertex is within the contact distance; see [`Untouched::FromNearest`].
+    #[error(
+        "the garment touches the body nowhere: its nearest vertex is {nearest_m} m off, so contact is what lies within \
+         {contact_m} m"
+    )]
+    NotTouching {
+        /// Distance of the nearest vertex, m.
+        nearest_m: f64,
+        /// The contact distance used, m.
+        contact_m: f64,
+    },
     /// No q_f balances the weight, so it is zero and no PART feels the body.
     #[error(
         "nothing carries the garment: over {contact_parts} contact PARTs the body's normals point up by {support} of their \

@@ -67,6 +67,17 @@ pub enum LineForce {
     Given(f64),
 }
 
+/// What "directly attached" means for a garment none of whose vertices is within the contact distance, as one that is placed
+/// around the body and not yet draped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Untouched {
+    /// The contact distance counts from the garment's nearest vertex, where it will touch first; a warning says so.
+    #[default]
+    FromNearest,
+    /// All PARTs are contactless, as (9) has it; nothing carries the garment, which is warned of.
+    Contactless,
+}
+
 /// How to read equations (2) to (9).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperOptions {
@@ -85,6 +96,8 @@ pub struct PaperOptions {
     /// A PART is in contact if any of its vertices is at most this far from the body, m. Default 0.5 cm, the upper value of
     /// level 7 in Table 3: the paper only says "directly attached" and "contactless".
     pub contact_distance_m: f64,
+    /// Which PARTs are in contact where none is within that distance.
+    pub untouched: Untouched,
     /// An axis has no stiffness where |Σ cos q ΔV| is at most this share of Σ |q| ΔV. Default 0.02: cloth within about one
     /// degree of the axis, closer than the normals of a triangle mesh mean it. The same share of Σ ΔV decides whether the
     /// contact PARTs can carry the garment at all.
@@ -101,6 +114,7 @@ impl Default for PaperOptions {
             body_force: BodyForce::default(),
             line_force: LineForce::default(),
             contact_distance_m: 0.005,
+            untouched: Untouched::default(),
             degenerate_below: 0.02,
         }
     }

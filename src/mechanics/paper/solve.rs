@@ -6,7 +6,9 @@ use super::balance::{Sums, balance};
 use super::calibrate::{HangingStrip, clearance, share};
 use super::outside::put_outside;
 use super::volume::volumes;
-use super::{BodyForce, Clearance, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning, PartForces};
+use super::{
+    BodyForce, Clearance, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning, PartForces, Untouched,
+};
 use crate::GRAVITY;
 use crate::distance::{Body, SurfacePoint};
 use crate::fabric::Fabric;
@@ -32,6 +34,13 @@ pub fn solve(
     let areas = garment.vertex_areas();
     let normals = garment.vertex_normals();
     let volume = volumes(garment, topology, &areas, thickness, options.volume);
+    let mut warnings = Vec::new();
+    let nearest_m = surface.iter().map(|s| s.signed_distance).fold(f64::INFINITY, f64::min);
+    let mut contact_m = options.contact_distance_m;
+    if nearest_m > contact_m && nearest_m.is_finite() && options.untouched == Untouched::FromNearest {
+        contact_m += nearest_m;
+        warnings.push(PaperWarning::NotTouching { nearest_m, contact_m });
+    }
     let sum_part = |_: usize, part: &Part| {
         let mut sums = Sums::default();
         for v in part.vertices.iter().map(|&v| v as usize) {
@@ -41,13 +50,12 @@ pub fn solve(
             sums.body += surface[v].normal * volume[v];
             sums.garment += share(normals[v], options.cosine) * (q * volume[v]);
             sums.largest += q.abs() * volume[v];
-            sums.contact |= surface[v].signed_distance <= options.contact_distance_m;
+            sums.contact |= surface[v].signed_distance <= contact_m;
         }
         sums
     };
     let sums = parts.map(sum_part);
 
-    let mut warnings = Vec::new();
     let mass_density = fabric.density_kg_per_m2 / thickness;
     let weight_n = GRAVITY * mass_density * volume.iter().sum::<f64>();
     let contact_parts = sums.iter().filter(|s| s.contact).count();

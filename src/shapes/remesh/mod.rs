@@ -43,11 +43,11 @@ pub enum Density {
 }
 
 /// Rounds of split, collapse, flip and relaxation before the count is looked at: at most doubling the resolution each.
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 3;
 /// Rounds that bring the count near its target.
-const COUNT_ROUNDS: usize = 4;
+const COUNT_ROUNDS: usize = 3;
 /// Passes of flips and relaxation after the last change of count.
-const POLISH: usize = 5;
+const POLISH: usize = 4;
 
 /// Remeshes `mesh`, whose boundary vertices carry tags, to the wanted density. `None` where it is not a manifold.
 pub(crate) fn remesh(

@@ -1,0 +1,68 @@
+//! `partwise assets`: everything built in, as files to open, edit and pass back.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use partwise::fabric;
+use partwise::mesh::WholeFile;
+use partwise::mesh::export::write_mesh;
+use partwise::range_table::RangeTable;
+use partwise::shapes::body::DressForm;
+use partwise::shapes::garment::{BUILT_IN, GarmentSpec, garment_on};
+
+use super::console;
+use super::failure::UserError;
+use super::measurements::MeasurementArgs;
+
+/// Triangles of the form as `run` makes it.
+const FORM_TRIANGLES: usize = partwise::shapes::body::DEFAULT_TRIANGLES;
+
+/// Arguments of `assets`.
+#[derive(Debug, Args)]
+pub(crate) struct AssetsArgs {
+    /// Folder to write to; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "partwise-assets")]
+    out: PathBuf,
+    /// Vertices of each garment [default: the larger size of the paper's Table 4]
+    #[arg(long, value_name = "N")]
+    vertices: Option<usize>,
+    #[command(flatten)]
+    measurements: MeasurementArgs,
+}
+
+impl AssetsArgs {
+    /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specs as TOML.
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        for folder in ["tables", "fabrics", "bodies", "garments"] {
+            let folder = self.out.join(folder);
+            std::fs::create_dir_all(&folder)
+                .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
+        }
+        let spec = self.measurements.spec()?;
+        let form = DressForm::new(&spec)?;
+        write_mesh(&self.path("bodies/form.obj"), &form.mesh(FORM_TRIANGLES)?)?;
+        self.text("bodies/form.toml", &toml::to_string(&spec)?)?;
+        for name in BUILT_IN {
+            let spec = GarmentSpec::by_name(name)?;
+            let made = garment_on(&spec, &form, self.vertices)?;
+            write_mesh(&self.path(&format!("garments/{name}.obj")), &made.mesh)?;
+            self.text(&format!("garments/{name}.toml"), &toml::to_string(&spec)?)?;
+        }
+        self.text("tables/table-3.toml", &RangeTable::table_3().to_toml())?;
+        for name in fabric::BUILT_IN {
+            self.text(&format!("fabrics/{name}.toml"), &toml::to_string(&fabric::Fabric::by_name(name)?)?)?;
+        }
+        console::result(&self.out.display().to_string());
+        Ok(())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.out.join(Path::new(name))
+    }
+
+    fn text(&self, name: &str, text: &str) -> anyhow::Result<()> {
+        let path = self.path(name);
+        WholeFile::write(&path, text.as_bytes()).with_context(|| format!("{}: cannot be written", path.display()))
+    }
+}

@@ -1,0 +1,107 @@
+//! Fit: how far the cloth is stretched and how hard it presses on the body, which is what people in try-on look for.
+//!
+//! The strain of a triangle is its largest principal one, σ₁ − 1, σ₁² being the larger eigenvalue of FᵀF, with F the
+//! deformation gradient from the rest shape. A vertex shows the mean of its triangles, weighted by their rest areas. The pressure at a
+//! vertex is the contact force κ A (h − q) over its rest area A.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | F | deformation gradient, columns along weft and warp | – |
+//! | ε | largest principal strain | % outside, – inside |
+//! | p | contact pressure | kPa |
+//!
+//! Limits: strain that the mesh cannot show (wrinkles finer than an edge) is missing, and so is a negative strain across a
+//! fold. Pressure is that of the penalty at rest; it is smooth over about one edge.
+
+use glam::DVec3;
+
+use super::energy::Cloth;
+use crate::distance::Body;
+
+/// Strain and pressure per vertex.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Largest principal strain, percent.
+    pub strain_percent: Vec<f64>,
+    /// Contact pressure, kPa.
+    pub pressure_kpa: Vec<f64>,
+    /// 95th percentile over the triangles of the largest principal strain, percent.
+    pub strain_p95_percent: f64,
+    /// Its largest value, percent.
+    pub strain_max_percent: f64,
+    /// Largest contact pressure, kPa.
+    pub pressure_max_kpa: f64,
+}
+
+/// Measures `cloth` on `body` at `x` (m).
+#[must_use]
+pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Fit {
+    let mut sum = vec![0.0; x.len()];
+    let mut area = vec![0.0; x.len()];
+    let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
+    for triangle in &cloth.triangles {
+        let strain = 100.0 * principal_strain(triangle.deformation(x));
+        strains.push(strain);
+        for v in triangle.vertices {
+            sum[v as usize] += strain * triangle.area;
+            area[v as usize] += triangle.area;
+        }
+    }
+    let strain_percent = sum.iter().zip(&area).map(|(s, a)| if *a > 0.0 { s / a } else { 0.0 }).collect();
+    let mut pressure_kpa = vec![0.0; x.len()];
+    for touch in cloth.contacts(body, x).touches() {
+        let v = touch.vertex as usize;
+        pressure_kpa[v] = 1e-3 * touch.force() / cloth.areas[v];
+    }
+    strains.sort_by(f64::total_cmp);
+    let at = |share: f64| strains.get(((strains.len().max(1) - 1) as f64 * share).round() as usize).copied();
+    Fit {
+        strain_p95_percent: at(0.95).unwrap_or(0.0),
+        strain_max_percent: at(1.0).unwrap_or(0.0),
+        pressure_max_kpa: pressure_kpa.iter().copied().fold(0.0, f64::max),
+        strain_percent,
+        pressure_kpa,
+    }
+}
+
+/// Largest singular value of the deformation gradient with these columns, less one.
+#[must_use]
+pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
+    let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
+    (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt() - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fabric::Fabric;
+    use crate::mesh::{RestShape, Topology, TriMesh};
+
+    /// A box of 1 m with its top at z = 0.
+    fn table() -> TriMesh {
+        let corner = |i: usize| DVec3::new((i & 1) as f64 - 0.5, (i >> 1 & 1) as f64 - 0.5, (i >> 2 & 1) as f64 - 1.0);
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        TriMesh::new((0..8).map(corner).collect(), triangles)
+    }
+
+    #[test]
+    fn a_stretched_sheet_pressed_on_a_table_reads_back() {
+        let flat = |s: f64, z: f64| {
+            let at = |x: f64, y: f64| DVec3::new(s * x, y, z);
+            vec![at(-0.1, -0.1), at(0.1, -0.1), at(0.1, 0.1), at(-0.1, 0.1)]
+        };
+        let mesh = TriMesh::new(flat(1.0, 0.1), vec![[0, 1, 2], [0, 2, 3]]);
+        let fabric = Fabric::by_name("jersey").unwrap();
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
+        let body = Body::new(&table()).unwrap();
+        let (depth, stretch) = (0.2e-3, 1.03);
+        let x = flat(stretch, cloth.offset - depth);
+        let fit = fit(&cloth, &body, &x);
+        assert!((fit.strain_p95_percent - 3.0).abs() < 1e-9, "{}", fit.strain_p95_percent);
+        assert!(fit.strain_percent.iter().all(|s| (s - 3.0).abs() < 1e-9));
+        let expected = 1e-3 * cloth.contacts(&body, &x).stiffness() * depth;
+        assert!(fit.pressure_kpa.iter().all(|p| (p - expected).abs() < 1e-9 * expected), "{:?}", fit.pressure_kpa);
+    }
+}
