@@ -7,10 +7,12 @@ mod failure;
 mod inputs;
 mod interrupt;
 mod measurements;
+mod merge;
 mod run;
 mod sinks;
 mod stages;
 mod summary;
+mod sweep;
 mod view;
 mod watch;
 
@@ -61,6 +63,10 @@ enum Command {
     Run(Box<run::RunArgs>),
     /// Report the health of a body and a garment, and how they lie about each other, without draping
     Check(Box<check::CheckArgs>),
+    /// Run every point of a sweep file: tables, garments, fabrics; a row on disk after each, and a recording of all
+    Sweep(Box<sweep::SweepArgs>),
+    /// Join the shards of a sweep into what one run would have written
+    Merge(Box<merge::MergeArgs>),
     /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
@@ -74,6 +80,8 @@ pub(crate) fn main() -> ExitCode {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
+        Some(Command::Sweep(args)) => args.execute(),
+        Some(Command::Merge(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };
