@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
+use partwise::record::Tab;
 use partwise::sweep::{Status, merge, store};
 
 use super::console;
@@ -43,7 +44,7 @@ impl MergeArgs {
                 }
             }
         }
-        let recordings = record_all(&rows, &shelf, &manifest.name, &self.out, &self.sinks)?;
+        let recordings = record_all(&rows, &shelf, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &manifest.name,
             folder: self.out.display().to_string(),

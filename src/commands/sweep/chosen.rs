@@ -34,9 +34,12 @@ pub(crate) fn labels(rows: &[&Row]) -> Vec<String> {
     all.iter().map(label).collect()
 }
 
-/// Up to [`MOST`] rows, ascending: the first (the table everything is compared with), and an even choice from those that no
+/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with), and an even choice from those that no
 /// other row beats in both PART count and error. All are deterministic figures, so that shards choose alike.
 pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
+    if rows.len() <= MOST {
+        return (0..rows.len()).collect();
+    }
     let figures: Vec<Option<(usize, f64)>> =
         rows.iter().map(|row| Some((row.part_count?, error_mm(row).unwrap_or(0.0)))).collect();
     let beaten = |mine: (usize, f64)| {
@@ -58,7 +61,6 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     }
     chosen.sort_unstable();
     chosen.dedup();
-    chosen.retain(|&i| i < rows.len());
     chosen
 }
 
@@ -78,7 +80,15 @@ mod tests {
 
     #[test]
     fn the_first_and_what_nothing_beats() {
-        let rows = [row("a", 10, 5.0), row("b", 20, 6.0), row("c", 5, 9.0), row("d", 30, 1.0), row("e", 31, 1.0)];
+        let rows = [
+            row("a", 10, 5.0),
+            row("b", 20, 6.0),
+            row("c", 5, 9.0),
+            row("d", 30, 1.0),
+            row("e", 31, 1.0),
+            row("f", 40, 2.0),
+            row("g", 50, 2.0),
+        ];
         let rows: Vec<&Row> = rows.iter().collect();
         assert_eq!(choose(&rows), [0, 2, 3]);
         let many: Vec<Row> = (0..40).map(|i| row("t", 10 + i, 50.0 - i as f64)).collect();
@@ -86,7 +96,7 @@ mod tests {
         let chosen = choose(&many);
         assert_eq!(chosen.len(), MOST);
         assert_eq!((chosen[0], chosen[5]), (0, 39));
-        assert_eq!(choose(&many[..1]), [0]);
+        assert_eq!(choose(&many[..3]), [0, 1, 2]);
         assert!(choose(&[]).is_empty());
     }
 

@@ -69,7 +69,7 @@ pub(crate) struct SweepArgs {
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
     jobs: usize,
     /// What the points are measured against
-    #[arg(long, value_enum, default_value_t = Against::Canonical, help_heading = "Rows")]
+    #[arg(long, value_enum, default_value_t = Against::Own, help_heading = "Rows")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Rows")]
@@ -124,7 +124,7 @@ impl SweepArgs {
         for warning in bench.warnings() {
             console::warning(&warning);
         }
-        let recordings = record_all(&outcome.rows, &shelf, &plan.name, &folder, &self.sinks)?;
+        let recordings = record_all(&outcome.rows, &shelf, &plan.name, &folder, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &plan.name,
             folder: folder.display().to_string(),
@@ -199,6 +199,7 @@ pub(crate) fn record_all(
     name: &str,
     folder: &Path,
     sinks: &SinkArgs,
+    opens_on: Tab,
 ) -> anyhow::Result<Vec<RecordSummary>> {
     let (groups, missing) = recording::groups(rows, shelf);
     if missing > 0 {
@@ -222,7 +223,7 @@ pub(crate) fn record_all(
         }
         let sinks: Vec<Sink> = sinks.sinks(&group.name);
         if !sinks.is_empty() {
-            done.push(recording::record(group, shelf, name, sinks, Tab::Stages)?);
+            done.push(recording::record(group, shelf, name, sinks, opens_on)?);
         }
     }
     Ok(done)

@@ -103,7 +103,7 @@ pub(crate) fn record(
         })?;
     }
     if judged {
-        recorder.scatter(When::Table(0), &scatter(rows, &label, &chosen))?;
+        recorder.scatter(When::Table(0), "time, ms", &scatter(rows, &label, &chosen))?;
     }
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {
@@ -142,7 +142,7 @@ fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<Sca
     let point = |(i, row): (usize, &&Row)| {
         Some(ScatterPoint {
             label: &labels[i],
-            ms: row.time_total_ms?,
+            cost: row.time_total_ms?,
             error_mm: error_mm(row)?,
             group: usize::from(chosen.contains(&i)),
             named: chosen.contains(&i),

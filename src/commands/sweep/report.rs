@@ -6,7 +6,7 @@ use partwise::record::RecordSummary;
 use partwise::sweep::{Row, Status};
 use serde_json::json;
 
-use super::chosen::{error_mm, labels};
+use super::chosen::labels;
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -152,7 +152,3 @@ pub(crate) fn csv(rows: &[Row]) -> anyhow::Result<String> {
     Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
-/// Whether there is anything to judge the rows by.
-pub(crate) fn judged(rows: &[Row]) -> bool {
-    rows.iter().any(|row| error_mm(row).is_some())
-}
