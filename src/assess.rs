@@ -14,6 +14,7 @@ use glam::DVec3;
 use crate::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
 use crate::accuracy::{self, Accuracy, AccuracyError, Comparison};
 use crate::drape::{Drape, Scene, Settings};
+use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::refine::{RefineOptions, SolveError, Step, Stop, refine};
 use crate::wrinkles::{self, Wrinkles};
@@ -74,7 +75,7 @@ pub fn assess(
     observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
 ) -> Result<Assessment, AssessError> {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
-    let mut references = References { scene, settings, cloth: &cloth, options, warnings: Vec::new() };
+    let mut references = References { scene, fabric: &settings.fabric, cloth: &cloth, options, warnings: Vec::new() };
     let own = references.from(&drape.positions, observer)?;
     let canonical = references.from(&scene.garment.positions, observer)?;
     let mut spread = Vec::new();
@@ -106,6 +107,23 @@ pub fn assess(
     })
 }
 
+/// The canonical drape of a scene alone, found or made, and what the user should know about it: what a range table can hold
+/// at best is measured on it.
+///
+/// # Errors
+/// As [`assess`].
+pub fn canonical(
+    scene: &Scene,
+    fabric: &Fabric,
+    options: &AssessOptions,
+    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+) -> Result<(Reference, Vec<String>), AssessError> {
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
+    let mut references = References { scene, fabric, cloth: &cloth, options, warnings: Vec::new() };
+    let reference = references.from(&scene.garment.positions, observer)?;
+    Ok((reference, references.warnings))
+}
+
 /// Start positions moved by up to a millimetre along each axis, the same for the same seed on any machine.
 #[must_use]
 pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
@@ -128,7 +146,7 @@ pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
 
 struct References<'a> {
     scene: &'a Scene,
-    settings: &'a Settings,
+    fabric: &'a Fabric,
     cloth: &'a Cloth,
     options: &'a AssessOptions,
     warnings: Vec<String>,
@@ -144,7 +162,7 @@ impl References<'_> {
         let key = ReferenceKey::new(&ReferenceInput {
             garment: &self.scene.garment,
             rest: &self.scene.rest,
-            fabric: &self.settings.fabric,
+            fabric: self.fabric,
             body: &self.scene.body_mesh,
             held: &self.scene.held,
             start,

@@ -135,9 +135,9 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
                 let chosen = Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, overlay: None };
                 recorder.compare(&chosen).unwrap();
             }
-            points.push(ScatterPoint { label: name, ms, error_mm: rms, group: 0, named: true });
+            points.push(ScatterPoint { label: name, cost: ms, error_mm: rms, group: 0, named: true });
         }
-        recorder.scatter(When::Table(0), &points).unwrap();
+        recorder.scatter(When::Table(0), "time, ms", &points).unwrap();
         recorder.finish().unwrap()
     };
     let one = record("sweep-one.rrd", 1);

@@ -11,6 +11,8 @@ use partwise::mesh::rest::RestError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
 use partwise::shapes::ShapeError;
+use partwise::sweep::{MergeError, PlanError, StoreError};
+use partwise::table_search::SearchError;
 
 /// A mistake in what the user gave that no library error describes.
 #[derive(Debug, thiserror::Error)]
@@ -43,4 +45,10 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<FabricError>()
         || cause.is::<ShapeError>()
         || cause.is::<PaperError>()
+        || cause.is::<PlanError>()
+        || cause.is::<SearchError>()
+        || cause
+            .downcast_ref::<StoreError>()
+            .is_some_and(|e| !matches!(e, StoreError::Write { .. } | StoreError::Io { .. }))
+        || cause.downcast_ref::<MergeError>().is_some_and(|e| !matches!(e, MergeError::Store(_)))
 }

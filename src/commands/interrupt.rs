@@ -19,6 +19,11 @@ pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
+/// The same as a flag that work of its own looks at.
+pub(crate) fn flag() -> &'static AtomicBool {
+    &REQUESTED
+}
+
 /// Blocks until Ctrl-C.
 pub(crate) fn wait() {
     while !requested() {

@@ -2,17 +2,21 @@
 
 mod assets;
 mod check;
+mod compare;
 mod console;
 mod cusick;
 mod failure;
 mod inputs;
 mod interrupt;
 mod measurements;
+mod merge;
 mod readings;
 mod run;
 mod sinks;
 mod stages;
 mod summary;
+mod sweep;
+mod tune;
 mod view;
 mod watch;
 
@@ -65,6 +69,14 @@ enum Command {
     Check(Box<check::CheckArgs>),
     /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
     Cusick(cusick::CusickArgs),
+    /// Run every point of a sweep file: tables, garments, fabrics; a row on disk after each, and a recording of all
+    Sweep(Box<sweep::SweepArgs>),
+    /// Set range tables side by side: PARTs of each level, what is split and merged, time, error
+    Compare(Box<compare::CompareArgs>),
+    /// Search range tables for the least error at every number of PARTs
+    Tune(Box<tune::TuneArgs>),
+    /// Join the shards of a sweep into what one run would have written
+    Merge(Box<merge::MergeArgs>),
     /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
@@ -79,6 +91,10 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
         Some(Command::Cusick(args)) => args.execute(),
+        Some(Command::Sweep(args)) => args.execute(),
+        Some(Command::Compare(args)) => args.execute(),
+        Some(Command::Tune(args)) => args.execute(),
+        Some(Command::Merge(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };

@@ -246,7 +246,7 @@ impl Summary {
 }
 
 /// The command line as typed, the program by its bare name.
-fn command_line() -> String {
+pub(crate) fn command_line() -> String {
     let arguments = std::env::args().skip(1).map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }

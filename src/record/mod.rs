@@ -187,12 +187,12 @@ impl Recorder {
         self.timed(|open| sweep::chosen(open, chosen))
     }
 
-    /// All points of speed against error so far.
+    /// All points of cost against error so far; `cost` is the axis' title (`time, ms`).
     ///
     /// # Errors
     /// What Rerun refuses.
-    pub fn scatter(&mut self, when: When, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
-        self.timed(|open| sweep::scatter(open, when, points))
+    pub fn scatter(&mut self, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
+        self.timed(|open| sweep::scatter(open, when, cost, points))
     }
 
     /// Sends what is left, closes the file and gives it its name.

@@ -65,8 +65,8 @@ pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError
 pub struct ScatterPoint<'a> {
     /// Its name.
     pub label: &'a str,
-    /// Time, ms.
-    pub ms: f64,
+    /// What it costs: time in ms, or whatever else the axis is called.
+    pub cost: f64,
     /// Error, mm.
     pub error_mm: f64,
     /// Points of one group share a colour; the front, say, against the rest.
@@ -108,17 +108,17 @@ impl Axis {
 
 /// Both axes are logarithmic and span whole decades. Points that are not positive and finite cannot be placed and are left
 /// out.
-pub(super) fn scatter(open: &Open, when: When, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
+pub(super) fn scatter(open: &Open, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
     match when {
         When::Table(index) => open.at(index, 6),
         When::Iteration(iteration) => open.at_iteration(iteration),
     }
     let placed: Vec<&ScatterPoint<'_>> = points
         .iter()
-        .filter(|p| p.ms.is_finite() && p.error_mm.is_finite() && p.ms > 0.0 && p.error_mm > 0.0)
+        .filter(|p| p.cost.is_finite() && p.error_mm.is_finite() && p.cost > 0.0 && p.error_mm > 0.0)
         .collect();
     let [width, height] = PICTURE;
-    let (first, last) = decades(placed.iter().map(|p| p.ms));
+    let (first, last) = decades(placed.iter().map(|p| p.cost));
     let time = Axis { first, last, length: width };
     let (first, last) = decades(placed.iter().map(|p| p.error_mm));
     let error = Axis { first, last, length: height };
@@ -127,7 +127,7 @@ pub(super) fn scatter(open: &Open, when: When, points: &[ScatterPoint<'_>]) -> R
     let mut lines = Vec::new();
     let mut shades = Vec::new();
     let mut places = vec![at(0.5 * width, -15.0), at(0.0, height + 13.0)];
-    let mut labels = vec!["time, ms".to_owned(), "error, mm".to_owned()];
+    let mut labels = vec![cost.to_owned(), "error, mm".to_owned()];
     let mut line = |from: [f32; 2], to: [f32; 2], major: bool| {
         lines.push(vec![from, to]);
         shades.push(if major { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
@@ -153,14 +153,14 @@ pub(super) fn scatter(open: &Open, when: When, points: &[ScatterPoint<'_>]) -> R
     let ticks = Points2D::new(places).with_labels(labels).with_radii([0.0]).with_colors([TEXT]).with_show_labels(true);
     open.log(&format!("{}/ticks", paths::SCATTER), &ticks)?;
     let palette = colours::palette();
-    let dots = Points2D::new(placed.iter().map(|p| at(time.place(p.ms), error.place(p.error_mm))))
+    let dots = Points2D::new(placed.iter().map(|p| at(time.place(p.cost), error.place(p.error_mm))))
         .with_colors(meshes::rerun_colours(placed.iter().map(|p| palette[p.group % palette.len()])))
         .with_radii([2.6])
         .with_draw_order(30.0);
     open.log(&format!("{}/points", paths::SCATTER), &dots)?;
     let named: Vec<&ScatterPoint<'_>> = placed.into_iter().filter(|p| p.named).collect();
     // The viewer writes a text under its point.
-    let names = Points2D::new(named.iter().map(|p| at(time.place(p.ms), error.place(p.error_mm) - 2.5)))
+    let names = Points2D::new(named.iter().map(|p| at(time.place(p.cost), error.place(p.error_mm) - 2.5)))
         .with_labels(named.iter().map(|p| p.label))
         .with_radii([0.0])
         .with_colors([TEXT])

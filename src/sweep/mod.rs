@@ -41,6 +41,6 @@ pub use plan::Plan;
 pub use point::{Point, VERSION};
 pub use row::{COLUMNS, Measures, Row, Status};
 pub use run::{Outcome, Progress, Run, run_missing, sweep};
-pub use solve::{PointError, Solve, Solved, result_hash};
+pub use solve::{PointError, Solve, Solved, result_hash, row_of};
 pub use store::{Existing, Store};
 pub use timing::{Spread, Times, Timing};

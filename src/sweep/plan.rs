@@ -83,6 +83,21 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// The same plan with an option set in every point that does not set it itself: part of what determines a result, so
+    /// the ids change with it.
+    #[must_use]
+    pub fn with_option(mut self, name: &str, value: &str) -> Self {
+        let set = |mut point: Point| {
+            point.options.entry(name.to_owned()).or_insert_with(|| value.to_owned());
+            point.named()
+        };
+        let (points, notes) = distinct(self.points.into_iter().map(set).collect());
+        self.notes.extend(notes);
+        Self { points, ..self }
+    }
+}
+
 /// Gives the points their numbers, leaving out what is there already.
 fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();

@@ -94,8 +94,8 @@ pub fn result_hash(positions: &[DVec3]) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// The row of a point; `None` if it was interrupted.
-pub(super) fn row_of<S: Solve>(point: &Point, solver: &S, warm_up: usize, repeats: usize) -> Option<Row> {
+/// The row of a point, of so many passes before and so many timed; `None` if it was interrupted.
+pub fn row_of<S: Solve>(point: &Point, solver: &S, warm_up: usize, repeats: usize) -> Option<Row> {
     // A solver shared by the threads may be left odd by a panic of its own; its next point says so again, as a row.
     let caught = catch_unwind(AssertUnwindSafe(|| passes(point, solver, warm_up, repeats)));
     match caught {

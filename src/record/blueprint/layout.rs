@@ -108,7 +108,7 @@ impl Layout {
         let rows = View::rows("Numbers", &[paths::ROWS], paths::TABLE);
         let mut views: Vec<(f32, Node)> = vec![(1.0, rows.into())];
         if self.scatter {
-            views.insert(0, (1.6, View::plane("Time against error", &[paths::SCATTER]).into()));
+            views.insert(0, (1.6, View::plane("Cost against error", &[paths::SCATTER]).into()));
         }
         Node::Column("Numbers", views)
     }

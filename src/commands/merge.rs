@@ -1,0 +1,61 @@
+//! `partwise merge`: the shards of a sweep joined into what one run would have written, bit for bit but for timings.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+use partwise::record::Tab;
+use partwise::sweep::{Status, merge, store};
+
+use super::console;
+use super::sinks::SinkArgs;
+use super::sweep::kept::Shelf;
+use super::sweep::record_all;
+use super::sweep::report::{Format, Report};
+
+/// Arguments of `merge`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct MergeArgs {
+    /// Folders that `partwise sweep --shard I/N` wrote; overlaps are fine where they agree
+    #[arg(required = true, value_name = "DIR")]
+    shards: Vec<PathBuf>,
+    /// Folder of the joined sweep
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    sinks: SinkArgs,
+    /// What to print on stdout
+    #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
+    format: Format,
+}
+
+impl MergeArgs {
+    /// Runs the command.
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        let rows = merge(&self.shards, &self.out)?;
+        let (manifest, _) = store::read(&self.out)?;
+        let shelf = Shelf::in_folder(&self.out);
+        let sources: Vec<Shelf> = self.shards.iter().map(|folder| Shelf::in_folder(folder)).collect();
+        for row in rows.iter().filter(|row| row.status == Status::Ok) {
+            for source in &sources {
+                let taken = shelf.adopt(source, &row.point);
+                if taken.with_context(|| format!("{}: cannot keep a point", self.out.display()))? {
+                    break;
+                }
+            }
+        }
+        let recordings = record_all(&rows, &shelf, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
+        let report = Report {
+            name: &manifest.name,
+            folder: self.out.display().to_string(),
+            total: rows.len(),
+            skipped: rows.len(),
+            seconds: 0.0,
+            keeping_ms: 0.0,
+            rows: &rows,
+            recordings: &recordings,
+        };
+        console::result(&report.text(self.format)?);
+        Ok(())
+    }
+}

@@ -1,0 +1,111 @@
+//! What tells the points of one garment apart, and which few of them stand side by side.
+
+use partwise::sweep::Row;
+
+/// Views side by side at most: more are too narrow to see a garment in.
+pub(crate) const MOST: usize = 6;
+
+/// The error a row is judged by, mm: against its own continuation, else against the canonical drape.
+pub(crate) fn error_mm(row: &Row) -> Option<f64> {
+    row.rms_mm.or(row.canonical_rms_mm)
+}
+
+/// The table's name, and whatever else differs within the rows.
+pub(crate) fn labels(rows: &[&Row]) -> Vec<String> {
+    let fields = |row: &Row| {
+        [
+            row.table.clone(),
+            row.model.clone(),
+            row.fabric.clone(),
+            if row.extent_cm == "none" { "not cut".to_owned() } else { format!("{} cm", row.extent_cm) },
+            format!("min {}", row.min_part),
+            if row.refine == "converged" { row.refine.clone() } else { format!("{} steps", row.refine) },
+            format!("seed {}", row.seed),
+            row.options.clone(),
+        ]
+    };
+    let all: Vec<[String; 8]> = rows.iter().map(|row| fields(row)).collect();
+    let varies: Vec<bool> = (0..8).map(|i| all.windows(2).any(|pair| pair[0][i] != pair[1][i])).collect();
+    let some = varies.contains(&true);
+    let label = |fields: &[String; 8]| {
+        let kept = fields.iter().zip(&varies).enumerate().filter(|(i, (_, v))| **v || (*i == 0 && !some));
+        kept.map(|(_, (field, _))| field.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    all.iter().map(label).collect()
+}
+
+/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with), and an even choice from those that no
+/// other row beats in both PART count and error. All are deterministic figures, so that shards choose alike.
+pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
+    if rows.len() <= MOST {
+        return (0..rows.len()).collect();
+    }
+    let figures: Vec<Option<(usize, f64)>> =
+        rows.iter().map(|row| Some((row.part_count?, error_mm(row).unwrap_or(0.0)))).collect();
+    let beaten = |mine: (usize, f64)| {
+        figures
+            .iter()
+            .flatten()
+            .any(|&(parts, error)| parts <= mine.0 && error <= mine.1 && (parts < mine.0 || error < mine.1))
+    };
+    let known = rows.iter().any(|row| error_mm(row).is_some());
+    let mut front: Vec<usize> = (1..rows.len()).filter(|&i| figures[i].is_some_and(|f| !known || !beaten(f))).collect();
+    front.sort_by_key(|&i| figures[i].map(|f| f.0));
+    front.dedup_by_key(|i| figures[*i].map(|f| (f.0, f.1.to_bits())));
+    let room = MOST - 1;
+    let mut chosen = vec![0];
+    if front.len() <= room {
+        chosen.extend(front);
+    } else {
+        chosen.extend((0..room).map(|i| front[i * (front.len() - 1) / (room - 1)]));
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(table: &str, parts: usize, error: f64) -> Row {
+        Row {
+            table: table.to_owned(),
+            part_count: Some(parts),
+            canonical_rms_mm: Some(error),
+            extent_cm: "8".to_owned(),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn the_first_and_what_nothing_beats() {
+        let rows = [
+            row("a", 10, 5.0),
+            row("b", 20, 6.0),
+            row("c", 5, 9.0),
+            row("d", 30, 1.0),
+            row("e", 31, 1.0),
+            row("f", 40, 2.0),
+            row("g", 50, 2.0),
+        ];
+        let rows: Vec<&Row> = rows.iter().collect();
+        assert_eq!(choose(&rows), [0, 2, 3]);
+        let many: Vec<Row> = (0..40).map(|i| row("t", 10 + i, 50.0 - i as f64)).collect();
+        let many: Vec<&Row> = many.iter().collect();
+        let chosen = choose(&many);
+        assert_eq!(chosen.len(), MOST);
+        assert_eq!((chosen[0], chosen[5]), (0, 39));
+        assert_eq!(choose(&many[..3]), [0, 1, 2]);
+        assert!(choose(&[]).is_empty());
+    }
+
+    #[test]
+    fn labels_hold_what_differs_and_nothing_else() {
+        let mut rows = [row("a", 1, 1.0), row("b", 1, 1.0)];
+        assert_eq!(labels(&rows.iter().collect::<Vec<_>>()), ["a", "b"]);
+        rows[1].extent_cm = "none".to_owned();
+        assert_eq!(labels(&rows.iter().collect::<Vec<_>>()), ["a, 8 cm", "b, not cut"]);
+        assert_eq!(labels(&[&rows[0]]), ["a"]);
+    }
+}

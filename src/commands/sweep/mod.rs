@@ -1,0 +1,230 @@
+//! `partwise sweep`: every point of a sweep file, a row on disk after each, and a recording of them all.
+
+pub(crate) mod chosen;
+pub(crate) mod kept;
+mod packed;
+pub(crate) mod points;
+pub(crate) mod recording;
+pub(crate) mod report;
+pub(crate) mod scenes;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context as _;
+use clap::Args;
+use partwise::accuracy::reference::ReferenceCache;
+use partwise::record::{RecordSummary, Sink, Tab};
+use partwise::sweep::{Existing, Plan, Progress, Row, Run, Shard, Status, sweep};
+
+use self::kept::Shelf;
+use self::points::{ACCURACY, Against, Bench};
+use self::report::{Format, Report};
+use super::failure::UserError;
+use super::run::use_threads;
+use super::sinks::SinkArgs;
+use super::{console, interrupt};
+
+const LONG_ABOUT: &str = "\
+Runs every point of a sweep file: range tables, and any other setting, over garments, sizes and fabrics.
+
+A row is on disk after every point (rows.csv and rows.jsonl, the same columns), so that Ctrl-C, a crash or a full disk lose at \
+most the point in hand; --resume goes on from there. A point that fails is a row with its error, and the sweep goes on. At the end \
+one recording per garment shows each table as a step, the few best side by side, and speed against error.";
+
+const EXAMPLES: &str = "\
+Examples:
+  partwise sweep assets/sweeps/table-3-variations.toml                the paper's table and its variations
+  partwise sweep mine.toml --resume                                   go on after Ctrl-C, a crash, a full disk
+  partwise sweep mine.toml --shard 2/8 --out part-2                   one share of eight, for a job array
+  parallel partwise sweep mine.toml --shard {}/3 --out part-{} ::: 1 2 3 && partwise merge part-* --out whole
+
+A sweep file:
+  name = \"extents of a skirt\"
+  [base]
+  garment = \"flared-skirt@3920\"
+  [grid]
+  tables = [\"table-3\", { quantile = [10, 20] }, { scale = [0.5, 2] }, \"mine.toml\"]
+  extents_cm = [12, 8, 5]";
+
+/// Arguments of `sweep`.
+#[derive(Debug, Clone, Args)]
+#[command(long_about = LONG_ABOUT, after_help = EXAMPLES)]
+pub(crate) struct SweepArgs {
+    /// The sweep file, TOML
+    file: PathBuf,
+    /// Folder of the rows [default: recordings/sweeps/FILE, and /shard-I-of-N in it]
+    #[arg(long, value_name = "DIR", help_heading = "Rows")]
+    out: Option<PathBuf>,
+    /// Go on: skip what has a row, try again what failed
+    #[arg(long, help_heading = "Rows")]
+    resume: bool,
+    /// With the sweep file changed since: keep the rows of points it still has
+    #[arg(long, requires = "resume", help_heading = "Rows")]
+    adopt: bool,
+    /// Run one share of the points, e.g. 2/8; `partwise merge` joins them
+    #[arg(long, value_name = "I/N", help_heading = "Rows")]
+    shard: Option<Shard>,
+    /// Points at a time; more than one makes the timings of all of them worse
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
+    jobs: usize,
+    /// What the points are measured against
+    #[arg(long, value_enum, default_value_t = Against::Own, help_heading = "Rows")]
+    accuracy: Against,
+    /// Where references are kept [default: the user's cache folder]
+    #[arg(long, value_name = "DIR", help_heading = "Rows")]
+    cache: Option<PathBuf>,
+    #[command(flatten)]
+    sinks: SinkArgs,
+    /// What to print on stdout
+    #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
+    format: Format,
+    /// Worker threads; results do not depend on it [default: one per core]
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    threads: Option<usize>,
+}
+
+impl SweepArgs {
+    /// Runs the command.
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        use_threads(self.threads)?;
+        interrupt::listen();
+        let plan = self.plan()?;
+        let folder = self.folder();
+        let shelf = Shelf::in_folder(&folder);
+        let bench = Bench::new(&shelf, cache(self.cache.as_ref()));
+        let existing = match self.resume {
+            true => Existing::Resume { retry_failed: true, adopt: self.adopt },
+            false => Existing::Refuse,
+        };
+        let started = Instant::now();
+        let bar = console::progress(Some(0), &plan.name);
+        let progress = |p: Progress<'_>| {
+            bar.set_length(p.total as u64);
+            bar.set_position(p.done as u64);
+            if p.row.is_none() {
+                // The rows found there took no time: what is left is guessed from the others.
+                bar.reset_eta();
+            }
+            if p.failed > 0 {
+                bar.set_message(format!("{} ({} failed)", plan.name, p.failed));
+            }
+        };
+        let run = Run { jobs: self.jobs, stop: interrupt::flag(), progress: &progress };
+        let outcome = sweep(&plan, self.shard, &folder, existing, &run, &bench);
+        bar.finish_and_clear();
+        if let Some(error) = bench.take_broken() {
+            let advice = "the rows before are intact: make room and go on with --resume";
+            return Err(anyhow::Error::new(error))
+                .with_context(|| format!("{}: cannot keep a point; {advice}", folder.display()));
+        }
+        let outcome = outcome?;
+        self.mend(&plan, &outcome.rows, &shelf, &bench);
+        let seconds = started.elapsed().as_secs_f64();
+        for warning in bench.warnings() {
+            console::warning(&warning);
+        }
+        let recordings = record_all(&outcome.rows, &shelf, &plan.name, &folder, &self.sinks, Tab::Stages)?;
+        let report = Report {
+            name: &plan.name,
+            folder: folder.display().to_string(),
+            total: outcome.total,
+            skipped: outcome.skipped,
+            seconds,
+            keeping_ms: bench.keeping_ms(),
+            rows: &outcome.rows,
+            recordings: &recordings,
+        };
+        console::result(&report.text(self.format)?);
+        if outcome.failed > 0 && !interrupt::requested() {
+            anyhow::bail!(
+                "{} of {} points failed: the column `error` of {}/rows.csv says why; --resume tries them again",
+                outcome.failed,
+                outcome.total,
+                folder.display()
+            );
+        }
+        Ok(())
+    }
+
+    fn plan(&self) -> anyhow::Result<Plan> {
+        let plan = Plan::read(&self.file)?;
+        for point in &plan.points {
+            for (name, value) in &point.options {
+                let wrong = |what: String| UserError::new(format!("{}: options: {what}", self.file.display()));
+                if name != ACCURACY {
+                    return Err(wrong(format!("found `{name}`, expected none but `{ACCURACY}`")));
+                }
+                value.parse::<Against>().map_err(wrong)?;
+            }
+        }
+        for note in &plan.notes {
+            console::note(note);
+        }
+        Ok(plan.with_option(ACCURACY, self.accuracy.name()))
+    }
+
+    fn folder(&self) -> PathBuf {
+        let stem = self.file.file_stem().map_or_else(|| "sweep".into(), std::ffi::OsStr::to_string_lossy);
+        let whole = || Path::new("recordings").join("sweeps").join(stem.as_ref());
+        let share = |shard: Shard| whole().join(format!("shard-{}", shard.to_string().replace('/', "-of-")));
+        self.out.clone().unwrap_or_else(|| self.shard.map_or_else(whole, share))
+    }
+
+    /// Computes again what is kept of points whose file is gone or damaged.
+    fn mend(&self, plan: &Plan, rows: &[Row], shelf: &Shelf, bench: &Bench<'_>) {
+        for row in rows.iter().filter(|row| row.status == Status::Ok) {
+            if interrupt::requested() {
+                return;
+            }
+            if shelf.point(&row.point).is_some_and(|point| shelf.scene(&point.scene).is_some()) {
+                continue;
+            }
+            if let Err(error) = bench.keep_again(&plan.points[row.index]) {
+                console::warning(&format!("point {} is missing from the recording: {error}", row.index));
+            }
+        }
+    }
+}
+
+/// The folder of references: the one given, else the user's.
+pub(crate) fn cache(given: Option<&PathBuf>) -> Option<ReferenceCache> {
+    given.cloned().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
+}
+
+/// Makes the recordings of a sweep, in its folder unless a file was given.
+pub(crate) fn record_all(
+    rows: &[Row],
+    shelf: &Shelf,
+    name: &str,
+    folder: &Path,
+    sinks: &SinkArgs,
+    opens_on: Tab,
+) -> anyhow::Result<Vec<RecordSummary>> {
+    let (groups, missing) = recording::groups(rows, shelf);
+    if missing > 0 {
+        console::warning(&format!(
+            "{missing} points have a row but no drape on disk and are missing from the recording"
+        ));
+    }
+    if groups.len() > 1 && (sinks.save.is_some() || sinks.serve) {
+        return Err(UserError::new(format!(
+            "--save and --serve take one recording, and this sweep makes {}, one a garment; leave them out, and look at one of \
+             {}/*.rrd with `partwise view`",
+            groups.len(),
+            folder.display()
+        )));
+    }
+    let mut done = Vec::new();
+    for group in &groups {
+        let mut sinks = sinks.clone();
+        if sinks.save.is_none() && !sinks.no_save {
+            sinks.save = Some(folder.join(format!("{}.rrd", group.name)));
+        }
+        let sinks: Vec<Sink> = sinks.sinks(&group.name);
+        if !sinks.is_empty() {
+            done.push(recording::record(group, shelf, name, sinks, opens_on)?);
+        }
+    }
+    Ok(done)
+}

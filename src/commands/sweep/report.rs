@@ -1,0 +1,153 @@
+//! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
+
+use clap::ValueEnum;
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use partwise::record::RecordSummary;
+use partwise::sweep::{Row, Status};
+use serde_json::json;
+
+use super::chosen::labels;
+
+/// What stdout is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// Tables for people
+    Text,
+    /// One JSON object
+    Json,
+    /// The rows as CSV
+    Csv,
+}
+
+/// What became of a sweep.
+pub(crate) struct Report<'a> {
+    /// Its name.
+    pub(crate) name: &'a str,
+    /// Where it is.
+    pub(crate) folder: String,
+    /// Points of the sweep or shard.
+    pub(crate) total: usize,
+    /// Rows found at the start.
+    pub(crate) skipped: usize,
+    /// Wall time of the points, s.
+    pub(crate) seconds: f64,
+    /// Time spent on keeping points for the recording, ms.
+    pub(crate) keeping_ms: f64,
+    /// The rows.
+    pub(crate) rows: &'a [Row],
+    /// The recordings.
+    pub(crate) recordings: &'a [RecordSummary],
+}
+
+impl Report<'_> {
+    /// In the format asked for.
+    pub(crate) fn text(&self, format: Format) -> anyhow::Result<String> {
+        match format {
+            Format::Text => Ok(self.table()),
+            Format::Json => Ok(serde_json::to_string(&self.json())?),
+            Format::Csv => csv(self.rows),
+        }
+    }
+
+    fn failed(&self) -> usize {
+        self.rows.iter().filter(|row| row.status == Status::Error).count()
+    }
+
+    /// Time to keep points and to write the recordings, ms.
+    fn logging_ms(&self) -> f64 {
+        self.keeping_ms + self.recordings.iter().map(|r| r.log_ms).sum::<f64>()
+    }
+
+    fn json(&self) -> serde_json::Value {
+        let recordings: Vec<_> = self
+            .recordings
+            .iter()
+            .map(|r| json!({ "path": r.path, "bytes": r.bytes, "raw_bytes": r.raw_bytes, "log_ms": r.log_ms }))
+            .collect();
+        json!({
+            "sweep": self.name,
+            "folder": self.folder,
+            "points": self.total,
+            "skipped": self.skipped,
+            "failed": self.failed(),
+            "seconds": self.seconds,
+            "logging_ms": self.logging_ms(),
+            "recordings": recordings,
+            "rows": self.rows,
+        })
+    }
+
+    fn table(&self) -> String {
+        let mut out = rows_table(self.rows).to_string();
+        out.push_str(&format!(
+            "\n{} of {} points done, {} failed; {} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
+            self.rows.len(),
+            self.total,
+            self.failed(),
+            self.skipped,
+            self.seconds,
+            self.folder
+        ));
+        for recording in self.recordings {
+            out.push_str(&line(recording));
+        }
+        if !self.recordings.is_empty() {
+            out.push_str(&format!("keeping and recording the points took {:.1} s\n", self.logging_ms() / 1e3));
+        }
+        out
+    }
+}
+
+/// A recording, its size and its cost in a line.
+pub(crate) fn line(recording: &RecordSummary) -> String {
+    let Some(path) = &recording.path else { return String::new() };
+    format!(
+        "recording: {} ({:.1} MB, {:.2} of the bytes that changed, {:.1} s)\n",
+        path.display(),
+        recording.bytes as f64 / 1e6,
+        recording.bytes as f64 / recording.raw_bytes.max(1) as f64,
+        recording.log_ms / 1e3
+    )
+}
+
+/// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
+pub(crate) fn rows_table(rows: &[Row]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "representable mm"]);
+    let refs: Vec<&Row> = rows.iter().collect();
+    let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
+    for (row, label) in rows.iter().zip(labels(&refs)) {
+        let (index, garment) = (row.index.to_string(), row.garment.clone());
+        if row.status == Status::Error {
+            table.add_row([index, garment, format!("{label}: {}", row.error)]);
+            continue;
+        }
+        let parts = row.part_count.map_or_else(String::new, |n| n.to_string());
+        table.add_row([
+            index,
+            garment,
+            label,
+            parts,
+            mm(row.time_total_ms),
+            mm(row.rms_mm),
+            mm(row.canonical_rms_mm),
+            mm(row.representable_rms_mm),
+        ]);
+    }
+    for column in [0, 3, 4, 5, 6, 7] {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// The rows as CSV, with the columns of `rows.csv`.
+pub(crate) fn csv(rows: &[Row]) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row)?;
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
+}

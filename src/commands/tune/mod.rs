@@ -1,0 +1,242 @@
+//! `partwise tune`: range tables on the front of PART count and error, which the paper leaves open.
+
+mod find;
+mod recording;
+mod report;
+mod wearer;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use partwise::assess::AssessOptions;
+use partwise::fabric::Fabric;
+use partwise::record::RecordSummary;
+use partwise::shapes::BUILT_IN;
+use partwise::table_search::Front;
+
+use self::find::{Found, Taken, find, take};
+use self::report::Verdict;
+use self::wearer::Wearer;
+use super::failure::UserError;
+use super::inputs::{looks_like_a_file, read_text};
+use super::run::use_threads;
+use super::sinks::SinkArgs;
+use super::sweep::cache;
+use super::sweep::report::{Format, line};
+use super::{console, interrupt};
+
+const LONG_ABOUT: &str = "\
+Searches range tables for the least error at every number of PARTs.
+
+The paper adjusts its table by iteration with a computer and leaves the best one open. The error meant here is the representable \
+error: what remains of the reference drape when each PART moves by the mean of its vertices. No mechanics with one displacement a \
+PART can do better, and it takes no mechanics to compute, so that the best tables for every number of PARTs come out of one exact \
+dynamic program. First levels alone are searched, as the paper asks it, then levels whose PARTs are cut to an extent along the cloth.
+
+`partwise compare` then shows what the model makes of a table.";
+
+const EXAMPLES: &str = "\
+Examples:
+  partwise tune --garment flared-skirt                        a table for one garment, in recordings/tune/
+  partwise tune                                               a table for each of the five garments
+  partwise tune --together --garment pullover-1 --garment flared-skirt --hold-out low-cut-dress
+                                                              one table for two garments, tried on a third
+  partwise compare table-3 recordings/tune/flared-skirt-levels.toml --garment flared-skirt";
+
+/// Arguments of `tune`.
+#[derive(Debug, Clone, Args)]
+#[command(long_about = LONG_ABOUT, after_help = EXAMPLES)]
+pub(crate) struct TuneArgs {
+    /// Garment to tune on, as in `partwise run`; each gets tables of its own [default: the five built-in ones]
+    #[arg(long, value_name = "NAME[@VERTICES]|FILE")]
+    garment: Vec<String>,
+    /// One table for all garments together
+    #[arg(long)]
+    together: bool,
+    /// Garment that the search does not see and the tables are tried on
+    #[arg(long, value_name = "NAME[@VERTICES]|FILE")]
+    hold_out: Vec<String>,
+    /// Body: `form`, or an OBJ file with garments placed around it
+    #[arg(long, value_name = "form|FILE.obj", default_value = "form")]
+    body: String,
+    /// Fabric of the reference drape: a built-in name or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "interlock")]
+    fabric: String,
+    /// Most PARTs a table may make, over all garments tuned together [default: as many as Table 3 makes]
+    #[arg(long, value_name = "N", help_heading = "Search")]
+    max_parts: Option<usize>,
+    /// Extents to cut PARTs to
+    #[arg(
+        long,
+        value_name = "CM[,CM...]",
+        value_delimiter = ',',
+        default_value = "12,16,20,25,30,40,50",
+        help_heading = "Search"
+    )]
+    extents: Vec<f64>,
+    /// Search levels alone
+    #[arg(long, help_heading = "Search")]
+    levels_only: bool,
+    /// Where references are kept [default: the user's cache folder]
+    #[arg(long, value_name = "DIR", help_heading = "Search")]
+    cache: Option<PathBuf>,
+    /// Folder of the tables, the fronts and the recordings
+    #[arg(long, value_name = "DIR", default_value = "recordings/tune", help_heading = "Output")]
+    out: PathBuf,
+    #[command(flatten)]
+    sinks: SinkArgs,
+    /// What to print on stdout; CSV is the front
+    #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
+    format: Format,
+    /// Worker threads; results do not depend on it [default: one per core]
+    #[arg(long, value_name = "N", help_heading = "Output")]
+    threads: Option<usize>,
+}
+
+/// All that was found.
+#[derive(Default)]
+struct Results {
+    text: String,
+    fronts: Vec<(String, &'static str, Front)>,
+    verdicts: Vec<Verdict>,
+    tables: Vec<PathBuf>,
+    recordings: Vec<RecordSummary>,
+}
+
+impl TuneArgs {
+    /// Runs the command.
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        use_threads(self.threads)?;
+        interrupt::listen();
+        let extents_m = self.extents_m()?;
+        let fabric = self.fabric()?;
+        let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
+        let names: Vec<String> = if self.garment.is_empty() {
+            BUILT_IN.iter().map(|n| (*n).to_owned()).filter(|n| !self.hold_out.contains(n)).collect()
+        } else {
+            self.garment.clone()
+        };
+        let load = |names: &[String]| -> anyhow::Result<Option<Vec<Wearer>>> {
+            names.iter().map(|name| Wearer::load(name, &self.body, &fabric, &options)).collect()
+        };
+        let (Some(wearers), Some(held_out)) = (load(&names)?, load(&self.hold_out)?) else { return Ok(()) };
+        let sets: Vec<Vec<&Wearer>> =
+            if self.together { vec![wearers.iter().collect()] } else { wearers.iter().map(|w| vec![w]).collect() };
+        if sets.len() * sets.first().map_or(0, Vec::len) > 1 && self.sinks.save.is_some() {
+            return Err(UserError::new(
+                "--save takes one recording and this makes one a garment; choose a folder with --out",
+            ));
+        }
+        let mut results = Results::default();
+        for set in &sets {
+            if interrupt::requested() {
+                break;
+            }
+            self.tune(set, &held_out, &extents_m, &mut results)?;
+        }
+        let front = report::csv(&results.fronts)?;
+        self.write(&self.out.join("front.csv"), &front)?;
+        match self.format {
+            Format::Csv => console::result(&front),
+            Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
+                "verdicts": results.verdicts,
+                "tables": results.tables,
+                "front": self.out.join("front.csv"),
+                "recordings": results.recordings.iter().map(|r| &r.path).collect::<Vec<_>>(),
+            }))?),
+            Format::Text => {
+                let recordings: String = results.recordings.iter().map(line).collect();
+                let tables: String = results.tables.iter().map(|t| format!("table: {}\n", t.display())).collect();
+                console::result(&format!(
+                    "{}Representable error beside Table 3's\n{}\n{tables}front: {}\n{recordings}",
+                    results.text,
+                    report::verdicts(&results.verdicts),
+                    self.out.join("front.csv").display()
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Searches for one set of garments.
+    fn tune(
+        &self,
+        set: &[&Wearer],
+        held_out: &[Wearer],
+        extents_m: &[f64],
+        results: &mut Results,
+    ) -> anyhow::Result<()> {
+        let name = set.iter().map(|w| stem(&w.name)).collect::<Vec<_>>().join("+");
+        let max_parts = self.max_parts.unwrap_or_else(|| set.iter().map(|w| w.table_3.parts).sum());
+        let Some(found) = find(set, max_parts, extents_m, &name)? else { return Ok(()) };
+        let mut taken: Vec<(&'static str, Taken)> = Vec::new();
+        let kinds = [("levels", &found.levels), ("levels and extents", &found.all)];
+        for (kind, front) in kinds.into_iter().take(if extents_m.is_empty() { 1 } else { 2 }) {
+            results.text.push_str(&report::front(&format!("{name}, {kind}"), front, set));
+            results.fronts.push((name.clone(), kind, front.clone()));
+            let Some(best) = take(front, set, max_parts, &format!("{name}, {kind}"))? else { continue };
+            let path = self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")));
+            self.write(&path, &report::with_provenance(&best, set).to_toml())?;
+            results.tables.push(path);
+            let on = |w: &Wearer, held_out: bool| Verdict::new(&name, kind, &best, w, held_out);
+            results.verdicts.extend(set.iter().map(|w| on(w, false)));
+            results.verdicts.extend(held_out.iter().map(|w| on(w, true)));
+            taken.push((kind, best));
+        }
+        self.record(set, &found, &taken, max_parts, results)
+    }
+
+    fn record(
+        &self,
+        set: &[&Wearer],
+        found: &Found,
+        taken: &[(&'static str, Taken)],
+        max_parts: usize,
+        results: &mut Results,
+    ) -> anyhow::Result<()> {
+        let taken: Vec<(&'static str, &Taken)> = taken.iter().map(|(kind, t)| (*kind, t)).collect();
+        for wearer in set {
+            let mut sinks = self.sinks.clone();
+            if sinks.save.is_none() && !sinks.no_save {
+                sinks.save = Some(self.out.join(format!("{}.rrd", stem(&wearer.name))));
+            }
+            let sinks = sinks.sinks(&wearer.name);
+            if !sinks.is_empty() {
+                results.recordings.push(recording::record(wearer, set, found, &taken, max_parts, sinks)?);
+            }
+        }
+        Ok(())
+    }
+
+    fn extents_m(&self) -> anyhow::Result<Vec<f64>> {
+        if self.levels_only {
+            return Ok(Vec::new());
+        }
+        if let Some(wrong) = self.extents.iter().find(|cm| !(cm.is_finite() && **cm > 0.0)) {
+            return Err(UserError::new(format!(
+                "--extents: found {wrong}, expected centimetres above 0; --levels-only for none"
+            )));
+        }
+        Ok(self.extents.iter().map(|cm| cm / 100.0).collect())
+    }
+
+    fn fabric(&self) -> anyhow::Result<Fabric> {
+        if looks_like_a_file(&self.fabric) {
+            return Ok(Fabric::parse(&read_text(Path::new(&self.fabric))?, &self.fabric)?);
+        }
+        Ok(Fabric::by_name(&self.fabric)?)
+    }
+
+    fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
+        let written = std::fs::create_dir_all(&self.out).and_then(|()| std::fs::write(path, text));
+        written.map_err(|e| {
+            UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
+        })
+    }
+}
+
+/// A garment's name for files: without folder and ending.
+fn stem(name: &str) -> String {
+    let file = Path::new(name).file_name().map_or(name.into(), std::ffi::OsStr::to_string_lossy);
+    file.trim_end_matches(".obj").trim_end_matches(".toml").to_owned()
+}

@@ -1,0 +1,181 @@
+//! What a search found, for the terminal, as CSV, as JSON, and as range tables that say where they come from.
+
+use std::fmt::Write as _;
+
+use comfy_table::{CellAlignment, Table, presets};
+use partwise::range_table::RangeTable;
+use partwise::table_search::Front;
+use serde::Serialize;
+
+use super::find::Taken;
+use super::wearer::{Holds, Wearer};
+use crate::commands::summary::command_line;
+
+/// A tuned table beside Table 3 on one garment.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Verdict {
+    /// What the table was tuned on.
+    pub(super) tuned_on: String,
+    /// `levels`, or `levels and extents`.
+    pub(super) kind: &'static str,
+    /// The garment it is tried on.
+    pub(super) garment: String,
+    /// Whether the search did not see this garment.
+    pub(super) held_out: bool,
+    /// The extent, cm; none for levels alone.
+    pub(super) extent_cm: Option<f64>,
+    pub(super) levels: usize,
+    pub(super) parts: usize,
+    pub(super) rms_mm: f64,
+    pub(super) table_3_parts: usize,
+    pub(super) table_3_rms_mm: f64,
+    /// Error over Table 3's.
+    pub(super) ratio: f64,
+}
+
+impl Verdict {
+    pub(super) fn new(tuned_on: &str, kind: &'static str, taken: &Taken, wearer: &Wearer, held_out: bool) -> Self {
+        let Holds { parts, rms_mm } = wearer.holds(&taken.table, taken.extent_m);
+        Self {
+            tuned_on: tuned_on.to_owned(),
+            kind,
+            garment: wearer.name.clone(),
+            held_out,
+            extent_cm: taken.extent_m.map(|m| 100.0 * m),
+            levels: taken.table.levels.len(),
+            parts,
+            rms_mm,
+            table_3_parts: wearer.table_3.parts,
+            table_3_rms_mm: wearer.table_3.rms_mm,
+            ratio: rms_mm / wearer.table_3.rms_mm,
+        }
+    }
+}
+
+/// The verdicts for the terminal.
+pub(super) fn verdicts(all: &[Verdict]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header([
+        "tuned on",
+        "what",
+        "garment",
+        "extent cm",
+        "levels",
+        "PARTs",
+        "mm",
+        "Table 3: PARTs",
+        "mm",
+        "ratio",
+    ]);
+    for v in all {
+        table.add_row([
+            v.tuned_on.clone(),
+            v.kind.to_owned(),
+            format!("{}{}", v.garment, if v.held_out { " (held out)" } else { "" }),
+            v.extent_cm.map_or_else(|| "–".to_owned(), |cm| format!("{cm:.1}")),
+            v.levels.to_string(),
+            v.parts.to_string(),
+            format!("{:.2}", v.rms_mm),
+            v.table_3_parts.to_string(),
+            format!("{:.2}", v.table_3_rms_mm),
+            format!("{:.2}", v.ratio),
+        ]);
+    }
+    for column in 3..10 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// Lines of a front shown on the terminal at most; the CSV has all.
+const SHOWN: usize = 12;
+
+/// A front for the terminal, thinned.
+pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer]) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["PARTs", "error mm", "levels", "extent cm"]);
+    let last = front.points.len().saturating_sub(1);
+    let mut shown: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();
+    shown.dedup();
+    for point in shown.into_iter().filter_map(|i| front.points.get(i)) {
+        table.add_row([
+            point.parts.to_string(),
+            format!("{:.2}", 1e3 * point.rms_m),
+            (point.inner_bounds_cm.len() + 1).to_string(),
+            point.extent_m.map_or_else(|| "–".to_owned(), |m| format!("{:.1}", 100.0 * m)),
+        ]);
+    }
+    for column in table.column_iter_mut() {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let mut out = format!("{title}: {} tables that no other beats\n{table}\n", front.points.len());
+    let (parts, rms) = table_3(wearers);
+    let _ = writeln!(out, "Table 3: {parts} PARTs, {rms:.2} mm\n");
+    out
+}
+
+/// Table 3's PARTs and error over a set, weighted as the search weighs them.
+pub(super) fn table_3(wearers: &[&Wearer]) -> (usize, f64) {
+    let parts = wearers.iter().map(|w| w.table_3.parts).sum();
+    let weights = wearers.iter().map(|w| w.sample().weight);
+    let total: f64 = weights.clone().sum();
+    let mean = wearers.iter().zip(weights).map(|(w, weight)| weight * w.table_3.rms_mm.powi(2)).sum::<f64>() / total;
+    (parts, mean.sqrt())
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    tuned_on: &'a str,
+    kind: &'a str,
+    parts: usize,
+    rms_mm: f64,
+    levels: usize,
+    extent_cm: Option<f64>,
+    inner_bounds_cm: String,
+}
+
+/// Fronts as CSV.
+pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for (tuned_on, kind, front) in fronts {
+        for point in &front.points {
+            writer.serialize(Line {
+                tuned_on,
+                kind,
+                parts: point.parts,
+                rms_mm: 1e3 * point.rms_m,
+                levels: point.inner_bounds_cm.len() + 1,
+                extent_cm: point.extent_m.map(|m| 100.0 * m),
+                inner_bounds_cm: point.inner_bounds_cm.iter().map(f64::to_string).collect::<Vec<_>>().join(" "),
+            })?;
+        }
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
+}
+
+/// The table with its provenance: who made it how, from what, and how good it is there.
+pub(super) fn with_provenance(taken: &Taken, wearers: &[&Wearer]) -> RangeTable {
+    let figures: Vec<String> = wearers
+        .iter()
+        .zip(&taken.holds)
+        .map(|(w, h)| {
+            format!(
+                "{}: {} PARTs, {:.2} mm (Table 3: {}, {:.2} mm)",
+                w.name, h.parts, h.rms_mm, w.table_3.parts, w.table_3.rms_mm
+            )
+        })
+        .collect();
+    let extent = taken.extent_m.map_or_else(
+        || "levels alone (--max-extent 0)".to_owned(),
+        |m| format!("for PARTs cut to {0} cm (--max-extent {0})", 100.0 * m),
+    );
+    let source = format!(
+        "partwise {} by `{}`, {extent}; representable error on the canonical drape of {}",
+        env!("CARGO_PKG_VERSION"),
+        command_line(),
+        figures.join("; ")
+    );
+    taken.table.clone().with_source(source)
+}

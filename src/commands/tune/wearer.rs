@@ -1,0 +1,102 @@
+//! A garment to tune a table on, or to try one on: its distances, its reference drape, and what a table can hold of it.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+use partwise::assess::{AssessError, AssessOptions, canonical};
+use partwise::fabric::Fabric;
+use partwise::parts::{Parts, representable_rms_m, segment};
+use partwise::range_table::RangeTable;
+use partwise::shapes::BodySpec;
+use partwise::table_search::Sample;
+
+use crate::commands::run::refining;
+use crate::commands::sweep::scenes::Placed;
+use crate::commands::{console, interrupt};
+
+/// PARTs and representable error of a table on a garment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Holds {
+    /// PARTs.
+    pub(crate) parts: usize,
+    /// Representable error, mm.
+    pub(crate) rms_mm: f64,
+}
+
+/// A garment with its reference drape.
+pub(crate) struct Wearer {
+    /// As on the command line.
+    pub(crate) name: String,
+    /// Body, garment, distances.
+    pub(crate) placed: Placed,
+    /// The canonical drape, m.
+    pub(crate) reference: Vec<DVec3>,
+    /// From undraped to the canonical drape, m.
+    pub(crate) displacement: Vec<DVec3>,
+    /// What Table 3 makes of it.
+    pub(crate) table_3: Holds,
+}
+
+impl Wearer {
+    /// Makes or reads a garment and finds or computes its reference; `None` where the user stopped it.
+    pub(crate) fn load(
+        name: &str,
+        body: &str,
+        fabric: &Fabric,
+        options: &AssessOptions,
+    ) -> anyhow::Result<Option<Self>> {
+        let placed = Placed::load(body, name, &BodySpec::default())?;
+        let found = refining(&format!("{name}: reference drape"), |observer| {
+            canonical(&placed.scene, fabric, options, &mut |step| {
+                let _ = observer(step);
+                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+        });
+        let (reference, warnings) = match found {
+            Ok(found) => found,
+            Err(AssessError::Interrupted) => return Ok(None),
+            Err(other) => return Err(other.into()),
+        };
+        for warning in placed.warnings.iter().chain(&warnings) {
+            console::warning(&format!("{name}: {warning}"));
+        }
+        let start = &placed.scene.garment.positions;
+        let displacement = reference.positions.iter().zip(start).map(|(a, b)| *a - *b).collect();
+        let mut wearer = Self {
+            name: name.to_owned(),
+            placed,
+            reference: reference.positions,
+            displacement,
+            table_3: Holds { parts: 0, rms_mm: 0.0 },
+        };
+        wearer.table_3 = wearer.holds(&RangeTable::table_3(), None);
+        Ok(Some(wearer))
+    }
+
+    /// As the search sees it. Errors count relative to Table 3's, so that a wide skirt does not outweigh a pullover.
+    pub(crate) fn sample(&self) -> Sample<'_> {
+        Sample {
+            mesh: &self.placed.scene.garment,
+            topology: &self.placed.scene.topology,
+            distances_m: &self.placed.distance_m,
+            displacement: &self.displacement,
+            weight: 1.0 / self.table_3.rms_mm.max(1e-3).powi(2),
+        }
+    }
+
+    /// The PARTs of a table, cut to an extent (m) if there is one.
+    pub(crate) fn parts(&self, table: &RangeTable, extent_m: Option<f64>) -> Parts {
+        let scene = &self.placed.scene;
+        let parts = segment(&scene.topology, &self.placed.distance_m, table);
+        match extent_m {
+            None => parts,
+            Some(extent_m) => parts.cut_to_extent(&scene.garment, &scene.topology, extent_m),
+        }
+    }
+
+    /// What a table holds of the reference.
+    pub(crate) fn holds(&self, table: &RangeTable, extent_m: Option<f64>) -> Holds {
+        let parts = self.parts(table, extent_m);
+        Holds { parts: parts.len(), rms_mm: 1e3 * representable_rms_m(&parts, &self.displacement) }
+    }
+}
