@@ -133,7 +133,7 @@ impl RunArgs {
                 ..Layout::default()
             },
             replaceable: self.watch,
-            ..RecordOptions::default()
+            front: self.sinks.seen_from.direction(),
         }
     }
 
