@@ -89,7 +89,7 @@ impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
-        let mut solved = self.solve()?;
+        let mut solved = self.solve(None)?;
         let mut recorder = Recorder::open(self.record_options(&solved))?;
         self.record(&mut recorder, &mut solved, 0)?;
         if let Some(path) = &self.export {
@@ -102,7 +102,7 @@ impl RunArgs {
                 console::note(&format!("look at it: {url}"));
             }
             if self.watch {
-                self.keep_watching(&mut recorder)?;
+                self.keep_watching(&mut recorder, solved)?;
             } else {
                 interrupt::wait();
             }
@@ -137,10 +137,11 @@ impl RunArgs {
         }
     }
 
-    fn solve(&self) -> anyhow::Result<Solved> {
+    /// Reads what is to be read, the quick files first, and runs every stage; `kept` saves reading body and garment again.
+    fn solve(&self, kept: Option<Inputs>) -> anyhow::Result<Solved> {
         let start = Instant::now();
-        let inputs = self.input.load()?;
         let settings = self.stages.settings()?;
+        let inputs = kept.map_or_else(|| self.input.load(), Ok)?;
         let load = start.elapsed();
         let name = &inputs.garment_name;
         let mut snapshots = Vec::new();
@@ -231,7 +232,7 @@ impl RunArgs {
     }
 
     /// Streams a new step after each edit; an edit that does not read leaves the last good state on the page.
-    fn keep_watching(&self, recorder: &mut Recorder) -> anyhow::Result<()> {
+    fn keep_watching(&self, recorder: &mut Recorder, solved: Solved) -> anyhow::Result<()> {
         let files: Vec<PathBuf> =
             self.input.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
         if files.is_empty() {
@@ -243,12 +244,25 @@ impl RunArgs {
         let mut watch = FileWatch::new(files)?;
         console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
         let mut index = 0;
-        while watch.changed().is_some() {
-            match self.solve() {
+        let mut last = Some(solved.inputs);
+        while let Some(changed) = watch.changed() {
+            // Body and garment take a second to make; a new table need not wait for them.
+            let meshes_stand = changed.iter().all(|file| !self.input.files().contains(&file.as_path()));
+            let kept = last.take_if(|_| meshes_stand);
+            // A file that does not read is found before what is kept is used up.
+            let solved = match self.stages.settings() {
+                Ok(_) => self.solve(kept),
+                Err(error) => {
+                    last = kept;
+                    Err(error)
+                }
+            };
+            match solved {
                 Ok(mut solved) => {
                     index += 1;
                     self.record(recorder, &mut solved, index)?;
                     self.print(&solved)?;
+                    last = Some(solved.inputs);
                 }
                 Err(error) => {
                     console::error(&error);
