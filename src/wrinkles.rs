@@ -2,15 +2,15 @@
 //!
 //! The paper takes the difference of the displacements of two adjacent PARTs for a wrinkle at their seam, |D_p − D_q|. A
 //! fold is curvature: the mean curvature of the drape, H_i = |Σ_j (cot α_ij + cot β_ij)(x_i − x_j)| / (4 A_i), with α, β the angles
-//! opposite edge i–j and A_i the vertex area (Meyer, Desbrun, Schröder, Barr: "Discrete differential-geometry operators for
-//! triangulated 2-manifolds", 2003, with barycentric areas). Both are reported per seam, and Spearman's rank correlation
+//! opposite edge i–j and A_i the vertex's mixed area (Meyer, Desbrun, Schröder, Barr: "Discrete differential-geometry operators
+//! for triangulated 2-manifolds", 2003). Both are reported per seam, and Spearman's rank correlation
 //! says how far one tells the other.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | D | displacement of a PART | m |
 //! | H | mean curvature, without sign | 1/m |
-//! | A | barycentric vertex area | m² |
+//! | A | mixed area: the vertex's Voronoi cell, cut at obtuse triangles | m² |
 //!
 //! Limits: H counts the body's own roundness too; on the edge of the cloth it is undefined, and taken from the inner
 //! neighbours.
@@ -77,8 +77,12 @@ pub fn measure(
 #[must_use]
 pub fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     let mut laplacian = vec![DVec3::ZERO; mesh.vertex_count()];
+    let mut areas = vec![0.0; mesh.vertex_count()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(t);
+        for (&v, share) in triangle.iter().zip(mixed_areas(corners)) {
+            areas[v as usize] += share;
+        }
         for k in 0..3 {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let (a, b) = (corners[i] - corners[k], corners[j] - corners[k]);
@@ -92,7 +96,6 @@ pub fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
         }
     }
     let edge = topology.boundary_vertices();
-    let areas = mesh.vertex_areas();
     let inner: Vec<f64> = laplacian
         .iter()
         .zip(&areas)
@@ -109,6 +112,22 @@ pub fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
             if count > 0 { sum / f64::from(count) } else { 0.0 }
         })
         .collect()
+}
+
+/// What each corner of a triangle owns of it, m²: its Voronoi cell, or where an angle is obtuse half the triangle for that
+/// corner and a quarter for the others.
+fn mixed_areas(corners: [DVec3; 3]) -> [f64; 3] {
+    let side = |i: usize, j: usize| corners[j % 3] - corners[i % 3];
+    let area = 0.5 * side(0, 1).cross(side(0, 2)).length();
+    let cosine = [0, 1, 2].map(|i| side(i, i + 1).dot(side(i, i + 2)));
+    if area <= 0.0 || cosine.iter().any(|&c| c < 0.0) {
+        return cosine.map(|c| if c < 0.0 { 0.5 * area } else { 0.25 * area });
+    }
+    // cot = cosine / (2 area), so |e|² cot / 8 is |e|² cosine / (16 area).
+    [0, 1, 2].map(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        (side(i, j).length_squared() * cosine[k] + side(i, k).length_squared() * cosine[j]) / (16.0 * area)
+    })
 }
 
 /// Spearman's rank correlation, ties at their mean rank.

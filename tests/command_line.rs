@@ -1,5 +1,7 @@
 //! The command line as a user meets it: what it prints, writes, refuses, and exits with.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use std::fs;
 use std::path::Path;
 use std::process::Output;
@@ -180,7 +182,7 @@ fn bad_tables_are_refused_by_file_and_row() {
         ("[[0.0, 1.0], [0.5, 2.0]]", "row 2"),
         ("[[-1.0, 1.0]]", "row 1"),
         ("[[0.0, nan]]", "row 1"),
-        ("[[0.0]]", "line 2"),
+        ("[[0.0]]", "t.toml:2"),
         ("[]", "level"),
     ] {
         bench.write("t.toml", &format!("name = \"t\"\nlevels = {levels}\nunit = \"cm\"\n"));

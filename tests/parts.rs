@@ -1,5 +1,7 @@
 //! Equation (1): levels and connectivity against brute force, and the cuts and joins that build on it.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use glam::DVec3;
 use partwise::distance::Body;
 use partwise::mesh::{Topology, TriMesh};

@@ -30,9 +30,9 @@ def free_port():
 
 
 def shoot(rerun, recording, picture, size):
-    """Runs the viewer; tries three times, since a software renderer on a busy machine may miss its first frames."""
+    """Runs the viewer until its picture passes; on a busy machine the first may show the file still loading."""
     reason = ""
-    for attempt in range(3):
+    for attempt in range(6):
         with tempfile.TemporaryDirectory() as runtime:
             environment = dict(os.environ, XDG_RUNTIME_DIR=runtime, RUST_LOG="off")
             command = [rerun, recording, "--headless", "--bind", "127.0.0.1", "--port", str(free_port()),
@@ -43,12 +43,15 @@ def shoot(rerun, recording, picture, size):
             except subprocess.TimeoutExpired:
                 reason = "the viewer did not finish within 120 s"
         if os.path.exists(picture):
-            return
+            reason = fault(picture)
+            if not reason:
+                return
         time.sleep(2 * (attempt + 1))
     sys.exit(f"{recording}: no picture: {reason or 'the viewer said nothing'}")
 
 
-def judge(picture):
+def fault(picture):
+    """What is wrong with the picture; empty if nothing is."""
     image = Image.open(picture).convert("RGB")
     small = image.resize((image.width // 4, image.height // 4))
     pixels = small.tobytes()
@@ -56,11 +59,12 @@ def judge(picture):
     colours = len(set(triples))
     coloured = sum(max(t) - min(t) > 60 for t in triples) / len(triples)
     if colours < FEWEST_COLOURS:
-        sys.exit(f"{picture}: {colours} colours, expected at least {FEWEST_COLOURS}: a blank picture?")
+        return (f"{picture}: {colours} colours, expected at least {FEWEST_COLOURS}: a blank picture?")
     if coloured < SMALLEST_COLOURED_SHARE:
-        sys.exit(f"{picture}: {100 * coloured:.1f} % of it is coloured, expected at least "
+        return (f"{picture}: {100 * coloured:.1f} % of it is coloured, expected at least "
                  f"{100 * SMALLEST_COLOURED_SHARE:.0f} %: no garment in sight?")
     print(f"{picture}: {image.width}x{image.height}, {colours} colours, {100 * coloured:.0f} % coloured")
+    return ""
 
 
 def main():
@@ -74,7 +78,6 @@ def main():
         os.remove(options.picture)
     os.makedirs(os.path.dirname(os.path.abspath(options.picture)), exist_ok=True)
     shoot(options.rerun, options.recording, options.picture, options.size)
-    judge(options.picture)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 //! compared with its *own continuation*, refined to convergence from that very result ([`Accuracy::vertices`], `rms_mm`); with the
 //! *canonical drape*, refined from the undraped start (`canonical_rms_mm`); and the spread of canonical drapes from perturbed
 //! starts stands beside both (`canonical_spread_mm`). The vertex error e_i = |x_i − x'_i| is split by zone: contact, where the
-//! reference is within [`CONTACT_ZONE`] of the body, and free. [`shape`] compares shapes, [`state`] tells how settled and how
-//! strained, [`representable`] what the PARTs could hold at best, [`reference`] keeps references on disk.
+//! reference is within [`CONTACT_ZONE`] of the body, and free. [`mod@shape`] compares shapes, [`state`] tells how settled and how
+//! strained, [`representable`] what the PARTs could hold at best, [`mod@reference`] keeps references on disk.
 //!
 //! Limits: no figure tells whether either drape is *the* drape of a real cloth; that is what the drape tests are for.
 

@@ -55,7 +55,7 @@ impl CheckArgs {
             console::note(note);
         }
         let mut table = Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["", &loaded.body_name, &loaded.garment_name]);
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["", &loaded.body_name, &loaded.garment_name]);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);
         }

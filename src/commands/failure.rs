@@ -21,6 +21,7 @@ pub(crate) struct UserError(String);
 
 impl UserError {
     /// The mistake as an error to return.
+    #[allow(clippy::new_ret_no_self, reason = "nobody needs the type: it only picks the exit code")]
     pub(crate) fn new(message: impl Into<String>) -> anyhow::Error {
         Self(message.into()).into()
     }

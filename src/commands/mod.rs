@@ -4,11 +4,13 @@ mod assets;
 mod check;
 mod compare;
 mod console;
+mod cusick;
 mod failure;
 mod inputs;
 mod interrupt;
 mod measurements;
 mod merge;
+mod readings;
 mod run;
 mod sinks;
 mod stages;
@@ -65,6 +67,8 @@ enum Command {
     Run(Box<run::RunArgs>),
     /// Report the health of a body and a garment, and how they lie about each other, without draping
     Check(Box<check::CheckArgs>),
+    /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
+    Cusick(cusick::CusickArgs),
     /// Run every point of a sweep file: tables, garments, fabrics; a row on disk after each, and a recording of all
     Sweep(Box<sweep::SweepArgs>),
     /// Set range tables side by side: PARTs of each level, what is split and merged, time, error
@@ -86,6 +90,7 @@ pub(crate) fn main() -> ExitCode {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
+        Some(Command::Cusick(args)) => args.execute(),
         Some(Command::Sweep(args)) => args.execute(),
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),

@@ -40,6 +40,9 @@ pub(crate) struct RunArgs {
     /// Solve again and stream the next step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
+    /// Leave the solver's steps out of the recording, for a small file
+    #[arg(long, help_heading = "Recording")]
+    no_iterations: bool,
     /// Measure the drape against its own continuation and the canonical drape; references are cached between runs
     #[arg(long, help_heading = "Stages")]
     accuracy: bool,
@@ -86,7 +89,7 @@ impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
-        let mut solved = self.solve()?;
+        let mut solved = self.solve(None)?;
         let mut recorder = Recorder::open(self.record_options(&solved))?;
         self.record(&mut recorder, &mut solved, 0)?;
         if let Some(path) = &self.export {
@@ -99,9 +102,9 @@ impl RunArgs {
                 console::note(&format!("look at it: {url}"));
             }
             if self.watch {
-                self.keep_watching(&mut recorder)?
+                self.keep_watching(&mut recorder, solved)?;
             } else {
-                interrupt::wait()
+                interrupt::wait();
             }
             if let Some(path) = recorder.finish()?.path {
                 console::note(&format!("recording: {}", path.display()));
@@ -124,26 +127,27 @@ impl RunArgs {
             layout: Layout {
                 several_tables: self.watch,
                 follow: self.watch,
-                iterations: !self.watch && solved.snapshots.len() > 1,
+                iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.assessment.is_some(),
                 fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
                 ..Layout::default()
             },
             replaceable: self.watch,
-            ..RecordOptions::default()
+            front: self.sinks.seen_from.direction(),
         }
     }
 
-    fn solve(&self) -> anyhow::Result<Solved> {
+    /// Reads what is to be read, the quick files first, and runs every stage; `kept` saves reading body and garment again.
+    fn solve(&self, kept: Option<Inputs>) -> anyhow::Result<Solved> {
         let start = Instant::now();
-        let inputs = self.input.load()?;
         let settings = self.stages.settings()?;
+        let inputs = kept.map_or_else(|| self.input.load(), Ok)?;
         let load = start.elapsed();
         let name = &inputs.garment_name;
         let mut snapshots = Vec::new();
         let drape = refining(name, |progress| {
             drape(&inputs.scene, &settings, &mut |step| {
-                let positions = (step.iteration % MESH_EVERY == 0).then(|| step.positions.to_vec());
+                let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
                 snapshots.push(Snapshot {
                     iteration: step.iteration,
                     energy: step.energy,
@@ -169,6 +173,10 @@ impl RunArgs {
         Ok(Solved { inputs, settings, drape, assessment, snapshots, summary })
     }
 
+    fn records_iterations(&self) -> bool {
+        !self.watch && !self.no_iterations
+    }
+
     fn cache(&self) -> Option<ReferenceCache> {
         self.cache.clone().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
     }
@@ -179,11 +187,10 @@ impl RunArgs {
         recorder.body(index, &scene.body_mesh)?;
         recorder.garment(index, &scene.garment)?;
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
-        let fit = solved.drape.state.as_ref().map(|s| &s.fit);
         let mut overlays = Vec::new();
-        if let Some(fit) = fit {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &fit.strain_percent });
-            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa });
+        if let Some(state) = &solved.drape.state {
+            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
+            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
         let mut scalars = Vec::new();
         if let Some(assessment) = &solved.assessment {
@@ -200,7 +207,7 @@ impl RunArgs {
             scalars: &scalars,
             overlays: &overlays,
         })?;
-        if !self.watch {
+        if self.records_iterations() {
             for s in &solved.snapshots {
                 let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);
                 recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
@@ -225,7 +232,7 @@ impl RunArgs {
     }
 
     /// Streams a new step after each edit; an edit that does not read leaves the last good state on the page.
-    fn keep_watching(&self, recorder: &mut Recorder) -> anyhow::Result<()> {
+    fn keep_watching(&self, recorder: &mut Recorder, solved: Solved) -> anyhow::Result<()> {
         let files: Vec<PathBuf> =
             self.input.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
         if files.is_empty() {
@@ -237,12 +244,25 @@ impl RunArgs {
         let mut watch = FileWatch::new(files)?;
         console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
         let mut index = 0;
-        while watch.changed().is_some() {
-            match self.solve() {
+        let mut last = Some(solved.inputs);
+        while let Some(changed) = watch.changed() {
+            // Body and garment take a second to make; a new table need not wait for them.
+            let meshes_stand = changed.iter().all(|file| !self.input.files().contains(&file.as_path()));
+            let kept = last.take_if(|_| meshes_stand);
+            // A file that does not read is found before what is kept is used up.
+            let solved = match self.stages.settings() {
+                Ok(_) => self.solve(kept),
+                Err(error) => {
+                    last = kept;
+                    Err(error)
+                }
+            };
+            match solved {
                 Ok(mut solved) => {
                     index += 1;
                     self.record(recorder, &mut solved, index)?;
                     self.print(&solved)?;
+                    last = Some(solved.inputs);
                 }
                 Err(error) => {
                     console::error(&error);

@@ -2,8 +2,31 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use glam::DVec3;
 use partwise::record::Sink;
+
+/// Where the views of a recording look from when it opens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SeenFrom {
+    /// The wearer looks at you
+    Front,
+    /// The wearer's left
+    Side,
+    /// Behind the wearer
+    Back,
+}
+
+impl SeenFrom {
+    /// The direction towards the eye; our own bodies, and most of other people's, look along −y.
+    pub(crate) fn direction(self) -> DVec3 {
+        match self {
+            Self::Front => DVec3::NEG_Y,
+            Self::Side => DVec3::X,
+            Self::Back => DVec3::Y,
+        }
+    }
+}
 
 /// The sinks of a recording; several at once are fine.
 #[derive(Debug, Clone, Args)]
@@ -24,6 +47,9 @@ pub(crate) struct SinkArgs {
     /// Serve the bundled web viewer on 127.0.0.1 and print its address
     #[arg(long)]
     pub(crate) serve: bool,
+    /// Where the views look from when the recording opens
+    #[arg(long, value_enum, default_value_t = SeenFrom::Front)]
+    pub(crate) seen_from: SeenFrom,
     /// Port of the served page [default: any free one]
     #[arg(long, value_name = "PORT")]
     pub(crate) web_port: Option<u16>,

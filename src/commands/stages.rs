@@ -6,11 +6,11 @@ use clap::{Args, ValueEnum};
 use partwise::drape::{Model, Refine, Settings};
 use partwise::fabric::Fabric;
 use partwise::mechanics::coupled::CoupledOptions;
-use partwise::mechanics::paper::PaperOptions;
-use partwise::range_table::RangeTable;
+use partwise::range_table::{GapRule, RangeTable};
 
 use super::failure::UserError;
 use super::inputs::{looks_like_a_file, read_text};
+use super::readings::{self, Reading};
 
 /// The models of stage two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -28,19 +28,24 @@ pub(crate) struct StageArgs {
     /// Range table: `table-3` (the paper's) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "table-3")]
     table: String,
-    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam [default: 1, which is the
-    /// paper's definition; 6 for `coupled`]
-    #[arg(long, value_name = "N")]
-    min_part: Option<usize>,
+    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam; 1 is the
+    /// paper's definition
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    min_part: usize,
     /// Model of stage two
     #[arg(long, value_enum, default_value_t = ModelName::Coupled)]
     model: ModelName,
     /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade from coarse to fine; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "5")]
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "8")]
     max_extent: Vec<f64>,
     /// Newton steps at full resolution afterwards; 0 is the two-stage scheme alone [default: converged, 0 for `paper`]
     #[arg(long, value_name = "N|converged")]
     refine: Option<Refine>,
+    #[arg(long = "reading", value_name = "KEY=VALUE", value_parser = readings::parse, help = readings::HELP)]
+    readings: Vec<Reading>,
+    /// Who takes a hole between two levels, whatever the table says: extend-lower, extend-upper, own-level, error
+    #[arg(long, value_name = "RULE", value_parser = gap_rule)]
+    gap: Option<GapRule>,
     /// Fabric: a built-in name or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "interlock")]
     fabric: String,
@@ -55,23 +60,31 @@ impl StageArgs {
     /// Reads tables and fabrics.
     pub(crate) fn settings(&self) -> anyhow::Result<Settings> {
         let model = match self.model {
-            ModelName::Paper => Model::Paper(PaperOptions::default()),
+            ModelName::Paper => Model::Paper(readings::options(&self.readings)),
             ModelName::Coupled => {
                 let extents_m = self.max_extent.iter().filter(|e| **e != 0.0).map(|cm| cm / 100.0).collect();
                 Model::Coupled(CoupledOptions { extents_m, ..CoupledOptions::default() })
             }
         };
-        let (min_part, refine) = match self.model {
-            ModelName::Paper => (1, Refine::Steps(0)),
-            ModelName::Coupled => (6, Refine::Converged),
+        let refine = match self.model {
+            ModelName::Paper => Refine::Steps(0),
+            ModelName::Coupled => Refine::Converged,
         };
         Ok(Settings {
-            table: self.table()?,
-            min_part: self.min_part.unwrap_or(min_part),
+            table: self.gapped(self.table()?)?,
+            min_part: self.min_part,
             model,
             refine: self.refine.unwrap_or(refine),
             fabric: self.fabric()?,
         })
+    }
+
+    fn gapped(&self, mut table: RangeTable) -> anyhow::Result<RangeTable> {
+        if let Some(gap) = self.gap {
+            table.gap = gap;
+            table.validate()?;
+        }
+        Ok(table)
     }
 
     fn table(&self) -> anyhow::Result<RangeTable> {
@@ -92,4 +105,11 @@ impl StageArgs {
         }
         Ok(Fabric::by_name(&self.fabric)?)
     }
+}
+
+fn gap_rule(text: &str) -> Result<GapRule, String> {
+    [GapRule::ExtendLower, GapRule::ExtendUpper, GapRule::OwnLevel, GapRule::Error]
+        .into_iter()
+        .find(|rule| rule.as_str() == text)
+        .ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
 }

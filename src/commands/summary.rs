@@ -232,7 +232,7 @@ impl Summary {
 
     fn levels_table(&self) -> Table {
         let mut table = Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
         let bound = |b: Option<f64>| b.map_or_else(|| "∞".to_owned(), |b| format!("{b}"));
         let rows = self.level_bounds_cm.iter().zip(&self.parts_per_level).zip(&self.vertices_per_level).enumerate();
         for (i, (([lower, upper], parts), vertices)) in rows.filter(|(_, (_, vertices))| **vertices > 0) {

@@ -41,16 +41,16 @@ fn gamma(linear: f64) -> u8 {
 pub struct ColourMap {
     lightness: (f64, f64),
     hue_deg: (f64, f64),
-    chroma: f64,
+    chroma: (f64, f64),
 }
 
 impl ColourMap {
     /// Dark blue over teal to yellow: distances.
-    pub const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: 0.155 };
+    pub const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
     /// Dark violet over red to pale yellow: forces.
-    pub const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: 0.175 };
+    pub const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
     /// Pale grey over orange to dark red: errors, strains and pressures, where much is bad.
-    pub const ALARM: Self = Self { lightness: (0.93, 0.42), hue_deg: (95.0, 22.0), chroma: 0.165 };
+    pub const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
 
     /// The colour at `t` in 0–1; outside it the end's, and grey for what is not a number.
     #[must_use]
@@ -63,7 +63,7 @@ impl ColourMap {
         // Towards both ends of the lightness sRGB holds less chroma; without this the ends clip to another hue.
         let lightness = mix(self.lightness);
         let room = 1.0 - ((lightness - 0.66) / 0.42).powi(4);
-        oklch(lightness, self.chroma * room.max(0.25), mix(self.hue_deg))
+        oklch(lightness, mix(self.chroma) * room.max(0.25), mix(self.hue_deg))
     }
 
     /// The colours of many values over `range`.

@@ -19,7 +19,7 @@ const AZIMUTH_DEG: f64 = 18.0;
 /// Air around what must be seen.
 const MARGIN: f64 = 1.14;
 /// Room for the colour bar and its numbers under the garment, relative to the larger of its half extents.
-const LEGEND_HEIGHT: f64 = 0.30;
+const LEGEND_HEIGHT: f64 = 0.36;
 
 /// An eye and the directions of its picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -37,7 +37,7 @@ impl Legend<'_> {
         let (length, thickness) = (1.5 * eye.half_width.max(0.4 * eye.half_height), 0.045 * size);
         // In front of the legs: in the plane of the garment's nearest point.
         let start = eye.centre + eye.toward * eye.half_depth
-            - eye.up * (eye.half_height + 0.19 * size)
+            - eye.up * (eye.half_height + 0.25 * size)
             - eye.right * (0.5 * length);
         let at = |along: f64, above: f64| single(start + eye.right * (along * length) + eye.up * (above * thickness));
         let mut corners = Vec::new();

@@ -17,6 +17,8 @@ use crate::mesh::TriMesh;
 
 /// Share of the garment's height that the longest arrow takes.
 const LONGEST_ARROW: f64 = 0.16;
+/// With more arrows than this they shrink.
+const MANY_ARROWS: f64 = 150.0;
 /// Values above this quantile share the last colour.
 const QUANTILE: f64 = 0.99;
 /// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
@@ -160,16 +162,18 @@ fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError
         }
     }
     let height = 2.0 * open.eye.half_height;
-    let scale = LONGEST_ARROW * height / full;
+    // Hundreds of arrows would hide the garment: the more, the smaller.
+    let small = (MANY_ARROWS / parts as f64).sqrt().clamp(0.4, 1.0);
+    let longest = LONGEST_ARROW * height * small;
     // Off the surface by a hair, so that an arrow along the cloth is not half sunk in it.
     let origins = best.iter().map(|(_, x)| single(*x + 0.035 * height * toward));
     let vectors = step.part_force_n.iter().map(|f| {
-        let length = (f.length() * scale).min(1.25 * LONGEST_ARROW * height);
+        let length = (f.length() / full).min(1.25) * longest;
         single(f.normalize_or_zero() * length)
     });
     let arrows = Arrows3D::from_vectors(vectors)
         .with_origins(origins)
-        .with_radii([0.0045 * height as f32])
+        .with_radii([(0.0045 * height * small) as f32])
         .with_colors([Color::from_rgb(238, 240, 243)]);
     open.log(paths::FORCE_ARROWS, &arrows)
 }

@@ -13,6 +13,9 @@
 //! | F⁰, F¹, F² | gravity, body reaction, pull of the neighbours | N |
 //! | m | sweeps of the blend | – |
 //!
+//! The coarse cloth is softer than the fabric where the fabric is stiff: flat triangles that cannot stretch can only fold along
+//! their edges, so its membrane is capped where its own weight would strain it by [`CoupledOptions::coarse_strain`].
+//!
 //! Source: Luo, Jiang and Cong's two stages, with "the force from the adjacent PARTs" (their spring model) generalised to
 //! triangles, because springs alone neither shear nor bend. Limits: a fold narrower than about three PARTs cannot show, and one
 //! near that limit comes out too stiff; the body is felt at the nodes only until the push-out.
@@ -34,7 +37,7 @@ pub use nodes::CoarseMesh;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, PartResult, Stage};
 pub use rest::coarse_rest;
 
-use super::energy::{Cloth, Contacts, Friction, gravity};
+use super::energy::{Cloth, Contacts, EnergyError, Friction, gravity};
 use crate::distance::Body;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
@@ -119,10 +122,9 @@ fn stage(
     let Garment { mesh, topology, rest, fabric, held } = *garment;
     let parts = if extent_m.is_finite() { joined.cut_to_extent(mesh, topology, extent_m) } else { joined.clone() };
     let mut is_held = vec![false; mesh.vertex_count()];
-    for &v in held {
-        if let Some(h) = is_held.get_mut(v as usize) {
-            *h = true;
-        }
+    for &vertex in held {
+        let count = mesh.vertex_count();
+        *is_held.get_mut(vertex as usize).ok_or(EnergyError::Held { vertex, count })? = true;
     }
     let coarse = CoarseMesh::new(mesh, topology, &parts, &is_held);
     if coarse.triangles.is_empty() {
@@ -165,7 +167,15 @@ fn stage(
 
     result.part_results = balance(&cloth, &contacts, &settled.positions);
     let residual = last.map_or(0.0, |h| h.residual_over_weight);
-    warn(result, &parts, &coarse, stranded, extent_m, options, residual);
+    warn(result, &parts, &coarse, stranded, extent_m);
+    if residual > options.tolerance && last.is_some_and(|h| h.iteration >= options.max_steps) {
+        result.warnings.push(format!(
+            "the coarse cloth of {} PARTs stopped after {} steps at a residual of {residual:.1e} of its weight (asked: {:.0e})",
+            parts.len(),
+            options.max_steps,
+            options.tolerance
+        ));
+    }
     result.stages.push(Stage {
         extent_m,
         part_count: parts.len(),
@@ -281,15 +291,7 @@ fn balance(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<PartResul
 }
 
 /// Says what a user should know about a stage.
-fn warn(
-    result: &mut CoupledResult,
-    parts: &Parts,
-    coarse: &CoarseMesh,
-    stranded: usize,
-    extent_m: f64,
-    options: &CoupledOptions,
-    residual: f64,
-) {
+fn warn(result: &mut CoupledResult, parts: &Parts, coarse: &CoarseMesh, stranded: usize, extent_m: f64) {
     if !coarse.loose.is_empty() {
         result.warnings.push(format!(
             "{} of {} PARTs (extent {:.1} cm) meet no two others in a triangle and follow their neighbours",
@@ -303,13 +305,6 @@ fn warn(
     }
     if parts.unassigned > 0 {
         result.warnings.push(format!("{} vertices are in no PART and follow their neighbours", parts.unassigned));
-    }
-    if residual > options.tolerance {
-        result.warnings.push(format!(
-            "the coarse cloth of {} PARTs stopped at a residual of {residual:.1e} of its weight (asked: {:.0e})",
-            parts.len(),
-            options.tolerance
-        ));
     }
 }
 

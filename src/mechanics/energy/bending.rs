@@ -146,7 +146,7 @@ impl Bending {
     }
 
     fn cost(e: &Element, d: &[DVec3; 3]) -> f64 {
-        0.5 * e.stiffness.dot(DVec3::from(d.map(|k| k.length_squared())))
+        0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
     }
 
     /// Adds the gradient, N; returns the energy.

@@ -25,9 +25,11 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 /// (compression stockings reach 2 to 5 kPa), so a looser one stays well off the skin.
 const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
 
-/// The cloth keeps at least this distance (m) from the body, however thin it is: a triangle a centimetre long over a
-/// limb of 5 cm radius sags 0.25 mm below its vertices.
-const LEAST_OFFSET: f64 = 5e-4;
+/// The tightest body the vertices alone keep off the triangles between them, m: a shoulder's ridge, a bust's apex.
+const TIGHTEST_RADIUS: f64 = 0.03;
+
+/// No mesh is so coarse that its cloth floats farther than this from the body, m: the gap cloth simulators commonly keep.
+const LARGEST_SAG: f64 = 3e-3;
 
 /// What can be wrong with a garment's data.
 #[derive(Debug, thiserror::Error)]
@@ -145,7 +147,7 @@ impl Cloth {
             masses,
             areas,
             held: is_held,
-            offset: fabric.thickness_m.max(LEAST_OFFSET),
+            offset: fabric.thickness_m + sag(mesh),
             friction: fabric.friction,
             order,
             unknown,
@@ -229,10 +231,16 @@ impl Cloth {
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
     pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.hessian_after(None, x, contacts, blocks);
+    }
+
+    /// [`hessian`](Self::hessian) for the step after the one that led from `before` to `x`, with the stress which that
+    /// step predicted: see [`Triangle::hessian`].
+    pub fn hessian_after(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
         blocks.clear();
         blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
-            let parts = t.hessian(&self.stiffness, x);
+            let parts = t.hessian(&self.stiffness, x, before);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
@@ -279,4 +287,15 @@ fn block_neighbours(n: usize, topology: &Topology, bending: &Bending) -> Vec<Vec
         list.dedup();
     }
     neighbours
+}
+/// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
+/// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
+fn sag(mesh: &TriMesh) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for t in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(t);
+        sum += a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        count += 3.0;
+    }
+    (sum / f64::max(count, 1.0) / (6.0 * TIGHTEST_RADIUS)).min(LARGEST_SAG)
 }

@@ -7,7 +7,7 @@
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | q | signed distance to the body | m |
-//! | h | offset: the distance the cloth keeps, its thickness | m |
+//! | h | offset: the distance the cloth keeps, its thickness and what a triangle sags | m |
 //! | κ | contact stiffness: pressure over penetration | N/m³ |
 //! | A_i | rest area of vertex i | m² |
 //!

@@ -69,8 +69,10 @@ pub enum PaperError {
 pub enum PaperWarning {
     /// No vertex is within the contact distance; see [`Untouched::FromNearest`].
     #[error(
-        "the garment touches the body nowhere: its nearest vertex is {nearest_m} m off, so contact is what lies within \
-         {contact_m} m"
+        "the garment touches the body nowhere: its nearest vertex is {:.1} mm off, so contact is what lies within \
+         {:.1} mm",
+        1e3 * .nearest_m,
+        1e3 * .contact_m
     )]
     NotTouching {
         /// Distance of the nearest vertex, m.
@@ -80,7 +82,7 @@ pub enum PaperWarning {
     },
     /// No q_f balances the weight, so it is zero and no PART feels the body.
     #[error(
-        "nothing carries the garment: over {contact_parts} contact PARTs the body's normals point up by {support} of their \
+        "nothing carries the garment: over {contact_parts} contact PARTs the body's normals point up by {support:.3} of their \
          volume on average; the force density q_f is 0"
     )]
     NothingCarries {
@@ -99,7 +101,7 @@ pub enum PaperWarning {
         parts: usize,
     },
     /// Displacements beyond the garment's own size: the reading has failed there.
-    #[error("{parts} PARTs move by more than the garment is large, the farthest by {largest_m} m")]
+    #[error("{parts} PARTs move by more than the garment is large, the farthest by {largest_m:.2} m")]
     Explodes {
         /// How many.
         parts: usize,

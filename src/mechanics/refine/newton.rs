@@ -12,6 +12,11 @@ const ARMIJO: f64 = 1e-4;
 /// Shorter steps than this are rounding.
 const SHORTEST_STEP: f64 = 1e-6;
 
+/// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
+/// under gravity is a millimetre.
+const LEAST_DAMPING: f64 = 1.0;
+const MOST_DAMPING: f64 = 1e4;
+
 /// Settles `cloth` on `body` from `start`.
 ///
 /// # Errors
@@ -79,7 +84,8 @@ pub fn refine_with(
         if iteration >= limit {
             break Stop::StepsDone;
         }
-        cloth.hessian(&x, &contacts, &mut blocks);
+        // After a step, `trial` holds the positions it was taken from.
+        cloth.hessian_after((iteration > 0).then_some(&trial), &x, &contacts, &mut blocks);
         let diagonal: Vec<f64> = masses.iter().map(|m| m * damping).collect();
         solver.factorise(&cloth.pattern, &blocks, &diagonal)?;
         direction.clear();
@@ -113,9 +119,9 @@ pub fn refine_with(
         energy = cloth.gradient(&x, &contacts, &mut gradient);
         residual = norm(&gradient) / cloth.weight;
         if t >= first {
-            damping = (damping * 0.5).max(1e-2);
+            damping = (damping * 0.5).max(LEAST_DAMPING);
         } else if t < 0.3 * first {
-            damping = (damping * 2.0).min(1e4);
+            damping = (damping * 2.0).min(MOST_DAMPING);
         }
         history.push(Record {
             iteration,

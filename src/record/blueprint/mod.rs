@@ -2,7 +2,7 @@
 //!
 //! Rerun's typed blueprint cannot set the 3D eye, background, grid, axes or dataframe query, so the blueprint store is
 //! written by hand: `view/{id}` and its properties, `container/{id}`, `viewport`, and the panels, on the sequence timeline
-//! `blueprint` at 0; then one activation command. [`layout`] says which views there are, [`view`] what each holds.
+//! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
 pub(crate) mod layout;
 pub(crate) mod view;

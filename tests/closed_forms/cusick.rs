@@ -1,0 +1,48 @@
+//! The drape test on a coarse specimen: in order of stiffness, in folds, and inside the published bands where it is.
+
+use partwise::fabric::Fabric;
+use partwise::mechanics::cusick::{results_csv, run, targets};
+
+#[test]
+fn silk_cotton_wool_and_denim_fall_inside_their_published_bands() {
+    let targets = targets().unwrap();
+    assert_eq!(targets.len(), 4);
+    for name in ["silk", "cotton", "wool", "denim"] {
+        let result = run(&Fabric::by_name(name).unwrap(), 8).unwrap();
+        assert!(result.converged, "{name}: residual {:e} after {}", result.residual_over_weight, result.steps);
+        let band = targets.iter().find(|t| t.fabric == name).unwrap();
+        let percent = 100.0 * result.coefficient;
+        assert!(percent > band.low_percent && percent < band.high_percent, "{name}: {percent} %");
+        assert!((4..=12).contains(&result.folds), "{name}: {} folds", result.folds);
+    }
+}
+
+#[test]
+fn a_stiffer_fabric_drapes_less() {
+    let mut fabric = Fabric::by_name("jersey").unwrap();
+    let soft = run(&fabric, 6).unwrap().coefficient;
+    fabric.bending_nm = fabric.bending_nm.map(|b| 20.0 * b);
+    let stiff = run(&fabric, 6).unwrap().coefficient;
+    assert!(soft > 0.1 && soft + 0.1 < stiff && stiff < 1.0, "{soft} and {stiff}");
+}
+
+#[test]
+fn results_come_as_csv_with_their_bands() {
+    let csv = results_csv(&["jersey", "denim"], 4).unwrap();
+    let rows: Vec<csv::StringRecord> = csv::Reader::from_reader(csv.as_bytes()).records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 2);
+    assert_eq!(&rows[0][4], "no published band");
+    assert_eq!((&rows[1][0], &rows[1][2], &rows[1][3]), ("denim", "70", "90"));
+    assert!(results_csv(&["felt"], 4).is_err());
+    assert!(run(&Fabric::by_name("silk").unwrap(), 2).is_err());
+}
+
+#[test]
+fn the_results_beside_the_code_are_what_the_code_gives() {
+    // One row is drawn again; all of them would take the better part of a minute.
+    let kept = include_str!("../../assets/cusick/results.csv");
+    let drawn = results_csv(&["interlock"], 10).unwrap();
+    let row = drawn.lines().nth(1).unwrap();
+    assert!(kept.lines().any(|line| line == row), "assets/cusick/results.csv lacks `{row}`: write it again");
+    assert_eq!(kept.lines().count(), 1 + partwise::fabric::BUILT_IN.len());
+}
