@@ -57,7 +57,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_enum, default_value_t = ModelName::Coupled, help_heading = "Stages")]
     model: ModelName,
     /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "5", help_heading = "Stages")]
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "8", help_heading = "Stages")]
     max_extent: Vec<f64>,
     /// Join PARTs of fewer vertices than this to a neighbour [default: 6 for `coupled`, 1 for `paper`]
     #[arg(long, value_name = "N", help_heading = "Stages")]

@@ -56,7 +56,7 @@ pub(super) fn text(all: &[Compared]) -> String {
             of_garment[0].row.garment
         );
         let mut table = Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["table", "PARTs", "kept", "split", "merged"]);
+        table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["table", "PARTs", "kept", "split", "merged"]);
         for c in of_garment {
             let counts = [c.level_part_count, c.kept, c.split, c.merged].map(|n| n.to_string());
             table.add_row(std::iter::once(c.row.table.clone()).chain(counts));
@@ -65,9 +65,12 @@ pub(super) fn text(all: &[Compared]) -> String {
         let _ = writeln!(out, "{table}");
         let mut table = Table::new();
         let pairs = of_garment.iter().flat_map(|c| [c.row.table.clone(), "PARTs".to_owned()]);
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(std::iter::once("level".to_owned()).chain(pairs));
+        table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(std::iter::once("level".to_owned()).chain(pairs));
         let most = of_garment.iter().map(|c| c.per_level.len()).max().unwrap_or(0);
         for level in 0..most {
+            if of_garment.iter().all(|c| c.per_level.get(level).is_none_or(|l| l.vertices == 0)) {
+                continue;
+            }
             let cells = of_garment.iter().flat_map(|c| match c.per_level.get(level) {
                 Some(l) => [range(l), l.parts.to_string()],
                 None => [String::new(), String::new()],

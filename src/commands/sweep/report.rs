@@ -113,7 +113,7 @@ pub(crate) fn line(recording: &RecordSummary) -> String {
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.load_preset(presets::UTF8_BORDERS_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
     table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "representable mm"]);
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));

@@ -39,11 +39,12 @@ pub(crate) struct Taken {
     pub(crate) holds: Vec<Holds>,
 }
 
-/// Searches on all garments together. Where the user stops it, what was found until then.
+/// Searches on all garments together, over so many candidate bounds a round. Where the user stops it, what was found until then.
 pub(crate) fn find(
     wearers: &[&Wearer],
     max_parts: usize,
     extents_m: &[f64],
+    candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
     let samples: Vec<_> = wearers.iter().map(|w| w.sample()).collect();
@@ -53,10 +54,11 @@ pub(crate) fn find(
         if interrupt::requested() {
             break;
         }
-        let options = match extent_m {
+        let mut options = match extent_m {
             None => SearchOptions::new(max_parts),
             Some(extent_m) => SearchOptions::with_extent(max_parts, extent_m),
         };
+        options.candidates = candidates.unwrap_or(options.candidates);
         let title = extent_m.map_or("levels alone".to_owned(), |m| format!("cut to {:.1} cm", 100.0 * m));
         let bar = console::progress(Some(0), &format!("{what}: {title}"));
         let progress = |p: Progress| {

@@ -74,6 +74,9 @@ pub(crate) struct TuneArgs {
         help_heading = "Search"
     )]
     extents: Vec<f64>,
+    /// Bounds tried in each round; the time grows with the square [default: 400 for levels alone, 60 with extents]
+    #[arg(long, value_name = "N", help_heading = "Search")]
+    candidates: Option<usize>,
     /// Search levels alone
     #[arg(long, help_heading = "Search")]
     levels_only: bool,
@@ -168,7 +171,7 @@ impl TuneArgs {
     ) -> anyhow::Result<()> {
         let name = set.iter().map(|w| stem(&w.name)).collect::<Vec<_>>().join("+");
         let max_parts = self.max_parts.unwrap_or_else(|| set.iter().map(|w| w.table_3.parts).sum());
-        let Some(found) = find(set, max_parts, extents_m, &name)? else { return Ok(()) };
+        let Some(found) = find(set, max_parts, extents_m, self.candidates, &name)? else { return Ok(()) };
         let mut taken: Vec<(&'static str, Taken)> = Vec::new();
         let kinds = [("levels", &found.levels), ("levels and extents", &found.all)];
         for (kind, front) in kinds.into_iter().take(if extents_m.is_empty() { 1 } else { 2 }) {

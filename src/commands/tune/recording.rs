@@ -114,7 +114,7 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
         index: shown.index,
         distance_m: &wearer.placed.distance_m,
         part_of_vertex: &covering(&parts),
-        part_force_n: &vec![DVec3::ZERO; parts.len() + 1],
+        part_force_n: &vec![DVec3::ZERO; parts.len() + usize::from(parts.unassigned > 0)],
         draped: &positions,
         panel: &panel,
         scalars: &[("error/representable_rms_mm", holds.rms_mm), ("levels", shown.table.levels.len() as f64)],

@@ -55,7 +55,7 @@ impl Verdict {
 /// The verdicts for the terminal.
 pub(super) fn verdicts(all: &[Verdict]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header([
+    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header([
         "tuned on",
         "what",
         "garment",
@@ -95,7 +95,7 @@ const SHOWN: usize = 12;
 /// A front for the terminal, thinned.
 pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer]) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["PARTs", "error mm", "levels", "extent cm"]);
+    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extent cm"]);
     let last = front.points.len().saturating_sub(1);
     let mut shown: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();
     shown.dedup();

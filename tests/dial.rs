@@ -1,0 +1,220 @@
+//! Range tables as a dial, from the command line: sweeps that survive, shards that join, tables compared and tuned.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use partwise::range_table::RangeTable;
+use partwise::record::inspect;
+use tempfile::TempDir;
+
+const SWEEP: &str = r#"
+name = "small"
+[base]
+garment = "flared-skirt@600"
+extent_cm = 20
+[grid]
+tables = ["table-3", { scale = [0.5, 2] }, { quantile = [4, 8] }]
+"#;
+
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self { folder: TempDir::new().unwrap() };
+        bench.write("sweep.toml", SWEEP);
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin("partwise"));
+        command.current_dir(self.folder.path()).args(arguments).env("XDG_CACHE_HOME", self.path("cache"));
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    fn does(&self, arguments: &[&str]) -> Output {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        output
+    }
+
+    fn refuses(&self, arguments: &[&str], word: &str) {
+        let output = self.run(arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(word), "{arguments:?} should say `{word}`: {said}");
+    }
+
+    /// The rows of a sweep's CSV without what differs from run to run.
+    fn rows(&self, folder: &str) -> Vec<Vec<String>> {
+        let mut reader = csv::Reader::from_path(self.path(folder).join("rows.csv")).unwrap();
+        let header = reader.headers().unwrap().clone();
+        let kept: Vec<usize> = (0..header.len()).filter(|&i| !header[i].starts_with("time_")).collect();
+        let rows = reader.records().map(|r| r.unwrap());
+        rows.map(|row| kept.iter().map(|&i| row[i].to_owned()).collect()).collect()
+    }
+
+    fn recording(&self, folder: &str) -> inspect::Contents {
+        inspect::read(&self.path(folder).join("flared-skirt@600.rrd")).unwrap()
+    }
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_sweep_leaves_rows_and_a_recording_and_is_not_run_twice() {
+    let bench = Bench::new();
+    let report = json(&bench.does(&["sweep", "sweep.toml", "--out", "a", "--format", "json"]));
+    assert_eq!((&report["points"], &report["failed"]), (&5.into(), &0.into()));
+    for row in report["rows"].as_array().unwrap() {
+        for key in ["part_count", "rms_mm", "canonical_rms_mm", "representable_rms_mm", "time_total_ms"] {
+            assert!(row[key].as_f64().unwrap() > 0.0, "{key} of {row}");
+        }
+    }
+    let contents = bench.recording("a");
+    for path in ["/parts/garment", "/force/garment", "/drape/garment", "/error/garment", "/report", "/rows"] {
+        assert_eq!(contents.entities[path].rows, 5, "{path}");
+    }
+    assert_eq!(contents.entities["/body"].fixed_rows, 1);
+    assert!(contents.entities.contains_key("/compare/4/garment") && contents.entities.contains_key("/scatter/points"));
+    bench.refuses(&["sweep", "sweep.toml", "--out", "a"], "--resume");
+    let again = json(&bench.does(&["sweep", "sweep.toml", "--out", "a", "--resume", "--format", "json"]));
+    assert_eq!(again["skipped"], 5);
+    // Another accuracy is another result: its rows are not mixed with these.
+    bench.refuses(&["sweep", "sweep.toml", "--out", "a", "--resume", "--accuracy", "none"], "--adopt");
+}
+
+#[test]
+fn threads_jobs_and_shards_change_no_row_and_no_step() {
+    let bench = Bench::new();
+    let sweep = |more: &[&str]| {
+        bench.does(&[&["sweep", "sweep.toml", "--accuracy", "canonical"], more].concat());
+    };
+    sweep(&["--out", "one", "--threads", "1"]);
+    sweep(&["--out", "two", "--threads", "2", "--jobs", "2"]);
+    assert_eq!(bench.rows("one"), bench.rows("two"));
+    assert_eq!(bench.recording("one"), bench.recording("two"));
+    for shard in ["1", "2", "3"] {
+        sweep(&["--shard", &format!("{shard}/3"), "--out", &format!("part-{shard}"), "--no-save"]);
+    }
+    bench.does(&["merge", "part-3", "part-1", "part-2", "--out", "whole"]);
+    assert_eq!(bench.rows("one"), bench.rows("whole"));
+    assert_eq!(bench.recording("one"), bench.recording("whole"));
+    bench.refuses(&["merge", "part-1", "part-2", "--out", "most"], "missing");
+}
+
+#[test]
+fn a_killed_sweep_goes_on_where_it_was() {
+    let bench = Bench::new();
+    let whole = ["sweep", "sweep.toml", "--out", "whole", "--accuracy", "canonical"];
+    bench.does(&whole);
+    let broken = ["sweep", "sweep.toml", "--out", "broken", "--accuracy", "canonical", "--no-save"];
+    let mut child = bench.command(&broken).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let began = Instant::now();
+    let rows = bench.path("broken").join("rows.jsonl");
+    while fs::read_to_string(&rows).map_or(0, |text| text.lines().count()) < 2 {
+        assert!(began.elapsed() < Duration::from_secs(60), "no rows within a minute");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    // A torn line, as a full disk leaves it, and a point whose drape is gone.
+    let mut text = fs::read_to_string(&rows).unwrap();
+    text.push_str("{\"point\":\"ab");
+    fs::write(&rows, text).unwrap();
+    let lost = fs::read_dir(bench.path("broken").join("points")).unwrap().next().unwrap().unwrap();
+    fs::remove_file(lost.path()).unwrap();
+    bench.does(&["sweep", "sweep.toml", "--out", "broken", "--accuracy", "canonical", "--resume"]);
+    assert_eq!(bench.rows("whole"), bench.rows("broken"));
+    assert_eq!(bench.recording("whole"), bench.recording("broken"));
+}
+
+#[test]
+fn a_point_that_fails_is_a_row_and_the_rest_are_done() {
+    let bench = Bench::new();
+    let one = "name = \"one level\"\nunit = \"cm\"\nlevels = [[0.0, inf]]\n";
+    bench.write("one.toml", one);
+    bench.write("fails.toml", &format!("{SWEEP}\n[[points]]\ntable = \"one.toml\"\nextent_cm = \"none\"\n"));
+    let output = bench.run(&["sweep", "fails.toml", "--out", "a", "--accuracy", "none", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = json(&output);
+    assert_eq!((&report["failed"], report["rows"].as_array().unwrap().len()), (&1.into(), 6));
+    assert!(report["rows"][5]["error"].as_str().unwrap().contains("no three"), "{}", report["rows"][5]);
+    assert_eq!(bench.recording("a").entities["/drape/garment"].rows, 5);
+    bench.write("odd.toml", "name = \"odd\"\n[base]\noptions = { speed = 3 }\n[grid]\n");
+    bench.refuses(&["sweep", "odd.toml"], "speed");
+    bench.refuses(&["sweep", "nowhere.toml"], "nowhere.toml");
+}
+
+#[test]
+fn compared_tables_tell_what_is_split_and_what_is_merged() {
+    let bench = Bench::new();
+    bench.write("coarse.toml", "name = \"coarse\"\nunit = \"cm\"\nlevels = [[0.0, 4.0], [4.0, inf]]\n");
+    bench.write("fine.toml", "name = \"fine\"\nunit = \"cm\"\nlevels = [[0.0, 2.0], [2.0, 4.0], [4.0, inf]]\n");
+    let common = ["compare", "coarse.toml", "fine.toml", "--garment", "flared-skirt@600", "--max-extent", "20"];
+    let found = json(&bench.does(&[&common[..], &["--accuracy", "canonical", "--format", "json"]].concat()));
+    let [coarse, fine] = &found.as_array().unwrap()[..] else { panic!("{found}") };
+    assert_eq!(coarse["split"], 0);
+    assert!(fine["split"].as_u64().unwrap() > 0 && fine["merged"] == 0, "{fine}");
+    let counted: u64 = fine["per_level"].as_array().unwrap().iter().map(|l| l["parts"].as_u64().unwrap()).sum();
+    assert_eq!(fine["level_part_count"], counted);
+    let contents = inspect::read(&bench.path("recordings/compare/flared-skirt@600.rrd")).unwrap();
+    assert!(contents.entities.contains_key("/compare/1/garment"));
+    let csv =
+        bench.does(&[&common[..], &["--accuracy", "none", "--format", "csv", "--no-save", "--csv", "c.csv"]].concat());
+    assert_eq!(fs::read(bench.path("c.csv")).unwrap(), csv.stdout);
+    // A header, and a line for each level of each table.
+    assert_eq!(String::from_utf8(csv.stdout).unwrap().lines().count(), 1 + 2 + 3);
+    bench.refuses(&["compare", "table-3"], "2 to 6");
+    bench.refuses(&["compare", "table-3", "nowhere.toml"], "nowhere.toml");
+}
+
+#[test]
+fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
+    let bench = Bench::new();
+    let tune =
+        ["tune", "--garment", "flared-skirt@600", "--hold-out", "pullover-1@700", "--extents", "30", "--out", "t"];
+    let found = json(&bench.does(&[&tune[..], &["--format", "json"]].concat()));
+    let verdicts = found["verdicts"].as_array().unwrap();
+    assert_eq!(verdicts.len(), 4);
+    for v in verdicts.iter().filter(|v| v["held_out"] == false) {
+        assert!(v["parts"].as_u64() <= v["table_3_parts"].as_u64(), "{v}");
+        assert!(v["ratio"].as_f64().unwrap() < 1.0, "{v}");
+    }
+    let path = bench.path("t/flared-skirt@600-levels.toml");
+    let table = RangeTable::parse(&fs::read_to_string(&path).unwrap(), "tuned").unwrap();
+    for word in ["partwise tune", "flared-skirt@600", "Table 3"] {
+        assert!(table.source.contains(word), "{}", table.source);
+    }
+    // What compare counts is what tune promised.
+    let path = path.display().to_string();
+    let common = ["compare", "table-3", &path, "--garment", "flared-skirt@600", "--accuracy", "none", "--no-save"];
+    let compared = json(&bench.does(&[&common[..], &["--format", "json"]].concat()));
+    let promised = verdicts.iter().find(|v| v["held_out"] == false && v["kind"] == "levels").unwrap();
+    assert_eq!(compared[0]["level_part_count"], promised["table_3_parts"]);
+    assert_eq!(compared[1]["level_part_count"], promised["parts"]);
+    assert!(fs::read_to_string(bench.path("t/front.csv")).unwrap().lines().count() > 10);
+    let contents = inspect::read(&bench.path("t/flared-skirt@600.rrd")).unwrap();
+    // Table 3, three rounds of levels alone, two of one extent: a step each.
+    assert_eq!(contents.entities["/drape/garment"].rows, 6);
+    bench.refuses(&["tune", "--garment", "toga", "--out", "u"], "toga");
+    bench.refuses(&["tune", "--garment", "flared-skirt@600", "--extents", "0", "--out", "u"], "--extents");
+    assert!(!Path::new(&bench.path("u")).exists());
+}
