@@ -6,7 +6,7 @@ cd "$(dirname "$0")/../.."
 cargo build --release
 partwise="${CARGO_TARGET_DIR:-target}/release/partwise"
 for garment in pullover-1 pullover-2 flared-skirt low-cut-dress long-sleeved-dress; do
-    "$partwise" --garment "$garment@1500" --fabric jersey --no-iterations --save "recordings/gallery/$garment.rrd"
+    "$partwise" --garment "$garment@1300" --fabric jersey --no-iterations --save "recordings/gallery/$garment.rrd"
     if command -v rerun >/dev/null; then
         python3 tests/screenshot.py "recordings/gallery/$garment.rrd" "recordings/gallery/$garment.png"
     fi
