@@ -1,5 +1,7 @@
 //! Range tables as a dial, from the command line: sweeps that survive, shards that join, tables compared and tuned.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

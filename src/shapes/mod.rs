@@ -1,6 +1,6 @@
 //! The built-in dress form and the five garments, made from measurements.
 //!
-//! [`body`] is the form, [`garment`] the wardrobe, [`girth`] measures either. Both are solids given by a field ([`solid`], [`anatomy`]),
+//! [`body`] is the form, [`mod@garment`] the wardrobe, [`girth`] measures either. Both are solids given by a field ([`solid`], [`anatomy`]),
 //! contoured ([`contour`]) and remeshed to even triangles (`remesh`). Everything here is deterministic: the same spec gives
 //! the same bits on any number of threads.
 

@@ -3,7 +3,7 @@
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | m_i | mass of vertex i: areal density times a third of its triangles' rest areas | kg |
-//! | g | gravitational acceleration, [`GRAVITY`](crate::GRAVITY) | m/s² |
+//! | g | gravitational acceleration, [`GRAVITY`] | m/s² |
 //!
 //! Heights count from the origin, so the energy's zero is arbitrary; its Hessian is zero.
 
