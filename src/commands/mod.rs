@@ -70,10 +70,13 @@ enum Command {
     /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
     Cusick(cusick::CusickArgs),
     /// Run every point of a sweep file: tables, garments, fabrics; a row on disk after each, and a recording of all
+    #[command(long_about = sweep::LONG_ABOUT)]
     Sweep(Box<sweep::SweepArgs>),
     /// Set range tables side by side: PARTs of each level, what is split and merged, time, error
+    #[command(long_about = compare::LONG_ABOUT)]
     Compare(Box<compare::CompareArgs>),
     /// Search range tables for the least error at every number of PARTs
+    #[command(long_about = tune::LONG_ABOUT)]
     Tune(Box<tune::TuneArgs>),
     /// Join the shards of a sweep into what one run would have written
     Merge(Box<merge::MergeArgs>),

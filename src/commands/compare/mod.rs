@@ -24,7 +24,7 @@ use super::sweep::report::{Format, line};
 use super::sweep::{cache, record_all};
 use super::{console, interrupt};
 
-const LONG_ABOUT: &str = "\
+pub(super) const LONG_ABOUT: &str = "\
 Drapes a garment once for each of two to six range tables and sets them side by side: PARTs of each level, which PARTs of the \
 first table are kept, split or merged, the time of the two stages, and how far the drape they give is from where it would settle.
 
@@ -39,7 +39,7 @@ Examples:
 
 /// Arguments of `compare`.
 #[derive(Debug, Clone, Args)]
-#[command(long_about = LONG_ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
     /// Range tables: `table-3` (the paper's) or TOML files; the others are compared with the first
     #[arg(required = true, value_name = "NAME|FILE")]

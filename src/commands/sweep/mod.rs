@@ -25,7 +25,7 @@ use super::run::use_threads;
 use super::sinks::SinkArgs;
 use super::{console, interrupt};
 
-const LONG_ABOUT: &str = "\
+pub(super) const LONG_ABOUT: &str = "\
 Runs every point of a sweep file: range tables, and any other setting, over garments, sizes and fabrics.
 
 A row is on disk after every point (rows.csv and rows.jsonl, the same columns), so that Ctrl-C, a crash or a full disk lose at \
@@ -49,7 +49,7 @@ A sweep file:
 
 /// Arguments of `sweep`.
 #[derive(Debug, Clone, Args)]
-#[command(long_about = LONG_ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct SweepArgs {
     /// The sweep file, TOML
     file: PathBuf,

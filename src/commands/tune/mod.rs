@@ -25,7 +25,7 @@ use super::sweep::cache;
 use super::sweep::report::{Format, line};
 use super::{console, interrupt};
 
-const LONG_ABOUT: &str = "\
+pub(super) const LONG_ABOUT: &str = "\
 Searches range tables for the least error at every number of PARTs.
 
 The paper adjusts its table by iteration with a computer and leaves the best one open. The error meant here is the representable \
@@ -45,7 +45,7 @@ Examples:
 
 /// Arguments of `tune`.
 #[derive(Debug, Clone, Args)]
-#[command(long_about = LONG_ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct TuneArgs {
     /// Garment to tune on, as in `partwise run`; each gets tables of its own [default: the five built-in ones]
     #[arg(long, value_name = "NAME[@VERTICES]|FILE")]
@@ -70,7 +70,7 @@ pub(crate) struct TuneArgs {
         long,
         value_name = "CM[,CM...]",
         value_delimiter = ',',
-        default_value = "12,16,20,25,30,40,50",
+        default_value = "14,16,18,20,22,25,30,40,50",
         help_heading = "Search"
     )]
     extents: Vec<f64>,
