@@ -212,6 +212,24 @@ fn sinks_that_cannot_be_had_are_said() {
 }
 
 #[test]
+fn a_held_edge_stays_and_an_unknown_one_is_refused() {
+    let bench = Bench::new();
+    let steps = ["--refine", "3", "--no-save"];
+    let held = bench.drape(&[&steps[..], &["--hold", "top", "--export", "held.obj"]].concat());
+    assert!(held.status.success(), "{}", String::from_utf8_lossy(&held.stderr));
+    let out = fs::read_to_string(bench.path("held.obj")).unwrap();
+    let corner = "v -0.3 -0.3 1.51";
+    assert!(out.lines().any(|l| l == corner), "the sheet's edge is held");
+    let free = bench.drape(&[&steps[..], &["--export", "free.obj"]].concat());
+    assert!(free.status.success());
+    assert!(!fs::read_to_string(bench.path("free.obj")).unwrap().lines().any(|l| l == corner));
+    bench.refuses(
+        &["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--hold", "cuff"],
+        &["cuff", "front", "top"],
+    );
+}
+
+#[test]
 fn help_teaches_and_mistakes_exit_with_two() {
     let bench = Bench::new();
     let help = String::from_utf8(bench.run(&["--help"]).stdout).unwrap();

@@ -54,6 +54,9 @@ pub(crate) struct InputArgs {
     /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces
     #[arg(long, value_name = "own|texture|FILE.obj")]
     rest: Option<String>,
+    /// Hold an edge of the garment where it is: `top` (the highest edge, a waistband) or the edges of a group of the file
+    #[arg(long, value_name = "top|GROUP")]
+    hold: Option<String>,
     /// Leave garment vertices that start inside the body where they are
     #[arg(long)]
     no_push_out: bool,
@@ -132,8 +135,12 @@ impl InputArgs {
             mesh = pushed;
         }
         let topology = Topology::new(&mesh);
+        let held = match &self.hold {
+            None => placed.held,
+            Some(what) => held_edge(&mesh, &topology, what)?,
+        };
         Ok(Inputs {
-            scene: Scene { body_mesh, body, garment: mesh, topology, rest: placed.rest, held: placed.held },
+            scene: Scene { body_mesh, body, garment: mesh, topology, rest: placed.rest, held },
             body_name: stem(&self.body),
             garment_name: self.garment_name(),
             warnings,
@@ -229,6 +236,30 @@ impl InputArgs {
             }
         })
     }
+}
+
+/// The vertices of the highest edge, or of the edges that a group lies on.
+fn held_edge(mesh: &TriMesh, topology: &Topology, what: &str) -> anyhow::Result<Vec<u32>> {
+    let height = |edge: &[u32]| edge.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() / edge.len() as f64;
+    if what == "top" {
+        let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
+        return highest.ok_or_else(|| UserError::new("--hold top: the garment has no edge to hold"));
+    }
+    let Some(group) = mesh.groups.iter().position(|g| g == what) else {
+        return Err(UserError::new(format!(
+            "--hold: no group \"{what}\" in the garment; expected `top` or one of {}",
+            mesh.groups.join(", ")
+        )));
+    };
+    let on_edge = topology.boundary_vertices();
+    let mut held: Vec<u32> = (mesh.triangles.iter().zip(&mesh.triangle_group))
+        .filter(|&(_, &g)| g as usize == group)
+        .flat_map(|(triangle, _)| *triangle)
+        .filter(|&v| on_edge[v as usize])
+        .collect();
+    held.sort_unstable();
+    held.dedup();
+    Ok(held)
 }
 
 /// Whether an argument names a file rather than something built in.
