@@ -3,107 +3,22 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
+mod settings;
+
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::distance::{Body, SurfacePoint};
-use crate::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
+use crate::distance::SurfacePoint;
+use crate::mechanics::coupled::{self, CoupledError, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
-use crate::mechanics::paper::{self, PaperError, PaperOptions, PartForces};
+use crate::mechanics::paper::{self, PaperError, PartForces};
 use crate::mechanics::refine::{self, RefineOptions, Refined, SolveError, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
-use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::{Parts, segment};
-use crate::range_table::RangeTable;
-
-/// What is draped over what; stays the same while tables and fabrics vary.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// The body's surface, m.
-    pub body_mesh: TriMesh,
-    /// The same, ready for distance queries.
-    pub body: Body,
-    /// The garment as placed, undraped, m.
-    pub garment: TriMesh,
-    /// Its connectivity.
-    pub topology: Topology,
-    /// Its rest shape.
-    pub rest: RestShape,
-    /// Vertices that stay where they are worn (a waistband's edge).
-    pub held: Vec<u32>,
-}
-
-/// The two models of stage two.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Model {
-    /// Equations (2) to (9) as read in [`paper`]: every PART for itself.
-    Paper(PaperOptions),
-    /// All PARTs at once, as the nodes of a coarse cloth: see [`coupled`].
-    Coupled(CoupledOptions),
-}
-
-impl Model {
-    /// The name on the command line.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Paper(_) => "paper",
-            Self::Coupled(_) => "coupled",
-        }
-    }
-}
-
-/// How far to go at full resolution after stage two.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Refine {
-    /// At most this many Newton steps; 0 is the two-stage scheme alone.
-    Steps(usize),
-    /// Until the residual force is under 1e-3 of the weight: the reference drape.
-    #[default]
-    Converged,
-}
-
-impl std::fmt::Display for Refine {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Steps(n) => write!(f, "{n}"),
-            Self::Converged => f.write_str("converged"),
-        }
-    }
-}
-
-impl std::str::FromStr for Refine {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "converged" => Ok(Self::Converged),
-            steps => steps
-                .parse()
-                .map(Self::Steps)
-                .map_err(|_| format!("found `{text}`, expected a number of steps or `converged`")),
-        }
-    }
-}
-
-/// The dials of one run.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// The range table of stage one.
-    pub table: RangeTable,
-    /// PARTs with fewer vertices join a neighbour; 1 keeps the paper's definition.
-    pub min_part: usize,
-    /// The model of stage two.
-    pub model: Model,
-    /// Steps at full resolution.
-    pub refine: Refine,
-    /// The cloth.
-    pub fabric: Fabric,
-}
+pub use settings::{Model, Refine, Scene, Settings};
 
 /// How long each stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -216,7 +131,8 @@ pub fn drape(
     let level_part_count = parts.len();
     let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts))?;
     warnings.extend(stage.warnings);
-    let refined = timed(&mut times.refine, || refine_further(scene, settings, &stage.positions, observer))?;
+    let start = stage.start.as_deref().unwrap_or(&stage.positions);
+    let refined = timed(&mut times.refine, || refine_further(scene, settings, start, observer))?;
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
         Some((cloth, Refined { positions, energy, residual_over_weight, steps, history, stop })) => {
@@ -225,6 +141,11 @@ pub fn drape(
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+    if let (Some((low, _)), true) = (scene.body_mesh.bounds(), state.is_some())
+        && positions.iter().all(|x| x.z < low.z)
+    {
+        warnings.push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
+    }
     let inside =
         scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
     let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
@@ -249,8 +170,14 @@ struct StageTwo {
     parts: Parts,
     outcomes: Vec<PartOutcome>,
     positions: Vec<DVec3>,
+    /// Where the refinement starts, if not from the positions.
+    start: Option<Vec<DVec3>>,
     warnings: Vec<String>,
 }
+
+/// A coarse cloth whose residual is more than this share of its weight has not come to rest anywhere: other people's
+/// undraped panels, with seams metres too long, may slip off the body before it does.
+const ASTRAY: f64 = 0.5;
 
 fn stage_two(
     scene: &Scene,
@@ -269,6 +196,7 @@ fn stage_two(
                 parts,
                 outcomes: result.parts.iter().map(outcome).collect(),
                 positions: result.positions,
+                start: None,
                 warnings: result.warnings.iter().map(ToString::to_string).collect(),
             })
         }
@@ -280,11 +208,20 @@ fn stage_two(
                 displacement: p.displacement,
                 contact: p.in_contact,
             };
+            let mut warnings = result.warnings.clone();
+            let astray = result.residual_over_weight() > ASTRAY && settings.refine != Refine::Steps(0);
+            if astray {
+                warnings.push(
+                    "the coarse cloth has gone astray: the steps at full resolution start from the undraped garment"
+                        .into(),
+                );
+            }
             Ok(StageTwo {
                 outcomes: result.part_results.iter().map(outcome).collect(),
                 parts: result.parts,
                 positions: result.positions,
-                warnings: result.warnings,
+                start: astray.then(|| mesh.positions.clone()),
+                warnings,
             })
         }
     }
@@ -304,7 +241,11 @@ fn refine_further(
     };
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, observer)?;
+    let floor = scene.body_mesh.bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
+    let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {
+        // What has fallen past the feet meets nothing any more, and would fall for ever.
+        if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
+    })?;
     Ok(Some((cloth, refined)))
 }
 
