@@ -27,9 +27,9 @@ pub struct Scene {
 /// The two models of stage two.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Model {
-    /// Equations (2) to (9) as read in [`paper`]: every PART for itself.
+    /// Equations (2) to (9) as read in [`paper`](crate::mechanics::paper): every PART for itself.
     Paper(PaperOptions),
-    /// All PARTs at once, as the nodes of a coarse cloth: see [`coupled`].
+    /// All PARTs at once, as the nodes of a coarse cloth: see [`coupled`](crate::mechanics::coupled).
     Coupled(CoupledOptions),
 }
 
