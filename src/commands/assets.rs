@@ -10,6 +10,7 @@ use partwise::mesh::export::write_mesh;
 use partwise::range_table::RangeTable;
 use partwise::shapes::body::DressForm;
 use partwise::shapes::garment::{BUILT_IN, GarmentSpec, garment_on};
+use rayon::prelude::*;
 
 use super::console;
 use super::failure::UserError;
@@ -43,12 +44,12 @@ impl AssetsArgs {
         let form = DressForm::new(&spec)?;
         write_mesh(&self.path("bodies/form.obj"), &form.mesh(FORM_TRIANGLES)?)?;
         self.text("bodies/form.toml", &toml::to_string(&spec)?)?;
-        for name in BUILT_IN {
+        BUILT_IN.par_iter().try_for_each(|name| -> anyhow::Result<()> {
             let spec = GarmentSpec::by_name(name)?;
             let made = garment_on(&spec, &form, self.vertices)?;
             write_mesh(&self.path(&format!("garments/{name}.obj")), &made.mesh)?;
-            self.text(&format!("garments/{name}.toml"), &toml::to_string(&spec)?)?;
-        }
+            self.text(&format!("garments/{name}.toml"), &toml::to_string(&spec)?)
+        })?;
         self.text("tables/table-3.toml", &RangeTable::table_3().to_toml())?;
         for name in fabric::BUILT_IN {
             self.text(&format!("fabrics/{name}.toml"), &toml::to_string(&fabric::Fabric::by_name(name)?)?)?;
