@@ -46,7 +46,7 @@ impl State {
         hold(cloth, &contacts, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
         let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
-        let (penetrating_vertices, depth) = contacts.penetration();
+        let (penetrating_vertices, depth) = contacts.penetration(x);
         Self {
             energy_j,
             residual_over_weight: residual / cloth.weight,

@@ -135,8 +135,9 @@ pub fn drape(
     let refined = timed(&mut times.refine, || refine_further(scene, settings, start, observer))?;
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
-        Some((cloth, Refined { positions, energy, residual_over_weight, steps, history, stop })) => {
-            let fit = fit(&cloth, &scene.body, &positions);
+        Some((cloth, refined)) => {
+            let fit = fit(&cloth, &scene.body, &refined.positions, refined.contact_stiffness);
+            let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
             (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
         }
     };

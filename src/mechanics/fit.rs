@@ -33,9 +33,9 @@ pub struct Fit {
     pub pressure_max_kpa: f64,
 }
 
-/// Measures `cloth` on `body` at `x` (m).
+/// Measures `cloth` on `body` at `x` (m), where it settled against a contact of stiffness κ (N/m³).
 #[must_use]
-pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Fit {
+pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3], contact_stiffness: f64) -> Fit {
     let mut sum = vec![0.0; x.len()];
     let mut area = vec![0.0; x.len()];
     let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
@@ -49,7 +49,10 @@ pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Fit {
     }
     let strain_percent = sum.iter().zip(&area).map(|(s, a)| if *a > 0.0 { s / a } else { 0.0 }).collect();
     let mut pressure_kpa = vec![0.0; x.len()];
-    for touch in cloth.contacts(body, x).touches() {
+    let mut contacts = cloth.contacts(body, x);
+    contacts.stiffen(contact_stiffness / contacts.stiffness());
+    contacts.update(x);
+    for touch in contacts.touches() {
         let v = touch.vertex as usize;
         pressure_kpa[v] = 1e-3 * touch.force() / cloth.areas[v];
     }
@@ -98,7 +101,8 @@ mod tests {
         let body = Body::new(&table()).unwrap();
         let (depth, stretch) = (0.2e-3, 1.03);
         let x = flat(stretch, cloth.offset - depth);
-        let fit = fit(&cloth, &body, &x);
+        let stiffness = cloth.contacts(&body, &x).stiffness();
+        let fit = fit(&cloth, &body, &x, stiffness);
         assert!((fit.strain_p95_percent - 3.0).abs() < 1e-9, "{}", fit.strain_p95_percent);
         assert!(fit.strain_percent.iter().all(|s| (s - 3.0).abs() < 1e-9));
         let expected = 1e-3 * cloth.contacts(&body, &x).stiffness() * depth;

@@ -13,8 +13,9 @@
 //! | F⁰, F¹, F² | gravity, body reaction, pull of the neighbours | N |
 //! | m | sweeps of the blend | – |
 //!
-//! The coarse cloth is softer than the fabric where the fabric is stiff: flat triangles that cannot stretch can only fold along
-//! their edges, so its membrane is capped where its own weight would strain it by [`CoupledOptions::coarse_strain`].
+//! The coarse cloth is softer than the fabric: flat triangles that cannot stretch can only fold along their edges (membrane
+//! locking), which no fold of a few PARTs' width does. So its membrane is capped where its own weight would strain it by
+//! [`CoupledOptions::coarse_strain`], resists compression less, and bends more easily.
 //!
 //! Source: Luo, Jiang and Cong's two stages, with "the force from the adjacent PARTs" (their spring model) generalised to
 //! triangles, because springs alone neither shear nor bend. Limits: a fold narrower than about three PARTs cannot show, and one
@@ -134,10 +135,13 @@ fn stage(
     let coarse_shape = coarse_rest(mesh, topology, rest, &parts, &coarse);
     let held_nodes: Vec<u32> =
         (0..parts.len() as u32).filter(|&p| is_held[coarse.node_vertex[p as usize] as usize]).collect();
-    let fabric = softened(fabric, mesh, options.coarse_strain);
-    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, &fabric, &held_nodes)?;
+    let fabric = &Fabric { bending_nm: fabric.bending_nm.map(|b| b * options.bending_share), ..fabric.clone() };
+    let mut cloth = Cloth::new(&nodes, &Topology::new(&nodes), &coarse_shape, fabric, &held_nodes)?
+        .with_slack(options.compression_share);
     let fine_offset = cloth.offset;
     load(&mut cloth, garment, &parts);
+    let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
+    cloth = cloth.softened(height, options.coarse_strain).unwrap_or(cloth);
     let setup = began.elapsed();
 
     let began = Instant::now();
@@ -193,20 +197,6 @@ fn stage(
     Ok(())
 }
 
-/// The fabric with its membrane no stiffer than its own hanging weight asks for: see [`CoupledOptions::coarse_strain`].
-fn softened(fabric: &Fabric, mesh: &TriMesh, strain: f64) -> Fabric {
-    let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
-    let most = fabric.density_kg_per_m2 * crate::GRAVITY * height / strain;
-    // No height or no strain asked for: as stiff as it is.
-    let cap = |k: f64| if most > 0.0 { k.min(most) } else { k };
-    Fabric {
-        stretch_weft_n_per_m: cap(fabric.stretch_weft_n_per_m),
-        stretch_warp_n_per_m: cap(fabric.stretch_warp_n_per_m),
-        shear_n_per_m: cap(fabric.shear_n_per_m),
-        ..fabric.clone()
-    }
-}
-
 /// Gives each node the mass and the area of its whole PART: the coarse triangles end at the nodes.
 fn load(cloth: &mut Cloth, garment: &Garment<'_>, parts: &Parts) {
     let mut areas = vec![0.0; parts.len()];
@@ -258,7 +248,7 @@ fn carry_loose(parts: &Parts, coarse: &CoarseMesh, displacement: &mut [DVec3]) -
 fn soft_contacts<'b>(cloth: &mut Cloth, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
     cloth.offset = cloth.offset.max(COARSE_OFFSET);
     let friction = Friction::new(cloth.friction);
-    let mut contacts = Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset, COARSE_CONTACT, friction);
+    let mut contacts = Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset, COARSE_CONTACT, friction).exact();
     contacts.update(x);
     contacts.friction_refresh(x);
     contacts

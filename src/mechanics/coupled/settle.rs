@@ -76,6 +76,7 @@ pub(super) fn settle(
         step_length: 0.0,
         largest_move_m: 0.0,
         damping,
+        softened: false,
     }];
     for iteration in 1..=goal.max_steps {
         if history.last().is_some_and(|h| h.residual_over_weight < goal.tolerance) {
@@ -131,6 +132,7 @@ pub(super) fn settle(
             step_length: if accepted { t } else { 0.0 },
             largest_move_m: if accepted { t * longest } else { 0.0 },
             damping,
+            softened: false,
         });
         if done {
             break;

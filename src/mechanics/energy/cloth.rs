@@ -187,6 +187,21 @@ impl Cloth {
         self.pattern = pattern;
     }
 
+    /// The same cloth with its membrane no stiffer than what lets a length of `height_m` (m) of it stretch by `strain` where
+    /// it hangs by its weight; `None` where it is not that stiff, or no height or strain is given.
+    #[must_use]
+    pub fn softened(&self, height_m: f64, strain: f64) -> Option<Self> {
+        let most = self.weight / self.areas.iter().sum::<f64>() * height_m / strain;
+        let stiffness = if most > 0.0 && most.is_finite() { self.stiffness.capped(most)? } else { return None };
+        Some(Self { stiffness, ..self.clone() })
+    }
+
+    /// The same cloth with another share of its membrane stiffness left under compression.
+    #[must_use]
+    pub fn with_slack(self, slack: f64) -> Self {
+        Self { stiffness: self.stiffness.with_slack(slack), ..self }
+    }
+
     /// Number of vertices, held or free.
     #[must_use]
     pub fn vertex_count(&self) -> usize {
@@ -237,10 +252,26 @@ impl Cloth {
     /// [`hessian`](Self::hessian) for the step after the one that led from `before` to `x`, with the stress which that
     /// step predicted: see [`Triangle::hessian`].
     pub fn hessian_after(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.assemble(|t| t.hessian(&self.stiffness, x, before), x, contacts, blocks);
+    }
+
+    /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
+    /// than [`hessian_after`](Self::hessian_after), and not always positive.
+    pub fn hessian_bearing(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.assemble(|t| t.hessian_bearing(&self.stiffness, x, before), x, contacts, blocks);
+    }
+
+    fn assemble(
+        &self,
+        of_triangle: impl Fn(&Triangle) -> [DMat3; 6],
+        x: &[DVec3],
+        contacts: &Contacts,
+        blocks: &mut Vec<DMat3>,
+    ) {
         blocks.clear();
         blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
-            let parts = t.hessian(&self.stiffness, x, before);
+            let parts = of_triangle(t);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };

@@ -1,24 +1,26 @@
 //! Contact: the body pushes the cloth off its surface.
 //!
 //! E = Σ ½ κ A_i (h − q(x_i))² over the vertices with q < h: a pressure κ (h − q) along the body's normal ∇q, so that the
-//! cloth's middle surface rests a fraction of its thickness nearer than h. The Hessian keeps κ A_i ∇q ∇qᵀ and drops the
-//! body's curvature times the pressure, which is negative on a convex body and second order in the penetration.
+//! cloth's middle surface rests a fraction of its thickness nearer than h. q is the body's distance without its creases,
+//! [`field`](super::field). The Hessian keeps κ A_i ∇q ∇qᵀ and drops the body's curvature times the pressure, which is
+//! negative on a convex body and second order in the penetration.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | q | signed distance to the body | m |
+//! | q | signed distance to the body, creases rounded | m |
 //! | h | offset: the distance the cloth keeps, its thickness and what a triangle sags | m |
 //! | κ | contact stiffness: pressure over penetration | N/m³ |
 //! | A_i | rest area of vertex i | m² |
 //!
-//! A closest point costs as much as ten triangles' energies, so each vertex remembers its last query: q has slope at most
-//! one, hence q(x) ≥ q(x') − |x − x'|, and a vertex whose bound stays above h is not asked again.
+//! A distance costs as much as ten triangles' energies, so each vertex remembers its last one: q has slope at most one,
+//! hence q(x) ≥ q(x') − |x − x'|, and a vertex whose bound stays above h is not asked again.
 //!
 //! Limits: vertices are tested, not edges or triangles; a sharp body corner can poke through a triangle.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::field::{Field, SIDE};
 use super::friction::Friction;
 use super::membrane::outer;
 use crate::distance::Body;
@@ -30,7 +32,7 @@ pub struct Touch {
     pub vertex: u32,
     /// h − q, m: positive.
     pub depth: f64,
-    /// ∇q, outward.
+    /// ∇q, outward; of unit length but where a crease is rounded.
     pub normal: DVec3,
     /// κ A_i, N/m.
     pub stiffness: f64,
@@ -44,10 +46,18 @@ impl Touch {
     }
 }
 
+/// What there is to touch, and by which distance.
+#[derive(Debug, Clone)]
+enum Met<'b> {
+    Nothing,
+    Exact(&'b Body),
+    Rounded(Field<'b>),
+}
+
 /// What the cloth meets at its current positions, with the memory that makes asking again cheap.
 #[derive(Debug, Clone)]
 pub struct Contacts<'b> {
-    body: Option<&'b Body>,
+    met: Met<'b>,
     offset: f64,
     areas: Vec<f64>,
     asks: Vec<bool>,
@@ -64,7 +74,7 @@ impl<'b> Contacts<'b> {
     #[must_use]
     pub fn none() -> Self {
         Self {
-            body: None,
+            met: Met::Nothing,
             offset: 0.0,
             areas: Vec::new(),
             asks: Vec::new(),
@@ -82,7 +92,7 @@ impl<'b> Contacts<'b> {
     pub fn new(body: &'b Body, areas: &[f64], held: &[bool], offset: f64, stiffness: f64, friction: Friction) -> Self {
         let n = areas.len();
         Self {
-            body: Some(body),
+            met: Met::Rounded(Field::new(body, n)),
             offset,
             areas: areas.to_vec(),
             asks: held.iter().map(|h| !h).collect(),
@@ -92,6 +102,13 @@ impl<'b> Contacts<'b> {
             touches: Vec::new(),
             friction,
         }
+    }
+
+    /// The same by the exact distance, creases and all: cheaper for a few nodes that move far.
+    #[must_use]
+    pub fn exact(self) -> Self {
+        let met = if let Met::Rounded(field) = self.met { Met::Exact(field.body()) } else { self.met };
+        Self { met, ..self }
     }
 
     /// κ, N/m³.
@@ -108,20 +125,29 @@ impl<'b> Contacts<'b> {
     /// Finds what touches at `x`. Same bits on any number of threads.
     pub fn update(&mut self, x: &[DVec3]) {
         self.touches.clear();
-        let Some(body) = self.body else { return };
+        if matches!(self.met, Met::Nothing) {
+            return;
+        }
         let near: Vec<u32> = (0..x.len())
             .filter(|&v| self.asks[v] && self.answer[v] - x[v].distance(self.asked_at[v]) < self.offset)
             .map(|v| v as u32)
             .collect();
-        let points: Vec<_> = near.par_iter().with_min_len(128).map(|&v| body.nearest(x[v as usize])).collect();
-        for (&vertex, point) in near.iter().zip(&points) {
+        let found = match &mut self.met {
+            Met::Nothing => Vec::new(),
+            Met::Exact(body) => {
+                let exact = |&v: &u32| body.nearest(x[v as usize]);
+                near.par_iter().with_min_len(128).map(exact).map(|p| (p.signed_distance, p.normal)).collect()
+            }
+            Met::Rounded(field) => field.at(&near, x),
+        };
+        for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
             self.asked_at[v] = x[v];
-            self.answer[v] = point.signed_distance;
-            let depth = self.offset - point.signed_distance;
+            self.answer[v] = distance;
+            let depth = self.offset - distance;
             if depth > 0.0 {
                 let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex, depth, normal: point.normal, stiffness });
+                self.touches.push(Touch { vertex, depth, normal, stiffness });
             }
         }
     }
@@ -137,11 +163,18 @@ impl<'b> Contacts<'b> {
         &self.touches
     }
 
-    /// Vertices inside the body at the positions last updated, and the deepest's depth (m).
+    /// Vertices inside the body at the positions `x` last updated, and the deepest's depth (m), by the exact distance.
     #[must_use]
-    pub fn penetration(&self) -> (usize, f64) {
-        let inside = self.touches.iter().map(|t| t.depth - self.offset).filter(|&d| d > 0.0);
-        inside.fold((0, 0.0), |(n, deepest), d| (n + 1, d.max(deepest)))
+    pub fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
+        let body = match &self.met {
+            Met::Nothing => return (0, 0.0),
+            Met::Exact(body) => *body,
+            Met::Rounded(field) => field.body(),
+        };
+        // Over a sharp edge the rounded distance is up to a third of the lattice's side more than the exact one.
+        let near = self.touches.iter().filter(|t| self.offset - t.depth < SIDE / 3.0);
+        let exact = near.map(|t| -body.nearest(x[t.vertex as usize]).signed_distance);
+        exact.filter(|&d| d > 0.0).fold((0, 0.0), |(n, deepest), d| (n + 1, d.max(deepest)))
     }
 
     /// Contact energy, J, without friction.

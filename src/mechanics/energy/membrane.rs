@@ -21,12 +21,16 @@
 //! | A | rest area | m² |
 //! | k_u, k_v | uniaxial stiffness along weft and warp | N/m |
 //! | μ | shear stiffness | N/m |
+//! | B | smallest bending stiffness | N·m |
 //! | ν | Poisson's ratio, the geometric mean of both directions | – |
 //! | b_i | gradient of corner i's shape function | 1/m |
 //!
-//! The Hessian is positive semi-definite: exact in tension up to terms of strain times stiffness within the plane, and
-//! without the negative stiffness that compression and shear have out of the plane (Teran and others: "Robust
-//! quasistatic finite elements and flesh simulation", SCA 2005, for the principle).
+//! There are two Hessians. The positive one is exact in tension up to terms of strain times stiffness within the plane,
+//! and without the negative stiffness that compression and shear have out of the plane (Teran and others: "Robust
+//! quasistatic finite elements and flesh simulation", SCA 2005, for the principle). The bearing one is exact, but that the
+//! compressive stress out of the plane is cut at what a triangle's bending bears: folds as narrow as a triangle, of half wave
+//! √(2A), buckle at B π²/2A, and as long as the stress stays well under that the whole is positive for the bending's
+//! sake. It sees the soft directions in which cloth folds, where the positive one is stiff and creeps.
 //!
 //! Limits: constants are those at zero strain; a measured curve's stiffening is not followed.
 
@@ -55,22 +59,46 @@ pub struct Stiffness {
     /// Uniaxial k_u and k_v.
     weft: f64,
     warp: f64,
+    poisson: f64,
+    /// Share left under compression, r.
+    slack: f64,
+    /// What a triangle bears in compression times its area, N·m.
+    bearing: f64,
 }
 
 impl Stiffness {
     /// From a fabric's uniaxial constants.
     #[must_use]
     pub fn new(fabric: &Fabric) -> Self {
-        let (k_u, k_v, nu) = (fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m, fabric.poisson);
+        let least_bending = fabric.bending_nm.into_iter().fold(f64::INFINITY, f64::min);
+        let bearing = BORNE * std::f64::consts::PI.powi(2) * least_bending / 2.0;
+        Self::of(
+            fabric.stretch_weft_n_per_m,
+            fabric.stretch_warp_n_per_m,
+            fabric.shear_n_per_m,
+            fabric.poisson,
+            bearing,
+        )
+    }
+
+    fn of(k_u: f64, k_v: f64, shear: f64, nu: f64, bearing: f64) -> Self {
         let d = 1.0 - nu * nu;
-        Self {
-            uu: k_u / d,
-            uv: nu * (k_u * k_v).sqrt() / d,
-            vv: k_v / d,
-            shear: fabric.shear_n_per_m,
-            weft: k_u,
-            warp: k_v,
-        }
+        let (uu, uv, vv) = (k_u / d, nu * (k_u * k_v).sqrt() / d, k_v / d);
+        Self { uu, uv, vv, shear, weft: k_u, warp: k_v, poisson: nu, slack: SLACK, bearing }
+    }
+
+    /// The same with another share r of the stiffness left under compression.
+    #[must_use]
+    pub fn with_slack(self, slack: f64) -> Self {
+        Self { slack, ..self }
+    }
+
+    /// The same with no constant over `most` (N/m); `None` where none is.
+    #[must_use]
+    pub fn capped(&self, most: f64) -> Option<Self> {
+        let stiffer = self.weft.max(self.warp).max(self.shear) > most;
+        let (weft, warp, shear) = (self.weft.min(most), self.warp.min(most), self.shear.min(most));
+        stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.bearing).with_slack(self.slack))
     }
 }
 
@@ -79,6 +107,10 @@ impl Stiffness {
 /// compression, into wrinkles finer than the mesh. A tenth drops most of that and keeps the triangles in shape; with all of
 /// it a stiff woven locks into facets and settles in twice the steps.
 const SLACK: f64 = 0.1;
+
+/// Share of the buckling stress that the bearing Hessian keeps: at three tenths the whole is not positive every now
+/// and then, at one tenth hardly ever.
+const BORNE: f64 = 0.1;
 
 /// Stiffness of a strained state.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +125,7 @@ impl Stiffness {
     /// stresses and the energy.
     fn tangent(&self, su: f64, sv: f64) -> Tangent {
         let (tu, tv) = (self.uu * su + self.uv * sv, self.uv * su + self.vv * sv);
-        let (r, q) = (SLACK, 1.0 - SLACK);
+        let (r, q) = (self.slack, 1.0 - self.slack);
         let (uu, uv, vv) = (r * self.uu, r * self.uv, r * self.vv);
         if tu >= 0.0 && tv >= 0.0 {
             Tangent { uu: self.uu, uv: self.uv, vv: self.vv }
@@ -171,16 +203,7 @@ impl Triangle {
         let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
         let (u, v) = (fu / lu, fv / lv);
         let k = c.tangent(lu - 1.0, lv - 1.0);
-        let (mut su, mut sv, mut gamma) = (lu - 1.0, lv - 1.0, fu.dot(fv));
-        if let Some(before) = before {
-            let [gu, gv] = self.deformation(before);
-            su = gu.normalize_or(u).dot(fu) - 1.0;
-            sv = gv.normalize_or(v).dot(fv) - 1.0;
-            gamma = gu.dot(fv) + gv.dot(fu) - gu.dot(gv);
-        }
-        let predicted = c.tangent(su, sv);
-        let (tu, tv) = (predicted.uu * su + predicted.uv * sv, predicted.uv * su + predicted.vv * sv);
-        let tau = c.shear * gamma;
+        let [tu, tv, tau] = self.predicted_stress(c, x, before);
         let n = fu.cross(fv).normalize_or_zero();
         let (wu, wv) = (n.cross(u), n.cross(v));
         let (a, b, t) = positive_part(tu / lu, tv / lv, tau);
@@ -188,6 +211,45 @@ impl Triangle {
         let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * (tu / lu).max(0.0) + nn * a;
         let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * (tv / lv).max(0.0) + nn * b;
         let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + nn * t;
+        self.blocks(huu, huv, hvv)
+    }
+
+    /// The bearing Hessian, in the order and with the predicted stress of [`hessian`](Self::hessian): exact but for
+    /// compression past what the triangle bears. Not always positive.
+    #[must_use]
+    pub fn hessian_bearing(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [DMat3; 6] {
+        let [fu, fv] = self.deformation(x);
+        let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
+        let (u, v) = (fu / lu, fv / lv);
+        let k = c.tangent(lu - 1.0, lv - 1.0);
+        let [tu, tv, tau] = self.predicted_stress(c, x, before);
+        let n = fu.cross(fv).normalize_or_zero();
+        let (wu, wv) = (n.cross(u), n.cross(v));
+        let least = -c.bearing / self.area;
+        let (a, b, t) = positive_part(tu / lu - least, tv / lv - least, tau);
+        let nn = outer(n, n);
+        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * (tu / lu) + nn * (a + least);
+        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * (tv / lv) + nn * (b + least);
+        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * tau + nn * t;
+        self.blocks(huu, huv, hvv)
+    }
+
+    /// Stresses σ_u, σ_v and τ at `x`, or as the step from `before` to `x` predicted them, linear in it.
+    fn predicted_stress(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [f64; 3] {
+        let [fu, fv] = self.deformation(x);
+        let (mut su, mut sv, mut gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
+        if let Some(before) = before {
+            let [gu, gv] = self.deformation(before);
+            su = gu.normalize_or(fu.normalize_or_zero()).dot(fu) - 1.0;
+            sv = gv.normalize_or(fv.normalize_or_zero()).dot(fv) - 1.0;
+            gamma = gu.dot(fv) + gv.dot(fu) - gu.dot(gv);
+        }
+        let k = c.tangent(su, sv);
+        [k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * gamma]
+    }
+
+    /// From second derivatives by F_u and F_v to those by the corners.
+    fn blocks(&self, huu: DMat3, huv: DMat3, hvv: DMat3) -> [DMat3; 6] {
         let block = |i: usize, j: usize| {
             let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
             huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)

@@ -2,7 +2,8 @@
 //!
 //! [`Cloth`] holds what does not change while a garment settles: rest shape, masses, bending rings, the held vertices and the
 //! pattern of the Hessian. [`Contacts`] holds what does: which vertices touch the body, and how they hold on to it.
-//! Forces are −∇E. Every Hessian here is positive semi-definite, so a Newton step always descends.
+//! Forces are −∇E. Every Hessian here is positive semi-definite, but for the compression that a triangle bears
+//! ([`Cloth::hessian_bearing`]), so a Newton step always descends.
 //!
 //! | term | file | equation |
 //! |---|---|---|
@@ -16,6 +17,7 @@ pub mod bending;
 mod cloth;
 pub mod contact;
 pub mod fan;
+pub mod field;
 pub mod friction;
 pub mod gravity;
 pub mod membrane;

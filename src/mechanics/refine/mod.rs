@@ -1,9 +1,15 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
-//! Each step solves (∇²E⁺ + ε M) d = −∇E with the positive part of the Hessian and goes along d as far as Armijo's
-//! condition allows, so the energy never rises; ε (Levenberg, Marquardt) falls while full steps succeed and grows where
-//! they do not. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight, is under the
-//! tolerance and no vertex is inside the body.
+//! Each step solves (∇²E + ε M) d = −∇E and goes along d as far as Armijo's condition allows, so the energy never rises; ε
+//! (Levenberg, Marquardt) falls while full steps succeed and grows where they do not. The Hessian keeps the compression that the
+//! cloth bears ([`Cloth::hessian_bearing`](super::energy::Cloth::hessian_bearing)); where that is not positive, the step
+//! takes its positive part. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight, is
+//! under the tolerance and no vertex is inside the body.
+//!
+//! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
+//! in thousands, so it creeps into its folds a millimetre at a time. Far from rest it is therefore first settled with its stiffness
+//! capped at what its own weight strains by [`RefineOptions::soft_strain`]; with a few millimetres left to go, it continues
+//! with its true stiffness. Each of the two energies falls; [`Record::softened`] says which one a step belongs to.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -33,6 +39,8 @@ pub struct RefineOptions {
     pub damping: f64,
     /// Longest move of a vertex in one step, m.
     pub longest_move_m: f64,
+    /// Strain under its own hanging weight that stiff cloth may have to begin with; 0 for its true stiffness throughout.
+    pub soft_strain: f64,
 }
 
 /// No run takes more steps than this.
@@ -40,7 +48,7 @@ pub const STEP_LIMIT: usize = 2000;
 
 impl Default for RefineOptions {
     fn default() -> Self {
-        Self { max_steps: None, tolerance: 1e-3, damping: 300.0, longest_move_m: 0.1 }
+        Self { max_steps: None, tolerance: 1e-3, damping: 300.0, longest_move_m: 0.1, soft_strain: 0.005 }
     }
 }
 
@@ -74,6 +82,8 @@ pub struct Record {
     pub largest_move_m: f64,
     /// Damping ε, 1/s².
     pub damping: f64,
+    /// Whether the energy is that of the softened cloth.
+    pub softened: bool,
 }
 
 /// Why a run ended.
@@ -104,6 +114,8 @@ pub struct Refined {
     pub history: Vec<Record>,
     /// Why it ended.
     pub stop: Stop,
+    /// Contact stiffness κ at the end, N/m³: more than to begin with, if vertices had to be kept out.
+    pub contact_stiffness: f64,
 }
 
 /// Told of every step; may end the run.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{Observer, Record, RefineOptions, Refined, STEP_LIMIT, SolveError, Solver, Step, Stop};
+use crate::GRAVITY;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
 
@@ -16,6 +17,16 @@ const SHORTEST_STEP: f64 = 1e-6;
 /// under gravity is a millimetre.
 const LEAST_DAMPING: f64 = 1.0;
 const MOST_DAMPING: f64 = 1e4;
+
+/// Stiff cloth begins soft where the residual is over this share of ‖m g‖₂, the residual of cloth that nothing carries yet. A
+/// drape that has settled before is well under it.
+const FAR_FROM_REST: f64 = 0.5;
+
+/// Residual over weight at which the softened cloth has done its part.
+const SOFT_TOLERANCE: f64 = 1e-2;
+
+/// Steps with the positive Hessian, at most, after one whose bearing Hessian failed.
+const LONGEST_PAUSE: usize = 4;
 
 /// Settles `cloth` on `body` from `start`.
 ///
@@ -46,10 +57,18 @@ pub fn refine_with(
     let mut solver = Solver::new(&cloth.pattern)?;
     let masses: Vec<f64> = cloth.order.iter().map(|&v| cloth.masses[v as usize]).collect();
     let mut x = start;
-    let (mut gradient, mut blocks, mut direction) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut gradient, mut direction) = (Vec::new(), Vec::new());
     let mut energy = cloth.gradient(&x, &contacts, &mut gradient);
     let mut residual = norm(&gradient) / cloth.weight;
+    let unborne = GRAVITY * masses.iter().map(|m| m * m).sum::<f64>().sqrt() / cloth.weight;
+    let mut soft =
+        if residual > FAR_FROM_REST * unborne { cloth.softened(extent(&x), options.soft_strain) } else { None };
+    if let Some(soft) = &soft {
+        energy = soft.gradient(&x, &contacts, &mut gradient);
+        residual = norm(&gradient) / cloth.weight;
+    }
     let mut damping = options.damping;
+    let mut tangent = Tangent::default();
     let limit = options.max_steps.unwrap_or(STEP_LIMIT).min(STEP_LIMIT);
     let mut history = vec![Record {
         iteration: 0,
@@ -58,6 +77,7 @@ pub fn refine_with(
         step_length: 0.0,
         largest_move_m: 0.0,
         damping,
+        softened: soft.is_some(),
     }];
     let mut trial = x.clone();
     let mut iteration = 0;
@@ -72,8 +92,8 @@ pub fn refine_with(
         if observer(&step).is_break() {
             break Stop::Interrupted;
         }
-        if residual < options.tolerance {
-            if contacts.penetration().0 == 0 {
+        if soft.is_none() && residual < options.tolerance {
+            if contacts.penetration(&x).0 == 0 {
                 break Stop::Converged;
             }
             contacts.stiffen(4.0);
@@ -84,10 +104,11 @@ pub fn refine_with(
         if iteration >= limit {
             break Stop::StepsDone;
         }
-        // After a step, `trial` holds the positions it was taken from.
-        cloth.hessian_after((iteration > 0).then_some(&trial), &x, &contacts, &mut blocks);
+        let now = soft.as_ref().unwrap_or(cloth);
         let diagonal: Vec<f64> = masses.iter().map(|m| m * damping).collect();
-        solver.factorise(&cloth.pattern, &blocks, &diagonal)?;
+        // After a step, `trial` holds the positions it was taken from.
+        let before = tangent.stepped.then_some(&trial[..]);
+        tangent.factorise(now, &mut solver, before, &x, &contacts, &diagonal)?;
         direction.clear();
         direction.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
         solver.solve(&mut direction);
@@ -100,7 +121,7 @@ pub fn refine_with(
                 trial[v as usize] = x[v as usize] + *d * t;
             }
             contacts.update(&trial);
-            let there = cloth.energy(&trial, &contacts);
+            let there = now.energy(&trial, &contacts);
             if there <= energy + ARMIJO * t * slope {
                 break true;
             }
@@ -109,30 +130,111 @@ pub fn refine_with(
                 break false;
             }
         };
-        if !accepted {
+        tangent.stepped = accepted;
+        if accepted {
+            std::mem::swap(&mut x, &mut trial);
+            iteration += 1;
+        } else {
             contacts.update(&x);
-            break Stop::Stalled;
+            // A bearing Hessian may point nowhere useful, and the softened cloth need not settle.
+            if !tangent.pause() && soft.take().is_none() {
+                break Stop::Stalled;
+            }
         }
-        std::mem::swap(&mut x, &mut trial);
-        iteration += 1;
         contacts.friction_refresh(&x);
-        energy = cloth.gradient(&x, &contacts, &mut gradient);
+        energy = soft.as_ref().unwrap_or(cloth).gradient(&x, &contacts, &mut gradient);
         residual = norm(&gradient) / cloth.weight;
-        if t >= first {
+        if soft.is_some() && residual < SOFT_TOLERANCE {
+            soft = None;
+            damping = options.damping;
+            energy = cloth.gradient(&x, &contacts, &mut gradient);
+            residual = norm(&gradient) / cloth.weight;
+        } else if t >= first {
             damping = (damping * 0.5).max(LEAST_DAMPING);
         } else if t < 0.3 * first {
             damping = (damping * 2.0).min(MOST_DAMPING);
         }
-        history.push(Record {
-            iteration,
-            energy,
-            residual_over_weight: residual,
-            step_length: t,
-            largest_move_m: t * longest,
-            damping,
-        });
+        if accepted {
+            history.push(Record {
+                iteration,
+                energy,
+                residual_over_weight: residual,
+                step_length: t,
+                largest_move_m: t * longest,
+                damping,
+                softened: soft.is_some(),
+            });
+        }
     };
-    Ok(Refined { positions: x, energy, residual_over_weight: residual, steps: iteration, history, stop })
+    if soft.is_some() {
+        energy = cloth.gradient(&x, &contacts, &mut gradient);
+        residual = norm(&gradient) / cloth.weight;
+    }
+    let contact_stiffness = contacts.stiffness();
+    Ok(Refined {
+        positions: x,
+        energy,
+        residual_over_weight: residual,
+        steps: iteration,
+        history,
+        stop,
+        contact_stiffness,
+    })
+}
+
+/// Which Hessian is taken, and its blocks.
+#[derive(Debug, Default)]
+struct Tangent {
+    blocks: Vec<glam::DMat3>,
+    /// Whether a step led here, so that its prediction of the stress can be used.
+    stepped: bool,
+    /// Whether the last factorisation was of the bearing Hessian.
+    bearing: bool,
+    /// Steps yet to be taken with the positive Hessian.
+    waiting: usize,
+    /// How many those were the last time.
+    pause: usize,
+}
+
+impl Tangent {
+    /// Factors the bearing Hessian, or where it is not positive, the positive one, for a few steps more each time.
+    fn factorise(
+        &mut self,
+        cloth: &Cloth,
+        solver: &mut Solver,
+        before: Option<&[DVec3]>,
+        x: &[DVec3],
+        contacts: &Contacts<'_>,
+        diagonal: &[f64],
+    ) -> Result<(), SolveError> {
+        if self.waiting == 0 {
+            cloth.hessian_bearing(before, x, contacts, &mut self.blocks);
+            self.bearing = solver.factorise(&cloth.pattern, &self.blocks, diagonal).is_ok();
+            if self.bearing {
+                self.pause = 0;
+                return Ok(());
+            }
+            self.pause = (2 * self.pause).clamp(1, LONGEST_PAUSE);
+            self.waiting = self.pause;
+        }
+        self.waiting -= 1;
+        self.bearing = false;
+        cloth.hessian_after(before, x, contacts, &mut self.blocks);
+        solver.factorise(&cloth.pattern, &self.blocks, diagonal)
+    }
+
+    /// After a step that led nowhere: whether the positive Hessian is left to try.
+    fn pause(&mut self) -> bool {
+        self.waiting = LONGEST_PAUSE;
+        std::mem::take(&mut self.bearing)
+    }
+}
+
+/// The longest side of the box about `x`, m: about the length that hangs, whichever way the cloth lies as yet.
+fn extent(x: &[DVec3]) -> f64 {
+    let bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = x.iter().fold(bounds, |(low, high), p| (low.min(*p), high.max(*p)));
+    (high - low).max_element().max(0.0)
 }
 
 /// ‖g‖₂, N.

@@ -1,0 +1,153 @@
+//! The distance to the body as contact feels it: once continuously differentiable.
+//!
+//! The exact distance q of a body made of triangles has a crease over every hollow edge, where the nearest triangle
+//! changes. A vertex that lies in one is pushed by both sides, but the gradient there is that of one or the other: Newton's
+//! method cannot settle it, and one such vertex stops the line search of a whole garment. So contact takes
+//!
+//! q̃(x) = Σ N(x/h − i) q(h i), N(t) = n(t₁) n(t₂) n(t₃),
+//!
+//! the quadratic B-spline n over a lattice of side h with the exact distances as coefficients. A crease is rounded over h and a
+//! bit; a plane is reproduced as it is, a curved surface to h²/8 times its curvature.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | q | exact signed distance | m |
+//! | h | side of the lattice, [`SIDE`] | m |
+//!
+//! Values are asked for where they are first needed and kept; each is a function of its lattice point alone, so they are the same
+//! whatever was asked before and on any number of threads. Limits: what is thinner than h (a finger's tip, a brim) is
+//! rounded away. Whether a vertex is inside the body is always told by the exact distance.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, IVec3};
+use rayon::prelude::*;
+
+use crate::distance::Body;
+
+/// h, m: about the gap of an undergarment's ease, and a quarter of a dress form's triangles. A surface of 5 cm radius is
+/// off by 0.06 mm; two planes that meet at 10 degrees by 0.1 mm in the crease.
+pub const SIDE: f64 = 5e-3;
+
+/// Lattice values about one cell, x slowest.
+type Stencil = [f64; 27];
+
+/// The rounded distance, with the lattice values found so far.
+#[derive(Debug, Clone)]
+pub struct Field<'b> {
+    body: &'b Body,
+    values: HashMap<IVec3, f64>,
+    /// The cell each vertex was last seen in, and its values: it seldom leaves it in one step.
+    kept: Vec<Option<(IVec3, Box<Stencil>)>>,
+}
+
+impl<'b> Field<'b> {
+    /// Of a body, for so many vertices.
+    #[must_use]
+    pub fn new(body: &'b Body, vertices: usize) -> Self {
+        Self { body, values: HashMap::new(), kept: vec![None; vertices] }
+    }
+
+    /// The body.
+    #[must_use]
+    pub fn body(&self) -> &'b Body {
+        self.body
+    }
+
+    /// q̃ (m) and its gradient at the positions of `vertices`, in their order.
+    pub fn at(&mut self, vertices: &[u32], x: &[DVec3]) -> Vec<(f64, DVec3)> {
+        let moved = |&&v: &&u32| self.kept[v as usize].as_ref().is_none_or(|(cell, _)| *cell != cell_of(x[v as usize]));
+        let moved: Vec<u32> = vertices.iter().filter(moved).copied().collect();
+        let mut missing: Vec<IVec3> = moved
+            .iter()
+            .flat_map(|&v| around(cell_of(x[v as usize])))
+            .filter(|i| !self.values.contains_key(i))
+            .collect();
+        missing.sort_unstable_by_key(|i| i.to_array());
+        missing.dedup();
+        let body = self.body;
+        let found: Vec<f64> =
+            missing.par_iter().with_min_len(128).map(|i| body.nearest(i.as_dvec3() * SIDE).signed_distance).collect();
+        self.values.extend(missing.into_iter().zip(found));
+        for v in moved {
+            let cell = cell_of(x[v as usize]);
+            let mut stencil = Box::new([0.0; 27]);
+            for (value, i) in stencil.iter_mut().zip(around(cell)) {
+                *value = self.values.get(&i).copied().unwrap_or_default();
+            }
+            self.kept[v as usize] = Some((cell, stencil));
+        }
+        let value = |&v: &u32| match &self.kept[v as usize] {
+            Some((cell, stencil)) => spline(x[v as usize] / SIDE - cell.as_dvec3(), stencil),
+            None => (f64::INFINITY, DVec3::ZERO),
+        };
+        vertices.iter().map(value).collect()
+    }
+}
+
+/// The lattice point nearest to x.
+fn cell_of(x: DVec3) -> IVec3 {
+    (x / SIDE).round().as_ivec3()
+}
+
+/// It and its neighbours, x slowest.
+fn around(cell: IVec3) -> impl Iterator<Item = IVec3> {
+    (0..27).map(move |k| cell + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1))
+}
+
+/// Value and gradient (per metre) at `f` from the middle of the stencil, |f| ≤ ½ in each coordinate.
+fn spline(f: DVec3, stencil: &Stencil) -> (f64, DVec3) {
+    let weights = |t: f64| [0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)];
+    let slopes = |t: f64| [t - 0.5, -2.0 * t, t + 0.5];
+    let (wx, wy, wz) = (weights(f.x), weights(f.y), weights(f.z));
+    let (sx, sy, sz) = (slopes(f.x), slopes(f.y), slopes(f.z));
+    let (mut q, mut gradient) = (0.0, DVec3::ZERO);
+    for i in 0..3 {
+        for j in 0..3 {
+            let row = &stencil[9 * i + 3 * j..9 * i + 3 * j + 3];
+            let value = row[0] * wz[0] + row[1] * wz[1] + row[2] * wz[2];
+            let slope = row[0] * sz[0] + row[1] * sz[1] + row[2] * sz[2];
+            q += wx[i] * wy[j] * value;
+            gradient += DVec3::new(sx[i] * wy[j] * value, wx[i] * sy[j] * value, wx[i] * wy[j] * slope);
+        }
+    }
+    (q, gradient / SIDE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// The cube [0, 0.2]³ m.
+    fn cube() -> Body {
+        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * 0.2;
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
+    }
+
+    #[test]
+    fn over_a_plane_it_is_the_exact_distance() {
+        let body = cube();
+        let x = [DVec3::new(0.1, 0.07, 0.2013), DVec3::new(0.11, 0.093, 0.1991)];
+        for ((q, gradient), x) in Field::new(&body, 2).at(&[0, 1], &x).into_iter().zip(x) {
+            assert!((q - (x.z - 0.2)).abs() < 1e-12, "{q}");
+            assert!((gradient - DVec3::Z).length() < 1e-9, "{gradient}");
+        }
+    }
+
+    #[test]
+    fn its_gradient_is_that_of_its_value_over_an_edge_too() {
+        let body = cube();
+        let mut field = Field::new(&body, 1);
+        let x = DVec3::new(0.2011, 0.1993, 0.2007);
+        let (_, gradient) = field.at(&[0], &[x])[0];
+        let step = 1e-6;
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let ends = [1.0, -1.0].map(|s| field.at(&[0], &[x + axis * s * step])[0].0);
+            let slope = (ends[0] - ends[1]) / (2.0 * step);
+            assert!((slope - gradient.dot(axis)).abs() < 1e-6, "{slope} against {}", gradient.dot(axis));
+        }
+    }
+}
