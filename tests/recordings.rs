@@ -167,7 +167,7 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
 }
 
 #[test]
-fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
+fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legends() {
     let folder = Folder::new();
     let scene = Scene::new(2);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
@@ -194,7 +194,13 @@ fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
         assert_eq!(contents.entities[path].rows, 40);
         assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);
     }
+    // Every tab shows something on the timeline the recording opens on.
+    for path in [paths::PARTS, paths::FORCE, paths::REPORT, "/fit/strain/garment"] {
+        assert!(contents.entities[path].timelines.contains(paths::ITERATION), "{path}");
+    }
     assert!(contents.entities[paths::DRAPE].timelines.contains(paths::ITERATION));
+    // A mesh at every fourth iteration, the step's, and the result at the last.
+    assert_eq!(contents.entities[paths::DRAPE].rows, 10 + 1 + 1);
     for name in ["strain", "pressure"] {
         for leaf in ["garment", "legend/bar", "legend/ticks"] {
             assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");

@@ -165,6 +165,7 @@ impl Recorder {
     ) -> Result<(), RecordError> {
         self.timed(|open| {
             open.at_iteration(iteration);
+            open.last_iteration = Some(iteration);
             step::series(open, paths::ENERGY, "energy", 1, energy_j)?;
             open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
             // Plots have no logarithmic axis.

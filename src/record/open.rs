@@ -30,6 +30,10 @@ pub(crate) struct Open {
     pub(super) distance: Vec<f64>,
     pub(super) vertex_colour: Vec<u8>,
     pub(super) levels: usize,
+    /// The displaced garment of the last step.
+    pub(super) draped: Option<TriMesh>,
+    /// The last iteration of the solver.
+    pub(super) last_iteration: Option<i64>,
     /// The text panel as last logged, Markdown.
     pub(super) report: String,
     seen: RefCell<BTreeSet<String>>,
@@ -59,6 +63,8 @@ impl Open {
             distance: Vec::new(),
             vertex_colour: Vec::new(),
             levels: 0,
+            draped: None,
+            last_iteration: None,
             report: String::new(),
             seen: RefCell::new(BTreeSet::new()),
             laid_out: false,
@@ -67,8 +73,17 @@ impl Open {
         })
     }
 
-    /// Sets the step and the stage of what is logged next.
+    /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from
+    /// the first on: a view shows one timeline at a time, and none would otherwise show both.
     pub(super) fn at(&self, index: i64, stage: i64) {
+        self.at_table(index, stage);
+        if self.options.layout.iterations {
+            self.stream.set_time_sequence(paths::ITERATION, 0);
+        }
+    }
+
+    /// Sets the step and the stage of what is logged next, and no iteration.
+    pub(super) fn at_table(&self, index: i64, stage: i64) {
         self.stream.reset_time();
         self.stream.set_time_sequence(paths::TABLE, index);
         self.stream.set_time_sequence(paths::STAGE, stage);
@@ -163,8 +178,21 @@ impl Open {
             .map_err(|e| RecordError::Incomplete { reason: format!("a viewer does not take the data: {e}") })
     }
 
+    /// The mesh comes every so often; the last iteration shows the result.
+    fn end_of_iterations(&self) -> Result<(), RecordError> {
+        if let (Some(last), Some(draped)) = (self.last_iteration, &self.draped) {
+            self.at_iteration(last);
+            self.log(paths::DRAPE, &meshes::shape(draped))?;
+        }
+        Ok(())
+    }
+
     pub(super) fn finish(mut self: Box<Self>) -> Result<RecordSummary, RecordError> {
         let started = Instant::now();
+        if let Err(error) = self.end_of_iterations() {
+            self.discard();
+            return Err(error);
+        }
         let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
         // Dropping the sinks ends the file with its footer.
         self.stream.disconnect();

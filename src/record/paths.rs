@@ -1,5 +1,7 @@
 //! Where everything lies in a recording: the entity paths, the timelines and the fields.
 //!
+//! A run with the solver's steps opens on `iteration`; what changes with `table` is there from its first step on.
+//!
 //! | path | archetype | what | changes with |
 //! |---|---|---|---|
 //! | `/body` | Mesh3D | the body, as given | mesh file |

@@ -179,8 +179,9 @@ fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError
 }
 
 fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
-    open.at(step.index, 5);
     let draped = open.garment.with_positions(step.draped.to_vec());
+    // Its iterations show how it came to be; the last of them is this.
+    open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
     for overlay in step.overlays {
@@ -188,6 +189,7 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
             if overlay.name == "error" { paths::ERROR.to_owned() } else { format!("{}/{}", paths::FIT, overlay.name) };
         self::overlay(open, &branch, &draped, overlay)?;
     }
+    open.draped = Some(draped);
     Ok(())
 }
 

@@ -13,7 +13,7 @@ pub(crate) const ASPECT: f64 = 0.52;
 pub struct Layout {
     /// Several steps of the timeline `table`: numbers are plotted over it.
     pub several_tables: bool,
-    /// Steps of the timeline `iteration` will come: a tab for the solver.
+    /// Steps of the timeline `iteration` will come: a tab for the solver, and the timeline the recording opens on.
     pub iterations: bool,
     /// The error garment will come.
     pub error: bool,
@@ -47,8 +47,9 @@ pub enum Tab {
 
 impl Layout {
     pub(crate) fn time_panel(&self) -> TimePanel {
-        let timeline = if self.opens_on == Tab::Solver { paths::ITERATION } else { paths::TABLE };
-        TimePanel { timeline, follow: self.follow }
+        // Following rests on the last iteration: the result.
+        let timeline = if self.iterations { paths::ITERATION } else { paths::TABLE };
+        TimePanel { timeline, follow: self.follow || self.iterations }
     }
 
     /// The views, seen from `eye`.
@@ -137,7 +138,7 @@ fn solver(eye: &Eye) -> Node {
         (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10]).into()),
     ];
     Node::Row(
-        "Solver (timeline: iteration)",
+        "Solver",
         vec![(1.0, View::spatial("Drape", &[paths::BODY, "/drape"], eye).into()), (2.0, Node::Column("Solver", plots))],
     )
 }
