@@ -11,6 +11,7 @@ pub mod eye;
 pub mod inspect;
 mod legend;
 mod meshes;
+mod native;
 mod open;
 pub mod panel;
 pub mod paths;
