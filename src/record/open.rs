@@ -4,8 +4,9 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder};
+use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
+use super::blueprint::layout::Layout;
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
@@ -14,6 +15,8 @@ use super::web::WebViewer;
 use super::{RecordOptions, RecordSummary, blueprint, colours, inspect, paths};
 use crate::mesh::TriMesh;
 
+/// Bytes of an application's name.
+const LONGEST_ID: usize = 100;
 /// How long the last data may take to reach viewers.
 const LAST_FLUSH: Duration = Duration::from_secs(10);
 
@@ -47,7 +50,9 @@ impl Open {
     pub(super) fn new(options: RecordOptions) -> Result<Self, RecordError> {
         let started = Instant::now();
         let OpenSinks { sinks, targets, web } = OpenSinks::open(&options.sinks)?;
-        let stream = RecordingStreamBuilder::new("partwise").recording_name(options.name.as_str()).set_sinks(sinks)?;
+        let stream = RecordingStreamBuilder::new(application(&options.name))
+            .recording_name(options.name.as_str())
+            .set_sinks(sinks)?;
         // Steps are counted by our own timelines; wall-clock columns would only cost bytes.
         stream.set_log_tick_enabled(false);
         stream.set_log_time_enabled(false);
@@ -73,11 +78,16 @@ impl Open {
         })
     }
 
+    /// What the recording holds, and how large its views are.
+    pub(super) fn layout(&self) -> &Layout {
+        &self.options.layout
+    }
+
     /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from
     /// the first on: a view shows one timeline at a time, and none would otherwise show both.
     pub(super) fn at(&self, index: i64, stage: i64) {
         self.at_table(index, stage);
-        if self.options.layout.iterations {
+        if self.layout().iterations {
             self.stream.set_time_sequence(paths::ITERATION, 0);
         }
     }
@@ -218,5 +228,26 @@ impl Open {
         for target in &self.targets {
             let _ = std::fs::remove_file(&target.part);
         }
+    }
+}
+
+/// The viewer keeps one layout for each application: under one name, a recording opened later would rearrange the views of
+/// those before, and leave some blank.
+fn application(name: &str) -> ApplicationId {
+    let pieces = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|piece| !piece.is_empty());
+    let mut id = std::iter::once("partwise").chain(pieces).collect::<Vec<_>>().join("-");
+    id.truncate(LONGEST_ID);
+    ApplicationId::try_new(id).unwrap_or_else(|_| ApplicationId::from("partwise"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recordings_of_different_names_have_different_layouts() {
+        assert_eq!(application("flared-skirt@1200: Table 3").to_string(), "partwise-flared-skirt-1200-Table-3");
+        assert_eq!(application("").to_string(), "partwise");
+        assert_eq!(application(&"a".repeat(1000)).to_string().len(), LONGEST_ID);
     }
 }

@@ -22,8 +22,8 @@
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
 //! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
 //! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
-//! | `/compare/<slot>/garment`, `.../caption` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
-//! | `/scatter/points`, `.../names`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
+//! | `/compare/<slot>/garment`, `.../caption`, `.../caption/plate` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
+//! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
 
 /// The body.
 pub const BODY: &str = "/body";
