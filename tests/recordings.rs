@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use partwise::record::{
     Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
-    When, inspect, paths, web,
+    When, WrinkleView, inspect, paths, web,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -172,7 +172,7 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
     let scene = Scene::new(2);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
     let fit = vec!["strain".to_owned(), "pressure".to_owned()];
-    let layout = Layout { iterations: true, fit, opens_on: Tab::Fit, ..Layout::default() };
+    let layout = Layout { iterations: true, fit, wrinkles: true, opens_on: Tab::Fit, ..Layout::default() };
     let mut recorder = Recorder::open(options(&folder.file("solver.rrd"), layout)).unwrap();
     recorder.body(0, &scene.body).unwrap();
     recorder.garment(0, &scene.garment).unwrap();
@@ -189,7 +189,21 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
         Overlay { name: "pressure", unit: "kPa", values: &pressure },
     ];
     recorder.step(&step(0, &scene, &solved, &overlays)).unwrap();
+    let part = &solved.part_of_vertex;
+    let edges = scene.garment.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let joining = edges.filter(|&[a, b]| a < b && part[a as usize] != part[b as usize]);
+    let jumps_mm: Vec<([u32; 2], f64)> = joining.map(|edge| (edge, f64::from(edge[0]))).collect();
+    assert!(!jumps_mm.is_empty());
+    let curvature_per_m = vec![1.0; scene.draped.len()];
+    let (draped, curvature_per_m) = (scene.draped.as_slice(), curvature_per_m.as_slice());
+    let view = WrinkleView { index: 0, draped, jumps_mm: &jumps_mm, curvature_per_m };
+    recorder.wrinkles(&view).unwrap();
+    let error = recorder.wrinkles(&WrinkleView { curvature_per_m: &[], ..view }).unwrap_err();
+    assert!(matches!(error, RecordError::Mismatch { .. }), "{error}");
     let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    for path in ["seams/lines", "seams/legend/bar", "curvature/garment", "curvature/legend/ticks"] {
+        assert!(contents.entities.contains_key(&format!("/wrinkles/{path}")), "{path}");
+    }
     for path in [paths::ENERGY, paths::RESIDUAL] {
         assert_eq!(contents.entities[path].rows, 40);
         assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);

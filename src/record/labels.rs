@@ -6,6 +6,8 @@
 //! Limits: the viewer's texts have one size on screen, so that what is free when the recording opens need not be after
 //! zooming out. Widths are estimated from the number of letters.
 
+use std::ops::Range;
+
 /// Width of a letter and height of a line of text, the viewer's box around it included.
 const LETTER: f64 = 3.5;
 const LINE: f64 = 12.5;
@@ -13,8 +15,10 @@ const LINE: f64 = 12.5;
 const BOX: f64 = 6.0;
 /// How far below its anchor the viewer begins a text's box.
 const DROP: f64 = 0.5;
+/// Distance of the beads that stand for a line.
+const BEAD: f64 = 2.0;
 /// Rings of spots around a dot.
-const RINGS: i32 = 6;
+const RINGS: i32 = 9;
 
 /// A rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,35 +59,65 @@ pub(super) struct Spot {
 #[derive(Debug)]
 pub(super) struct Labels {
     frame: Rect,
-    taken: Vec<Rect>,
+    dots: Vec<Rect>,
+    names: Vec<Rect>,
+    lines: Vec<Rect>,
     radius: f64,
 }
 
 impl Labels {
     /// No names yet, inside `frame`, among dots of this radius.
     pub(super) fn new(frame: Rect, dots: impl Iterator<Item = [f64; 2]>, radius: f64) -> Self {
-        Self { frame, taken: dots.map(|dot| Rect::around(dot, [2.0 * radius; 2])).collect(), radius }
+        let dots = dots.map(|dot| Rect::around(dot, [2.0 * radius; 2])).collect();
+        Self { frame, dots, names: Vec::new(), lines: Vec::new(), radius }
     }
 
-    /// Finds room for the name of a dot; `None` where there is none.
+    /// Finds room for the name of a dot; `None` where there is none. Lines cross nothing as long as there is room; in a crowd
+    /// they run under names.
     pub(super) fn place(&mut self, dot: [f64; 2], name: &str) -> Option<Spot> {
         let size = [LETTER * name.chars().count() as f64 + BOX, LINE];
-        let free = (0..RINGS).flat_map(|ring| {
+        let free = |rect: &Rect| !self.dots.iter().chain(&self.names).any(|other| rect.overlaps(other));
+        let off_lines = |rect: &Rect| !self.lines.iter().any(|other| rect.overlaps(other));
+        let fits = |rect: &Rect| rect.within(&self.frame) && free(rect);
+        let tidy = |rect: &Rect| off_lines(rect) && self.leader(dot, rect).iter().all(|b| free(b) && off_lines(b));
+        let spots = |rings| self.spots(dot, size, rings).filter(fits);
+        let next_to = spots(0..1).find(off_lines);
+        let tidily = || spots(1..RINGS).find(tidy);
+        let rect = next_to.or_else(tidily).or_else(|| spots(1..RINGS).next())?;
+        let leader = next_to.is_none().then(|| rect.nearest(dot));
+        if leader.is_some() {
+            let beads = self.leader(dot, &rect);
+            self.lines.extend(beads);
+        }
+        self.names.push(rect);
+        Some(Spot { anchor: [0.5 * (rect.low[0] + rect.high[0]), rect.high[1] + DROP], leader })
+    }
+
+    /// The spots around a dot, ring by ring.
+    fn spots(&self, dot: [f64; 2], size: [f64; 2], rings: Range<i32>) -> impl Iterator<Item = Rect> + Clone {
+        let radius = self.radius + 1.0;
+        rings.flat_map(move |ring| {
             let far = f64::from(ring) * 0.8 * LINE;
-            let (aside, above) = (0.5 * size[0] + self.radius + 1.0 + far, 0.5 * LINE + self.radius + 1.0 + far);
+            let (aside, above) = (0.5 * size[0] + radius + far, 0.5 * LINE + radius + far);
             let half = 0.5 * aside;
             [[0.0, -above], [aside, 0.0], [0.0, above], [-aside, 0.0]]
                 .into_iter()
                 .chain([[half, -above], [-half, -above], [half, above], [-half, above]])
                 .chain([[aside, -above], [-aside, -above], [aside, above], [-aside, above]])
-                .map(move |[x, y]| (ring, Rect::around([dot[0] + x, dot[1] + y], size)))
-        });
-        let (ring, rect) = free
-            .into_iter()
-            .find(|(_, rect)| rect.within(&self.frame) && !self.taken.iter().any(|other| rect.overlaps(other)))?;
-        self.taken.push(rect);
-        let anchor = [0.5 * (rect.low[0] + rect.high[0]), rect.high[1] + DROP];
-        Some(Spot { anchor, leader: (ring > 0).then(|| rect.nearest(dot)) })
+                .map(move |[x, y]| Rect::around([dot[0] + x, dot[1] + y], size))
+        })
+    }
+
+    /// The line from a dot to its name as beads, those on either left out.
+    fn leader(&self, dot: [f64; 2], name: &Rect) -> Vec<Rect> {
+        let end = name.nearest(dot);
+        let length = (end[0] - dot[0]).hypot(end[1] - dot[1]);
+        let beads = (length / BEAD).floor();
+        (1..beads as i32)
+            .map(|i| f64::from(i) / beads)
+            .filter(|along| along * length > self.radius + BEAD)
+            .map(|along| Rect::around([0, 1].map(|i| dot[i] + along * (end[i] - dot[i])), [0.5 * BEAD; 2]))
+            .collect()
     }
 }
 
@@ -105,9 +139,9 @@ mod tests {
         let spots: Vec<Spot> = dots.iter().filter_map(|&dot| labels.place(dot, "table-3 x0.75")).collect();
         assert_eq!(spots.len(), 8, "there is room for all");
         assert!(spots.iter().any(|s| s.leader.is_some()));
-        for (i, a) in labels.taken.iter().enumerate().skip(8) {
+        for (i, a) in labels.names.iter().enumerate() {
             assert!(a.within(&FRAME));
-            assert!(labels.taken[..i].iter().all(|b| !a.overlaps(b)));
+            assert!(labels.dots.iter().chain(&labels.names[..i]).all(|b| !a.overlaps(b)));
         }
     }
 

@@ -44,7 +44,7 @@ impl Legend<'_> {
     /// Logs `{path}/bar` and `{path}/ticks` under the garment, for a view in which a pixel there is `pixel_m` long.
     pub(crate) fn log(&self, open: &Open, path: &str, pixel_m: f64) -> Result<(), RecordError> {
         let eye = &open.eye;
-        let (length, thickness) = (1.5 * eye.half_width.max(0.4 * eye.half_height), STRIP_PX * pixel_m);
+        let (length, thickness) = (1.65 * eye.half_width.max(0.36 * eye.half_height), STRIP_PX * pixel_m);
         let start = under(eye, (TITLE_PX + TEXT_PX) * pixel_m) - eye.right * (0.5 * length);
         let at = |along: f64, above: f64| single(start + eye.right * (along * length) + eye.up * above);
         let edges = [-1.2 * TEXT_PX, TITLE_PX].map(|px| px * pixel_m);
@@ -69,7 +69,7 @@ impl Legend<'_> {
         for tick in 0..=steps {
             let t = f64::from(tick) / f64::from(steps);
             let value = self.range.low + t * (self.range.high - self.range.low);
-            let bound = if self.open_end && tick == steps { "≥ " } else { "" };
+            let bound = if self.open_end && tick == steps { "≥" } else { "" };
             places.push(at(t, 0.0));
             labels.push(format!("{bound}{}", number(value)));
         }

@@ -22,6 +22,7 @@ pub mod scatter;
 pub mod sinks;
 pub mod step;
 pub mod web;
+pub mod wrinkles;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -36,6 +37,7 @@ pub use panel::{LevelRow, Panel};
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
+pub use wrinkles::WrinkleView;
 
 use crate::mesh::TriMesh;
 use open::Open;
@@ -183,6 +185,14 @@ impl Recorder {
                 _ => Ok(()),
             }
         })
+    }
+
+    /// The jumps at the PARTs' seams beside the mean curvature.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn wrinkles(&mut self, view: &WrinkleView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| wrinkles::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.

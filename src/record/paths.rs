@@ -14,6 +14,8 @@
 //! | `/force/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar | `table` |
 //! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
 //! | `/fit/<name>/garment`, `.../legend/...` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
+//! | `/wrinkles/seams/garment`, `.../lines`, `.../legend/...` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
+//! | `/wrinkles/curvature/garment`, `.../legend/...` | Mesh3D | mean curvature of the drape | `table` |
 //! | `/error/garment`, `/error/legend/...` | Mesh3D | distance to the reference drape | `table` |
 //! | `/report` | TextDocument | table, fabric, counts, timings, command line, versions | `table` |
 //! | `/levels/histogram/<level>` | BarChart | how many vertices lie how far off, split by level | `table` |
@@ -45,6 +47,10 @@ pub const FORCE_LEGEND: &str = "/force/legend";
 pub const DRAPE: &str = "/drape/garment";
 /// Strain, pressure and other per-vertex values, one branch each.
 pub const FIT: &str = "/fit";
+/// The PARTs' seams, coloured by the jump of the displacement.
+pub const SEAMS: &str = "/wrinkles/seams";
+/// The mean curvature of the drape.
+pub const CURVATURE: &str = "/wrinkles/curvature";
 /// Distance to the reference drape.
 pub const ERROR: &str = "/error";
 /// The text panel.

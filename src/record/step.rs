@@ -18,7 +18,7 @@ const LONGEST_ARROW: f64 = 0.16;
 /// With more arrows than this they shrink.
 const MANY_ARROWS: f64 = 150.0;
 /// Values above this quantile share the last colour.
-const QUANTILE: f64 = 0.99;
+pub(super) const QUANTILE: f64 = 0.99;
 /// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
 const FORCE_QUANTILE: f64 = 0.95;
 
@@ -188,16 +188,27 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
+    let layout = open.layout();
     for overlay in step.overlays {
-        let branch =
-            if overlay.name == "error" { paths::ERROR.to_owned() } else { format!("{}/{}", paths::FIT, overlay.name) };
-        self::overlay(open, &branch, &draped, overlay)?;
+        let (branch, pixel_m) = if overlay.name == "error" {
+            (paths::ERROR.to_owned(), layout.stage_pixel_m(&open.eye))
+        } else {
+            (format!("{}/{}", paths::FIT, overlay.name), layout.fit_pixel_m(&open.eye))
+        };
+        self::overlay(open, &branch, &draped, overlay, pixel_m)?;
     }
     open.draped = Some(draped);
     Ok(())
 }
 
-fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_>) -> Result<(), RecordError> {
+/// Values on the draped garment: `{branch}/garment` and `{branch}/legend`.
+pub(super) fn overlay(
+    open: &Open,
+    branch: &str,
+    draped: &TriMesh,
+    overlay: &Overlay<'_>,
+    pixel_m: f64,
+) -> Result<(), RecordError> {
     let path = format!("{branch}/garment");
     open.triangles_once(&path)?;
     let range = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
@@ -205,13 +216,8 @@ fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_
     let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
     open.log(&path, &coloured)?;
     let open_end = overlay.values.iter().any(|&v| v > range.high);
-    let layout = open.layout();
-    let pixel_m = if branch == paths::ERROR { layout.stage_pixel_m(&open.eye) } else { layout.fit_pixel_m(&open.eye) };
-    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(
-        open,
-        &format!("{branch}/legend"),
-        pixel_m,
-    )
+    let legend = Legend { title: overlay.name, unit: overlay.unit, map, range, open_end };
+    legend.log(open, &format!("{branch}/legend"), pixel_m)
 }
 
 fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {

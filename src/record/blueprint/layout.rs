@@ -28,6 +28,8 @@ pub struct Layout {
     pub error: bool,
     /// Names of the per-vertex overlays that will come (`strain`, `pressure`).
     pub fit: Vec<String>,
+    /// Both measures of wrinkles will come.
+    pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
     pub compare: Vec<String>,
     /// A scatter of time against error will come.
@@ -50,6 +52,8 @@ pub enum Tab {
     Numbers,
     /// Strain and pressure.
     Fit,
+    /// Jumps at the PARTs' seams, and mean curvature.
+    Wrinkles,
     /// Energy and residual over the iterations.
     Solver,
 }
@@ -72,6 +76,9 @@ impl Layout {
         }
         if !self.fit.is_empty() {
             tabs.push((Tab::Fit, self.fit(eye)));
+        }
+        if self.wrinkles {
+            tabs.push((Tab::Wrinkles, wrinkles(eye)));
         }
         if self.iterations {
             tabs.push((Tab::Solver, solver(eye)));
@@ -110,6 +117,11 @@ impl Layout {
     /// Length of a pixel under the garment where the fit is shown, m.
     pub(crate) fn fit_pixel_m(&self, eye: &Eye) -> f64 {
         self.fit_eye(eye).pixel_m(HEIGHT_PX)
+    }
+
+    /// Length of a pixel under the garment where wrinkles are shown, m.
+    pub(crate) fn wrinkle_pixel_m(&self, eye: &Eye) -> f64 {
+        eye.through(0.5 * ASPECT).pixel_m(HEIGHT_PX)
     }
 
     fn stages(&self, eye: &Eye) -> Node {
@@ -187,6 +199,15 @@ impl Layout {
         }
         Node::Row("Fit", views)
     }
+}
+
+fn wrinkles(eye: &Eye) -> Node {
+    let eye = &eye.through(0.5 * ASPECT);
+    let views = vec![
+        (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
+        (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
+    ];
+    Node::Row("Wrinkles", views)
 }
 
 fn solver(eye: &Eye) -> Node {
