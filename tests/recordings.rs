@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use partwise::record::{
     Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
-    When, inspect, paths, web,
+    When, WrinkleView, inspect, paths, web,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -167,12 +167,12 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
 }
 
 #[test]
-fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
+fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legends() {
     let folder = Folder::new();
     let scene = Scene::new(2);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
     let fit = vec!["strain".to_owned(), "pressure".to_owned()];
-    let layout = Layout { iterations: true, fit, opens_on: Tab::Fit, ..Layout::default() };
+    let layout = Layout { iterations: true, fit, wrinkles: true, opens_on: Tab::Fit, ..Layout::default() };
     let mut recorder = Recorder::open(options(&folder.file("solver.rrd"), layout)).unwrap();
     recorder.body(0, &scene.body).unwrap();
     recorder.garment(0, &scene.garment).unwrap();
@@ -189,12 +189,32 @@ fn the_solver_lies_on_its_own_timeline_and_fit_garments_have_their_legends() {
         Overlay { name: "pressure", unit: "kPa", values: &pressure },
     ];
     recorder.step(&step(0, &scene, &solved, &overlays)).unwrap();
+    let part = &solved.part_of_vertex;
+    let edges = scene.garment.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let joining = edges.filter(|&[a, b]| a < b && part[a as usize] != part[b as usize]);
+    let jumps_mm: Vec<([u32; 2], f64)> = joining.map(|edge| (edge, f64::from(edge[0]))).collect();
+    assert!(!jumps_mm.is_empty());
+    let curvature_per_m = vec![1.0; scene.draped.len()];
+    let (draped, curvature_per_m) = (scene.draped.as_slice(), curvature_per_m.as_slice());
+    let view = WrinkleView { index: 0, draped, jumps_mm: &jumps_mm, curvature_per_m };
+    recorder.wrinkles(&view).unwrap();
+    let error = recorder.wrinkles(&WrinkleView { curvature_per_m: &[], ..view }).unwrap_err();
+    assert!(matches!(error, RecordError::Mismatch { .. }), "{error}");
     let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    for path in ["seams/lines", "seams/legend/bar", "curvature/garment", "curvature/legend/ticks"] {
+        assert!(contents.entities.contains_key(&format!("/wrinkles/{path}")), "{path}");
+    }
     for path in [paths::ENERGY, paths::RESIDUAL] {
         assert_eq!(contents.entities[path].rows, 40);
         assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);
     }
+    // Every tab shows something on the timeline the recording opens on.
+    for path in [paths::PARTS, paths::FORCE, paths::REPORT, "/fit/strain/garment"] {
+        assert!(contents.entities[path].timelines.contains(paths::ITERATION), "{path}");
+    }
     assert!(contents.entities[paths::DRAPE].timelines.contains(paths::ITERATION));
+    // A mesh at every fourth iteration, the step's, and the result at the last.
+    assert_eq!(contents.entities[paths::DRAPE].rows, 10 + 1 + 1);
     for name in ["strain", "pressure"] {
         for leaf in ["garment", "legend/bar", "legend/ticks"] {
             assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");

@@ -10,7 +10,7 @@ use partwise::accuracy::reference::ReferenceCache;
 use partwise::assess::{AssessOptions, Assessment, assess};
 use partwise::drape::{Drape, Settings, drape};
 use partwise::mechanics::refine::Step;
-use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView};
+use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
 
 use super::inputs::{InputArgs, Inputs};
 use super::sinks::SinkArgs;
@@ -129,6 +129,7 @@ impl RunArgs {
                 follow: self.watch,
                 iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.assessment.is_some(),
+                wrinkles: solved.assessment.is_some(),
                 fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
                 ..Layout::default()
             },
@@ -207,6 +208,21 @@ impl RunArgs {
             scalars: &scalars,
             overlays: &overlays,
         })?;
+        if let Some(assessment) = &solved.assessment {
+            let joining = scene.topology.edges.as_slice();
+            let seams = solved.drape.parts.seams.iter().zip(&assessment.wrinkles.seams);
+            let jumps_mm: Vec<([u32; 2], f64)> = seams
+                .flat_map(|(seam, measured)| {
+                    seam.edges.iter().map(|&e| (joining[e as usize], measured.displacement_difference_mm))
+                })
+                .collect();
+            recorder.wrinkles(&WrinkleView {
+                index,
+                draped: &solved.drape.positions,
+                jumps_mm: &jumps_mm,
+                curvature_per_m: &assessment.wrinkles.vertex_curvature_per_m,
+            })?;
+        }
         if self.records_iterations() {
             for s in &solved.snapshots {
                 let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);

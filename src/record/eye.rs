@@ -1,7 +1,7 @@
 //! Where the 3D views look from: the front, slightly above and to one side, with the whole garment in the view.
 //!
 //! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of what must be seen, m; a = width over
-//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + half the depth;
+//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + a quarter of the depth;
 //! h includes the colour bar under the hem.
 //!
 //! Limits: the viewer's views have any shape; a is what the layout gives them in a window of 16:10.
@@ -18,8 +18,10 @@ const ELEVATION_DEG: f64 = 7.0;
 const AZIMUTH_DEG: f64 = 18.0;
 /// Air around what must be seen.
 const MARGIN: f64 = 1.14;
+/// A garment is widest near its middle depth: so much of half its depth the eye steps back for what is nearer.
+const BULGE: f64 = 0.5;
 /// Room for the colour bar and its numbers under the garment, relative to the larger of its half extents.
-const LEGEND_HEIGHT: f64 = 0.36;
+const LEGEND_HEIGHT: f64 = 0.42;
 
 /// An eye and the directions of its picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -70,12 +72,26 @@ impl Eye {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
         let centre = right * middle((left_end, right_end)) + up * middle((low, high)) + toward * middle((back, near));
         let (half_width, half_height) = (0.5 * (right_end - left_end), 0.5 * (high - low));
-        let legend = LEGEND_HEIGHT * half_height.max(half_width);
-        let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
-        let fit = ((half_height + 0.5 * legend) / tan).max(half_width / (tan * aspect));
         let half_depth = 0.5 * (near - back);
-        let target = centre - up * (0.5 * legend);
-        let position = target + toward * (MARGIN * fit + half_depth);
-        Some(Self { position, target, right, up, half_width, half_height, centre, toward, half_depth })
+        let target = centre - up * (0.5 * LEGEND_HEIGHT * half_height.max(half_width));
+        let position = target;
+        let eye = Self { position, target, right, up, half_width, half_height, centre, toward, half_depth };
+        Some(eye.through(aspect))
+    }
+
+    /// The same, as near as a view of this width over height allows.
+    #[must_use]
+    pub fn through(&self, aspect: f64) -> Self {
+        let legend = LEGEND_HEIGHT * self.half_height.max(self.half_width);
+        let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
+        let fit = ((self.half_height + 0.5 * legend) / tan).max(self.half_width / (tan * aspect));
+        Self { position: self.target + self.toward * (MARGIN * fit + BULGE * self.half_depth), ..*self }
+    }
+
+    /// Length of a pixel in the plane of the garment's nearest point, m, in a view of this height.
+    #[must_use]
+    pub fn pixel_m(&self, height_px: f64) -> f64 {
+        let off = (self.position - self.target).dot(self.toward) - self.half_depth;
+        2.0 * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan() * off / height_px
     }
 }

@@ -6,18 +6,23 @@
 pub mod blueprint;
 pub mod colour_map;
 pub mod colours;
+pub mod compare;
 pub mod error;
 pub mod eye;
 pub mod inspect;
+mod labels;
 mod legend;
+mod levels;
 mod meshes;
+mod native;
 mod open;
 pub mod panel;
 pub mod paths;
+pub mod scatter;
 pub mod sinks;
 pub mod step;
-pub mod sweep;
 pub mod web;
+pub mod wrinkles;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -26,11 +31,13 @@ use glam::DVec3;
 use rerun::{Scalars, TextDocument};
 
 pub use blueprint::layout::{Layout, Tab};
+pub use compare::Chosen;
 pub use error::RecordError;
 pub use panel::{LevelRow, Panel};
+pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
-pub use sweep::{Chosen, ScatterPoint, When};
+pub use wrinkles::WrinkleView;
 
 use crate::mesh::TriMesh;
 use open::Open;
@@ -165,6 +172,7 @@ impl Recorder {
     ) -> Result<(), RecordError> {
         self.timed(|open| {
             open.at_iteration(iteration);
+            open.last_iteration = Some(iteration);
             step::series(open, paths::ENERGY, "energy", 1, energy_j)?;
             open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
             // Plots have no logarithmic axis.
@@ -179,12 +187,20 @@ impl Recorder {
         })
     }
 
+    /// The jumps at the PARTs' seams beside the mean curvature.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn wrinkles(&mut self, view: &WrinkleView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| wrinkles::log(open, view))
+    }
+
     /// One of the tables chosen to stand side by side.
     ///
     /// # Errors
     /// A slice that does not fit the garment; what Rerun refuses.
     pub fn compare(&mut self, chosen: &Chosen<'_>) -> Result<(), RecordError> {
-        self.timed(|open| sweep::chosen(open, chosen))
+        self.timed(|open| compare::chosen(open, chosen))
     }
 
     /// All points of cost against error so far; `cost` is the axis' title (`time, ms`).
@@ -192,7 +208,7 @@ impl Recorder {
     /// # Errors
     /// What Rerun refuses.
     pub fn scatter(&mut self, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
-        self.timed(|open| sweep::scatter(open, when, cost, points))
+        self.timed(|open| scatter::scatter(open, when, cost, points))
     }
 
     /// Sends what is left, closes the file and gives it its name.

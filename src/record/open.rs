@@ -4,8 +4,9 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder};
+use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
+use super::blueprint::layout::Layout;
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
@@ -14,6 +15,8 @@ use super::web::WebViewer;
 use super::{RecordOptions, RecordSummary, blueprint, colours, inspect, paths};
 use crate::mesh::TriMesh;
 
+/// Bytes of an application's name.
+const LONGEST_ID: usize = 100;
 /// How long the last data may take to reach viewers.
 const LAST_FLUSH: Duration = Duration::from_secs(10);
 
@@ -30,6 +33,10 @@ pub(crate) struct Open {
     pub(super) distance: Vec<f64>,
     pub(super) vertex_colour: Vec<u8>,
     pub(super) levels: usize,
+    /// The displaced garment of the last step.
+    pub(super) draped: Option<TriMesh>,
+    /// The last iteration of the solver.
+    pub(super) last_iteration: Option<i64>,
     /// The text panel as last logged, Markdown.
     pub(super) report: String,
     seen: RefCell<BTreeSet<String>>,
@@ -43,7 +50,9 @@ impl Open {
     pub(super) fn new(options: RecordOptions) -> Result<Self, RecordError> {
         let started = Instant::now();
         let OpenSinks { sinks, targets, web } = OpenSinks::open(&options.sinks)?;
-        let stream = RecordingStreamBuilder::new("partwise").recording_name(options.name.as_str()).set_sinks(sinks)?;
+        let stream = RecordingStreamBuilder::new(application(&options.name))
+            .recording_name(options.name.as_str())
+            .set_sinks(sinks)?;
         // Steps are counted by our own timelines; wall-clock columns would only cost bytes.
         stream.set_log_tick_enabled(false);
         stream.set_log_time_enabled(false);
@@ -59,6 +68,8 @@ impl Open {
             distance: Vec::new(),
             vertex_colour: Vec::new(),
             levels: 0,
+            draped: None,
+            last_iteration: None,
             report: String::new(),
             seen: RefCell::new(BTreeSet::new()),
             laid_out: false,
@@ -67,8 +78,22 @@ impl Open {
         })
     }
 
-    /// Sets the step and the stage of what is logged next.
+    /// What the recording holds, and how large its views are.
+    pub(super) fn layout(&self) -> &Layout {
+        &self.options.layout
+    }
+
+    /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from
+    /// the first on: a view shows one timeline at a time, and none would otherwise show both.
     pub(super) fn at(&self, index: i64, stage: i64) {
+        self.at_table(index, stage);
+        if self.layout().iterations {
+            self.stream.set_time_sequence(paths::ITERATION, 0);
+        }
+    }
+
+    /// Sets the step and the stage of what is logged next, and no iteration.
+    pub(super) fn at_table(&self, index: i64, stage: i64) {
         self.stream.reset_time();
         self.stream.set_time_sequence(paths::TABLE, index);
         self.stream.set_time_sequence(paths::STAGE, stage);
@@ -163,8 +188,21 @@ impl Open {
             .map_err(|e| RecordError::Incomplete { reason: format!("a viewer does not take the data: {e}") })
     }
 
+    /// The mesh comes every so often; the last iteration shows the result.
+    fn end_of_iterations(&self) -> Result<(), RecordError> {
+        if let (Some(last), Some(draped)) = (self.last_iteration, &self.draped) {
+            self.at_iteration(last);
+            self.log(paths::DRAPE, &meshes::shape(draped))?;
+        }
+        Ok(())
+    }
+
     pub(super) fn finish(mut self: Box<Self>) -> Result<RecordSummary, RecordError> {
         let started = Instant::now();
+        if let Err(error) = self.end_of_iterations() {
+            self.discard();
+            return Err(error);
+        }
         let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
         // Dropping the sinks ends the file with its footer.
         self.stream.disconnect();
@@ -190,5 +228,26 @@ impl Open {
         for target in &self.targets {
             let _ = std::fs::remove_file(&target.part);
         }
+    }
+}
+
+/// The viewer keeps one layout for each application: under one name, a recording opened later would rearrange the views of
+/// those before, and leave some blank.
+fn application(name: &str) -> ApplicationId {
+    let pieces = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|piece| !piece.is_empty());
+    let mut id = std::iter::once("partwise").chain(pieces).collect::<Vec<_>>().join("-");
+    id.truncate(LONGEST_ID);
+    ApplicationId::try_new(id).unwrap_or_else(|_| ApplicationId::from("partwise"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recordings_of_different_names_have_different_layouts() {
+        assert_eq!(application("flared-skirt@1200: Table 3").to_string(), "partwise-flared-skirt-1200-Table-3");
+        assert_eq!(application("").to_string(), "partwise");
+        assert_eq!(application(&"a".repeat(1000)).to_string().len(), LONGEST_ID);
     }
 }

@@ -49,7 +49,11 @@ impl Panel {
         if !self.title.is_empty() {
             line(&mut text, format_args!("## {}\n", self.title));
         }
-        two_columns(&mut text, "Drape", "", self.facts.iter().map(|(k, v)| (k.as_str(), v.clone())));
+        let (short, long): (Vec<_>, Vec<_>) = self.facts.iter().partition(|(name, value)| fits(name, value));
+        two_columns(&mut text, "Drape", "", short.into_iter().map(|(k, v)| (k.as_str(), v.clone())));
+        for (name, value) in long {
+            line(&mut text, format_args!("**{name}:** {value}\n"));
+        }
         for warning in &self.warnings {
             line(&mut text, format_args!("> ⚠ {warning}\n"));
         }
@@ -57,9 +61,10 @@ impl Panel {
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
-            for (i, row) in self.levels.iter().enumerate() {
-                let range = range_cm(row.lower_m, row.upper_m);
-                line(&mut text, format_args!("| {i} | {range} | {} | {} |", row.vertices, row.parts));
+            // An empty level says nothing; the others keep their numbers.
+            for (i, row) in self.levels.iter().enumerate().filter(|(_, row)| row.vertices > 0) {
+                let (level, range) = (i + 1, range_cm(row.lower_m, row.upper_m));
+                line(&mut text, format_args!("| {level} | {range} | {} | {} |", row.vertices, row.parts));
             }
             text.push('\n');
         }
@@ -79,6 +84,11 @@ pub fn range_cm(lower_m: f64, upper_m: f64) -> String {
     // 100 × a centimetre bound read from a table is off by an ulp; a micrometre is far below any bound.
     let cm = |m: f64| number((m * 1e6).round() / 1e4);
     if upper_m.is_finite() { format!("{} – {}", cm(lower_m), cm(upper_m)) } else { format!("{} –", cm(lower_m)) }
+}
+
+/// Whether a fact fits beside others in the panel's width. A table's columns do not wrap: what is longer is text.
+fn fits(name: &str, value: &str) -> bool {
+    name.chars().count() <= 15 && value.chars().count() <= 20
 }
 
 fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterator<Item = (&'a str, String)>) {
@@ -109,14 +119,26 @@ mod tests {
             table: "Table 3".into(),
             levels: vec![
                 LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2 },
+                LevelRow { lower_m: 0.0006, upper_m: 0.0006, vertices: 0, parts: 0 },
                 LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1 },
+            ],
+            facts: vec![
+                ("model".into(), "coupled".into()),
+                ("wrinkles".into(), "a sentence as long as this one is text".into()),
             ],
             timings_ms: vec![("distance".into(), 12.345)],
             command_line: "partwise run --garment skirt".into(),
             ..Panel::default()
         };
         let text = panel.markdown();
-        for piece in ["| 0 | 0 – 0.06 | 4 | 2 |", "| 1 | 0.06 – | 9 | 1 |", "| distance | 12.3 |", "partwise run"] {
+        for piece in [
+            "| 1 | 0 – 0.06 | 4 | 2 |",
+            "| 3 | 0.06 – | 9 | 1 |",
+            "| distance | 12.3 |",
+            "partwise run",
+            "| model | coupled |",
+            "**wrinkles:** a sentence",
+        ] {
             assert!(text.contains(piece), "{piece} in {text}");
         }
         assert!(!text.contains("Fabric"));

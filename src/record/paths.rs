@@ -1,5 +1,7 @@
 //! Where everything lies in a recording: the entity paths, the timelines and the fields.
 //!
+//! A run with the solver's steps opens on `iteration`; what changes with `table` is there from its first step on.
+//!
 //! | path | archetype | what | changes with |
 //! |---|---|---|---|
 //! | `/body` | Mesh3D | the body, as given | mesh file |
@@ -12,6 +14,8 @@
 //! | `/force/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar | `table` |
 //! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
 //! | `/fit/<name>/garment`, `.../legend/...` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
+//! | `/wrinkles/seams/garment`, `.../lines`, `.../legend/...` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
+//! | `/wrinkles/curvature/garment`, `.../legend/...` | Mesh3D | mean curvature of the drape | `table` |
 //! | `/error/garment`, `/error/legend/...` | Mesh3D | distance to the reference drape | `table` |
 //! | `/report` | TextDocument | table, fabric, counts, timings, command line, versions | `table` |
 //! | `/levels/histogram/<level>` | BarChart | how many vertices lie how far off, split by level | `table` |
@@ -20,8 +24,8 @@
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
 //! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
 //! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
-//! | `/compare/<slot>/garment`, `.../caption` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
-//! | `/scatter/points`, `.../names`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
+//! | `/compare/<slot>/garment`, `.../caption`, `.../caption/plate` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
+//! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
 
 /// The body.
 pub const BODY: &str = "/body";
@@ -43,6 +47,10 @@ pub const FORCE_LEGEND: &str = "/force/legend";
 pub const DRAPE: &str = "/drape/garment";
 /// Strain, pressure and other per-vertex values, one branch each.
 pub const FIT: &str = "/fit";
+/// The PARTs' seams, coloured by the jump of the displacement.
+pub const SEAMS: &str = "/wrinkles/seams";
+/// The mean curvature of the drape.
+pub const CURVATURE: &str = "/wrinkles/curvature";
 /// Distance to the reference drape.
 pub const ERROR: &str = "/error";
 /// The text panel.

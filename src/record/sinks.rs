@@ -14,6 +14,7 @@ use rerun::sink::{FileSink, FileSinkError, GrpcSink, LogSink};
 use rerun::{MemoryLimit, ServerOptions};
 
 use super::error::RecordError;
+use super::native;
 use super::panel::RERUN_VERSION;
 use super::web::WebViewer;
 
@@ -123,21 +124,9 @@ fn file(path: &Path) -> Result<(FileSink, Target), RecordError> {
 }
 
 fn spawn() -> Result<GrpcSink, RecordError> {
-    let no_viewer = |reason: String| RecordError::NoViewer { reason, version: RERUN_VERSION };
-    let options = rerun::SpawnOptions {
-        port: VIEWER_PORT,
-        wait_for_bind: true,
-        hide_welcome_screen: true,
-        extra_args: vec!["--bind=127.0.0.1".to_owned()],
-        ..rerun::SpawnOptions::default()
-    };
-    let info = rerun::spawn(&options).map_err(|error| match error {
-        rerun::SpawnError::ExecutableNotFoundInPath { executable_name, .. } => {
-            no_viewer(format!("there is no `{executable_name}` in PATH"))
-        }
-        other => no_viewer(other.to_string()),
-    })?;
-    connect(&format!("rerun+http://127.0.0.1:{}/proxy", info.port)).map_err(|error| no_viewer(error.to_string()))
+    native::start(VIEWER_PORT)?;
+    connect(&format!("rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"))
+        .map_err(|error| RecordError::NoViewer { reason: error.to_string(), version: RERUN_VERSION })
 }
 
 fn connect(url: &str) -> Result<GrpcSink, RecordError> {

@@ -2,17 +2,15 @@
 
 use glam::DVec3;
 use rerun::components::{Scalar, Text};
-use rerun::{
-    AnyValues, Arrows3D, BarChart, Clear, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument,
-};
+use rerun::{AnyValues, Arrows3D, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument};
 
 use super::colour_map::{ColourMap, Range};
 use super::colours::{self, colour_parts};
 use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
-use super::panel::{LevelRow, Panel};
-use super::{Open, paths};
+use super::panel::Panel;
+use super::{Open, levels, paths};
 use crate::mesh::TriMesh;
 
 /// Share of the garment's height that the longest arrow takes.
@@ -20,11 +18,9 @@ const LONGEST_ARROW: f64 = 0.16;
 /// With more arrows than this they shrink.
 const MANY_ARROWS: f64 = 150.0;
 /// Values above this quantile share the last colour.
-const QUANTILE: f64 = 0.99;
+pub(super) const QUANTILE: f64 = 0.99;
 /// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
 const FORCE_QUANTILE: f64 = 0.95;
-/// Bars of the distance histogram, about.
-const BINS: usize = 80;
 
 /// A value per vertex of the draped garment.
 #[derive(Debug, Clone, Copy)]
@@ -95,7 +91,7 @@ pub(crate) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordErro
     parts(open, step)?;
     force(open, step)?;
     drape(open, step)?;
-    levels(open, step)?;
+    levels::log(open, step)?;
     numbers(open, step)
 }
 
@@ -110,7 +106,11 @@ fn distance(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let map = ColourMap::DISTANCE;
     open.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
     let open_end = cm.iter().any(|&d| d > range.high);
-    Legend { title: "distance", unit: "cm", map, range, open_end }.log(open, paths::DISTANCE_LEGEND)
+    Legend { title: "distance", unit: "cm", map, range, open_end }.log(
+        open,
+        paths::DISTANCE_LEGEND,
+        open.layout().stage_pixel_m(&open.eye),
+    )
 }
 
 fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
@@ -136,7 +136,11 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let mesh = open.cells.colours(|v| shades[v as usize]);
     open.log(paths::FORCE, &mesh)?;
     let open_end = magnitude.iter().any(|&f| f > range.high);
-    Legend { title: "|F|", unit, map, range, open_end }.log(open, paths::FORCE_LEGEND)?;
+    Legend { title: "|F|", unit, map, range, open_end }.log(
+        open,
+        paths::FORCE_LEGEND,
+        open.layout().stage_pixel_m(&open.eye),
+    )?;
     arrows(open, step, range.high / factor)
 }
 
@@ -179,19 +183,32 @@ fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError
 }
 
 fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
-    open.at(step.index, 5);
     let draped = open.garment.with_positions(step.draped.to_vec());
+    // Its iterations show how it came to be; the last of them is this.
+    open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
+    let layout = open.layout();
     for overlay in step.overlays {
-        let branch =
-            if overlay.name == "error" { paths::ERROR.to_owned() } else { format!("{}/{}", paths::FIT, overlay.name) };
-        self::overlay(open, &branch, &draped, overlay)?;
+        let (branch, pixel_m) = if overlay.name == "error" {
+            (paths::ERROR.to_owned(), layout.stage_pixel_m(&open.eye))
+        } else {
+            (format!("{}/{}", paths::FIT, overlay.name), layout.fit_pixel_m(&open.eye))
+        };
+        self::overlay(open, &branch, &draped, overlay, pixel_m)?;
     }
+    open.draped = Some(draped);
     Ok(())
 }
 
-fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_>) -> Result<(), RecordError> {
+/// Values on the draped garment: `{branch}/garment` and `{branch}/legend`.
+pub(super) fn overlay(
+    open: &Open,
+    branch: &str,
+    draped: &TriMesh,
+    overlay: &Overlay<'_>,
+    pixel_m: f64,
+) -> Result<(), RecordError> {
     let path = format!("{branch}/garment");
     open.triangles_once(&path)?;
     let range = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
@@ -199,49 +216,8 @@ fn overlay(open: &mut Open, branch: &str, draped: &TriMesh, overlay: &Overlay<'_
     let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
     open.log(&path, &coloured)?;
     let open_end = overlay.values.iter().any(|&v| v > range.high);
-    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, &format!("{branch}/legend"))
-}
-
-/// Bars of one level: how many vertices lie in each, and its middle and width, m. A level's bars tile its own range, so
-/// that no bar holds vertices of two.
-fn bars(row: &LevelRow, distance_m: &[f64], widest: f64, end: f64) -> Vec<(f64, f64, f64)> {
-    let upper = row.upper_m.min(end.max(row.lower_m + widest));
-    let count = ((upper - row.lower_m) / widest).ceil().max(1.0);
-    let width = (upper - row.lower_m) / count;
-    let mut bars: Vec<(f64, f64, f64)> =
-        (0..count as usize).map(|i| (0.0, row.lower_m + (i as f64 + 0.5) * width, width)).collect();
-    let last = bars.len() - 1;
-    for &d in distance_m.iter().filter(|d| (row.lower_m..row.upper_m).contains(*d)) {
-        bars[(((d - row.lower_m) / width) as usize).min(last)].0 += 1.0;
-    }
-    bars.retain(|bar| bar.0 > 0.0);
-    bars
-}
-
-fn levels(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
-    let rows = &step.panel.levels;
-    let end = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
-    let shade = |level: usize| {
-        let [r, g, b] = ColourMap::DISTANCE.at((level as f64 + 0.5) / rows.len() as f64);
-        Color::from_rgb(r, g, b)
-    };
-    for (level, row) in rows.iter().enumerate() {
-        let bars = bars(row, step.distance_m, end / BINS as f64, end);
-        let chart = BarChart::new(bars.iter().map(|b| b.0).collect::<Vec<f64>>())
-            .with_abscissa(bars.iter().map(|b| 100.0 * b.1).collect::<Vec<f64>>())
-            .with_widths(bars.iter().map(|b| 100.0 * b.2 as f32).collect::<Vec<f32>>())
-            .with_color(shade(level));
-        open.log(&format!("{}/{level:02}", paths::HISTOGRAM), &chart)?;
-        let parts = BarChart::new(vec![row.parts as f64]).with_abscissa(vec![level as f64]).with_color(shade(level));
-        open.log(&format!("{}/{level:02}", paths::LEVEL_PARTS), &parts)?;
-    }
-    for gone in rows.len()..open.levels {
-        for branch in [paths::HISTOGRAM, paths::LEVEL_PARTS] {
-            open.log(&format!("{branch}/{gone:02}"), &Clear::flat())?;
-        }
-    }
-    open.levels = rows.len();
-    Ok(())
+    let legend = Legend { title: overlay.name, unit: overlay.unit, map, range, open_end };
+    legend.log(open, &format!("{branch}/legend"), pixel_m)
 }
 
 fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
@@ -253,11 +229,14 @@ fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
         row.push((format!("{stage}_ms"), *ms));
     }
     for (i, (leaf, value)) in step.scalars.iter().enumerate() {
-        series(open, &format!("{}/{leaf}", paths::NUMBERS), leaf, i, *value)?;
+        series(open, &format!("{}/{leaf}", paths::NUMBERS), &name_of(leaf), i, *value)?;
         row.push((leaf.replace('/', "_"), *value));
     }
-    let mut cells = AnyValues::default().with_component::<Text>("table", [step.panel.table.as_str()]);
+    // The viewer sorts the columns by name, capitals first.
+    let mut cells = AnyValues::default().with_component::<Text>("Table", [step.panel.table.as_str()]);
     for (name, value) in row {
+        // Micrometres and microseconds: further digits fill the screen with noise.
+        let value = (1e3 * value).round() / 1e3;
         // A column without a name cannot be shown.
         if let Ok(column) = ComponentIdentifier::try_new(name) {
             cells = cells.with_component::<Scalar>(column, [value]);
@@ -266,6 +245,15 @@ fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log(paths::ROWS, &cells)?;
     open.report = step.panel.markdown();
     open.log(paths::REPORT, &TextDocument::from_markdown(open.report.as_str()))
+}
+
+/// What a line is called: errors as in the terminal's tables (`own`, `canonical`, `representable`).
+fn name_of(leaf: &str) -> String {
+    let Some(error) = leaf.strip_prefix("error/") else { return leaf.replace('_', " ") };
+    match error.trim_end_matches("rms_mm").trim_end_matches('_') {
+        "" => "own".to_owned(),
+        kind => kind.to_owned(),
+    }
 }
 
 /// A scalar, drawn as a line with a dot at each step: one step alone is then seen too.
@@ -277,25 +265,4 @@ pub(super) fn series(open: &Open, path: &str, name: &str, place: usize, value: f
         open.log_fixed(path, &SeriesPoints::new().with_names([name]).with_colors([colour]).with_marker_sizes([4.0]))?;
     }
     open.log(path, &Scalars::single(value))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bars_tile_their_level_and_count_every_vertex_once() {
-        let row = |lower_m, upper_m| LevelRow { lower_m, upper_m, vertices: 0, parts: 0 };
-        let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
-        // A narrow level has one bar of its own width.
-        assert_eq!(bars(&row(0.0, 0.01), &distances, 0.02, 0.1), [(3.0, 0.005, 0.01)]);
-        // A wide one is cut evenly; empty bars are left out.
-        let wide = bars(&row(0.01, 0.05), &distances, 0.02, 0.1);
-        assert_eq!(wide.iter().map(|b| b.0).sum::<f64>(), 3.0);
-        assert!(wide.iter().all(|b| (b.2 - 0.02).abs() < 1e-12));
-        // The open level ends at the picture's end; what lies beyond counts in its last bar.
-        let open = bars(&row(0.05, f64::INFINITY), &distances, 0.02, 0.1);
-        assert_eq!(open.len(), 1);
-        assert!(open[0].1 < 0.1);
-    }
 }

@@ -76,6 +76,7 @@ pub(crate) fn record(
     let judged = rows.iter().any(|row| error_mm(row).is_some());
     let layout = Layout {
         several_tables: true,
+        table_count: u32::try_from(rows.len()).ok(),
         error: judged,
         compare: if chosen.len() > 1 { chosen.iter().map(|&i| label[i].clone()).collect() } else { Vec::new() },
         scatter: judged,
@@ -103,7 +104,8 @@ pub(crate) fn record(
         })?;
     }
     if judged {
-        recorder.scatter(When::Table(0), "time, ms", &scatter(rows, &label, &chosen))?;
+        let cost = if chosen.len() > 1 { "time, ms (green: side by side)" } else { "time, ms" };
+        recorder.scatter(When::Table(0), cost, &scatter(rows, &label, &chosen))?;
     }
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {
@@ -138,6 +140,9 @@ fn caption(row: &Row) -> String {
     format!("{parts} PARTs · {:.0} ms{error}", row.time_total_ms.unwrap_or_default())
 }
 
+/// As many points as these have their names written beside them; of more only the chosen.
+const ALL_NAMED: usize = 16;
+
 fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<ScatterPoint<'a>> {
     let point = |(i, row): (usize, &&Row)| {
         Some(ScatterPoint {
@@ -145,7 +150,7 @@ fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<Sca
             cost: row.time_total_ms?,
             error_mm: error_mm(row)?,
             group: usize::from(chosen.contains(&i)),
-            named: chosen.contains(&i),
+            named: rows.len() <= ALL_NAMED || chosen.contains(&i),
         })
     };
     rows.iter().enumerate().filter_map(point).collect()

@@ -2,23 +2,34 @@
 
 use super::super::eye::Eye;
 use super::super::paths;
+use super::super::scatter::VISIBLE;
 use super::view::View;
 use super::{Node, TimePanel};
 
-/// Width over height of a 3D view of the first tab in a window of 16:10.
-pub(crate) const ASPECT: f64 = 0.52;
+/// Width over height of a tab in a window of 16:10, below the bars of the viewer.
+pub(crate) const ASPECT: f64 = 1.8;
+/// Height of a tab in a window of 1440 × 900, pixels: how large texts are beside what they stand by.
+const HEIGHT_PX: f64 = 795.0;
+/// Share of the first tab's height that the stages take; the levels below take the rest.
+const STAGE_HEIGHT: f64 = 0.75;
+/// Width of the text panel over that of a stage.
+const REPORT_OVER_STAGE: f32 = 1.25;
 
 /// What a recording will hold beyond the stages of one drape; each piece gets its views only if it is there.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layout {
     /// Several steps of the timeline `table`: numbers are plotted over it.
     pub several_tables: bool,
-    /// Steps of the timeline `iteration` will come: a tab for the solver.
+    /// How many those steps are, where it is known: plots leave room for their legends then.
+    pub table_count: Option<u32>,
+    /// Steps of the timeline `iteration` will come: a tab for the solver, and the timeline the recording opens on.
     pub iterations: bool,
     /// The error garment will come.
     pub error: bool,
     /// Names of the per-vertex overlays that will come (`strain`, `pressure`).
     pub fit: Vec<String>,
+    /// Both measures of wrinkles will come.
+    pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
     pub compare: Vec<String>,
     /// A scatter of time against error will come.
@@ -41,14 +52,17 @@ pub enum Tab {
     Numbers,
     /// Strain and pressure.
     Fit,
+    /// Jumps at the PARTs' seams, and mean curvature.
+    Wrinkles,
     /// Energy and residual over the iterations.
     Solver,
 }
 
 impl Layout {
     pub(crate) fn time_panel(&self) -> TimePanel {
-        let timeline = if self.opens_on == Tab::Solver { paths::ITERATION } else { paths::TABLE };
-        TimePanel { timeline, follow: self.follow }
+        // Following rests on the last iteration: the result.
+        let timeline = if self.iterations { paths::ITERATION } else { paths::TABLE };
+        TimePanel { timeline, follow: self.follow || self.iterations }
     }
 
     /// The views, seen from `eye`.
@@ -63,6 +77,9 @@ impl Layout {
         if !self.fit.is_empty() {
             tabs.push((Tab::Fit, self.fit(eye)));
         }
+        if self.wrinkles {
+            tabs.push((Tab::Wrinkles, wrinkles(eye)));
+        }
         if self.iterations {
             tabs.push((Tab::Solver, solver(eye)));
         }
@@ -74,10 +91,44 @@ impl Layout {
         }
     }
 
+    fn stage_eye(&self, eye: &Eye) -> Eye {
+        let wide = if self.error { 5.0 } else { 4.0 } + f64::from(REPORT_OVER_STAGE);
+        eye.through(ASPECT / (wide * STAGE_HEIGHT))
+    }
+
+    fn compare_eye(&self, eye: &Eye) -> Eye {
+        eye.through(ASPECT / self.compare.len() as f64)
+    }
+
+    fn fit_eye(&self, eye: &Eye) -> Eye {
+        eye.through(ASPECT / self.fit.len() as f64)
+    }
+
+    /// Length of a pixel under the garment in the stages' views, m.
+    pub(crate) fn stage_pixel_m(&self, eye: &Eye) -> f64 {
+        self.stage_eye(eye).pixel_m(HEIGHT_PX * STAGE_HEIGHT)
+    }
+
+    /// Length of a pixel under the garment where tables stand side by side, m.
+    pub(crate) fn compare_pixel_m(&self, eye: &Eye) -> f64 {
+        self.compare_eye(eye).pixel_m(HEIGHT_PX)
+    }
+
+    /// Length of a pixel under the garment where the fit is shown, m.
+    pub(crate) fn fit_pixel_m(&self, eye: &Eye) -> f64 {
+        self.fit_eye(eye).pixel_m(HEIGHT_PX)
+    }
+
+    /// Length of a pixel under the garment where wrinkles are shown, m.
+    pub(crate) fn wrinkle_pixel_m(&self, eye: &Eye) -> f64 {
+        eye.through(0.5 * ASPECT).pixel_m(HEIGHT_PX)
+    }
+
     fn stages(&self, eye: &Eye) -> Node {
+        let eye = &self.stage_eye(eye);
         let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
         let mut views = vec![
-            seen("Distance to the body", "/distance"),
+            seen("Distance", "/distance"),
             seen("PARTs", "/parts"),
             seen("Force per PART", "/force"),
             seen("Drape", "/drape"),
@@ -87,33 +138,51 @@ impl Layout {
         }
         let top = Node::Row(
             "Stages",
-            vec![(views.len() as f32, Node::Row("Stages", views)), (1.25, View::text("Report", paths::REPORT).into())],
+            vec![
+                (views.len() as f32, Node::Row("Stages", views)),
+                (REPORT_OVER_STAGE, View::text("Report", paths::REPORT).into()),
+            ],
         );
         let mut below: Vec<(f32, Node)> = vec![
-            (1.6, View::bars("Vertices over distance, cm, by level", &[paths::HISTOGRAM]).into()),
+            (1.6, View::bars("Vertices over distance, cm; the levels", &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
         ];
         if self.several_tables {
-            let count = "/numbers/part_count";
-            below.push((1.0, View::plot("PARTs", &[count]).into()));
-            below.push((1.0, View::plot("Time of each stage, ms", &[paths::STAGE_MS]).into()));
+            below.push((1.0, self.plot("PARTs", "/numbers/part_count", false)));
+            below.push((1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, false)));
             if self.error {
-                below.push((1.0, View::plot("Error, mm", &["/numbers/error"]).into()));
+                below.push((1.0, self.plot("Error, mm", "/numbers/error", false)));
             }
         }
-        Node::Column("Stages", vec![(3.0, top), (1.0, Node::Row("Levels", below))])
+        Node::Column(
+            "Stages",
+            vec![(STAGE_HEIGHT as f32, top), (1.0 - STAGE_HEIGHT as f32, Node::Row("Levels", below))],
+        )
     }
 
     fn numbers(&self) -> Node {
-        let rows = View::rows("Numbers", &[paths::ROWS], paths::TABLE);
-        let mut views: Vec<(f32, Node)> = vec![(1.0, rows.into())];
-        if self.scatter {
-            views.insert(0, (1.6, View::plane("Cost against error", &[paths::SCATTER]).into()));
+        let mut plots = vec![(1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, true))];
+        if self.error {
+            plots.push((1.0, self.plot("Error, mm", "/numbers/error", true)));
         }
-        Node::Column("Numbers", views)
+        let mut top = vec![(1.0, Node::Column("Numbers", plots))];
+        if self.scatter {
+            top.insert(0, (2.0, View::plane("Cost against error", &[paths::SCATTER], VISIBLE).into()));
+        }
+        let rows = View::rows("Numbers", &[paths::ROWS], paths::TABLE);
+        Node::Column("Numbers", vec![(1.6, Node::Row("Numbers", top)), (1.0, rows.into())])
+    }
+
+    /// Scalars over `table`, each step apart from the edges; a legend takes two fifths of the width, left of the first.
+    fn plot(&self, name: &str, path: &str, legend: bool) -> Node {
+        let view = View::plot(name, &[path], legend);
+        let Some(count) = self.table_count.map(i64::from) else { return view.into() };
+        let room = if legend { 2 * count / 3 } else { 0 };
+        view.between(-1 - room, count).into()
     }
 
     fn side_by_side(&self, eye: &Eye) -> Node {
+        let eye = &self.compare_eye(eye);
         let views = self.compare.iter().enumerate().map(|(slot, title)| {
             let path = format!("{}/{slot}", paths::COMPARE);
             (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
@@ -122,6 +191,7 @@ impl Layout {
     }
 
     fn fit(&self, eye: &Eye) -> Node {
+        let eye = &self.fit_eye(eye);
         let mut views: Vec<(f32, Node)> = Vec::new();
         for name in &self.fit {
             let path = format!("{}/{name}", paths::FIT);
@@ -131,13 +201,23 @@ impl Layout {
     }
 }
 
+fn wrinkles(eye: &Eye) -> Node {
+    let eye = &eye.through(0.5 * ASPECT);
+    let views = vec![
+        (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
+        (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
+    ];
+    Node::Row("Wrinkles", views)
+}
+
 fn solver(eye: &Eye) -> Node {
+    let eye = &eye.through(ASPECT / 3.0);
     let plots = vec![
-        (1.0, View::plot("Energy, J", &[paths::ENERGY]).into()),
-        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10]).into()),
+        (1.0, View::plot("Energy, J", &[paths::ENERGY], false).into()),
+        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], false).into()),
     ];
     Node::Row(
-        "Solver (timeline: iteration)",
+        "Solver",
         vec![(1.0, View::spatial("Drape", &[paths::BODY, "/drape"], eye).into()), (2.0, Node::Column("Solver", plots))],
     )
 }

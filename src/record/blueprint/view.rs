@@ -1,11 +1,12 @@
 //! One view of the layout: its class, what it shows and its own settings.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, DataframeQuery, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, SpatialInformation, ViewBlueprint,
-    ViewContents,
+    Background, DataframeQuery, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, SpatialInformation, TimeAxis,
+    ViewBlueprint, ViewContents, VisualBounds2D,
 };
 use rerun::external::re_sdk_types::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind};
 use rerun::external::re_sdk_types::components::Color;
+use rerun::external::re_sdk_types::datatypes::{Range2D, TimeRange, TimeRangeBoundary};
 use rerun::{AsComponents, RecordingStream, SerializedComponentBatch};
 
 use super::super::RecordError;
@@ -51,11 +52,11 @@ impl View {
             .with("SpatialInformation", &SpatialInformation::update_fields().with_show_axes(false))
     }
 
-    /// A drawing in the plane.
-    pub(crate) fn plane(name: impl Into<String>, contents: &[&str]) -> Self {
-        let [r, g, b] = BACKDROP;
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(r, g, b));
-        Self::new("2D", name, contents).with("Background", &backdrop)
+    /// A drawing in the plane, of which `[x, y]` is seen. Black, so that its texts read in the light theme too.
+    pub(crate) fn plane(name: impl Into<String>, contents: &[&str], [x, y]: [[f64; 2]; 2]) -> Self {
+        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(0, 0, 0));
+        let seen = VisualBounds2D::new(Range2D { x_range: x.into(), y_range: y.into() });
+        Self::new("2D", name, contents).with("Background", &backdrop).with("VisualBounds2D", &seen)
     }
 
     /// A text.
@@ -65,11 +66,17 @@ impl View {
         view
     }
 
-    /// Scalars over the active timeline.
-    pub(crate) fn plot(name: impl Into<String>, contents: &[&str]) -> Self {
+    /// Scalars over the active timeline, with a legend or without: one line needs none, and in a small plot it hides the lines.
+    pub(crate) fn plot(name: impl Into<String>, contents: &[&str], legend: bool) -> Self {
         Self::new("TimeSeries", name, contents)
-            .with("PlotLegend", &PlotLegend::new().with_corner(Corner2D::LeftTop))
+            .with("PlotLegend", &PlotLegend::new().with_corner(Corner2D::LeftTop).with_visible(legend))
             .with("ScalarAxis", &ScalarAxis::new().with_zoom_lock(false))
+    }
+
+    /// Shows these steps of the timeline, whatever there is.
+    pub(crate) fn between(self, first: i64, last: i64) -> Self {
+        let [start, end] = [first, last].map(|step| TimeRangeBoundary::Absolute(step.into()));
+        self.with("TimeAxis", &TimeAxis::new().with_view_range(TimeRange { start, end }))
     }
 
     /// Bars.

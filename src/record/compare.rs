@@ -1,0 +1,57 @@
+//! Comparing range tables: the chosen few side by side.
+
+use glam::DVec3;
+
+use super::colour_map::{ColourMap, Range};
+use super::colours;
+use super::error::RecordError;
+use super::legend::caption;
+use super::meshes;
+use super::open::Open;
+use super::paths;
+use super::step::Overlay;
+
+/// One of two to six results shown side by side, each in a view of its own with the same eye.
+#[derive(Debug, Clone, Copy)]
+pub struct Chosen<'a> {
+    /// Step of the timeline `table` it belongs to.
+    pub index: i64,
+    /// Place from the left, from 0; the layout's `compare` names it.
+    pub slot: usize,
+    /// What stands under it (`86 PARTs · 1.2 ms · 12 mm`).
+    pub caption: &'a str,
+    /// Displaced vertices, m.
+    pub draped: &'a [DVec3],
+    /// PART of each vertex: their colours, where there is no overlay.
+    pub part_of_vertex: &'a [u32],
+    /// A value per vertex shown instead, over the range the caller shares between the slots.
+    pub overlay: Option<(Overlay<'a>, Range)>,
+}
+
+pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError> {
+    let expected = open.garment.positions.len();
+    for (what, found) in [("positions", chosen.draped.len()), ("PART numbers", chosen.part_of_vertex.len())] {
+        if found != expected {
+            let (what, of) = (format!("{what} of slot {}", chosen.slot), "vertices of the garment");
+            return Err(RecordError::Mismatch { what, found, expected, of });
+        }
+    }
+    let branch = format!("{}/{}", paths::COMPARE, chosen.slot);
+    let path = format!("{branch}/garment");
+    let draped = open.garment.with_positions(chosen.draped.to_vec());
+    open.at(chosen.index, 6);
+    if let Some((overlay, range)) = &chosen.overlay {
+        open.triangles_once(&path)?;
+        let shades = ColourMap::ALARM.colours(overlay.values, *range);
+        open.log(&path, &meshes::shape(&draped).with_vertex_colors(meshes::rerun_colours(shades)))?;
+    } else {
+        let cells = meshes::CellMesh::new(&draped);
+        let parts = chosen.part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
+        let palette = colours::palette();
+        let of_part = colours::colour_parts(chosen.part_of_vertex, parts, &open.garment.triangles, &open.vertex_colour);
+        let shade = |v: u32| palette[of_part[chosen.part_of_vertex[v as usize] as usize] as usize];
+        let shades = meshes::rerun_colours(cells.owner.iter().map(|&v| shade(v)));
+        open.log(&path, &cells.shape().with_vertex_colors(shades))?;
+    }
+    caption(open, &format!("{branch}/caption"), chosen.caption, open.layout().compare_pixel_m(&open.eye))
+}
