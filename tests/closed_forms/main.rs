@@ -4,6 +4,7 @@
 
 mod bench;
 mod cantilever;
+mod crease;
 mod cusick;
 mod fit;
 mod friction;

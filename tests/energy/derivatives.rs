@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 use partwise::distance::Body;
+use partwise::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts, Friction, gravity, membrane::Stiffness};
 use partwise::mesh::TriMesh;
 
-use crate::patch::{cloth, deformed, fabric, jitters, sheet};
+use crate::patch::{cloth, deformed, fabric, jitters, of, sheet};
 
 /// Moves of 1e-6 m: rounding of an energy of 1e-2 J over it is 1e-12 N, truncation less.
 const H: f64 = 1e-6;
@@ -103,13 +104,24 @@ fn friction_gradient() {
     check_gradient(&x, |x| anchored.friction.energy(x), &gradient, "friction");
 }
 
-/// Checks ∇²E d against differences of ∇E, over the free vertices.
+/// Checks the positive ∇²E d against differences of ∇E, over the free vertices.
 fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
     let mut blocks = Vec::new();
     cloth.hessian(x, contacts, &mut blocks);
+    check_blocks(cloth, x, contacts, &blocks, tolerance);
+}
+
+/// The same for the bearing Hessian.
+fn check_bearing(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
+    let mut blocks = Vec::new();
+    cloth.hessian_bearing(None, x, contacts, &mut blocks);
+    check_blocks(cloth, x, contacts, &blocks, tolerance);
+}
+
+fn check_blocks(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, blocks: &[glam::DMat3], tolerance: f64) {
     let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(i + 5000)).collect();
     let mut product = Vec::new();
-    cloth.multiply(&blocks, &d, &mut product);
+    cloth.multiply(blocks, &d, &mut product);
     let at = |s: f64| {
         let mut y = x.to_vec();
         for (&v, d) in cloth.order.iter().zip(&d) {
@@ -149,6 +161,17 @@ fn hessian_of_a_sheared_bent_sheet_is_near() {
     let mesh = sheet();
     let cloth = cloth(&mesh, &[]);
     check_hessian(&cloth, &deformed(&mesh), &Contacts::none(), 0.02);
+}
+
+#[test]
+fn bearing_hessian_is_exact_for_what_the_bending_bears() {
+    let mesh = sheet();
+    let stiff = Fabric { bending_nm: [1e-2; 3], ..fabric() };
+    let cloth = of(&mesh, &stiff, &[]);
+    // Sheared, bent, and squeezed by half a percent: all within what this bending bears.
+    check_bearing(&cloth, &deformed(&mesh), &Contacts::none(), 1e-5);
+    let squeezed: Vec<DVec3> = deformed(&mesh).iter().map(|p| *p * DVec3::new(0.9, 1.0, 0.9)).collect();
+    check_bearing(&cloth, &squeezed, &Contacts::none(), 1e-5);
 }
 
 #[test]

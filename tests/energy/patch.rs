@@ -56,7 +56,11 @@ pub(crate) fn fabric() -> Fabric {
 }
 
 pub(crate) fn cloth(mesh: &TriMesh, held: &[u32]) -> Cloth {
-    Cloth::new(mesh, &Topology::new(mesh), &RestShape::from_edges(mesh).unwrap(), &fabric(), held).unwrap()
+    of(mesh, &fabric(), held)
+}
+
+pub(crate) fn of(mesh: &TriMesh, fabric: &Fabric, held: &[u32]) -> Cloth {
+    Cloth::new(mesh, &Topology::new(mesh), &RestShape::from_edges(mesh).unwrap(), fabric, held).unwrap()
 }
 
 /// The sheet's positions stretched, sheared and bent: every triangle is under tension.
