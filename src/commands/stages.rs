@@ -36,7 +36,7 @@ pub(crate) struct StageArgs {
     #[arg(long, value_enum, default_value_t = ModelName::Coupled)]
     model: ModelName,
     /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade from coarse to fine; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "8")]
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "6")]
     max_extent: Vec<f64>,
     /// Newton steps at full resolution afterwards; 0 is the two-stage scheme alone [default: converged, 0 for `paper`]
     #[arg(long, value_name = "N|converged")]

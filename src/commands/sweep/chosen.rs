@@ -5,6 +5,9 @@ use partwise::sweep::Row;
 /// Views side by side at most: more are too narrow to see a garment in.
 pub(crate) const MOST: usize = 6;
 
+/// And at least, where there are so many rows: two that nothing beats say little about the rest.
+const FEWEST: usize = 4;
+
 /// The error a row is judged by, mm: against its own continuation, else against the canonical drape.
 pub(crate) fn error_mm(row: &Row) -> Option<f64> {
     row.rms_mm.or(row.canonical_rms_mm)
@@ -35,7 +38,8 @@ pub(crate) fn labels(rows: &[&Row]) -> Vec<String> {
 }
 
 /// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with), and an even choice from those that no
-/// other row beats in both PART count and error. All are deterministic figures, so that shards choose alike.
+/// other row beats in both PART count and error; if those are few, those whose PART counts lie farthest from the chosen. All are deterministic
+/// figures, so that shards choose alike.
 pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     if rows.len() <= MOST {
         return (0..rows.len()).collect();
@@ -61,6 +65,18 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     }
     chosen.sort_unstable();
     chosen.dedup();
+    let apart = |i: usize, chosen: &[usize]| {
+        let parts = |i: usize| figures[i].map(|f| (f.0.max(1) as f64).ln());
+        let gaps = chosen.iter().map(|&c| Some((parts(i)? - parts(c)?).abs()));
+        gaps.flatten().fold(f64::INFINITY, f64::min)
+    };
+    while chosen.len() < FEWEST {
+        let others = (0..rows.len()).filter(|i| figures[*i].is_some() && !chosen.contains(i));
+        // Of equals the first.
+        let Some(next) = others.rev().max_by(|&a, &b| apart(a, &chosen).total_cmp(&apart(b, &chosen))) else { break };
+        chosen.push(next);
+        chosen.sort_unstable();
+    }
     chosen
 }
 
@@ -90,7 +106,8 @@ mod tests {
             row("g", 50, 2.0),
         ];
         let rows: Vec<&Row> = rows.iter().collect();
-        assert_eq!(choose(&rows), [0, 2, 3]);
+        // The last fills up: its PART count lies farthest from the three.
+        assert_eq!(choose(&rows), [0, 2, 3, 6]);
         let many: Vec<Row> = (0..40).map(|i| row("t", 10 + i, 50.0 - i as f64)).collect();
         let many: Vec<&Row> = many.iter().collect();
         let chosen = choose(&many);
