@@ -84,10 +84,9 @@ pub(super) fn settle(
         }
         cloth.hessian(&x, contacts, &mut blocks);
         let diagonal: Vec<f64> = cloth.order.iter().map(|&v| cloth.masses[v as usize] * damping).collect();
-        solver.factorise(&cloth.pattern, &blocks, &diagonal)?;
         direction.clear();
         direction.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
-        solver.solve(&mut direction);
+        solver.solve(&cloth.pattern, &blocks, &diagonal, true, &mut direction)?;
         let slope: f64 = cloth.order.iter().zip(&direction).map(|(&v, d)| gradient[v as usize].dot(*d)).sum();
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (LONGEST_MOVE / longest).min(1.0);

@@ -288,21 +288,7 @@ impl Cloth {
 
     /// H d for a Hessian in [`hessian`](Self::hessian)'s blocks, both over the unknowns in elimination order.
     pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
-        out.clear();
-        out.resize(d.len(), DVec3::ZERO);
-        for (j, &dj) in d.iter().enumerate() {
-            let range = self.pattern.column(j);
-            let column = blocks[range.clone()].iter().zip(&self.pattern.rows[range]);
-            let mut sum = DVec3::ZERO;
-            for (k, (block, &row)) in column.enumerate() {
-                let i = row as usize;
-                sum += block.transpose() * d[i];
-                if k > 0 {
-                    out[i] += *block * dj;
-                }
-            }
-            out[j] += sum;
-        }
+        self.pattern.multiply(blocks, d, out);
     }
 }
 

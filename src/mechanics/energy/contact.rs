@@ -128,6 +128,7 @@ impl<'b> Contacts<'b> {
         if matches!(self.met, Met::Nothing) {
             return;
         }
+        self.bound(x);
         let near: Vec<u32> = (0..x.len())
             .filter(|&v| self.asks[v] && self.answer[v] - x[v].distance(self.asked_at[v]) < self.offset)
             .map(|v| v as u32)
@@ -149,6 +150,21 @@ impl<'b> Contacts<'b> {
                 let stiffness = self.stiffness * self.areas[v];
                 self.touches.push(Touch { vertex, depth, normal, stiffness });
             }
+        }
+    }
+
+    /// Gives every vertex that was never asked a bound by the exact distance: most are far, and a lattice about each would
+    /// cost twenty times as much. The rounded distance is less by no more than the lattice's side.
+    fn bound(&mut self, x: &[DVec3]) {
+        let Met::Rounded(field) = &self.met else { return };
+        let body = field.body();
+        let fresh = |&v: &usize| self.asks[v] && self.answer[v] == f64::NEG_INFINITY;
+        let new: Vec<usize> = (0..x.len()).filter(fresh).collect();
+        let distances: Vec<f64> =
+            new.par_iter().with_min_len(128).map(|&v| body.nearest(x[v]).signed_distance).collect();
+        for (v, distance) in new.into_iter().zip(distances) {
+            self.asked_at[v] = x[v];
+            self.answer[v] = distance - SIDE;
         }
     }
 

@@ -63,7 +63,7 @@ impl<'b> Field<'b> {
             .flat_map(|&v| around(cell_of(x[v as usize])))
             .filter(|i| !self.values.contains_key(i))
             .collect();
-        missing.sort_unstable_by_key(|i| i.to_array());
+        missing.sort_unstable_by_key(IVec3::to_array);
         missing.dedup();
         let body = self.body;
         let found: Vec<f64> =

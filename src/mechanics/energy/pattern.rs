@@ -3,6 +3,8 @@
 //! Two free vertices share a block if a triangle or a bending element holds both. Unknowns are numbered in the order of
 //! elimination ([`ordering`](super::ordering)), columns ascending, lower half only: block (i, j) with i ≥ j.
 
+use glam::{DMat3, DVec3};
+
 /// Marks a vertex that is held, and a block that falls away with it.
 pub const HELD: u32 = u32::MAX;
 
@@ -52,6 +54,25 @@ impl Pattern {
     #[must_use]
     pub fn column(&self, j: usize) -> std::ops::Range<usize> {
         self.starts[j] as usize..self.starts[j + 1] as usize
+    }
+
+    /// A d for a matrix in `blocks` of this pattern.
+    pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.resize(d.len(), DVec3::ZERO);
+        for (j, &dj) in d.iter().enumerate() {
+            let range = self.column(j);
+            let column = blocks[range.clone()].iter().zip(&self.rows[range]);
+            let mut sum = DVec3::ZERO;
+            for (k, (block, &row)) in column.enumerate() {
+                let i = row as usize;
+                sum += block.transpose() * d[i];
+                if k > 0 {
+                    out[i] += *block * dj;
+                }
+            }
+            out[j] += sum;
+        }
     }
 
     /// The block of a pair of unknowns.

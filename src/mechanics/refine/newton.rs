@@ -1,6 +1,6 @@
 //! Newton's method with a line search and Levenberg damping.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::{Observer, Record, RefineOptions, Refined, STEP_LIMIT, SolveError, Solver, Step, Stop};
 use crate::GRAVITY;
@@ -108,10 +108,8 @@ pub fn refine_with(
         let diagonal: Vec<f64> = masses.iter().map(|m| m * damping).collect();
         // After a step, `trial` holds the positions it was taken from.
         let before = tangent.stepped.then_some(&trial[..]);
-        tangent.factorise(now, &mut solver, before, &x, &contacts, &diagonal)?;
-        direction.clear();
-        direction.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
-        solver.solve(&mut direction);
+        let here = State { cloth: now, before, x: &x, contacts: &contacts, gradient: &gradient };
+        tangent.direction(&here, &mut solver, &diagonal, &mut direction)?;
         let slope: f64 = cloth.order.iter().zip(&direction).map(|(&v, d)| gradient[v as usize].dot(*d)).sum();
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (options.longest_move_m / longest).min(1.0);
@@ -185,7 +183,7 @@ pub fn refine_with(
 /// Which Hessian is taken, and its blocks.
 #[derive(Debug, Default)]
 struct Tangent {
-    blocks: Vec<glam::DMat3>,
+    blocks: Vec<DMat3>,
     /// Whether a step led here, so that its prediction of the stress can be used.
     stepped: bool,
     /// Whether the last factorisation was of the bearing Hessian.
@@ -196,20 +194,33 @@ struct Tangent {
     pause: usize,
 }
 
+/// Where a step is taken from.
+struct State<'a> {
+    cloth: &'a Cloth,
+    before: Option<&'a [DVec3]>,
+    x: &'a [DVec3],
+    contacts: &'a Contacts<'a>,
+    gradient: &'a [DVec3],
+}
+
 impl Tangent {
-    /// Factors the bearing Hessian, or where it is not positive, the positive one, for a few steps more each time.
-    fn factorise(
+    /// The step d, by the bearing Hessian, or where that is not positive, by the positive one, for a few steps more each time.
+    fn direction(
         &mut self,
-        cloth: &Cloth,
+        here: &State<'_>,
         solver: &mut Solver,
-        before: Option<&[DVec3]>,
-        x: &[DVec3],
-        contacts: &Contacts<'_>,
         diagonal: &[f64],
+        d: &mut Vec<DVec3>,
     ) -> Result<(), SolveError> {
+        let State { cloth, before, x, contacts, gradient } = *here;
+        let mut solve = |blocks: &[DMat3], positive: bool| {
+            d.clear();
+            d.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
+            solver.solve(&cloth.pattern, blocks, diagonal, positive, d)
+        };
         if self.waiting == 0 {
             cloth.hessian_bearing(before, x, contacts, &mut self.blocks);
-            self.bearing = solver.factorise(&cloth.pattern, &self.blocks, diagonal).is_ok();
+            self.bearing = solve(&self.blocks, false).is_ok();
             if self.bearing {
                 self.pause = 0;
                 return Ok(());
@@ -220,7 +231,7 @@ impl Tangent {
         self.waiting -= 1;
         self.bearing = false;
         cloth.hessian_after(before, x, contacts, &mut self.blocks);
-        solver.factorise(&cloth.pattern, &self.blocks, diagonal)
+        solve(&self.blocks, true)
     }
 
     /// After a step that led nowhere: whether the positive Hessian is left to try.
