@@ -1,4 +1,5 @@
-//! Cutting PARTs to a largest extent along the cloth (`--max-extent`).
+//! Cutting PARTs to a largest extent along the cloth: the range table's own, level by level, or the run's (`--max-extent`) for
+//! levels that have none.
 //!
 //! A level of an undraped garment is often a ring, and a ring that moves as one cannot fold. Each PART is cut by
 //! farthest-point seeds (Gonzalez 1985: "Clustering to minimize the maximum intercluster distance", Theoretical Computer
@@ -10,14 +11,33 @@
 //! smaller than asked, never larger. Non-positive extents make every vertex a PART; an infinite one or NaN cuts nothing.
 
 use crate::mesh::{Topology, TriMesh};
+use crate::range_table::{METRES_PER_CM, RangeTable};
 
 use super::seeding::nearest_seeds;
 use super::{Parts, UNASSIGNED};
 
 impl Parts {
-    /// The same PARTs, each cut until none is wider than `extent_m` metres along the cloth.
+    /// The same PARTs, cut where their level in the table has an extent: what stage one makes of a table with extents.
+    #[must_use]
+    pub fn cut_to_table(&self, mesh: &TriMesh, topology: &Topology, table: &RangeTable) -> Self {
+        let levels = table.effective_levels();
+        let extent_m = |level: u32| levels.get(level as usize)?.extent_cm.map(|cm| cm * METRES_PER_CM);
+        self.cut(mesh, topology, |level| extent_m(level).unwrap_or(f64::INFINITY))
+    }
+
+    /// The same PARTs, each cut until none is wider than `extent_m` metres along the cloth. PARTs of levels with an extent of
+    /// their own stay as they are.
     #[must_use]
     pub fn cut_to_extent(&self, mesh: &TriMesh, topology: &Topology, extent_m: f64) -> Self {
+        let own = |level: u32| self.own_extent.get(level as usize) == Some(&true);
+        self.cut(mesh, topology, |level| if own(level) { f64::INFINITY } else { extent_m })
+    }
+
+    /// Each PART cut to the extent of its level, m.
+    fn cut(&self, mesh: &TriMesh, topology: &Topology, extent_of: impl Fn(u32) -> f64 + Sync) -> Self {
+        if self.parts.iter().all(|part| extent_of(part.level) == f64::INFINITY) {
+            return self.clone();
+        }
         let mut place = vec![0u32; self.part_of_vertex.len()];
         for part in &self.parts {
             for (&v, i) in part.vertices.iter().zip(0..) {
@@ -27,7 +47,8 @@ impl Parts {
         let pieces = self.map(|number, part| {
             let inside = |w: u32| self.part_of_vertex[w as usize] == number as u32;
             let local = |w: u32| inside(w).then(|| place[w as usize] as usize);
-            nearest_seeds(&part.vertices, local, mesh, topology, (extent_m, usize::MAX)).unwrap_or_default()
+            let extent_m = extent_of(part.level);
+            nearest_seeds(&part.vertices, local, mesh, topology, extent_m)
         });
         let mut label = vec![UNASSIGNED; self.part_of_vertex.len()];
         let mut level_of_label = Vec::new();
@@ -39,6 +60,6 @@ impl Parts {
             level_of_label.extend(std::iter::repeat_n(part.level, *seeds));
         }
         let level_of = |label: u32| level_of_label[label as usize];
-        Self::from_labels(topology, &label, level_of, self.parts_per_level.len(), self.hole_vertices)
+        Self::from_labels(topology, &label, level_of, self.own_extent.clone(), self.hole_vertices)
     }
 }

@@ -54,18 +54,21 @@ impl RangeTable {
         if rows.is_empty() {
             return Err(TableError::Empty { place: at(file.levels.span().start) });
         }
-        let mut bounds = Vec::with_capacity(rows.len());
+        let mut levels = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let &[lower, upper] = row.get_ref().as_slice() else {
-                let (row, found) = (i + 1, row.get_ref().len());
-                return Err(TableError::NotAPair { place: at(rows[i].span().start), row, found });
+            let (lower_cm, upper_cm, extent_cm) = match *row.get_ref().as_slice() {
+                [lower, upper] => (lower, upper, None),
+                [lower, upper, extent] => (lower, upper, Some(extent)),
+                ref other => {
+                    let (place, row, found) = (at(row.span().start), i + 1, other.len());
+                    return Err(TableError::RowLength { place, row, found });
+                }
             };
-            bounds.push((lower, upper));
+            levels.push(Level { lower_cm, upper_cm, extent_cm });
         }
-        if let Some((row, problem)) = first_problem(&bounds, gap) {
+        if let Some((row, problem)) = first_problem(&levels, gap) {
             return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });
         }
-        let levels = bounds.into_iter().map(|(lower_cm, upper_cm)| Level { lower_cm, upper_cm }).collect();
         Ok(Self { name: file.name, source: file.source, gap, levels })
     }
 
@@ -80,7 +83,8 @@ impl RangeTable {
         text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap.as_str()));
         for level in &self.levels {
             // `{:?}` is the shortest text that reads back to the same bits; TOML spells infinity the same way.
-            text.push_str(&format!("    [{:?}, {:?}],\n", level.lower_cm, level.upper_cm));
+            let extent = level.extent_cm.map_or_else(String::new, |cm| format!(", {cm:?}"));
+            text.push_str(&format!("    [{:?}, {:?}{extent}],\n", level.lower_cm, level.upper_cm));
         }
         text.push_str("]\n");
         text
@@ -111,6 +115,11 @@ mod tests {
         assert_eq!(RangeTable::parse(&table.to_toml(), "again").unwrap(), table);
         let odd = RangeTable::from_bounds("a \"quoted\"\nname", &[0.1 + 0.2, 1.0 / 3.0, f64::INFINITY]).unwrap();
         assert_eq!(RangeTable::parse(&odd.to_toml(), "odd").unwrap(), odd);
+        let cut = odd.with_extents(&[Some(0.1 + 0.2), None]).unwrap();
+        assert_eq!(RangeTable::parse(&cut.to_toml(), "cut").unwrap(), cut);
+        let never = cut.with_extents(&[None, Some(f64::INFINITY)]).unwrap();
+        assert!(never.to_toml().contains("[0.3333333333333333, inf, inf]"), "{}", never.to_toml());
+        assert_eq!(RangeTable::parse(&never.to_toml(), "never").unwrap(), never);
     }
 
     #[test]
@@ -122,6 +131,9 @@ mod tests {
             ("[-1, 2],", 4, 1, "at least 0"),
             ("[nan, 2],", 4, 1, "two numbers"),
             ("[0, inf],\n[3, 4],", 4, 1, "only the last row"),
+            ("[0, 1],\n[1, 2, 0],", 5, 2, "the extent 0"),
+            ("[0, 1, -3],", 4, 1, "the extent -3"),
+            ("[0, 1, 5],\n[1, inf, nan],", 5, 2, "the extent NaN"),
         ] {
             let text = file(rows);
             let said = message(&text);
@@ -129,6 +141,7 @@ mod tests {
             assert!(said.contains(word), "{said}");
         }
         assert!(message(&file("[0, 1],\n[2],")).starts_with("t.toml:5: row 2 has 1 numbers"));
+        assert!(message(&file("[0, 1, 2, 3],")).contains("or three, [lower, upper, extent]"));
         assert!(message(&file("")).starts_with("t.toml:3: found no levels"));
     }
 

@@ -18,6 +18,8 @@ pub struct LevelRow {
     pub vertices: usize,
     /// PARTs in it.
     pub parts: usize,
+    /// The extent its PARTs are cut to by the table, m; infinite for never cut.
+    pub extent_m: Option<f64>,
 }
 
 /// Everything the text panel shows. Empty pieces are left out.
@@ -56,10 +58,14 @@ impl Panel {
         two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
-            line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
+            // Only tables with extents get a column for them.
+            let own = self.levels.iter().any(|row| row.extent_m.is_some());
+            let (head, rule) = if own { (" cut to, cm |", "--:|") } else { ("", "") };
+            line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
             for (i, row) in self.levels.iter().enumerate() {
                 let range = range_cm(row.lower_m, row.upper_m);
-                line(&mut text, format_args!("| {i} | {range} | {} | {} |", row.vertices, row.parts));
+                let extent = if own { format!(" {} |", extent_cm(row.extent_m)) } else { String::new() };
+                line(&mut text, format_args!("| {i} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
         }
@@ -79,6 +85,14 @@ pub fn range_cm(lower_m: f64, upper_m: f64) -> String {
     // 100 × a centimetre bound read from a table is off by an ulp; a micrometre is far below any bound.
     let cm = |m: f64| number((m * 1e6).round() / 1e4);
     if upper_m.is_finite() { format!("{} – {}", cm(lower_m), cm(upper_m)) } else { format!("{} –", cm(lower_m)) }
+}
+
+fn extent_cm(extent_m: Option<f64>) -> String {
+    match extent_m {
+        Some(m) if m.is_finite() => number((m * 1e6).round() / 1e4),
+        Some(_) => "not cut".to_owned(),
+        None => String::new(),
+    }
 }
 
 fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterator<Item = (&'a str, String)>) {
@@ -108,8 +122,8 @@ mod tests {
             title: "skirt on body".into(),
             table: "Table 3".into(),
             levels: vec![
-                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2 },
-                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1 },
+                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2, extent_m: None },
+                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1, extent_m: None },
             ],
             timings_ms: vec![("distance".into(), 12.345)],
             command_line: "partwise run --garment skirt".into(),
@@ -120,5 +134,11 @@ mod tests {
             assert!(text.contains(piece), "{piece} in {text}");
         }
         assert!(!text.contains("Fabric"));
+        let mut cut = panel.clone();
+        (cut.levels[0].extent_m, cut.levels[1].extent_m) = (Some(0.12), Some(f64::INFINITY));
+        let text = cut.markdown();
+        for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 12 |", "| 9 | 1 | not cut |"] {
+            assert!(text.contains(piece), "{piece} in {text}");
+        }
     }
 }

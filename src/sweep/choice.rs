@@ -148,7 +148,8 @@ impl TableChoice {
                 levels: table
                     .levels
                     .iter()
-                    .map(|l| [format!("{:?}", l.lower_cm), format!("{:?}", l.upper_cm)])
+                    .map(|l| [Some(l.lower_cm), Some(l.upper_cm), l.extent_cm])
+                    .map(|row| row.into_iter().flatten().map(|cm| format!("{cm:?}")).collect())
                     .collect(),
             },
             TableRule::Quantile { levels } => TableKey::Quantile { levels: *levels },
@@ -166,6 +167,6 @@ pub(super) enum InputKey<'a> {
 #[derive(Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum TableKey {
-    Rows { gap: &'static str, levels: Vec<[String; 2]> },
+    Rows { gap: &'static str, levels: Vec<Vec<String>> },
     Quantile { levels: usize },
 }

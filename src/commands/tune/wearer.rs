@@ -69,7 +69,7 @@ impl Wearer {
             displacement,
             table_3: Holds { parts: 0, rms_mm: 0.0 },
         };
-        wearer.table_3 = wearer.holds(&RangeTable::table_3(), None);
+        wearer.table_3 = wearer.holds(&RangeTable::table_3());
         Ok(Some(wearer))
     }
 
@@ -84,19 +84,16 @@ impl Wearer {
         }
     }
 
-    /// The PARTs of a table, cut to an extent (m) if there is one.
-    pub(crate) fn parts(&self, table: &RangeTable, extent_m: Option<f64>) -> Parts {
+    /// The PARTs of a table, levels with an extent cut to it.
+    pub(crate) fn parts(&self, table: &RangeTable) -> Parts {
         let scene = &self.placed.scene;
         let parts = segment(&scene.topology, &self.placed.distance_m, table);
-        match extent_m {
-            None => parts,
-            Some(extent_m) => parts.cut_to_extent(&scene.garment, &scene.topology, extent_m),
-        }
+        parts.cut_to_table(&scene.garment, &scene.topology, table)
     }
 
     /// What a table holds of the reference.
-    pub(crate) fn holds(&self, table: &RangeTable, extent_m: Option<f64>) -> Holds {
-        let parts = self.parts(table, extent_m);
+    pub(crate) fn holds(&self, table: &RangeTable) -> Holds {
+        let parts = self.parts(table);
         Holds { parts: parts.len(), rms_mm: 1e3 * representable_rms_m(&parts, &self.displacement) }
     }
 }

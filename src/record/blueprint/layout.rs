@@ -13,6 +13,8 @@ pub(crate) const ASPECT: f64 = 0.52;
 pub struct Layout {
     /// Several steps of the timeline `table`: numbers are plotted over it.
     pub several_tables: bool,
+    /// The steps show what PARTs can hold and run no mechanics: no views of forces and of the stages' times.
+    pub held: bool,
     /// Steps of the timeline `iteration` will come: a tab for the solver.
     pub iterations: bool,
     /// The error garment will come.
@@ -76,12 +78,11 @@ impl Layout {
 
     fn stages(&self, eye: &Eye) -> Node {
         let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
-        let mut views = vec![
-            seen("Distance to the body", "/distance"),
-            seen("PARTs", "/parts"),
-            seen("Force per PART", "/force"),
-            seen("Drape", "/drape"),
-        ];
+        let mut views = vec![seen("Distance to the body", "/distance"), seen("PARTs", "/parts")];
+        if !self.held {
+            views.push(seen("Force per PART", "/force"));
+        }
+        views.push(seen("Drape", "/drape"));
         if self.error {
             views.push(seen("Error", paths::ERROR));
         }
@@ -96,7 +97,9 @@ impl Layout {
         if self.several_tables {
             let count = "/numbers/part_count";
             below.push((1.0, View::plot("PARTs", &[count]).into()));
-            below.push((1.0, View::plot("Time of each stage, ms", &[paths::STAGE_MS]).into()));
+            if !self.held {
+                below.push((1.0, View::plot("Time of each stage, ms", &[paths::STAGE_MS]).into()));
+            }
             if self.error {
                 below.push((1.0, View::plot("Error, mm", &["/numbers/error"]).into()));
             }
