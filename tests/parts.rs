@@ -6,7 +6,7 @@ use glam::DVec3;
 use partwise::distance::Body;
 use partwise::mesh::{Topology, TriMesh};
 use partwise::parts::{Part, Parts, UNASSIGNED, segment};
-use partwise::range_table::{GapRule, RangeTable};
+use partwise::range_table::{Extent, GapRule, RangeTable};
 use proptest::prelude::*;
 
 /// Ericson's closest point on a triangle ("Real-Time Collision Detection", 5.1.5), written for this test.
@@ -261,7 +261,7 @@ fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
     };
     // In tenths of the strip, a quarter of which is each level.
     let tenth_cm = 10.0 * length;
-    let extents = [Some(tenth_cm), None, Some(0.5 * tenth_cm), Some(f64::INFINITY)];
+    let extents = [Some(Extent::even(tenth_cm)), None, Some(Extent::even(0.5 * tenth_cm)), Some(Extent::UNCUT)];
     let table = table.with_extents(&extents).unwrap();
     let own = segment(&topology, &d, &table).cut_to_table(&mesh, &topology, &table);
     consistent(&own, &topology);

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DVec3;
 use partwise::mesh::{Topology, TriMesh};
 use partwise::parts::{Parts, representable_rms_m, segment};
-use partwise::range_table::RangeTable;
+use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::{Front, FrontPoint, Sample, SearchError, SearchOptions, search};
 use proptest::prelude::*;
 
@@ -63,7 +63,7 @@ proptest! {
     fn the_front_is_that_of_all_tables(
         distances in prop::collection::vec(0u32..5, 20),
         moves in prop::collection::vec(-1.0f64..1.0, 60),
-        extents in prop::collection::vec(3.0f64..10.0, 0..3),
+        extents in prop::collection::vec((3.0f64..10.0, 0usize..3), 0..2),
     ) {
         let mesh = sheet(5, 4);
         let topology = Topology::new(&mesh);
@@ -71,12 +71,20 @@ proptest! {
         let displacement: Vec<DVec3> = moves.chunks(3).map(DVec3::from_slice).collect();
         let sample =
             Sample { mesh: &mesh, topology: &topology, distances_m: &distances, displacement: &displacement, weight: 2.5 };
-        let options = SearchOptions { include: Vec::new(), rounds: 1, ..SearchOptions::with_extents(14, &extents) };
+        let (widths, shapes): (Vec<f64>, Vec<usize>) = extents.into_iter().unzip();
+        let shapes: Vec<f64> = shapes.into_iter().flat_map(|s| [1.0, [0.5, 2.0, 4.0][s]]).collect();
+        let options = SearchOptions {
+            include: Vec::new(),
+            rounds: 1,
+            shapes: shapes.clone(),
+            ..SearchOptions::with_extents(14, &widths)
+        };
         let found = search(&[sample], &options, &|_| {});
 
-        // Up to four bounds between five values, and each level uncut or cut to either extent: 16 to 768 tables.
+        // Up to four bounds between five values, and each level uncut or cut to one of two shapes: 16 to 768 tables.
         let mut best = [f64::INFINITY; 15];
-        let choices: Vec<f64> = extents.iter().copied().chain([f64::INFINITY]).collect();
+        let cuts = widths.iter().flat_map(|&w| shapes.iter().map(move |s| Extent { width_cm: w, height_cm: s * w }));
+        let choices: Vec<Extent> = cuts.chain([Extent::UNCUT]).collect();
         for mask in 0u32..16 {
             let inner: Vec<f64> = (0..4).filter(|b| mask >> b & 1 == 1).map(|b| 0.5 + f64::from(b)).collect();
             let table = RangeTable::from_inner_bounds("all", &inner).unwrap();
@@ -118,15 +126,15 @@ proptest! {
 #[test]
 fn every_point_is_what_stage_one_makes_of_its_table() {
     let (a, b) = (Wavy::new(31, 24, 0.0), Wavy::new(17, 28, 1.3));
-    for (max_parts, extents_cm) in [(120, &[][..]), (300, &[8.0, 10.0, 15.0])] {
+    for (max_parts, widths_cm) in [(120, &[][..]), (300, &[8.0, 10.0, 15.0])] {
         let options =
-            SearchOptions { candidates: 40, exact_up_to: 0, ..SearchOptions::with_extents(max_parts, extents_cm) };
+            SearchOptions { candidates: 40, exact_up_to: 0, ..SearchOptions::with_extents(max_parts, widths_cm) };
         let found = search(&[a.sample(1.0), b.sample(3.0)], &options, &|_| {}).unwrap();
         is_a_front(found.front());
         assert!(found.front().points.len() > 10);
         for point in &found.front().points {
             let table = point.table("found", "test").unwrap();
-            assert_eq!(table.has_extents(), !extents_cm.is_empty());
+            assert_eq!(table.has_extents(), !widths_cm.is_empty());
             let cut = [&a, &b].map(|g| g.parts(&table));
             assert_eq!(cut[0].len() + cut[1].len(), point.parts);
             let e = [(&a, &cut[0]), (&b, &cut[1])].map(|(g, parts)| representable_rms_m(parts, &g.displacement));
@@ -164,22 +172,23 @@ fn no_included_table_is_better_and_no_round_is_worse() {
 #[test]
 fn an_extent_for_each_level_is_never_worse_than_one_for_all() {
     let garment = Wavy::new(31, 24, 0.4);
-    let found = |extents_cm: &[f64]| {
-        let options = SearchOptions { candidates: 25, rounds: 1, ..SearchOptions::with_extents(60, extents_cm) };
+    let found = |widths_cm: &[f64]| {
+        let options = SearchOptions { candidates: 25, rounds: 1, ..SearchOptions::with_extents(60, widths_cm) };
         search(&[garment.sample(1.0)], &options, &|_| {}).unwrap().front().clone()
     };
     let front = found(&[20.0, 30.0, 1.0]);
     is_a_front(&front);
     // A level cut to 1 cm has more PARTs than allowed.
-    assert!(front.points.iter().all(|p| !p.extents_cm.contains(&1.0)));
+    assert!(front.points.iter().all(|p| p.extents.iter().all(|e| e.width_cm > 1.0)));
     for fewer in [&[][..], &[20.0], &[30.0]] {
         for point in &found(fewer).points {
             assert!(front.best_within(point.parts).unwrap().rms_m <= point.rms_m);
         }
     }
-    let mixed = |p: &&FrontPoint| p.extents_cm.contains(&20.0) && p.extents_cm.contains(&30.0);
+    let has = |p: &FrontPoint, cm: f64| p.extents.iter().any(|e| e.width_cm == cm);
+    let mixed = |p: &&FrontPoint| has(p, 20.0) && has(p, 30.0);
     let mixed = front.points.iter().find(mixed).unwrap();
-    assert_eq!(mixed.extents_cm.len(), mixed.inner_bounds_cm.len() + 1);
+    assert_eq!(mixed.extents.len(), mixed.inner_bounds_cm.len() + 1);
     let table = mixed.table("found", "test").unwrap();
     let again = RangeTable::parse(&table.to_toml(), "again").unwrap();
     assert_eq!(garment.parts(&again).len(), mixed.parts);

@@ -5,24 +5,28 @@
 //! farthest-point seeds (Gonzalez 1985: "Clustering to minimize the maximum intercluster distance", Theoretical Computer
 //! Science 38): the first seed is the PART's lowest vertex, the next always the vertex farthest from all seeds, until none is
 //! farther than half the extent; every vertex goes to its nearest seed. Distance runs along garment edges inside the
-//! PART (Dijkstra), so two vertices of a piece are at most one extent apart along the cloth, and the pieces are connected.
+//! PART (Dijkstra), so two vertices of a piece are at most one extent apart along the cloth, and the pieces are connected. Where a
+//! level's extent is taller than wide, or wider than tall, vertical lengths are scaled so that it is as wide as tall.
 //!
 //! Limits: a path along edges is up to 15 % longer than the geodesic on a regular triangulation, so pieces come out that much
 //! smaller than asked, never larger. Non-positive extents make every vertex a PART; an infinite one or NaN cuts nothing.
 
 use crate::mesh::{Topology, TriMesh};
-use crate::range_table::{METRES_PER_CM, RangeTable};
+use crate::range_table::RangeTable;
 
 use super::seeding::nearest_seeds;
 use super::{Parts, UNASSIGNED};
+
+/// What cuts nothing.
+const UNCUT: ([f64; 2], f64) = ([1.0, 1.0], f64::INFINITY);
 
 impl Parts {
     /// The same PARTs, cut where their level in the table has an extent: what stage one makes of a table with extents.
     #[must_use]
     pub fn cut_to_table(&self, mesh: &TriMesh, topology: &Topology, table: &RangeTable) -> Self {
         let levels = table.effective_levels();
-        let extent_m = |level: u32| levels.get(level as usize)?.extent_cm.map(|cm| cm * METRES_PER_CM);
-        self.cut(mesh, topology, |level| extent_m(level).unwrap_or(f64::INFINITY))
+        let extent = |level: u32| levels.get(level as usize)?.extent.map(|e| e.evened());
+        self.cut(mesh, topology, |level| extent(level).unwrap_or(UNCUT))
     }
 
     /// The same PARTs, each cut until none is wider than `extent_m` metres along the cloth. PARTs of levels with an extent of
@@ -30,12 +34,12 @@ impl Parts {
     #[must_use]
     pub fn cut_to_extent(&self, mesh: &TriMesh, topology: &Topology, extent_m: f64) -> Self {
         let own = |level: u32| self.own_extent.get(level as usize) == Some(&true);
-        self.cut(mesh, topology, |level| if own(level) { f64::INFINITY } else { extent_m })
+        self.cut(mesh, topology, |level| if own(level) { UNCUT } else { ([1.0, 1.0], extent_m) })
     }
 
-    /// Each PART cut to the extent of its level, m.
-    fn cut(&self, mesh: &TriMesh, topology: &Topology, extent_of: impl Fn(u32) -> f64 + Sync) -> Self {
-        if self.parts.iter().all(|part| extent_of(part.level) == f64::INFINITY) {
+    /// Each PART cut to the extent of its level, m, after horizontal and vertical lengths are multiplied.
+    fn cut(&self, mesh: &TriMesh, topology: &Topology, extent_of: impl Fn(u32) -> ([f64; 2], f64) + Sync) -> Self {
+        if self.parts.iter().all(|part| extent_of(part.level).1 == f64::INFINITY) {
             return self.clone();
         }
         let mut place = vec![0u32; self.part_of_vertex.len()];
@@ -47,8 +51,7 @@ impl Parts {
         let pieces = self.map(|number, part| {
             let inside = |w: u32| self.part_of_vertex[w as usize] == number as u32;
             let local = |w: u32| inside(w).then(|| place[w as usize] as usize);
-            let extent_m = extent_of(part.level);
-            nearest_seeds(&part.vertices, local, mesh, topology, extent_m)
+            nearest_seeds(&part.vertices, local, mesh, topology, extent_of(part.level))
         });
         let mut label = vec![UNASSIGNED; self.part_of_vertex.len()];
         let mut level_of_label = Vec::new();

@@ -68,7 +68,7 @@ pub fn segment(topology: &Topology, distances_m: &[f64], table: &RangeTable) -> 
     let unsigned: Vec<f64> = distances_m.iter().map(|d| d.abs()).collect();
     let assigned = table.assign(&unsigned);
     let label: Vec<u32> = assigned.level_of_vertex.iter().map(|l| l.map_or(UNASSIGNED, |l| l as u32)).collect();
-    let own_extent = table.effective_levels().iter().map(|l| l.extent_cm.is_some()).collect();
+    let own_extent = table.effective_levels().iter().map(|l| l.extent.is_some()).collect();
     Parts::from_labels(topology, &label, |label| label, own_extent, assigned.hole_vertices)
 }
 

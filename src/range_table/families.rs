@@ -2,7 +2,7 @@
 //!
 //! Each yields a checked table whose name and source say how it was made. Bounds are centimetres.
 
-use super::{GapRule, Level, METRES_PER_CM, RangeTable, TableError};
+use super::{Extent, GapRule, Level, METRES_PER_CM, RangeTable, TableError};
 
 impl RangeTable {
     /// The same table with every bound times `factor`; an open end stays open.
@@ -56,9 +56,9 @@ impl RangeTable {
         let verb = if count < from { "merged" } else { "split" };
         let extent = |w: &[f64]| {
             let within = levels.iter().filter(|l| l.lower_cm < w[1] && w[0] < l.upper_cm);
-            within.filter_map(|l| l.extent_cm).reduce(f64::min)
+            within.filter_map(|l| l.extent).reduce(Extent::smaller)
         };
-        let extents: Vec<Option<f64>> = bounds.windows(2).map(extent).collect();
+        let extents: Vec<Option<Extent>> = bounds.windows(2).map(extent).collect();
         let made = Self::from_bounds(format!("{}, {count} levels", self.name), &bounds)?.with_extents(&extents)?;
         Ok(made.with_source(format!("\"{}\" {verb} from {from} to {count} levels", self.name)))
     }

@@ -8,16 +8,18 @@
 //! |---|---|---|
 //! | V_L, V_H | lower and upper value of a level, as printed | cm |
 //! | d | distance of a garment vertex from the body, unsigned | m |
-//! | extent | the widest a PART of the level may be along the cloth; optional, not in the paper | cm |
+//! | extent | how wide and tall a PART of the level may be along the cloth; optional, not in the paper | cm |
 //!
 //! Limits: distances below the first lower value or at and above a finite last upper value belong to no level; the vertices
 //! there are reported as unassigned.
 
 mod error;
+mod extent;
 pub mod families;
 mod format;
 
 pub use error::{BoundProblem, TableError};
+pub use extent::Extent;
 
 /// Metres in a centimetre: tables are written in centimetres, everything else is metres.
 pub const METRES_PER_CM: f64 = 0.01;
@@ -29,16 +31,16 @@ pub struct Level {
     pub lower_cm: f64,
     /// Upper value V_H, cm; infinite in an open last row.
     pub upper_cm: f64,
-    /// Widest a PART of this level may be along the cloth, cm: PARTs are cut to it; infinite for never cut. `None`, as in the
-    /// paper, leaves it to whoever runs the table (`--max-extent`).
-    pub extent_cm: Option<f64>,
+    /// How wide and tall a PART of this level may be along the cloth: PARTs are cut to it. `None`, as in the paper, leaves it
+    /// to whoever runs the table (`--max-extent`).
+    pub extent: Option<Extent>,
 }
 
 impl Level {
     /// A level without an extent of its own.
     #[must_use]
     pub fn new(lower_cm: f64, upper_cm: f64) -> Self {
-        Self { lower_cm, upper_cm, extent_cm: None }
+        Self { lower_cm, upper_cm, extent: None }
     }
 }
 
@@ -92,8 +94,8 @@ pub struct EffectiveLevel {
     pub upper_cm: f64,
     /// The table's row it stands for, from 0; `None` for a hole that is a level of its own.
     pub row: Option<usize>,
-    /// The row's extent, cm; a hole has none.
-    pub extent_cm: Option<f64>,
+    /// The row's extent; a hole has none.
+    pub extent: Option<Extent>,
 }
 
 impl RangeTable {
@@ -117,13 +119,13 @@ impl RangeTable {
         Self::new(name, GapRule::default(), levels)
     }
 
-    /// The same table with the extents of its rows, cm: see [`Level::extent_cm`]. Rows beyond the list keep theirs.
+    /// The same table with the extents of its rows: see [`Level::extent`]. Rows beyond the list keep theirs.
     ///
     /// # Errors
     /// [`TableError`] names the row whose extent is not above 0.
-    pub fn with_extents(mut self, extents_cm: &[Option<f64>]) -> Result<Self, TableError> {
-        for (level, &extent_cm) in self.levels.iter_mut().zip(extents_cm) {
-            level.extent_cm = extent_cm;
+    pub fn with_extents(mut self, extents: &[Option<Extent>]) -> Result<Self, TableError> {
+        for (level, &extent) in self.levels.iter_mut().zip(extents) {
+            level.extent = extent;
         }
         self.validate()?;
         Ok(self)
@@ -132,7 +134,7 @@ impl RangeTable {
     /// Whether any level has an extent of its own.
     #[must_use]
     pub fn has_extents(&self) -> bool {
-        self.levels.iter().any(|l| l.extent_cm.is_some())
+        self.levels.iter().any(|l| l.extent.is_some())
     }
 
     /// The same table with its origin told.
@@ -174,15 +176,15 @@ impl RangeTable {
                     GapRule::ExtendLower => last.upper_cm = lower_cm,
                     GapRule::ExtendUpper => lower_cm = before,
                     GapRule::OwnLevel => {
-                        out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None, extent_cm: None });
+                        out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None, extent: None });
                     }
                     // A checked table has no hole under this rule; an unchecked one keeps it, and its vertices stay
                     // unassigned, which is reported.
                     GapRule::Error => {}
                 }
             }
-            let (upper_cm, extent_cm) = (level.upper_cm, level.extent_cm);
-            out.push(EffectiveLevel { lower_cm, upper_cm, row: Some(row), extent_cm });
+            let (upper_cm, extent) = (level.upper_cm, level.extent);
+            out.push(EffectiveLevel { lower_cm, upper_cm, row: Some(row), extent });
         }
         out
     }

@@ -18,8 +18,8 @@ pub struct LevelRow {
     pub vertices: usize,
     /// PARTs in it.
     pub parts: usize,
-    /// The extent its PARTs are cut to by the table, m; infinite for never cut.
-    pub extent_m: Option<f64>,
+    /// The extent its PARTs are cut to by the table, cm, as people read it.
+    pub extent: Option<String>,
 }
 
 /// Everything the text panel shows. Empty pieces are left out.
@@ -59,12 +59,12 @@ impl Panel {
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             // Only tables with extents get a column for them.
-            let own = self.levels.iter().any(|row| row.extent_m.is_some());
+            let own = self.levels.iter().any(|row| row.extent.is_some());
             let (head, rule) = if own { (" cut to, cm |", "--:|") } else { ("", "") };
             line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
             for (i, row) in self.levels.iter().enumerate() {
                 let range = range_cm(row.lower_m, row.upper_m);
-                let extent = if own { format!(" {} |", extent_cm(row.extent_m)) } else { String::new() };
+                let extent = if own { format!(" {} |", row.extent.as_deref().unwrap_or("")) } else { String::new() };
                 line(&mut text, format_args!("| {i} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
@@ -85,14 +85,6 @@ pub fn range_cm(lower_m: f64, upper_m: f64) -> String {
     // 100 × a centimetre bound read from a table is off by an ulp; a micrometre is far below any bound.
     let cm = |m: f64| number((m * 1e6).round() / 1e4);
     if upper_m.is_finite() { format!("{} – {}", cm(lower_m), cm(upper_m)) } else { format!("{} –", cm(lower_m)) }
-}
-
-fn extent_cm(extent_m: Option<f64>) -> String {
-    match extent_m {
-        Some(m) if m.is_finite() => number((m * 1e6).round() / 1e4),
-        Some(_) => "not cut".to_owned(),
-        None => String::new(),
-    }
 }
 
 fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterator<Item = (&'a str, String)>) {
@@ -122,8 +114,8 @@ mod tests {
             title: "skirt on body".into(),
             table: "Table 3".into(),
             levels: vec![
-                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2, extent_m: None },
-                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1, extent_m: None },
+                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2, extent: None },
+                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1, extent: None },
             ],
             timings_ms: vec![("distance".into(), 12.345)],
             command_line: "partwise run --garment skirt".into(),
@@ -135,9 +127,9 @@ mod tests {
         }
         assert!(!text.contains("Fabric"));
         let mut cut = panel.clone();
-        (cut.levels[0].extent_m, cut.levels[1].extent_m) = (Some(0.12), Some(f64::INFINITY));
+        (cut.levels[0].extent, cut.levels[1].extent) = (Some("6 × 12".into()), Some("not cut".into()));
         let text = cut.markdown();
-        for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 12 |", "| 9 | 1 | not cut |"] {
+        for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 6 × 12 |", "| 9 | 1 | not cut |"] {
             assert!(text.contains(piece), "{piece} in {text}");
         }
     }

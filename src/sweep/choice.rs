@@ -148,8 +148,9 @@ impl TableChoice {
                 levels: table
                     .levels
                     .iter()
-                    .map(|l| [Some(l.lower_cm), Some(l.upper_cm), l.extent_cm])
-                    .map(|row| row.into_iter().flatten().map(|cm| format!("{cm:?}")).collect())
+                    .map(|l| (l.lower_cm, l.upper_cm, l.extent.map(|e| e.numbers_cm()).unwrap_or_default()))
+                    .map(|(lower, upper, extent)| [vec![lower, upper], extent].concat())
+                    .map(|row| row.iter().map(|cm| format!("{cm:?}")).collect())
                     .collect(),
             },
             TableRule::Quantile { levels } => TableKey::Quantile { levels: *levels },

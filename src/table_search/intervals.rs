@@ -161,9 +161,8 @@ fn cut_costs(
     max_parts: usize,
 ) -> Vec<Cost> {
     vertices.sort_unstable();
-    let extents_m = ladder.extents_m();
     if vertices.len() == 1 {
-        return vec![Cost { parts: 1, error: 0.0 }; extents_m.len()];
+        return vec![Cost { parts: 1, error: 0.0 }; ladder.len() - 1];
     }
     // `place` keeps entries of other pieces, so an entry counts only if it points back.
     for (&v, i) in vertices.iter().zip(0..) {
@@ -178,24 +177,29 @@ fn cut_costs(
     let moved: Vec<DVec3> = vertices.iter().map(|&v| sample.displacement[v as usize] - mean).collect();
     let squares: f64 = moved.iter().map(|u| u.length_squared()).sum();
     let mut sums: Vec<(DVec3, u32)> = Vec::new();
-    let mut costs: Vec<Cost> = Vec::with_capacity(extents_m.len());
-    spread_seeds(vertices, local, sample.mesh, sample.topology, |radius_m, seeds, seed_of_vertex| {
-        let reached = extents_m[costs.len()..].iter().take_while(|&&e| radius_m <= 0.5 * e).count();
-        if reached > 0 {
-            // Σ |u − ū_s|² = Σ |u|² − Σ_s |Σ u|²/n_s
-            sums.clear();
-            sums.resize(seeds, (DVec3::ZERO, 0));
-            for (&u, &s) in moved.iter().zip(seed_of_vertex) {
-                let (sum, count) = &mut sums[s as usize];
-                *sum += u;
-                *count += 1;
+    let mut all = Vec::with_capacity(ladder.len() - 1);
+    for shape in ladder.shapes() {
+        let mut left = &shape.extents_m[..];
+        let (mesh, topology) = (sample.mesh, sample.topology);
+        spread_seeds(vertices, local, mesh, topology, shape.stretch, |radius_m, seeds, seed_of_vertex| {
+            let reached = left.iter().take_while(|&&e| radius_m <= 0.5 * e).count();
+            if reached > 0 {
+                left = &left[reached..];
+                // Σ |u − ū_s|² = Σ |u|² − Σ_s |Σ u|²/n_s
+                sums.clear();
+                sums.resize(seeds, (DVec3::ZERO, 0));
+                for (&u, &s) in moved.iter().zip(seed_of_vertex) {
+                    let (sum, count) = &mut sums[s as usize];
+                    *sum += u;
+                    *count += 1;
+                }
+                let held: f64 = sums.iter().map(|(sum, count)| sum.length_squared() / f64::from((*count).max(1))).sum();
+                let cost = Cost { parts: seeds as u32, error: (squares - held).max(0.0) };
+                all.extend(std::iter::repeat_n(cost, reached));
             }
-            let held: f64 = sums.iter().map(|(sum, count)| sum.length_squared() / f64::from((*count).max(1))).sum();
-            let cost = Cost { parts: seeds as u32, error: (squares - held).max(0.0) };
-            costs.extend(std::iter::repeat_n(cost, reached));
-        }
-        costs.len() == extents_m.len() || seeds >= max_parts
-    });
-    costs.resize(extents_m.len(), TOO_MANY);
-    costs
+            left.is_empty() || seeds >= max_parts
+        });
+        all.extend(std::iter::repeat_n(TOO_MANY, left.len()));
+    }
+    all
 }

@@ -69,8 +69,11 @@ pub struct SearchOptions {
     pub exact_up_to: usize,
     /// Most PARTs a table may yield, over all garments together.
     pub max_parts: usize,
-    /// Extents each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
-    pub extents_cm: Vec<f64>,
+    /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
+    pub widths_cm: Vec<f64>,
+    /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
+    /// all widths.
+    pub shapes: Vec<f64>,
     /// Rounds: the first over quantiles, the others around the best table so far. Default 3.
     pub rounds: usize,
     /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
@@ -82,13 +85,21 @@ impl SearchOptions {
     #[must_use]
     pub fn new(max_parts: usize) -> Self {
         let include = vec![RangeTable::table_3()];
-        Self { candidates: 400, exact_up_to: 6000, max_parts, extents_cm: Vec::new(), rounds: 3, include }
+        Self {
+            candidates: 400,
+            exact_up_to: 6000,
+            max_parts,
+            widths_cm: Vec::new(),
+            shapes: vec![0.5, 1.0, 2.0, 4.0],
+            rounds: 3,
+            include,
+        }
     }
 
-    /// Defaults for levels that may each be cut to one of these extents (cm).
+    /// Defaults for levels that may each be cut to one of these widths (cm).
     #[must_use]
-    pub fn with_extents(max_parts: usize, extents_cm: &[f64]) -> Self {
-        Self { candidates: 120, exact_up_to: 0, extents_cm: extents_cm.to_vec(), ..Self::new(max_parts) }
+    pub fn with_extents(max_parts: usize, widths_cm: &[f64]) -> Self {
+        Self { candidates: 120, exact_up_to: 0, widths_cm: widths_cm.to_vec(), ..Self::new(max_parts) }
     }
 }
 
@@ -178,7 +189,7 @@ pub fn search(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Search, SearchError> {
     check(samples)?;
-    let ladder = Ladder::new(&options.extents_cm);
+    let ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
     let exact = candidates.complete();
     let round_count = if exact { 1 } else { options.rounds.max(1) };

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::front::{Front, FrontPoint};
 use super::intervals::Cost;
 use super::ladder::Ladder;
+use crate::range_table::Extent;
 
 /// How the best table up to a bound ends.
 #[derive(Debug, Clone, Copy, Default)]
@@ -24,6 +25,21 @@ pub(super) struct Program {
     steps: usize,
     error: Vec<f64>,
     last: Vec<Last>,
+}
+
+/// The steps of one level with no more PARTs than allowed, without those that another beats in both PARTs and error.
+fn worthwhile(steps: &[Cost], max_parts: usize) -> Vec<(u32, Cost)> {
+    let mut kept: Vec<(u32, Cost)> = (0..).zip(steps.iter().copied()).collect();
+    kept.retain(|(_, cost)| cost.parts as usize <= max_parts);
+    kept.sort_by(|(_, a), (_, b)| a.parts.cmp(&b.parts).then(a.error.total_cmp(&b.error)));
+    let mut least = f64::INFINITY;
+    kept.retain(|(_, cost)| {
+        cost.error < least && {
+            least = cost.error;
+            true
+        }
+    });
+    kept
 }
 
 /// Bounds worth a task of their own.
@@ -48,14 +64,8 @@ impl Program {
         let last = &mut self.last[(lower + 1) * width..];
         let uppers = after.par_chunks_mut(width).zip(last.par_chunks_mut(width)).zip(row.par_chunks(self.steps));
         uppers.with_min_len(GRAIN).for_each(|((error, last), steps)| {
-            let mut least = f64::INFINITY;
-            for (step, cost) in (0..).zip(steps) {
+            for (step, cost) in worthwhile(steps, max_parts) {
                 let parts = cost.parts as usize;
-                // More PARTs for no less error: a wider extent of this level is better.
-                if parts > max_parts || cost.error >= least {
-                    continue;
-                }
-                least = cost.error;
                 let level = Last { lower: lower as u32, parts: cost.parts, step };
                 let from = (fewest + parts).min(width);
                 let reach = error[from..].iter_mut().zip(&mut last[from..]).zip(&below[fewest..]);
@@ -78,15 +88,15 @@ impl Program {
             let squared = self.error[self.bins * (self.max_parts + 1) + parts];
             if squared < least {
                 least = squared;
-                let (inner_bounds_cm, extents_cm) = self.table(parts, inner_cm, ladder);
-                points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extents_cm });
+                let (inner_bounds_cm, extents) = self.table(parts, inner_cm, ladder);
+                points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extents });
             }
         }
         Front { points }
     }
 
     /// The inner bounds and extents of the best table with so many PARTs, read back from the end.
-    fn table(&self, mut parts: usize, inner_cm: &[f64], ladder: &Ladder) -> (Vec<f64>, Vec<f64>) {
+    fn table(&self, mut parts: usize, inner_cm: &[f64], ladder: &Ladder) -> (Vec<f64>, Vec<Extent>) {
         let (mut bounds, mut extents) = (Vec::new(), Vec::new());
         let mut upper = self.bins;
         while upper > 0 {
@@ -97,7 +107,7 @@ impl Program {
                 bounds.push(inner_cm[bound]);
             }
             if ladder.cuts() {
-                extents.push(ladder.cm(last.step as usize));
+                extents.push(ladder.extent(last.step as usize));
             }
         }
         bounds.reverse();

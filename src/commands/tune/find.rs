@@ -70,7 +70,7 @@ pub(crate) fn find(
             found.iterations.push(Iteration { what: title, round, front: found.all.union(front) });
         }
         let last = rounds.last().cloned().unwrap_or_default();
-        if options.extents_cm.is_empty() {
+        if options.widths_cm.is_empty() {
             (found.levels, found.exact) = (last.clone(), exact);
         }
         found.all = found.all.union(&last);

@@ -93,7 +93,7 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
         upper_m: bound.upper_cm * METRES_PER_CM,
         vertices,
         parts,
-        extent_m: bound.extent_cm.map(|cm| cm * METRES_PER_CM),
+        extent: bound.extent.map(|e| e.to_string()),
     });
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let panel = Panel {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use comfy_table::{CellAlignment, Table, presets};
-use partwise::range_table::RangeTable;
+use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::Front;
 use serde::Serialize;
 
@@ -42,7 +42,7 @@ impl Verdict {
             garment: wearer.name.clone(),
             held_out,
             levels: taken.table.levels.len(),
-            cut_levels: taken.table.levels.iter().filter(|l| l.extent_cm.is_some_and(f64::is_finite)).count(),
+            cut_levels: taken.table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
             parts,
             rms_mm,
             table_3_parts: wearer.table_3.parts,
@@ -104,7 +104,7 @@ pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer], exact: bool
             point.parts.to_string(),
             format!("{:.2}", 1e3 * point.rms_m),
             (point.inner_bounds_cm.len() + 1).to_string(),
-            between(&point.extents_cm),
+            between(&point.extents),
         ]);
     }
     for column in table.column_iter_mut() {
@@ -117,16 +117,21 @@ pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer], exact: bool
     out
 }
 
-/// The extents of a table in a few letters: the smallest to the largest.
-fn between(extents_cm: &[f64]) -> String {
-    let short = |cm: f64| if cm.is_finite() { cm.to_string() } else { "not cut".to_owned() };
-    let smallest = extents_cm.iter().copied().reduce(f64::min);
-    let largest = extents_cm.iter().copied().reduce(f64::max);
+/// The extents of a table in a few letters: the smallest and the largest.
+fn between(extents: &[Extent]) -> String {
+    let area = |e: &&Extent| e.width_cm * e.height_cm;
+    let smallest = extents.iter().min_by(|a, b| area(a).total_cmp(&area(b)));
+    let largest = extents.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
     match (smallest, largest) {
-        (Some(low), Some(high)) if low < high => format!("{} – {}", short(low), short(high)),
-        (Some(one), Some(_)) => short(one),
-        _ => "not cut".to_owned(),
+        (Some(low), Some(high)) if low != high => format!("{low} to {high}"),
+        (Some(one), Some(_)) => one.to_string(),
+        _ => Extent::UNCUT.to_string(),
     }
+}
+
+/// An extent in the CSV: `12`, `6x24`, `inf`.
+fn written(extent: &Extent) -> String {
+    extent.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
 }
 
 /// Table 3's PARTs and error over a set, weighted as the search weighs them.
@@ -174,7 +179,7 @@ pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<St
                 rms_mm: 1e3 * point.rms_m,
                 levels: point.inner_bounds_cm.len() + 1,
                 inner_bounds_cm: words(&point.inner_bounds_cm),
-                extents_cm: words(&point.extents_cm),
+                extents_cm: point.extents.iter().map(written).collect::<Vec<_>>().join(" "),
             })?;
         }
     }
