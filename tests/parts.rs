@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use partwise::distance::Body;
-use partwise::mesh::{Topology, TriMesh};
+use partwise::mesh::{RestShape, Topology, TriMesh};
 use partwise::parts::{Part, Parts, UNASSIGNED, segment};
 use partwise::range_table::{Extent, GapRule, RangeTable};
 use proptest::prelude::*;
@@ -246,11 +246,12 @@ fn no_piece_is_wider_than_the_extent() {
 #[test]
 fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
     let (mesh, topology) = strip(40);
+    let rest = RestShape::from_edges(&mesh).unwrap();
     let (first, all) = (mesh.positions[0], mesh.vertex_count());
     let d: Vec<f64> = (0..all).map(|v| [0.005, 0.015, 0.025, 0.035][4 * v / all]).collect();
     let table = RangeTable::from_bounds("four", &[0.0, 1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
     let whole = segment(&topology, &d, &table);
-    assert_eq!(whole.cut_to_table(&mesh, &topology, &table), whole);
+    assert_eq!(whole.cut_to_table(&mesh, &topology, &rest, &table), whole);
     let length = mesh.positions[all - 1].distance(first);
     let widest = |parts: &Parts, level: usize| {
         let width = |p: &Part| {
@@ -263,7 +264,7 @@ fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
     let tenth_cm = 10.0 * length;
     let extents = [Some(Extent::even(tenth_cm)), None, Some(Extent::even(0.5 * tenth_cm)), Some(Extent::UNCUT)];
     let table = table.with_extents(&extents).unwrap();
-    let own = segment(&topology, &d, &table).cut_to_table(&mesh, &topology, &table);
+    let own = segment(&topology, &d, &table).cut_to_table(&mesh, &topology, &rest, &table);
     consistent(&own, &topology);
     assert_eq!(own.own_extent, [true, false, true, true]);
     assert!(widest(&own, 0) <= 0.1 * length && widest(&own, 2) <= 0.05 * length);

@@ -4,8 +4,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
-use partwise::mesh::{Topology, TriMesh};
-use partwise::parts::{Parts, representable_rms_m, segment};
+use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::{Grain, Parts, representable_rms_m, segment};
 use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::{Front, FrontPoint, Sample, SearchError, SearchOptions, search};
 use proptest::prelude::*;
@@ -25,6 +25,8 @@ fn sheet(w: usize, h: usize) -> TriMesh {
 struct Wavy {
     mesh: TriMesh,
     topology: Topology,
+    rest: RestShape,
+    grain: Grain,
     distances: Vec<f64>,
     displacement: Vec<DVec3>,
 }
@@ -33,6 +35,8 @@ impl Wavy {
     fn new(w: usize, h: usize, phase: f64) -> Self {
         let mesh = sheet(w, h);
         let topology = Topology::new(&mesh);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let grain = Grain::new(&mesh, &topology, &rest);
         let distance = |x: &DVec3| 0.05 + 0.2 * x.y + 0.01 * (40.0 * x.x + phase).sin();
         let moved = |x: &DVec3| {
             let fold = 0.05 * (25.0 * x.x + 10.0 * x.y + phase).cos();
@@ -40,17 +44,22 @@ impl Wavy {
         };
         let distances = mesh.positions.iter().map(distance).collect();
         let displacement = mesh.positions.iter().map(moved).collect();
-        Self { mesh, topology, distances, displacement }
+        Self { mesh, topology, rest, grain, distances, displacement }
     }
 
     fn sample(&self, weight: f64) -> Sample<'_> {
-        let Self { mesh, topology, distances, displacement } = self;
-        Sample { mesh, topology, distances_m: distances, displacement, weight }
+        let Self { mesh, topology, grain, distances, displacement, .. } = self;
+        Sample { mesh, topology, grain, distances_m: distances, displacement, weight }
     }
 
     fn parts(&self, table: &RangeTable) -> Parts {
-        segment(&self.topology, &self.distances, table).cut_to_table(&self.mesh, &self.topology, table)
+        segment(&self.topology, &self.distances, table).cut_to_table(&self.mesh, &self.topology, &self.rest, table)
     }
+}
+
+/// Few candidates and rounds, for the sake of time.
+fn coarse(candidates: usize, options: SearchOptions) -> SearchOptions {
+    SearchOptions { candidates, candidates_around: 9, exact_up_to: 0, rounds: 3, ..options }
 }
 
 fn is_a_front(front: &Front) {
@@ -67,10 +76,12 @@ proptest! {
     ) {
         let mesh = sheet(5, 4);
         let topology = Topology::new(&mesh);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let grain = Grain::new(&mesh, &topology, &rest);
         let distances: Vec<f64> = distances.iter().map(|&d| 0.01 * f64::from(d)).collect();
         let displacement: Vec<DVec3> = moves.chunks(3).map(DVec3::from_slice).collect();
         let sample =
-            Sample { mesh: &mesh, topology: &topology, distances_m: &distances, displacement: &displacement, weight: 2.5 };
+            Sample { mesh: &mesh, topology: &topology, grain: &grain, distances_m: &distances, displacement: &displacement, weight: 2.5 };
         let (widths, shapes): (Vec<f64>, Vec<usize>) = extents.into_iter().unzip();
         let shapes: Vec<f64> = shapes.into_iter().flat_map(|s| [1.0, [0.5, 2.0, 4.0][s]]).collect();
         let options = SearchOptions {
@@ -95,7 +106,7 @@ proptest! {
                     code /= choices.len();
                 }
                 let table = table.clone().with_extents(&extents).unwrap();
-                let parts = segment(&topology, &distances, &table).cut_to_table(&mesh, &topology, &table);
+                let parts = segment(&topology, &distances, &table).cut_to_table(&mesh, &topology, &rest, &table);
                 if parts.len() <= 14 {
                     let rms = representable_rms_m(&parts, &displacement);
                     best[parts.len()] = rms.min(best[parts.len()]);
@@ -127,8 +138,7 @@ proptest! {
 fn every_point_is_what_stage_one_makes_of_its_table() {
     let (a, b) = (Wavy::new(31, 24, 0.0), Wavy::new(17, 28, 1.3));
     for (max_parts, widths_cm) in [(120, &[][..]), (300, &[8.0, 10.0, 15.0])] {
-        let options =
-            SearchOptions { candidates: 40, exact_up_to: 0, ..SearchOptions::with_extents(max_parts, widths_cm) };
+        let options = coarse(40, SearchOptions::with_extents(max_parts, widths_cm));
         let found = search(&[a.sample(1.0), b.sample(3.0)], &options, &|_| {}).unwrap();
         is_a_front(found.front());
         assert!(found.front().points.len() > 10);
@@ -197,10 +207,10 @@ fn an_extent_for_each_level_is_never_worse_than_one_for_all() {
 #[test]
 fn threads_do_not_change_the_search_and_progress_counts_up() {
     let garment = Wavy::new(25, 20, 0.0);
-    let run = |threads: usize, extents_cm: &[f64]| {
+    let run = |threads: usize, widths_cm: &[f64]| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let calls = AtomicUsize::new(0);
-        let options = SearchOptions { candidates: 30, exact_up_to: 0, ..SearchOptions::with_extents(200, extents_cm) };
+        let options = coarse(30, SearchOptions::with_extents(200, widths_cm));
         let found = pool.install(|| {
             search(&[garment.sample(1.0)], &options, &|p| {
                 assert!(p.done <= p.total && p.round <= p.rounds);
@@ -210,8 +220,8 @@ fn threads_do_not_change_the_search_and_progress_counts_up() {
         assert!(calls.into_inner() > 60);
         format!("{:?}", found.unwrap())
     };
-    for extents_cm in [&[][..], &[8.0, 12.0]] {
-        assert_eq!(run(1, extents_cm), run(2, extents_cm));
+    for widths_cm in [&[][..], &[8.0, 12.0]] {
+        assert_eq!(run(1, widths_cm), run(2, widths_cm));
     }
 }
 

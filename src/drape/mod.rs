@@ -130,7 +130,7 @@ pub fn drape(
         } else {
             parts
         };
-        joined.cut_to_table(&scene.garment, &scene.topology, &settings.table)
+        joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
     });
     let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();

@@ -7,21 +7,18 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use glam::DVec3;
-
-use crate::mesh::{Topology, TriMesh};
+use super::grain::Ruler;
 
 /// The nearest seed of each of these connected vertices, and how many seeds it takes for none to be farther than half of
-/// the extent (m), horizontal and vertical lengths multiplied first. `local` is the place of a vertex in the list, `None` for others.
+/// `extent_m`. `local` is the place of a vertex in the list, `None` for others.
 pub(crate) fn nearest_seeds(
     vertices: &[u32],
     local: impl Fn(u32) -> Option<usize>,
-    mesh: &TriMesh,
-    topology: &Topology,
-    (stretch, extent_m): ([f64; 2], f64),
+    ruler: Ruler<'_>,
+    extent_m: f64,
 ) -> (Vec<u32>, usize) {
     let mut found = (Vec::new(), 0);
-    spread_seeds(vertices, local, mesh, topology, stretch, |radius_m, seeds, seed_of_vertex| {
+    spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
         let enough = radius_m <= 0.5 * extent_m || radius_m == 0.0 || extent_m.is_nan();
         if enough {
             found = (seed_of_vertex.to_vec(), seeds);
@@ -33,16 +30,14 @@ pub(crate) fn nearest_seeds(
 
 /// Puts seed after seed, each on the vertex farthest from those before, until `enough` says so. After each it hears how far the
 /// farthest vertex is from its seed, m, how many seeds there are, and the nearest seed of every vertex. Where seeds lie
-/// does not depend on where it ends, so one run serves every extent. `stretch` multiplies horizontal and vertical lengths.
+/// does not depend on where it ends, so one run serves every extent.
 pub(crate) fn spread_seeds(
     vertices: &[u32],
     local: impl Fn(u32) -> Option<usize>,
-    mesh: &TriMesh,
-    topology: &Topology,
-    stretch: [f64; 2],
+    ruler: Ruler<'_>,
     mut enough: impl FnMut(f64, usize, &[u32]) -> bool,
 ) {
-    let graph = Graph::new(vertices, local, mesh, topology, stretch);
+    let graph = Graph::new(vertices, local, ruler);
     let mut spread = Spread::new(vertices.len());
     let (mut next, mut radius_m) = (0, f64::INFINITY);
     for seed in 0..vertices.len() {
@@ -65,19 +60,10 @@ struct Graph {
 }
 
 impl Graph {
-    fn new(
-        vertices: &[u32],
-        local: impl Fn(u32) -> Option<usize>,
-        mesh: &TriMesh,
-        topology: &Topology,
-        [across, up]: [f64; 2],
-    ) -> Self {
-        let stretch = DVec3::new(across, across, up);
+    fn new(vertices: &[u32], local: impl Fn(u32) -> Option<usize>, ruler: Ruler<'_>) -> Self {
         let mut graph = Self { start: vec![0], edges: Vec::new() };
         for &v in vertices {
-            let x = mesh.positions[v as usize];
-            let inside = topology.neighbours(v).iter().filter_map(|&w| Some((local(w)?, w)));
-            graph.edges.extend(inside.map(|(j, w)| (j, ((x - mesh.positions[w as usize]) * stretch).length())));
+            graph.edges.extend(ruler.neighbours(v).filter_map(|(w, length)| Some((local(w)?, length))));
             graph.start.push(graph.edges.len());
         }
         graph

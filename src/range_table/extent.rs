@@ -1,16 +1,17 @@
 //! The extent of a level: how wide and how tall a PART of it may be, measured along the cloth.
 //!
-//! Cloth that hangs folds around the body far more than it does from top to bottom (on the flared skirt its displacement varies
-//! four times as fast), so a PART may be taller than wide. Not in the paper, whose PARTs are as large as their level.
+//! Width is measured across the grain, height along it: the warp, which runs up the garment and along a sleeve. Cloth that hangs
+//! folds around the body and the arm far more than along them (its displacement varies four times as fast on the flared skirt, six
+//! times on the sleeve of pullover-1), so a PART may be taller than wide. Not in the paper, whose PARTs are as large as their level.
 
 use super::METRES_PER_CM;
 
 /// The widest and tallest a PART may be along the cloth, cm; infinite for a direction that is never cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// Horizontally, around the body, cm.
+    /// Along the weft, around the body or the arm, cm.
     pub width_cm: f64,
-    /// Vertically, cm.
+    /// Along the warp, cm.
     pub height_cm: f64,
 }
 
@@ -36,7 +37,7 @@ impl Extent {
         self.width_cm > 0.0 && self.height_cm > 0.0
     }
 
-    /// Factors for horizontal and vertical lengths after which the extent is the same in all directions, and that extent, m.
+    /// Factors for lengths along weft and warp after which the extent is the same in all directions, and that extent, m.
     #[must_use]
     pub fn evened(&self) -> ([f64; 2], f64) {
         let Self { width_cm, height_cm } = *self;

@@ -52,19 +52,28 @@ impl Candidates {
         Self { sorted, ranks, every: false, spacing }
     }
 
-    /// About `count` ranks around the given bounds, as far as the candidates were apart so far; the bounds themselves stay in.
-    pub(super) fn around(&self, bounds_cm: &[f64], count: usize) -> Self {
-        let each = (count / bounds_cm.len().max(1)).max(2) / 2;
-        let spacing = self.spacing.div_ceil(each);
+    /// The given bounds, about `count` ranks near them, near and far, and as many quantiles as a third of these, other ones each
+    /// round.
+    pub(super) fn around(&self, bounds_cm: &[f64], count: usize, round: usize) -> Self {
+        let near = 2 * count / 3;
+        let each = (near / (2 * bounds_cm.len().max(1))).max(1);
+        // Distances halve from as far as the first candidates were apart to one rank; where there is no room for all, rounds
+        // take turns.
+        let steps: Vec<usize> = (0..).map(|i| self.spacing >> i).take_while(|&step| step > 0).collect();
         let mut ranks = Vec::new();
         for &bound_cm in bounds_cm {
             let centre = rank(&self.sorted, bound_cm);
             ranks.push(centre);
-            for step in (1..=each).map(|i| i * spacing) {
+            for i in 0..each.min(steps.len()) {
+                let step = steps[(i + round * each) % steps.len()];
                 ranks.extend([centre.saturating_sub(step), centre + step]);
             }
         }
-        Self::of(self.sorted.clone(), ranks, spacing)
+        let others = (count - near).max(1);
+        // Multiples of the golden ratio never come back to the same place.
+        let shift = (round as f64 * 0.618_033_988_749_895).fract();
+        ranks.extend((0..others).map(|i| ((i as f64 + shift) * self.sorted.len() as f64 / others as f64) as usize));
+        Self::of(self.sorted.clone(), ranks, self.spacing)
     }
 
     /// Whether there is no other bound that makes a difference.

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::Sample;
 use super::ladder::Ladder;
-use crate::parts::spread_seeds;
+use crate::parts::{Ruler, spread_seeds};
 
 /// What a level costs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -180,8 +180,9 @@ fn cut_costs(
     let mut all = Vec::with_capacity(ladder.len() - 1);
     for shape in ladder.shapes() {
         let mut left = &shape.extents_m[..];
-        let (mesh, topology) = (sample.mesh, sample.topology);
-        spread_seeds(vertices, local, mesh, topology, shape.stretch, |radius_m, seeds, seed_of_vertex| {
+        let ruler =
+            Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };
+        spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
             let reached = left.iter().take_while(|&&e| radius_m <= 0.5 * e).count();
             if reached > 0 {
                 left = &left[reached..];

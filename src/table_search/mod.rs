@@ -38,6 +38,7 @@ use rayon::prelude::*;
 pub use front::{Front, FrontPoint};
 
 use crate::mesh::{Topology, TriMesh};
+use crate::parts::Grain;
 use crate::range_table::RangeTable;
 use candidates::Candidates;
 use ladder::Ladder;
@@ -50,6 +51,8 @@ pub struct Sample<'a> {
     pub mesh: &'a TriMesh,
     /// Its connectivity.
     pub topology: &'a Topology,
+    /// The grain of its cloth.
+    pub grain: &'a Grain,
     /// Distance of each vertex from the body, m; its sign does not matter.
     pub distances_m: &'a [f64],
     /// Reference displacement of each vertex, undraped to draped, m.
@@ -64,8 +67,8 @@ pub struct SearchOptions {
     /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
     /// extents means cut.
     pub candidates: usize,
-    /// With at most so many distinct distances every bound is a candidate, and one round is exact. Default 6,000 for levels
-    /// alone, 0 with extents.
+    /// With at most so many distinct distances every bound is a candidate, and one round is exact. Default 12,000 for
+    /// levels alone, 0 with extents.
     pub exact_up_to: usize,
     /// Most PARTs a table may yield, over all garments together.
     pub max_parts: usize,
@@ -74,7 +77,10 @@ pub struct SearchOptions {
     /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
     /// all widths.
     pub shapes: Vec<f64>,
-    /// Rounds: the first over quantiles, the others around the best table so far. Default 3.
+    /// Candidate bounds in each round after the first. Default 400, with extents 40.
+    pub candidates_around: usize,
+    /// Rounds: the first over quantiles, the others around the best table so far, with extents finely between the widths and
+    /// shapes given. They end early when two in a row bring less than a thousandth. Default 3, with extents 12.
     pub rounds: usize,
     /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
     pub include: Vec<RangeTable>,
@@ -87,7 +93,8 @@ impl SearchOptions {
         let include = vec![RangeTable::table_3()];
         Self {
             candidates: 400,
-            exact_up_to: 6000,
+            candidates_around: 400,
+            exact_up_to: 12_000,
             max_parts,
             widths_cm: Vec::new(),
             shapes: vec![0.5, 1.0, 2.0, 4.0],
@@ -99,7 +106,14 @@ impl SearchOptions {
     /// Defaults for levels that may each be cut to one of these widths (cm).
     #[must_use]
     pub fn with_extents(max_parts: usize, widths_cm: &[f64]) -> Self {
-        Self { candidates: 120, exact_up_to: 0, widths_cm: widths_cm.to_vec(), ..Self::new(max_parts) }
+        Self {
+            candidates: 120,
+            candidates_around: 40,
+            exact_up_to: 0,
+            rounds: 12,
+            widths_cm: widths_cm.to_vec(),
+            ..Self::new(max_parts)
+        }
     }
 }
 
@@ -189,7 +203,7 @@ pub fn search(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Search, SearchError> {
     check(samples)?;
-    let ladder = Ladder::new(&options.widths_cm, &options.shapes);
+    let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
     let exact = candidates.complete();
     let round_count = if exact { 1 } else { options.rounds.max(1) };
@@ -206,8 +220,16 @@ pub fn search(
         let Some(best) = front.best_within(options.max_parts) else {
             return Err(SearchError::TooFewParts { max_parts: options.max_parts });
         };
-        candidates = candidates.around(&best.inner_bounds_cm, options.candidates);
+        candidates = candidates.around(&best.inner_bounds_cm, options.candidates_around, round);
+        if round == 1 {
+            ladder = Ladder::fine(&options.widths_cm, &options.shapes);
+        }
+        let reached = best.rms_m;
         rounds.push(front);
+        let two_before = round.checked_sub(3).and_then(|i| rounds[i].best_within(options.max_parts));
+        if two_before.is_some_and(|before| reached > 0.999 * before.rms_m) {
+            break;
+        }
     }
     Ok(Search { rounds, exact })
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use partwise::assess::{AssessError, AssessOptions, canonical};
 use partwise::fabric::Fabric;
-use partwise::parts::{Parts, representable_rms_m, segment};
+use partwise::parts::{Grain, Parts, representable_rms_m, segment};
 use partwise::range_table::RangeTable;
 use partwise::shapes::BodySpec;
 use partwise::table_search::Sample;
@@ -33,6 +33,8 @@ pub(crate) struct Wearer {
     pub(crate) reference: Vec<DVec3>,
     /// From undraped to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
+    /// Its grain, which pieces narrow and tall follow.
+    grain: Grain,
     /// What Table 3 makes of it.
     pub(crate) table_3: Holds,
 }
@@ -64,6 +66,7 @@ impl Wearer {
         let displacement = reference.positions.iter().zip(start).map(|(a, b)| *a - *b).collect();
         let mut wearer = Self {
             name: name.to_owned(),
+            grain: Grain::new(&placed.scene.garment, &placed.scene.topology, &placed.scene.rest),
             placed,
             reference: reference.positions,
             displacement,
@@ -78,6 +81,7 @@ impl Wearer {
         Sample {
             mesh: &self.placed.scene.garment,
             topology: &self.placed.scene.topology,
+            grain: &self.grain,
             distances_m: &self.placed.distance_m,
             displacement: &self.displacement,
             weight: 1.0 / self.table_3.rms_mm.max(1e-3).powi(2),
@@ -88,7 +92,7 @@ impl Wearer {
     pub(crate) fn parts(&self, table: &RangeTable) -> Parts {
         let scene = &self.placed.scene;
         let parts = segment(&scene.topology, &self.placed.distance_m, table);
-        parts.cut_to_table(&scene.garment, &scene.topology, table)
+        parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
     }
 
     /// What a table holds of the reference.
