@@ -196,8 +196,19 @@ fn compared_tables_tell_what_is_split_and_what_is_merged() {
 #[test]
 fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     let bench = Bench::new();
-    let tune =
-        ["tune", "--garment", "flared-skirt@600", "--hold-out", "pullover-1@700", "--extents", "20,30", "--out", "t"];
+    let tune = [
+        "tune",
+        "--garment",
+        "flared-skirt@600",
+        "--hold-out",
+        "pullover-1@700",
+        "--extents",
+        "20,30",
+        "--candidates",
+        "40",
+        "--out",
+        "t",
+    ];
     let found = json(&bench.does(&[&tune[..], &["--format", "json"]].concat()));
     let verdicts = found["verdicts"].as_array().unwrap();
     assert_eq!(verdicts.len(), 4);

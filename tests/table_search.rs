@@ -239,3 +239,20 @@ fn what_cannot_be_searched_is_refused() {
     let holed = Sample { distances_m: &distances, ..garment.sample(1.0) };
     assert_eq!(refuse(holed, 5), SearchError::NotFinite { garment: 1, vertex: 7 });
 }
+
+#[test]
+fn the_tables_that_come_with_the_program_read_back_equal() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/tuned");
+    let mut found = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let table = RangeTable::parse(&text, &path.display().to_string()).unwrap();
+            assert_eq!(table.to_toml(), text, "{}", path.display());
+            assert_eq!(table.has_extents(), path.to_string_lossy().contains("extents"));
+            found += 1;
+        }
+    }
+    assert_eq!(found, 10);
+}
