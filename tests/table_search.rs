@@ -244,7 +244,8 @@ fn what_cannot_be_searched_is_refused() {
 fn the_tables_that_come_with_the_program_read_back_equal() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/tuned");
     let mut found = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
+    let folders = [folder.clone(), folder.join("held-out-1"), folder.join("held-out-2")];
+    for entry in folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap()) {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
             let text = std::fs::read_to_string(&path).unwrap();
@@ -254,5 +255,5 @@ fn the_tables_that_come_with_the_program_read_back_equal() {
             found += 1;
         }
     }
-    assert_eq!(found, 10);
+    assert_eq!(found, 14);
 }

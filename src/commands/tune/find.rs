@@ -43,14 +43,17 @@ pub(crate) struct Taken {
 pub(crate) fn find(
     wearers: &[&Wearer],
     max_parts: usize,
-    extents_cm: &[f64],
+    (extents_cm, shapes): (&[f64], &[f64]),
     candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
     let samples: Vec<_> = wearers.iter().map(|w| w.sample()).collect();
     let mut found = Found { iterations: Vec::new(), levels: Front::default(), exact: false, all: Front::default() };
     let levels = ("levels alone", SearchOptions::new(max_parts));
-    let both = ("levels and extents", SearchOptions::with_extents(max_parts, extents_cm));
+    let both = (
+        "levels and extents",
+        SearchOptions { shapes: shapes.to_vec(), ..SearchOptions::with_extents(max_parts, extents_cm) },
+    );
     for (title, mut options) in [levels, both].into_iter().take(if extents_cm.is_empty() { 1 } else { 2 }) {
         if interrupt::requested() {
             break;

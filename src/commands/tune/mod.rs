@@ -66,7 +66,7 @@ pub(crate) struct TuneArgs {
     /// Most PARTs a table may make, over all garments tuned together [default: as many as Table 3 makes]
     #[arg(long, value_name = "N", help_heading = "Search")]
     max_parts: Option<usize>,
-    /// Extents a level may be cut to; not to be cut is always open to it
+    /// Widths (along the weft) a level may be cut to; not to be cut is always open to it
     #[arg(
         long,
         value_name = "CM[,CM...]",
@@ -75,6 +75,15 @@ pub(crate) struct TuneArgs {
         help_heading = "Search"
     )]
     extents: Vec<f64>,
+    /// Heights of pieces (along the warp) over their widths; 1 alone keeps them as wide as tall
+    #[arg(
+        long,
+        value_name = "H/W[,H/W...]",
+        value_delimiter = ',',
+        default_value = "0.5,1,2,4",
+        help_heading = "Search"
+    )]
+    shapes: Vec<f64>,
     /// Bounds tried in each round; the time grows with the square [default: all for levels alone on up to 6000 vertices,
     /// otherwise 400; 120 with extents]
     #[arg(long, value_name = "N", help_heading = "Search")]
@@ -174,7 +183,9 @@ impl TuneArgs {
     ) -> anyhow::Result<()> {
         let name = set.iter().map(|w| stem(&w.name)).collect::<Vec<_>>().join("+");
         let max_parts = self.max_parts.unwrap_or_else(|| set.iter().map(|w| w.table_3.parts).sum());
-        let Some(found) = find(set, max_parts, extents_cm, self.candidates, &name)? else { return Ok(()) };
+        let Some(found) = find(set, max_parts, (extents_cm, &self.shapes), self.candidates, &name)? else {
+            return Ok(());
+        };
         let mut taken: Vec<(&'static str, Taken)> = Vec::new();
         let kinds = [("levels", &found.levels), ("levels and extents", &found.all)];
         for (kind, front) in kinds.into_iter().take(if extents_cm.is_empty() { 1 } else { 2 }) {
@@ -227,6 +238,9 @@ impl TuneArgs {
             return Err(UserError::new(format!(
                 "--extents: found {wrong}, expected centimetres above 0; --levels-only for none"
             )));
+        }
+        if let Some(wrong) = self.shapes.iter().find(|shape| !(shape.is_finite() && **shape > 0.0)) {
+            return Err(UserError::new(format!("--shapes: found {wrong}, expected heights over widths above 0")));
         }
         Ok(self.extents.clone())
     }
