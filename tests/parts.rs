@@ -4,9 +4,9 @@
 
 use glam::DVec3;
 use partwise::distance::Body;
-use partwise::mesh::{Topology, TriMesh};
-use partwise::parts::{Parts, UNASSIGNED, segment};
-use partwise::range_table::{GapRule, RangeTable};
+use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::{Part, Parts, UNASSIGNED, segment};
+use partwise::range_table::{Extent, GapRule, RangeTable};
 use proptest::prelude::*;
 
 /// Ericson's closest point on a triangle ("Real-Time Collision Detection", 5.1.5), written for this test.
@@ -241,6 +241,43 @@ fn no_piece_is_wider_than_the_extent() {
     }
     assert_eq!(whole.cut_to_extent(&mesh, &topology, f64::INFINITY), whole);
     assert_eq!(whole.cut_to_extent(&mesh, &topology, 0.0).len(), mesh.vertex_count());
+}
+
+#[test]
+fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
+    let (mesh, topology) = strip(40);
+    let rest = RestShape::from_edges(&mesh).unwrap();
+    let (first, all) = (mesh.positions[0], mesh.vertex_count());
+    let d: Vec<f64> = (0..all).map(|v| [0.005, 0.015, 0.025, 0.035][4 * v / all]).collect();
+    let table = RangeTable::from_bounds("four", &[0.0, 1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
+    let whole = segment(&topology, &d, &table);
+    assert_eq!(whole.cut_to_table(&mesh, &topology, &rest, &table), whole);
+    let length = mesh.positions[all - 1].distance(first);
+    let widest = |parts: &Parts, level: usize| {
+        let width = |p: &Part| {
+            let along = p.vertices.iter().map(|&v| mesh.positions[v as usize].distance(first));
+            along.clone().fold(0.0, f64::max) - along.fold(f64::INFINITY, f64::min)
+        };
+        parts.parts.iter().filter(|p| p.level as usize == level).map(width).fold(0.0, f64::max)
+    };
+    // In tenths of the strip, a quarter of which is each level.
+    let tenth_cm = 10.0 * length;
+    let extents = [Some(Extent::even(tenth_cm)), None, Some(Extent::even(0.5 * tenth_cm)), Some(Extent::UNCUT)];
+    let table = table.with_extents(&extents).unwrap();
+    let own = segment(&topology, &d, &table).cut_to_table(&mesh, &topology, &rest, &table);
+    consistent(&own, &topology);
+    assert_eq!(own.own_extent, [true, false, true, true]);
+    assert!(widest(&own, 0) <= 0.1 * length && widest(&own, 2) <= 0.05 * length);
+    assert!(own.parts_per_level[0] > 1 && own.parts_per_level[2] > own.parts_per_level[0]);
+    assert_eq!((own.parts_per_level[1], own.parts_per_level[3]), (1, 1));
+    // The run's extent reaches only the level that has none.
+    let both = own.cut_to_extent(&mesh, &topology, 0.02 * length);
+    consistent(&both, &topology);
+    assert!(both.parts_per_level[1] > 5 && widest(&both, 1) <= 0.02 * length);
+    for level in [0, 2, 3] {
+        assert_eq!(both.parts_per_level[level], own.parts_per_level[level]);
+    }
+    assert_eq!(own.join_small(&topology, &mesh, 3).own_extent, own.own_extent);
 }
 
 #[test]

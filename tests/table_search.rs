@@ -4,10 +4,10 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
-use partwise::mesh::{Topology, TriMesh};
-use partwise::parts::{Parts, representable_rms_m, segment};
-use partwise::range_table::RangeTable;
-use partwise::table_search::{Front, Sample, SearchError, SearchOptions, search, search_extents};
+use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::{Grain, Parts, representable_rms_m, segment};
+use partwise::range_table::{Extent, RangeTable};
+use partwise::table_search::{Front, FrontPoint, Sample, SearchError, SearchOptions, search};
 use proptest::prelude::*;
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
@@ -25,6 +25,8 @@ fn sheet(w: usize, h: usize) -> TriMesh {
 struct Wavy {
     mesh: TriMesh,
     topology: Topology,
+    rest: RestShape,
+    grain: Grain,
     distances: Vec<f64>,
     displacement: Vec<DVec3>,
 }
@@ -33,6 +35,8 @@ impl Wavy {
     fn new(w: usize, h: usize, phase: f64) -> Self {
         let mesh = sheet(w, h);
         let topology = Topology::new(&mesh);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let grain = Grain::new(&mesh, &topology, &rest);
         let distance = |x: &DVec3| 0.05 + 0.2 * x.y + 0.01 * (40.0 * x.x + phase).sin();
         let moved = |x: &DVec3| {
             let fold = 0.05 * (25.0 * x.x + 10.0 * x.y + phase).cos();
@@ -40,18 +44,22 @@ impl Wavy {
         };
         let distances = mesh.positions.iter().map(distance).collect();
         let displacement = mesh.positions.iter().map(moved).collect();
-        Self { mesh, topology, distances, displacement }
+        Self { mesh, topology, rest, grain, distances, displacement }
     }
 
     fn sample(&self, weight: f64) -> Sample<'_> {
-        let Self { mesh, topology, distances, displacement } = self;
-        Sample { mesh, topology, distances_m: distances, displacement, weight }
+        let Self { mesh, topology, grain, distances, displacement, .. } = self;
+        Sample { mesh, topology, grain, distances_m: distances, displacement, weight }
     }
 
-    fn parts(&self, table: &RangeTable, extent_m: Option<f64>) -> Parts {
-        let parts = segment(&self.topology, &self.distances, table);
-        extent_m.map_or_else(|| parts.clone(), |e| parts.cut_to_extent(&self.mesh, &self.topology, e))
+    fn parts(&self, table: &RangeTable) -> Parts {
+        segment(&self.topology, &self.distances, table).cut_to_table(&self.mesh, &self.topology, &self.rest, table)
     }
+}
+
+/// Few candidates and rounds, for the sake of time.
+fn coarse(candidates: usize, options: SearchOptions) -> SearchOptions {
+    SearchOptions { candidates, candidates_around: 9, exact_up_to: 0, rounds: 3, ..options }
 }
 
 fn is_a_front(front: &Front) {
@@ -62,28 +70,47 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn the_front_is_that_of_all_tables(
-        distances in prop::collection::vec(0u32..9, 20),
+        distances in prop::collection::vec(0u32..5, 20),
         moves in prop::collection::vec(-1.0f64..1.0, 60),
-        extent in prop::option::of(0.03f64..0.1),
+        extents in prop::collection::vec((3.0f64..10.0, 0usize..3), 0..2),
     ) {
         let mesh = sheet(5, 4);
         let topology = Topology::new(&mesh);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let grain = Grain::new(&mesh, &topology, &rest);
         let distances: Vec<f64> = distances.iter().map(|&d| 0.01 * f64::from(d)).collect();
         let displacement: Vec<DVec3> = moves.chunks(3).map(DVec3::from_slice).collect();
         let sample =
-            Sample { mesh: &mesh, topology: &topology, distances_m: &distances, displacement: &displacement, weight: 2.5 };
-        let options = SearchOptions { extent_m: extent, include: Vec::new(), rounds: 1, ..SearchOptions::new(14) };
+            Sample { mesh: &mesh, topology: &topology, grain: &grain, distances_m: &distances, displacement: &displacement, weight: 2.5 };
+        let (widths, shapes): (Vec<f64>, Vec<usize>) = extents.into_iter().unzip();
+        let shapes: Vec<f64> = shapes.into_iter().flat_map(|s| [1.0, [0.5, 2.0, 4.0][s]]).collect();
+        let options = SearchOptions {
+            include: Vec::new(),
+            rounds: 1,
+            shapes: shapes.clone(),
+            ..SearchOptions::with_extents(14, &widths)
+        };
         let found = search(&[sample], &options, &|_| {});
 
-        // Up to eight bounds between nine values: 256 tables.
+        // Up to four bounds between five values, and each level uncut or cut to one of two shapes: 16 to 768 tables.
         let mut best = [f64::INFINITY; 15];
-        for mask in 0u32..256 {
-            let inner: Vec<f64> = (0..8).filter(|b| mask >> b & 1 == 1).map(|b| 0.5 + f64::from(b)).collect();
-            let parts = segment(&topology, &distances, &RangeTable::from_inner_bounds("all", &inner).unwrap());
-            let parts = extent.map_or_else(|| parts.clone(), |e| parts.cut_to_extent(&mesh, &topology, e));
-            if parts.len() <= 14 {
-                let rms = representable_rms_m(&parts, &displacement);
-                best[parts.len()] = rms.min(best[parts.len()]);
+        let cuts = widths.iter().flat_map(|&w| shapes.iter().map(move |s| Extent { width_cm: w, height_cm: s * w }));
+        let choices: Vec<Extent> = cuts.chain([Extent::UNCUT]).collect();
+        for mask in 0u32..16 {
+            let inner: Vec<f64> = (0..4).filter(|b| mask >> b & 1 == 1).map(|b| 0.5 + f64::from(b)).collect();
+            let table = RangeTable::from_inner_bounds("all", &inner).unwrap();
+            for mut code in 0..choices.len().pow(inner.len() as u32 + 1) {
+                let mut extents = Vec::new();
+                for _ in 0..=inner.len() {
+                    extents.push(Some(choices[code % choices.len()]));
+                    code /= choices.len();
+                }
+                let table = table.clone().with_extents(&extents).unwrap();
+                let parts = segment(&topology, &distances, &table).cut_to_table(&mesh, &topology, &rest, &table);
+                if parts.len() <= 14 {
+                    let rms = representable_rms_m(&parts, &displacement);
+                    best[parts.len()] = rms.min(best[parts.len()]);
+                }
             }
         }
         let mut expected = Vec::new();
@@ -110,15 +137,15 @@ proptest! {
 #[test]
 fn every_point_is_what_stage_one_makes_of_its_table() {
     let (a, b) = (Wavy::new(31, 24, 0.0), Wavy::new(17, 28, 1.3));
-    for extent_m in [None, Some(0.1)] {
-        let max_parts = if extent_m.is_some() { 400 } else { 120 };
-        let options = SearchOptions { candidates: 40, extent_m, ..SearchOptions::new(max_parts) };
+    for (max_parts, widths_cm) in [(120, &[][..]), (300, &[8.0, 10.0, 15.0])] {
+        let options = coarse(40, SearchOptions::with_extents(max_parts, widths_cm));
         let found = search(&[a.sample(1.0), b.sample(3.0)], &options, &|_| {}).unwrap();
         is_a_front(found.front());
         assert!(found.front().points.len() > 10);
         for point in &found.front().points {
             let table = point.table("found", "test").unwrap();
-            let cut = [&a, &b].map(|g| g.parts(&table, extent_m));
+            assert_eq!(table.has_extents(), !widths_cm.is_empty());
+            let cut = [&a, &b].map(|g| g.parts(&table));
             assert_eq!(cut[0].len() + cut[1].len(), point.parts);
             let e = [(&a, &cut[0]), (&b, &cut[1])].map(|(g, parts)| representable_rms_m(parts, &g.displacement));
             let rms = ((e[0] * e[0] + 3.0 * e[1] * e[1]) / 4.0).sqrt();
@@ -131,14 +158,21 @@ fn every_point_is_what_stage_one_makes_of_its_table() {
 fn no_included_table_is_better_and_no_round_is_worse() {
     let garment = Wavy::new(31, 24, 0.4);
     let included = RangeTable::table_3().scaled(1.7).unwrap();
-    let parts = garment.parts(&included, None);
+    let parts = garment.parts(&included);
     let rms = representable_rms_m(&parts, &garment.displacement);
-    let options = SearchOptions { candidates: 20, include: vec![included], ..SearchOptions::new(parts.len()) };
+    let options =
+        SearchOptions { candidates: 20, exact_up_to: 0, include: vec![included], ..SearchOptions::new(parts.len()) };
     let found = search(&[garment.sample(1.0)], &options, &|_| {}).unwrap();
     let best: Vec<f64> = found.rounds.iter().map(|f| f.best_within(parts.len()).unwrap().rms_m).collect();
     assert!(best[0] <= rms);
     assert!(best.windows(2).all(|w| w[1] <= w[0]));
     assert!(best[2] < best[0], "rounds around the best table should find a better one: {best:?}");
+    // Every bound there is: no search over some of them finds better, for any number of PARTs.
+    let exact = search(&[garment.sample(1.0)], &SearchOptions::new(parts.len()), &|_| {}).unwrap();
+    assert!(exact.exact && exact.rounds.len() == 1 && !found.exact);
+    for point in &found.front().points {
+        assert!(exact.front().best_within(point.parts).unwrap().rms_m <= point.rms_m + 1e-12);
+    }
     let front = found.front();
     let last = front.points.last().unwrap();
     assert_eq!(front.coarsest_within(last.rms_m), Some(last));
@@ -146,34 +180,37 @@ fn no_included_table_is_better_and_no_round_is_worse() {
 }
 
 #[test]
-fn extents_compete_on_one_front() {
+fn an_extent_for_each_level_is_never_worse_than_one_for_all() {
     let garment = Wavy::new(31, 24, 0.4);
-    let options = SearchOptions { candidates: 25, ..SearchOptions::with_extent(60, 0.2) };
-    let extents = [None, Some(0.01), Some(0.2), Some(0.3)];
-    let front = search_extents(&[garment.sample(1.0)], &options, &extents, &|_| {}).unwrap();
+    let found = |widths_cm: &[f64]| {
+        let options = SearchOptions { candidates: 25, rounds: 1, ..SearchOptions::with_extents(60, widths_cm) };
+        search(&[garment.sample(1.0)], &options, &|_| {}).unwrap().front().clone()
+    };
+    let front = found(&[20.0, 30.0, 1.0]);
     is_a_front(&front);
-    for &extent_m in &[None, Some(0.2), Some(0.3)] {
-        let alone = search(&[garment.sample(1.0)], &SearchOptions { extent_m, ..options.clone() }, &|_| {}).unwrap();
-        for point in &alone.front().points {
+    // A level cut to 1 cm has more PARTs than allowed.
+    assert!(front.points.iter().all(|p| p.extents.iter().all(|e| e.width_cm > 1.0)));
+    for fewer in [&[][..], &[20.0], &[30.0]] {
+        for point in &found(fewer).points {
             assert!(front.best_within(point.parts).unwrap().rms_m <= point.rms_m);
         }
     }
-    for point in &front.points {
-        let parts = garment.parts(&point.table("found", "test").unwrap(), point.extent_m);
-        assert_eq!(parts.len(), point.parts);
-        assert!((representable_rms_m(&parts, &garment.displacement) - point.rms_m).abs() < 1e-9);
-    }
-    let only = search_extents(&[garment.sample(1.0)], &options, &[Some(0.01)], &|_| {});
-    assert_eq!(only, Err(SearchError::TooFewParts { max_parts: 60 }));
+    let has = |p: &FrontPoint, cm: f64| p.extents.iter().any(|e| e.width_cm == cm);
+    let mixed = |p: &&FrontPoint| has(p, 20.0) && has(p, 30.0);
+    let mixed = front.points.iter().find(mixed).unwrap();
+    assert_eq!(mixed.extents.len(), mixed.inner_bounds_cm.len() + 1);
+    let table = mixed.table("found", "test").unwrap();
+    let again = RangeTable::parse(&table.to_toml(), "again").unwrap();
+    assert_eq!(garment.parts(&again).len(), mixed.parts);
 }
 
 #[test]
 fn threads_do_not_change_the_search_and_progress_counts_up() {
     let garment = Wavy::new(25, 20, 0.0);
-    let run = |threads: usize, extent_m: Option<f64>| {
+    let run = |threads: usize, widths_cm: &[f64]| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let calls = AtomicUsize::new(0);
-        let options = SearchOptions { candidates: 30, extent_m, ..SearchOptions::new(200) };
+        let options = coarse(30, SearchOptions::with_extents(200, widths_cm));
         let found = pool.install(|| {
             search(&[garment.sample(1.0)], &options, &|p| {
                 assert!(p.done <= p.total && p.round <= p.rounds);
@@ -183,8 +220,8 @@ fn threads_do_not_change_the_search_and_progress_counts_up() {
         assert!(calls.into_inner() > 60);
         format!("{:?}", found.unwrap())
     };
-    for extent_m in [None, Some(0.08)] {
-        assert_eq!(run(1, extent_m), run(2, extent_m));
+    for widths_cm in [&[][..], &[8.0, 12.0]] {
+        assert_eq!(run(1, widths_cm), run(2, widths_cm));
     }
 }
 
@@ -201,4 +238,22 @@ fn what_cannot_be_searched_is_refused() {
     distances[7] = f64::NAN;
     let holed = Sample { distances_m: &distances, ..garment.sample(1.0) };
     assert_eq!(refuse(holed, 5), SearchError::NotFinite { garment: 1, vertex: 7 });
+}
+
+#[test]
+fn the_tables_that_come_with_the_program_read_back_equal() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/tuned");
+    let mut found = 0;
+    let folders = [folder.clone(), folder.join("held-out-1"), folder.join("held-out-2")];
+    for entry in folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap()) {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let table = RangeTable::parse(&text, &path.display().to_string()).unwrap();
+            assert_eq!(table.to_toml(), text, "{}", path.display());
+            assert_eq!(table.has_extents(), path.to_string_lossy().contains("extents"));
+            found += 1;
+        }
+    }
+    assert_eq!(found, 14);
 }

@@ -1,6 +1,7 @@
 //! `partwise merge`: the shards of a sweep joined into what one run would have written, bit for bit but for timings.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -32,6 +33,7 @@ pub(crate) struct MergeArgs {
 impl MergeArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        let started = Instant::now();
         let rows = merge(&self.shards, &self.out)?;
         let (manifest, _) = store::read(&self.out)?;
         let shelf = Shelf::in_folder(&self.out);
@@ -50,7 +52,7 @@ impl MergeArgs {
             folder: self.out.display().to_string(),
             total: rows.len(),
             skipped: rows.len(),
-            seconds: 0.0,
+            seconds: started.elapsed().as_secs_f64(),
             keeping_ms: 0.0,
             rows: &rows,
             recordings: &recordings,

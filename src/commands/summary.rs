@@ -9,7 +9,7 @@ use partwise::accuracy::Accuracy;
 use partwise::assess::Assessment;
 use partwise::drape::{Drape, Scene, Settings};
 use partwise::fabric::Fabric;
-use partwise::range_table::METRES_PER_CM;
+use partwise::range_table::{Extent, METRES_PER_CM};
 use partwise::record::{LevelRow, Panel};
 use serde::Serialize;
 
@@ -30,6 +30,9 @@ pub(crate) struct Summary {
     singleton_parts: usize,
     parts_per_level: Vec<usize>,
     level_bounds_cm: Vec<[Option<f64>; 2]>,
+    /// Extents the table itself has, by level; none for one it leaves to the run.
+    #[serde(skip)]
+    level_extents: Vec<Option<Extent>>,
     vertices_per_level: Vec<usize>,
     hole_vertices: usize,
     unassigned_vertices: usize,
@@ -87,6 +90,7 @@ impl Summary {
             singleton_parts: drape.parts.singletons,
             parts_per_level: drape.parts.parts_per_level.clone(),
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
+            level_extents: levels.iter().map(|l| l.extent).collect(),
             vertices_per_level,
             hole_vertices: drape.parts.hole_vertices,
             unassigned_vertices: drape.parts.unassigned,
@@ -198,16 +202,18 @@ impl Summary {
     pub(crate) fn panel(&self, fabric: &Fabric) -> Panel {
         let fact = |name: &str, value: String| (name.to_owned(), value);
         let metres = |cm: Option<f64>| cm.map_or(f64::INFINITY, |cm| cm * METRES_PER_CM);
-        let levels = self.level_bounds_cm.iter().zip(&self.vertices_per_level).zip(&self.parts_per_level);
+        let levels = self.level_bounds_cm.iter().zip(&self.level_extents);
+        let levels = levels.zip(&self.vertices_per_level).zip(&self.parts_per_level);
         Panel {
             title: format!("{} on {}", self.garment, self.body),
             table: self.table.clone(),
             levels: levels
-                .map(|((&[lower, upper], &vertices), &parts)| LevelRow {
+                .map(|(((&[lower, upper], extent), &vertices), &parts)| LevelRow {
                     lower_m: metres(lower),
                     upper_m: metres(upper),
                     vertices,
                     parts,
+                    extent: extent.map(|e| e.to_string()),
                 })
                 .collect(),
             facts: [

@@ -125,7 +125,12 @@ pub fn drape(
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
     let parts = timed(&mut times.segment, || {
         let parts = segment(&scene.topology, &distance, &settings.table);
-        if settings.min_part > 1 { parts.join_small(&scene.topology, &scene.garment, settings.min_part) } else { parts }
+        let joined = if settings.min_part > 1 {
+            parts.join_small(&scene.topology, &scene.garment, settings.min_part)
+        } else {
+            parts
+        };
+        joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
     });
     let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();

@@ -58,6 +58,6 @@ impl Parts {
         let label: Vec<u32> =
             self.part_of_vertex.iter().map(|&p| if p == UNASSIGNED { UNASSIGNED } else { root(p) }).collect();
         let level_of = |label: u32| self.parts[label as usize].level;
-        Self::from_labels(topology, &label, level_of, self.parts_per_level.len(), self.hole_vertices)
+        Self::from_labels(topology, &label, level_of, self.own_extent.clone(), self.hole_vertices)
     }
 }

@@ -14,14 +14,17 @@
 //! sharing vertices stay apart; a table that meets distance noise yields many single-vertex PARTs, which are counted.
 
 mod extent;
+mod grain;
 mod join;
 mod representable;
 mod seams;
 mod seeding;
 
+pub use grain::Grain;
+pub(crate) use grain::Ruler;
 pub use representable::representable_rms_m;
 pub use seams::Seam;
-pub(crate) use seeding::nearest_seeds;
+pub(crate) use seeding::spread_seeds;
 
 use rayon::prelude::*;
 
@@ -57,6 +60,8 @@ pub struct Parts {
     pub singletons: usize,
     /// Number of PARTs at each level, empty levels included.
     pub parts_per_level: Vec<usize>,
+    /// Levels whose extent the range table itself says: [`Parts::cut_to_table`] cuts them, [`Parts::cut_to_extent`] does not.
+    pub own_extent: Vec<bool>,
 }
 
 /// Cuts a garment by its vertices' distances to the body (m; a negative one, inside the body, counts by its magnitude).
@@ -66,7 +71,8 @@ pub fn segment(topology: &Topology, distances_m: &[f64], table: &RangeTable) -> 
     let unsigned: Vec<f64> = distances_m.iter().map(|d| d.abs()).collect();
     let assigned = table.assign(&unsigned);
     let label: Vec<u32> = assigned.level_of_vertex.iter().map(|l| l.map_or(UNASSIGNED, |l| l as u32)).collect();
-    Parts::from_labels(topology, &label, |label| label, assigned.level_count, assigned.hole_vertices)
+    let own_extent = table.effective_levels().iter().map(|l| l.extent.is_some()).collect();
+    Parts::from_labels(topology, &label, |label| label, own_extent, assigned.hole_vertices)
 }
 
 impl Parts {
@@ -101,7 +107,7 @@ impl Parts {
         topology: &Topology,
         label: &[u32],
         level_of: impl Fn(u32) -> u32,
-        level_count: usize,
+        own_extent: Vec<bool>,
         hole_vertices: usize,
     ) -> Self {
         let n = label.len();
@@ -139,7 +145,7 @@ impl Parts {
         parts.sort_by_key(|p| p.level);
         let part_of_vertex: Vec<u32> =
             piece_of_vertex.iter().map(|&p| number.get(p as usize).copied().unwrap_or(UNASSIGNED)).collect();
-        let mut parts_per_level = vec![0; level_count];
+        let mut parts_per_level = vec![0; own_extent.len()];
         for part in &parts {
             if let Some(count) = parts_per_level.get_mut(part.level as usize) {
                 *count += 1;
@@ -151,6 +157,7 @@ impl Parts {
             hole_vertices,
             singletons: parts.iter().filter(|p| p.vertices.len() == 1).count(),
             parts_per_level,
+            own_extent,
             part_of_vertex,
             parts,
         }

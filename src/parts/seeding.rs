@@ -7,33 +7,49 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::mesh::{Topology, TriMesh};
+use super::grain::Ruler;
 
 /// The nearest seed of each of these connected vertices, and how many seeds it takes for none to be farther than half of
-/// `extent_m`. `local` is the place of a vertex in the list, `None` for others; with more than `most` seeds it gives up.
+/// `extent_m`. `local` is the place of a vertex in the list, `None` for others.
 pub(crate) fn nearest_seeds(
     vertices: &[u32],
     local: impl Fn(u32) -> Option<usize>,
-    mesh: &TriMesh,
-    topology: &Topology,
-    (extent_m, most): (f64, usize),
-) -> Option<(Vec<u32>, usize)> {
-    let graph = Graph::new(vertices, local, mesh, topology);
-    let mut spread = Spread::new(vertices.len());
-    let (mut next, mut seeds) = (0, 0);
-    loop {
-        spread.start(seeds, next);
-        spread.flow(&graph);
-        seeds += 1;
-        let distance;
-        (next, distance) = spread.farthest();
-        if distance <= 0.5 * extent_m || distance == 0.0 || extent_m.is_nan() {
-            return Some((spread.seed_of_vertex, seeds));
+    ruler: Ruler<'_>,
+    extent_m: f64,
+) -> (Vec<u32>, usize) {
+    let mut found = (Vec::new(), 0);
+    spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
+        let enough = radius_m <= 0.5 * extent_m || radius_m == 0.0 || extent_m.is_nan();
+        if enough {
+            found = (seed_of_vertex.to_vec(), seeds);
         }
-        if seeds >= most {
-            return None;
+        enough
+    });
+    found
+}
+
+/// Puts seed after seed, each on the vertex farthest from those before, until `enough` says so. After each it hears how far the
+/// farthest vertex is from its seed, m, how many seeds there are, and the nearest seed of every vertex. Where seeds lie
+/// does not depend on where it ends, so one run serves every extent.
+pub(crate) fn spread_seeds(
+    vertices: &[u32],
+    local: impl Fn(u32) -> Option<usize>,
+    ruler: Ruler<'_>,
+    mut enough: impl FnMut(f64, usize, &[u32]) -> bool,
+) {
+    let graph = Graph::new(vertices, local, ruler);
+    let mut spread = Spread::new(vertices.len());
+    let (mut next, mut radius_m) = (0, f64::INFINITY);
+    for seed in 0..vertices.len() {
+        spread.start(seed, next);
+        spread.flow(&graph);
+        (next, radius_m) = spread.farthest();
+        if enough(radius_m, seed + 1, &spread.seed_of_vertex) {
+            return;
         }
     }
+    // Every vertex is a seed, and no caller asks for less than a distance of 0.
+    debug_assert!(vertices.is_empty() || radius_m == 0.0);
 }
 
 /// The edges inside the piece, by place in its list.
@@ -44,12 +60,10 @@ struct Graph {
 }
 
 impl Graph {
-    fn new(vertices: &[u32], local: impl Fn(u32) -> Option<usize>, mesh: &TriMesh, topology: &Topology) -> Self {
+    fn new(vertices: &[u32], local: impl Fn(u32) -> Option<usize>, ruler: Ruler<'_>) -> Self {
         let mut graph = Self { start: vec![0], edges: Vec::new() };
         for &v in vertices {
-            let x = mesh.positions[v as usize];
-            let inside = topology.neighbours(v).iter().filter_map(|&w| Some((local(w)?, w)));
-            graph.edges.extend(inside.map(|(j, w)| (j, x.distance(mesh.positions[w as usize]))));
+            graph.edges.extend(ruler.neighbours(v).filter_map(|(w, length)| Some((local(w)?, length))));
             graph.start.push(graph.edges.len());
         }
         graph
@@ -60,18 +74,26 @@ impl Graph {
 struct Spread {
     distance: Vec<f64>,
     seed_of_vertex: Vec<u32>,
+    /// The vertex before each on its way from the seed.
+    before: Vec<usize>,
     heap: BinaryHeap<Reverse<(Metres, usize)>>,
 }
 
 impl Spread {
     fn new(vertices: usize) -> Self {
-        Self { distance: vec![f64::INFINITY; vertices], seed_of_vertex: vec![0; vertices], heap: BinaryHeap::new() }
+        Self {
+            distance: vec![f64::INFINITY; vertices],
+            seed_of_vertex: vec![0; vertices],
+            before: vec![usize::MAX; vertices],
+            heap: BinaryHeap::new(),
+        }
     }
 
     /// Puts a seed at a vertex.
     fn start(&mut self, seed: usize, at: usize) {
         self.distance[at] = 0.0;
         self.seed_of_vertex[at] = seed as u32;
+        self.before[at] = usize::MAX;
         self.heap.push(Reverse((Metres(0.0), at)));
     }
 
@@ -82,9 +104,13 @@ impl Spread {
                 continue;
             }
             for &(j, length) in &graph.edges[graph.start[i]..graph.start[i + 1]] {
-                if d + length < self.distance[j] {
+                // Whoever lies behind a vertex goes where it goes, even where the way is shorter by less than a rounding: so
+                // pieces are connected.
+                let follows = self.before[j] == i && self.seed_of_vertex[j] != self.seed_of_vertex[i];
+                if d + length < self.distance[j] || follows {
                     self.distance[j] = d + length;
                     self.seed_of_vertex[j] = self.seed_of_vertex[i];
+                    self.before[j] = i;
                     self.heap.push(Reverse((Metres(d + length), j)));
                 }
             }

@@ -1,6 +1,6 @@
 //! What can be wrong with a range table, row by row.
 
-use super::GapRule;
+use super::{GapRule, Level};
 
 /// A range table that cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -8,7 +8,7 @@ pub enum TableError {
     /// Not TOML, or a key that is missing, unknown or of another type.
     #[error(
         "{place}: {message}; a range table has name = \"...\", unit = \"cm\", gap = \"extend-lower\" | \"extend-upper\" | \
-         \"own-level\" | \"error\" and levels = [[lower, upper], ...]"
+         \"own-level\" | \"error\" and levels = [[lower, upper], ...], with an extent as a third number where wanted, or its width and height as a third and fourth"
     )]
     Syntax {
         /// File and line.
@@ -43,9 +43,12 @@ pub enum TableError {
         /// File and line.
         place: String,
     },
-    /// A row that is not two numbers.
-    #[error("{place}: row {row} has {found} numbers, expected two, [lower, upper]; an open last row is [lower, inf]")]
-    NotAPair {
+    /// A row that is not two to four numbers.
+    #[error(
+        "{place}: row {row} has {found} numbers, expected [lower, upper], [lower, upper, extent] or [lower, upper, width, height]; an \
+         open last row is [lower, inf]"
+    )]
+    RowLength {
         /// File and line.
         place: String,
         /// Row number, from 1.
@@ -76,7 +79,7 @@ pub enum TableError {
 }
 
 /// What is wrong with the bounds of one row (cm).
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoundProblem {
     /// NaN.
     #[error("is [{0}, {1}], expected two numbers; write the bounds in centimetres")]
@@ -119,18 +122,24 @@ pub enum BoundProblem {
         /// The upper value before.
         before: f64,
     },
+    /// An extent that is not above 0.
+    #[error(
+        "has the extent {0:?}, expected centimetres above 0; inf never cuts the level, and without a third number it is cut as \
+         the run asks"
+    )]
+    Extent(Vec<f64>),
     /// No rows at all.
     #[error("is missing, expected at least one level [lower, upper]; [[0, inf]] makes the garment one level")]
     Missing,
 }
 
 /// The first row (from 1) that cannot stand, and why.
-pub(super) fn first_problem(rows: &[(f64, f64)], gap: GapRule) -> Option<(usize, BoundProblem)> {
+pub(super) fn first_problem(rows: &[Level], gap: GapRule) -> Option<(usize, BoundProblem)> {
     if rows.is_empty() {
         return Some((1, BoundProblem::Missing));
     }
     let mut before: Option<(f64, f64)> = None;
-    for (i, &(lower, upper)) in rows.iter().enumerate() {
+    for (i, &Level { lower_cm: lower, upper_cm: upper, extent }) in rows.iter().enumerate() {
         let problem = if lower.is_nan() || upper.is_nan() {
             Some(BoundProblem::NotANumber(lower, upper))
         } else if lower < 0.0 || upper < 0.0 {
@@ -139,6 +148,8 @@ pub(super) fn first_problem(rows: &[(f64, f64)], gap: GapRule) -> Option<(usize,
             Some(BoundProblem::Unordered(lower, upper))
         } else if upper == f64::INFINITY && i + 1 < rows.len() {
             Some(BoundProblem::OpenBeforeTheEnd(lower, upper))
+        } else if let Some(wrong) = extent.filter(|e| !e.is_valid()) {
+            Some(BoundProblem::Extent(wrong.numbers_cm()))
         } else {
             before.and_then(|(start, end)| match lower {
                 l if l < start => Some(BoundProblem::OutOfOrder { lower, before: end }),

@@ -2,7 +2,7 @@
 //!
 //! Each yields a checked table whose name and source say how it was made. Bounds are centimetres.
 
-use super::{GapRule, Level, METRES_PER_CM, RangeTable, TableError};
+use super::{Extent, GapRule, Level, METRES_PER_CM, RangeTable, TableError};
 
 impl RangeTable {
     /// The same table with every bound times `factor`; an open end stays open.
@@ -18,13 +18,15 @@ impl RangeTable {
                 expected,
             });
         }
-        let scale = |l: &Level| Level { lower_cm: l.lower_cm * factor, upper_cm: l.upper_cm * factor };
+        // Extents run along the cloth, which does not scale with the distances.
+        let scale = |l: &Level| Level { lower_cm: l.lower_cm * factor, upper_cm: l.upper_cm * factor, ..*l };
         let made = Self::new(format!("{} × {factor}", self.name), self.gap, self.levels.iter().map(scale).collect())?;
         Ok(made.with_source(format!("every bound of \"{}\" times {factor}", self.name)))
     }
 
     /// The table, its holes given away, merged or split into `count` levels. Merging keeps the bounds at evenly spaced ranks;
-    /// splitting halves the widest finite level again and again, the lowest of equals first.
+    /// splitting halves the widest finite level again and again, the lowest of equals first. A level takes the smallest of the
+    /// extents that its distances had.
     ///
     /// # Errors
     /// [`TableError::Family`] for no levels, or for more where no finite level is left to split.
@@ -52,7 +54,12 @@ impl RangeTable {
             bounds.insert(i + 1, bounds[i] + 0.5 * width);
         }
         let verb = if count < from { "merged" } else { "split" };
-        let made = Self::from_bounds(format!("{}, {count} levels", self.name), &bounds)?;
+        let extent = |w: &[f64]| {
+            let within = levels.iter().filter(|l| l.lower_cm < w[1] && w[0] < l.upper_cm);
+            within.filter_map(|l| l.extent).reduce(Extent::smaller)
+        };
+        let extents: Vec<Option<Extent>> = bounds.windows(2).map(extent).collect();
+        let made = Self::from_bounds(format!("{}, {count} levels", self.name), &bounds)?.with_extents(&extents)?;
         Ok(made.with_source(format!("\"{}\" {verb} from {from} to {count} levels", self.name)))
     }
 
@@ -139,7 +146,7 @@ mod tests {
         let half = RangeTable::table_3().scaled(0.5).unwrap();
         assert_eq!(half.name, "Table 3 × 0.5");
         assert_eq!(half.holes_cm(), [[1.5, 1.75]]);
-        assert_eq!(half.levels[18], Level { lower_cm: 5.5, upper_cm: f64::INFINITY });
+        assert_eq!(half.levels[18], Level::new(5.5, f64::INFINITY));
         assert!(RangeTable::table_3().scaled(0.0).is_err());
         assert!(RangeTable::table_3().scaled(f64::NAN).is_err());
     }
@@ -155,7 +162,7 @@ mod tests {
         }
         // 4.5–7 cm is the widest finite level of Table 3, 2.5–3.5 (with its hole) would be cut after 7–9.
         let split = table.with_level_count(20).unwrap();
-        assert!(split.levels.contains(&Level { lower_cm: 4.5, upper_cm: 5.75 }));
+        assert!(split.levels.contains(&Level::new(4.5, 5.75)));
         assert!(table.with_level_count(0).is_err());
         assert!(RangeTable::from_bounds("open", &[0.0, f64::INFINITY]).unwrap().with_level_count(2).is_err());
     }

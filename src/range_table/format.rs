@@ -4,7 +4,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::first_problem;
-use super::{GapRule, Level, RangeTable, TableError};
+use super::{Extent, GapRule, Level, RangeTable, TableError};
 
 /// Table 3 as printed, inside the binary.
 const TABLE_3: &str = include_str!("../../assets/tables/table-3.toml");
@@ -54,18 +54,22 @@ impl RangeTable {
         if rows.is_empty() {
             return Err(TableError::Empty { place: at(file.levels.span().start) });
         }
-        let mut bounds = Vec::with_capacity(rows.len());
+        let mut levels = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let &[lower, upper] = row.get_ref().as_slice() else {
-                let (row, found) = (i + 1, row.get_ref().len());
-                return Err(TableError::NotAPair { place: at(rows[i].span().start), row, found });
+            let (lower_cm, upper_cm, extent) = match *row.get_ref().as_slice() {
+                [lower, upper] => (lower, upper, None),
+                [lower, upper, extent] => (lower, upper, Some(Extent::even(extent))),
+                [lower, upper, width_cm, height_cm] => (lower, upper, Some(Extent { width_cm, height_cm })),
+                ref other => {
+                    let (place, row, found) = (at(row.span().start), i + 1, other.len());
+                    return Err(TableError::RowLength { place, row, found });
+                }
             };
-            bounds.push((lower, upper));
+            levels.push(Level { lower_cm, upper_cm, extent });
         }
-        if let Some((row, problem)) = first_problem(&bounds, gap) {
+        if let Some((row, problem)) = first_problem(&levels, gap) {
             return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });
         }
-        let levels = bounds.into_iter().map(|(lower_cm, upper_cm)| Level { lower_cm, upper_cm }).collect();
         Ok(Self { name: file.name, source: file.source, gap, levels })
     }
 
@@ -80,7 +84,9 @@ impl RangeTable {
         text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap.as_str()));
         for level in &self.levels {
             // `{:?}` is the shortest text that reads back to the same bits; TOML spells infinity the same way.
-            text.push_str(&format!("    [{:?}, {:?}],\n", level.lower_cm, level.upper_cm));
+            let numbers =
+                [level.lower_cm, level.upper_cm].into_iter().chain(level.extent.iter().flat_map(Extent::numbers_cm));
+            text.push_str(&format!("    [{}],\n", numbers.map(|cm| format!("{cm:?}")).collect::<Vec<_>>().join(", ")));
         }
         text.push_str("]\n");
         text
@@ -111,6 +117,11 @@ mod tests {
         assert_eq!(RangeTable::parse(&table.to_toml(), "again").unwrap(), table);
         let odd = RangeTable::from_bounds("a \"quoted\"\nname", &[0.1 + 0.2, 1.0 / 3.0, f64::INFINITY]).unwrap();
         assert_eq!(RangeTable::parse(&odd.to_toml(), "odd").unwrap(), odd);
+        let cut = odd.with_extents(&[Some(Extent { width_cm: 0.1 + 0.2, height_cm: 7.0 }), None]).unwrap();
+        assert_eq!(RangeTable::parse(&cut.to_toml(), "cut").unwrap(), cut);
+        let never = cut.with_extents(&[Some(Extent::even(2.5)), Some(Extent::UNCUT)]).unwrap();
+        assert!(never.to_toml().contains(", 2.5],\n    [0.3333333333333333, inf, inf],"), "{}", never.to_toml());
+        assert_eq!(RangeTable::parse(&never.to_toml(), "never").unwrap(), never);
     }
 
     #[test]
@@ -122,6 +133,9 @@ mod tests {
             ("[-1, 2],", 4, 1, "at least 0"),
             ("[nan, 2],", 4, 1, "two numbers"),
             ("[0, inf],\n[3, 4],", 4, 1, "only the last row"),
+            ("[0, 1],\n[1, 2, 0],", 5, 2, "the extent [0.0]"),
+            ("[0, 1, -3],", 4, 1, "the extent [-3.0]"),
+            ("[0, 1, 5],\n[1, inf, 4, nan],", 5, 2, "the extent [4.0, NaN]"),
         ] {
             let text = file(rows);
             let said = message(&text);
@@ -129,6 +143,7 @@ mod tests {
             assert!(said.contains(word), "{said}");
         }
         assert!(message(&file("[0, 1],\n[2],")).starts_with("t.toml:5: row 2 has 1 numbers"));
+        assert!(message(&file("[0, 1, 2, 3, 4],")).contains("or [lower, upper, width, height]"));
         assert!(message(&file("")).starts_with("t.toml:3: found no levels"));
     }
 

@@ -8,15 +8,18 @@
 //! |---|---|---|
 //! | V_L, V_H | lower and upper value of a level, as printed | cm |
 //! | d | distance of a garment vertex from the body, unsigned | m |
+//! | extent | how wide and tall a PART of the level may be along the cloth; optional, not in the paper | cm |
 //!
 //! Limits: distances below the first lower value or at and above a finite last upper value belong to no level; the vertices
 //! there are reported as unassigned.
 
 mod error;
+mod extent;
 pub mod families;
 mod format;
 
 pub use error::{BoundProblem, TableError};
+pub use extent::Extent;
 
 /// Metres in a centimetre: tables are written in centimetres, everything else is metres.
 pub const METRES_PER_CM: f64 = 0.01;
@@ -28,6 +31,17 @@ pub struct Level {
     pub lower_cm: f64,
     /// Upper value V_H, cm; infinite in an open last row.
     pub upper_cm: f64,
+    /// How wide and tall a PART of this level may be along the cloth: PARTs are cut to it. `None`, as in the paper, leaves it
+    /// to whoever runs the table (`--max-extent`).
+    pub extent: Option<Extent>,
+}
+
+impl Level {
+    /// A level without an extent of its own.
+    #[must_use]
+    pub fn new(lower_cm: f64, upper_cm: f64) -> Self {
+        Self { lower_cm, upper_cm, extent: None }
+    }
 }
 
 /// Who takes the distances between two rows that do not meet.
@@ -80,6 +94,8 @@ pub struct EffectiveLevel {
     pub upper_cm: f64,
     /// The table's row it stands for, from 0; `None` for a hole that is a level of its own.
     pub row: Option<usize>,
+    /// The row's extent; a hole has none.
+    pub extent: Option<Extent>,
 }
 
 impl RangeTable {
@@ -99,8 +115,26 @@ impl RangeTable {
     /// # Errors
     /// As [`RangeTable::new`].
     pub fn from_bounds(name: impl Into<String>, bounds_cm: &[f64]) -> Result<Self, TableError> {
-        let levels = bounds_cm.windows(2).map(|w| Level { lower_cm: w[0], upper_cm: w[1] }).collect();
+        let levels = bounds_cm.windows(2).map(|w| Level::new(w[0], w[1])).collect();
         Self::new(name, GapRule::default(), levels)
+    }
+
+    /// The same table with the extents of its rows: see [`Level::extent`]. Rows beyond the list keep theirs.
+    ///
+    /// # Errors
+    /// [`TableError`] names the row whose extent is not above 0.
+    pub fn with_extents(mut self, extents: &[Option<Extent>]) -> Result<Self, TableError> {
+        for (level, &extent) in self.levels.iter_mut().zip(extents) {
+            level.extent = extent;
+        }
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// Whether any level has an extent of its own.
+    #[must_use]
+    pub fn has_extents(&self) -> bool {
+        self.levels.iter().any(|l| l.extent.is_some())
     }
 
     /// The same table with its origin told.
@@ -115,8 +149,7 @@ impl RangeTable {
     /// # Errors
     /// As [`RangeTable::new`].
     pub fn validate(&self) -> Result<(), TableError> {
-        let rows: Vec<_> = self.levels.iter().map(|l| (l.lower_cm, l.upper_cm)).collect();
-        match error::first_problem(&rows, self.gap) {
+        match error::first_problem(&self.levels, self.gap) {
             None => Ok(()),
             Some((row, problem)) => Err(TableError::Row { place: format!("table \"{}\"", self.name), row, problem }),
         }
@@ -142,13 +175,16 @@ impl RangeTable {
                 match self.gap {
                     GapRule::ExtendLower => last.upper_cm = lower_cm,
                     GapRule::ExtendUpper => lower_cm = before,
-                    GapRule::OwnLevel => out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None }),
+                    GapRule::OwnLevel => {
+                        out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None, extent: None });
+                    }
                     // A checked table has no hole under this rule; an unchecked one keeps it, and its vertices stay
                     // unassigned, which is reported.
                     GapRule::Error => {}
                 }
             }
-            out.push(EffectiveLevel { lower_cm, upper_cm: level.upper_cm, row: Some(row) });
+            let (upper_cm, extent) = (level.upper_cm, level.extent);
+            out.push(EffectiveLevel { lower_cm, upper_cm, row: Some(row), extent });
         }
         out
     }
@@ -197,8 +233,8 @@ mod tests {
         let table = RangeTable::table_3();
         assert_eq!(table.levels.len(), 19);
         assert_eq!(table.holes_cm(), [[3.0, 3.5]]);
-        assert_eq!(table.levels[0], Level { lower_cm: 0.0, upper_cm: 0.06 });
-        assert_eq!(table.levels[18], Level { lower_cm: 11.0, upper_cm: f64::INFINITY });
+        assert_eq!(table.levels[0], Level::new(0.0, 0.06));
+        assert_eq!(table.levels[18], Level::new(11.0, f64::INFINITY));
         assert_eq!(table.gap, GapRule::ExtendLower);
     }
 

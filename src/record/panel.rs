@@ -18,6 +18,8 @@ pub struct LevelRow {
     pub vertices: usize,
     /// PARTs in it.
     pub parts: usize,
+    /// The extent its PARTs are cut to by the table, cm, as people read it.
+    pub extent: Option<String>,
 }
 
 /// Everything the text panel shows. Empty pieces are left out.
@@ -60,11 +62,15 @@ impl Panel {
         two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
-            line(&mut text, format_args!("| level | cm | vertices | PARTs |\n|--:|:--|--:|--:|"));
+            // Only tables with extents get a column for them.
+            let own = self.levels.iter().any(|row| row.extent.is_some());
+            let (head, rule) = if own { (" cut to, cm |", "--:|") } else { ("", "") };
+            line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
             // An empty level says nothing; the others keep their numbers.
             for (i, row) in self.levels.iter().enumerate().filter(|(_, row)| row.vertices > 0) {
                 let (level, range) = (i + 1, range_cm(row.lower_m, row.upper_m));
-                line(&mut text, format_args!("| {level} | {range} | {} | {} |", row.vertices, row.parts));
+                let extent = if own { format!(" {} |", row.extent.as_deref().unwrap_or("")) } else { String::new() };
+                line(&mut text, format_args!("| {level} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
         }
@@ -118,9 +124,9 @@ mod tests {
             title: "skirt on body".into(),
             table: "Table 3".into(),
             levels: vec![
-                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2 },
-                LevelRow { lower_m: 0.0006, upper_m: 0.0006, vertices: 0, parts: 0 },
-                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1 },
+                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2, extent: None },
+                LevelRow { lower_m: 0.0006, upper_m: 0.0006, vertices: 0, parts: 0, extent: None },
+                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1, extent: None },
             ],
             facts: vec![
                 ("model".into(), "coupled".into()),
@@ -142,5 +148,11 @@ mod tests {
             assert!(text.contains(piece), "{piece} in {text}");
         }
         assert!(!text.contains("Fabric"));
+        let mut cut = panel.clone();
+        (cut.levels[0].extent, cut.levels[1].extent) = (Some("6 × 12".into()), Some("not cut".into()));
+        let text = cut.markdown();
+        for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 6 × 12 |", "| 9 | 1 | not cut |"] {
+            assert!(text.contains(piece), "{piece} in {text}");
+        }
     }
 }

@@ -148,7 +148,9 @@ impl TableChoice {
                 levels: table
                     .levels
                     .iter()
-                    .map(|l| [format!("{:?}", l.lower_cm), format!("{:?}", l.upper_cm)])
+                    .map(|l| (l.lower_cm, l.upper_cm, l.extent.map(|e| e.numbers_cm()).unwrap_or_default()))
+                    .map(|(lower, upper, extent)| [vec![lower, upper], extent].concat())
+                    .map(|row| row.iter().map(|cm| format!("{cm:?}")).collect())
                     .collect(),
             },
             TableRule::Quantile { levels } => TableKey::Quantile { levels: *levels },
@@ -166,6 +168,6 @@ pub(super) enum InputKey<'a> {
 #[derive(Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum TableKey {
-    Rows { gap: &'static str, levels: Vec<[String; 2]> },
+    Rows { gap: &'static str, levels: Vec<Vec<String>> },
     Quantile { levels: usize },
 }

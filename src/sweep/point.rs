@@ -3,7 +3,7 @@
 //! A point's id is the blake3 hash of the canonical JSON of all that determines its result: version of the program, body,
 //! garment, fabric, model, range table, extents, smallest PART, refinement, seed and options. A file counts by its contents, not by its
 //! name or place, so that a moved folder or a shard on another machine has the same ids; a range table counts by its
-//! bounds and its gap rule, a fabric by its constants. What changes nothing but timings (repeats, jobs, threads) is no part of it.
+//! bounds, extents and gap rule, a fabric by its constants. What changes nothing but timings (repeats, jobs, threads) is no part of it.
 
 use std::collections::BTreeMap;
 

@@ -13,16 +13,22 @@ pub(super) struct Candidates {
     sorted: Vec<f64>,
     /// Ranks in `sorted`, ascending, distinct, each from 1 to its length − 1.
     ranks: Vec<usize>,
+    /// Whether these are all ranks there are.
+    every: bool,
     /// How far apart candidates are, in ranks.
     spacing: usize,
 }
 
 impl Candidates {
-    /// Evenly spaced ranks, and those of the tables to include.
+    /// Evenly spaced ranks, and those of the tables to include; every rank there is where they are few enough.
     pub(super) fn quantiles(samples: &[Sample<'_>], options: &SearchOptions) -> Self {
         let mut sorted: Vec<f64> = samples.iter().flat_map(|s| s.distances_m).map(|d| d.abs()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         sorted.dedup();
+        if sorted.len() <= options.exact_up_to {
+            let ranks = (1..sorted.len()).collect();
+            return Self { every: true, ..Self::of(sorted, ranks, 1) };
+        }
         let count = options.candidates.max(1);
         let mut ranks: Vec<usize> = (1..=count).map(|i| i * sorted.len() / (count + 1)).collect();
         for level in options.include.iter().flat_map(crate::range_table::RangeTable::effective_levels) {
@@ -35,25 +41,44 @@ impl Candidates {
     }
 
     fn of(sorted: Vec<f64>, mut ranks: Vec<usize>, spacing: usize) -> Self {
-        ranks.retain(|&r| r > 0 && r < sorted.len());
+        // Distances that differ in their last bits may have no bound in centimetres between them.
+        let parts = |r: usize| {
+            let bound_m = bound_cm(&sorted, r) * METRES_PER_CM;
+            sorted[r - 1] < bound_m && bound_m <= sorted[r]
+        };
+        ranks.retain(|&r| r > 0 && r < sorted.len() && parts(r));
         ranks.sort_unstable();
         ranks.dedup();
-        Self { sorted, ranks, spacing }
+        Self { sorted, ranks, every: false, spacing }
     }
 
-    /// About `count` ranks around the given bounds, as far as the candidates were apart so far; the bounds themselves stay in.
-    pub(super) fn around(&self, bounds_cm: &[f64], count: usize) -> Self {
-        let each = (count / bounds_cm.len().max(1)).max(2) / 2;
-        let spacing = self.spacing.div_ceil(each);
+    /// The given bounds, about `count` ranks near them, near and far, and as many quantiles as a third of these, other ones each
+    /// round.
+    pub(super) fn around(&self, bounds_cm: &[f64], count: usize, round: usize) -> Self {
+        let near = 2 * count / 3;
+        let each = (near / (2 * bounds_cm.len().max(1))).max(1);
+        // Distances halve from as far as the first candidates were apart to one rank; where there is no room for all, rounds
+        // take turns.
+        let steps: Vec<usize> = (0..).map(|i| self.spacing >> i).take_while(|&step| step > 0).collect();
         let mut ranks = Vec::new();
         for &bound_cm in bounds_cm {
             let centre = rank(&self.sorted, bound_cm);
             ranks.push(centre);
-            for step in (1..=each).map(|i| i * spacing) {
+            for i in 0..each.min(steps.len()) {
+                let step = steps[(i + round * each) % steps.len()];
                 ranks.extend([centre.saturating_sub(step), centre + step]);
             }
         }
-        Self::of(self.sorted.clone(), ranks, spacing)
+        let others = (count - near).max(1);
+        // Multiples of the golden ratio never come back to the same place.
+        let shift = (round as f64 * 0.618_033_988_749_895).fract();
+        ranks.extend((0..others).map(|i| ((i as f64 + shift) * self.sorted.len() as f64 / others as f64) as usize));
+        Self::of(self.sorted.clone(), ranks, self.spacing)
+    }
+
+    /// Whether there is no other bound that makes a difference.
+    pub(super) fn complete(&self) -> bool {
+        self.every
     }
 
     /// Number of smallest levels, between neighbouring candidates.
@@ -63,16 +88,24 @@ impl Candidates {
 
     /// The candidates, cm.
     pub(super) fn inner_cm(&self) -> Vec<f64> {
-        let halfway = |&r: &usize| 0.5 * (self.sorted[r - 1] + self.sorted[r]) / METRES_PER_CM;
-        self.ranks.iter().map(halfway).collect()
+        self.ranks.iter().map(|&r| bound_cm(&self.sorted, r)).collect()
     }
 
-    /// The smallest level of each distance.
-    pub(super) fn bin_of(&self, distances_m: &[f64]) -> Vec<u32> {
-        let rank_of = |d: f64| self.sorted.partition_point(|&s| s < d);
-        // A distance of rank r, itself the r-th of `sorted`, lies above all candidates up to r.
-        distances_m.iter().map(|d| self.ranks.partition_point(|&c| c <= rank_of(d.abs())) as u32).collect()
+    /// The vertices in each smallest level, ascending.
+    pub(super) fn members(&self, distances_m: &[f64]) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.bins()];
+        for (&d, v) in distances_m.iter().zip(0u32..) {
+            // A distance of rank r, itself the r-th of `sorted`, lies above all candidates up to r.
+            let rank = self.sorted.partition_point(|&s| s < d.abs());
+            members[self.ranks.partition_point(|&c| c <= rank)].push(v);
+        }
+        members
     }
+}
+
+/// The bound of a rank, halfway between its neighbours.
+fn bound_cm(sorted: &[f64], rank: usize) -> f64 {
+    0.5 * (sorted[rank - 1] + sorted[rank]) / METRES_PER_CM
 }
 
 /// How many distances lie below a bound.

@@ -1,6 +1,6 @@
 //! The Pareto front of PART count and representable error.
 
-use crate::range_table::{RangeTable, TableError};
+use crate::range_table::{Extent, RangeTable, TableError};
 
 /// A table that no other found beats in both PARTs and error.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,17 +11,18 @@ pub struct FrontPoint {
     pub rms_m: f64,
     /// Bounds between its levels, cm; the first level starts at 0, the last is open.
     pub inner_bounds_cm: Vec<f64>,
-    /// The extent its PARTs are cut to, m.
-    pub extent_m: Option<f64>,
+    /// The extent of each level; empty where levels alone were searched.
+    pub extents: Vec<Extent>,
 }
 
 impl FrontPoint {
-    /// As a table with a name.
+    /// As a table with a name, extents and all.
     ///
     /// # Errors
     /// [`TableError`] where the bounds were changed so that they no longer ascend.
     pub fn table(&self, name: &str, source: &str) -> Result<RangeTable, TableError> {
-        Ok(RangeTable::from_inner_bounds(name, &self.inner_bounds_cm)?.with_source(source))
+        let table = RangeTable::from_inner_bounds(name, &self.inner_bounds_cm)?.with_source(source);
+        table.with_extents(&self.extents.iter().copied().map(Some).collect::<Vec<_>>())
     }
 }
 

@@ -1,14 +1,14 @@
-//! PARTs and squared error of every level [a, b) between candidate bounds.
+//! PARTs and squared error of every level [a, b) between candidate bounds, uncut and cut to each extent.
 //!
 //! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces, and the
-//! squared error about a piece's mean follows the merge, e = e₁ + e₂ + n₁ n₂/(n₁ + n₂) |ū₁ − ū₂|². With an extent each piece that
-//! changed is cut as stage one would cut it.
+//! squared error about a piece's mean follows the merge, e = e₁ + e₂ + n₁ n₂/(n₁ + n₂) |ū₁ − ū₂|². A piece that changed is
+//! cut as stage one would cut it: its seeds lie where they lie for every extent, so one run of them gives all.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::{Sample, SearchOptions};
-use crate::parts::nearest_seeds;
+use super::Sample;
+use super::ladder::Ladder;
+use crate::parts::{Ruler, spread_seeds};
 
 /// What a level costs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -19,72 +19,65 @@ pub(super) struct Cost {
     pub(super) error: f64,
 }
 
-/// Row a holds the costs of [a, a + 1), [a, a + 2), ... `step` is called once a row.
-pub(super) fn costs(
-    sample: &Sample<'_>,
-    bin_of_vertex: &[u32],
-    bins: usize,
-    options: &SearchOptions,
-    step: &(dyn Fn() + Sync),
-) -> Vec<Vec<Cost>> {
-    let mut members = vec![Vec::new(); bins];
-    for (v, &bin) in bin_of_vertex.iter().enumerate() {
-        members[bin as usize].push(v as u32);
+/// More PARTs than any table may have.
+const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
+
+impl Cost {
+    fn plus(self, other: Self) -> Self {
+        Self { parts: self.parts.saturating_add(other.parts), error: self.error + other.error }
     }
-    let row = |lower: usize| {
-        let mut pieces = Pieces::new(sample, options);
-        let grow = |vertices: &Vec<u32>| {
-            pieces.grow(vertices);
-            pieces.cost()
-        };
-        let row: Vec<Cost> = members[lower..].iter().map(grow).collect();
-        step();
-        row
-    };
-    (0..bins).into_par_iter().with_max_len(1).map(row).collect()
+}
+
+/// The costs of [a, a + 1), [a, a + 2), ... at each step of the ladder, for the vertices of the smallest levels from a on.
+pub(super) fn row(sample: &Sample<'_>, members: &[Vec<u32>], ladder: &Ladder, max_parts: usize) -> Vec<Cost> {
+    let mut pieces = Pieces::new(sample, ladder, max_parts);
+    let mut row = Vec::with_capacity(members.len() * ladder.len());
+    for vertices in members {
+        pieces.grow(vertices);
+        pieces.costs(&mut row);
+    }
+    row
 }
 
 /// The connected pieces of the vertices so far.
 struct Pieces<'a> {
     sample: &'a Sample<'a>,
-    extent_m: Option<f64>,
+    ladder: &'a Ladder,
     /// A level with more PARTs is in no table, so cuts stop there.
     max_parts: usize,
     /// Union-find; `ABSENT` for vertices not in yet.
     parent: Vec<u32>,
-    /// By root: vertices (only their number matters without an extent), sum of displacements, cost.
-    vertices: Vec<Vec<u32>>,
+    /// Number of pieces and their squared errors, uncut.
+    whole: Cost,
+    /// By root: number of vertices and sum of displacements.
     size: Vec<u32>,
     sum: Vec<DVec3>,
-    error: Vec<f64>,
-    cut: Vec<Cost>,
+    /// By root, only where PARTs are cut: the vertices, and the costs at each step, empty where not known.
+    vertices: Vec<Vec<u32>>,
+    cut: Vec<Vec<Cost>>,
+    roots: Vec<u32>,
     /// Scratch: the place of a vertex in its piece.
     place: Vec<u32>,
-    roots: Vec<u32>,
 }
 
 const ABSENT: u32 = u32::MAX;
 
-/// More PARTs than any table may have.
-const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
-
 impl<'a> Pieces<'a> {
-    fn new(sample: &'a Sample<'a>, options: &SearchOptions) -> Self {
-        let (extent_m, max_parts) = (options.extent_m, options.max_parts);
+    fn new(sample: &'a Sample<'a>, ladder: &'a Ladder, max_parts: usize) -> Self {
         let n = sample.displacement.len();
-        let cuts = if extent_m.is_some() { n } else { 0 };
+        let cuts = if ladder.cuts() { n } else { 0 };
         Self {
             sample,
-            extent_m,
+            ladder,
             max_parts,
             parent: vec![ABSENT; n],
-            vertices: vec![Vec::new(); cuts],
+            whole: Cost::default(),
             size: vec![0; n],
             sum: vec![DVec3::ZERO; n],
-            error: vec![0.0; n],
-            cut: vec![Cost::default(); cuts],
-            place: vec![0; cuts],
+            vertices: vec![Vec::new(); cuts],
+            cut: vec![Vec::new(); cuts],
             roots: Vec::new(),
+            place: vec![0; cuts],
         }
     }
 
@@ -101,30 +94,28 @@ impl<'a> Pieces<'a> {
         for &v in vertices {
             let i = v as usize;
             (self.parent[i], self.size[i], self.sum[i]) = (v, 1, self.sample.displacement[i]);
-            if self.extent_m.is_some() {
+            self.whole.parts += 1;
+            if self.ladder.cuts() {
                 self.vertices[i] = vec![v];
+                self.roots.push(v);
             }
-            self.roots.push(v);
             for &w in self.sample.topology.neighbours(v) {
                 if self.parent[w as usize] != ABSENT {
                     self.join(v, w);
                 }
             }
         }
-        let roots = std::mem::take(&mut self.roots);
-        self.roots = roots.into_iter().filter(|&r| self.parent[r as usize] == r).collect();
-        if let Some(extent_m) = self.extent_m {
-            for &r in &self.roots {
-                // No cost yet: new or changed.
-                if self.cut[r as usize].parts == 0 {
-                    self.cut[r as usize] = cut_cost(
-                        self.sample,
-                        &mut self.vertices[r as usize],
-                        &mut self.place,
-                        extent_m,
-                        self.max_parts,
-                    );
-                }
+        let parent = &self.parent;
+        self.roots.retain(|&r| parent[r as usize] == r);
+        for &r in &self.roots {
+            if self.cut[r as usize].is_empty() {
+                self.cut[r as usize] = cut_costs(
+                    self.sample,
+                    &mut self.vertices[r as usize],
+                    &mut self.place,
+                    self.ladder,
+                    self.max_parts,
+                );
             }
         }
     }
@@ -139,31 +130,40 @@ impl<'a> Pieces<'a> {
         let (i, j) = (p as usize, q as usize);
         let (ni, nj) = (f64::from(self.size[i]), f64::from(self.size[j]));
         let apart = (self.sum[i] / ni).distance_squared(self.sum[j] / nj);
-        self.error[i] += self.error[j] + ni * nj / (ni + nj) * apart;
+        self.whole.error += ni * nj / (ni + nj) * apart;
+        self.whole.parts -= 1;
         self.parent[j] = p;
         self.size[i] += self.size[j];
         let sum = self.sum[j];
         self.sum[i] += sum;
-        if self.extent_m.is_some() {
+        if self.ladder.cuts() {
             let moved = std::mem::take(&mut self.vertices[j]);
             self.vertices[i].extend(moved);
-            self.cut[i] = Cost::default();
+            self.cut[i].clear();
+            self.cut[j].clear();
         }
     }
 
-    fn cost(&self) -> Cost {
-        let add = |a: Cost, b: Cost| Cost { parts: a.parts.saturating_add(b.parts), error: a.error + b.error };
-        let of = |&r: &u32| match self.extent_m {
-            None => Cost { parts: 1, error: self.error[r as usize] },
-            Some(_) => self.cut[r as usize],
-        };
-        self.roots.iter().map(of).fold(Cost::default(), add)
+    /// Appends the costs of all vertices so far, uncut and at each further step.
+    fn costs(&self, out: &mut Vec<Cost>) {
+        out.push(self.whole);
+        let at = |step: usize| self.roots.iter().map(|&r| self.cut[r as usize][step]).fold(Cost::default(), Cost::plus);
+        out.extend((0..self.ladder.len() - 1).map(at));
     }
 }
 
-/// The cost of one connected piece, cut to an extent, or [`TOO_MANY`].
-fn cut_cost(sample: &Sample<'_>, vertices: &mut [u32], place: &mut [u32], extent_m: f64, max_parts: usize) -> Cost {
+/// The costs of one connected piece cut to each extent, or [`TOO_MANY`].
+fn cut_costs(
+    sample: &Sample<'_>,
+    vertices: &mut [u32],
+    place: &mut [u32],
+    ladder: &Ladder,
+    max_parts: usize,
+) -> Vec<Cost> {
     vertices.sort_unstable();
+    if vertices.len() == 1 {
+        return vec![Cost { parts: 1, error: 0.0 }; ladder.len() - 1];
+    }
     // `place` keeps entries of other pieces, so an entry counts only if it points back.
     for (&v, i) in vertices.iter().zip(0..) {
         place[v as usize] = i;
@@ -172,17 +172,35 @@ fn cut_cost(sample: &Sample<'_>, vertices: &mut [u32], place: &mut [u32], extent
         let i = place[w as usize] as usize;
         (vertices.get(i) == Some(&w)).then_some(i)
     };
-    let found = nearest_seeds(vertices, local, sample.mesh, sample.topology, (extent_m, max_parts));
-    let Some((seed_of_vertex, seeds)) = found else { return TOO_MANY };
-    let mut count = vec![0u32; seeds];
-    let mut mean = vec![DVec3::ZERO; seeds];
-    for (&v, &s) in vertices.iter().zip(&seed_of_vertex) {
-        count[s as usize] += 1;
-        mean[s as usize] += sample.displacement[v as usize];
+    // About the mean of the whole piece, so that little is lost in the difference below.
+    let mean = vertices.iter().map(|&v| sample.displacement[v as usize]).sum::<DVec3>() / vertices.len() as f64;
+    let moved: Vec<DVec3> = vertices.iter().map(|&v| sample.displacement[v as usize] - mean).collect();
+    let squares: f64 = moved.iter().map(|u| u.length_squared()).sum();
+    let mut sums: Vec<(DVec3, u32)> = Vec::new();
+    let mut all = Vec::with_capacity(ladder.len() - 1);
+    for shape in ladder.shapes() {
+        let mut left = &shape.extents_m[..];
+        let ruler =
+            Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };
+        spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
+            let reached = left.iter().take_while(|&&e| radius_m <= 0.5 * e).count();
+            if reached > 0 {
+                left = &left[reached..];
+                // Σ |u − ū_s|² = Σ |u|² − Σ_s |Σ u|²/n_s
+                sums.clear();
+                sums.resize(seeds, (DVec3::ZERO, 0));
+                for (&u, &s) in moved.iter().zip(seed_of_vertex) {
+                    let (sum, count) = &mut sums[s as usize];
+                    *sum += u;
+                    *count += 1;
+                }
+                let held: f64 = sums.iter().map(|(sum, count)| sum.length_squared() / f64::from((*count).max(1))).sum();
+                let cost = Cost { parts: seeds as u32, error: (squares - held).max(0.0) };
+                all.extend(std::iter::repeat_n(cost, reached));
+            }
+            left.is_empty() || seeds >= max_parts
+        });
+        all.extend(std::iter::repeat_n(TOO_MANY, left.len()));
     }
-    for (mean, &count) in mean.iter_mut().zip(&count) {
-        *mean /= f64::from(count.max(1));
-    }
-    let squared = |(&v, &s): (&u32, &u32)| sample.displacement[v as usize].distance_squared(mean[s as usize]);
-    Cost { parts: seeds as u32, error: vertices.iter().zip(&seed_of_vertex).map(squared).sum() }
+    all
 }

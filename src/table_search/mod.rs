@@ -3,40 +3,46 @@
 //! levels and range values of each level").
 //!
 //! Both quantities add up over levels: the PARTs of level [a, b) are the connected pieces of the vertices with a ≤ d < b, whatever
-//! the other levels are, and so are their errors, cut to an extent or not. So a table is a path through the candidate
-//! bounds, and the best tables for every number of PARTs come out of one dynamic program,
+//! the other levels are, and so are their errors, cut to an extent e of the level's own or not. So a table is a path through the
+//! candidate bounds, and the best tables for every number of PARTs come out of one dynamic program,
 //!
 //! ```text
-//! E(b, p) = min over a < b of E(a, p − c(a, b)) + v(a, b)
+//! E(b, p) = min over a < b and e of E(a, p − c(a, b, e)) + v(a, b, e)
 //! ```
 //!
-//! exact over all tables whose bounds are candidates. Candidates are quantiles of the distances plus the bounds of given tables
-//! (so the front is never worse than those); later rounds put them close around the best table found.
+//! exact over all tables whose bounds are candidates. For levels alone on a garment of ordinary size every bound that makes a
+//! difference is one, so that no table at all is better. With extents candidates are quantiles of the distances plus the bounds
+//! of given tables (so the front is never worse than those); later rounds put them close around the best table found.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | c(a, b) | PARTs of level [a, b), over all garments | – |
-//! | v(a, b) | their share of the squared representable error, Σ over garments of weight/vertices · Σ \|u_i − ū_k\|² | m² |
+//! | c(a, b, e) | PARTs of level [a, b) cut to extent e, over all garments | – |
+//! | v(a, b, e) | their share of the squared representable error, Σ over garments of weight/vertices · Σ \|u_i − ū_k\|² | m² |
 //! | E(b, p) | least squared error of the vertices below b with p PARTs | m² |
 //!
 //! Source: own; segmentation by dynamic programming goes back to Bellman 1961, "On the approximation of curves by line segments
 //! using dynamic programming", Communications of the ACM 4(6). Limits: the error is of one translation a PART against one
-//! reference drape; O(m² n) for m candidates and n vertices without an extent, m² times a cut with one.
+//! reference drape; O(m n + m² p) for m candidates, n vertices and p PARTs without extents, m² cuts with them.
 
 mod candidates;
 mod front;
 mod intervals;
+mod ladder;
 mod program;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 pub use front::{Front, FrontPoint};
 
 use crate::mesh::{Topology, TriMesh};
+use crate::parts::Grain;
 use crate::range_table::RangeTable;
 use candidates::Candidates;
+use ladder::Ladder;
+use program::Program;
 
 /// One garment to find a table for.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +51,8 @@ pub struct Sample<'a> {
     pub mesh: &'a TriMesh,
     /// Its connectivity.
     pub topology: &'a Topology,
+    /// The grain of its cloth.
+    pub grain: &'a Grain,
     /// Distance of each vertex from the body, m; its sign does not matter.
     pub distances_m: &'a [f64],
     /// Reference displacement of each vertex, undraped to draped, m.
@@ -56,15 +64,25 @@ pub struct Sample<'a> {
 /// What to search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchOptions {
-    /// Candidate bounds per round. Default 400, with an extent 60: its cost grows with the square, times a cut.
+    /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
+    /// extents means cut.
     pub candidates: usize,
+    /// With at most so many distinct distances every bound is a candidate, and one round is exact. Default 12,000 for
+    /// levels alone, 0 with extents.
+    pub exact_up_to: usize,
     /// Most PARTs a table may yield, over all garments together.
     pub max_parts: usize,
-    /// Cut every PART to this extent, m; `None` for levels alone.
-    pub extent_m: Option<f64>,
-    /// Rounds: the first over quantiles, the others around the best table so far. Default 3.
+    /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
+    pub widths_cm: Vec<f64>,
+    /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
+    /// all widths.
+    pub shapes: Vec<f64>,
+    /// Candidate bounds in each round after the first. Default 400, with extents 40.
+    pub candidates_around: usize,
+    /// Rounds: the first over quantiles, the others around the best table so far, with extents finely between the widths and
+    /// shapes given. They end early when two in a row bring less than a thousandth. Default 3, with extents 12.
     pub rounds: usize,
-    /// Tables whose bounds are candidates too, so that the front is never worse than they are.
+    /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
     pub include: Vec<RangeTable>,
 }
 
@@ -72,13 +90,30 @@ impl SearchOptions {
     /// Defaults for levels alone with a limit of PARTs.
     #[must_use]
     pub fn new(max_parts: usize) -> Self {
-        Self { candidates: 400, max_parts, extent_m: None, rounds: 3, include: vec![RangeTable::table_3()] }
+        let include = vec![RangeTable::table_3()];
+        Self {
+            candidates: 400,
+            candidates_around: 400,
+            exact_up_to: 12_000,
+            max_parts,
+            widths_cm: Vec::new(),
+            shapes: vec![0.5, 1.0, 2.0, 4.0],
+            rounds: 3,
+            include,
+        }
     }
 
-    /// Defaults for levels that are cut to an extent (m).
+    /// Defaults for levels that may each be cut to one of these widths (cm).
     #[must_use]
-    pub fn with_extent(max_parts: usize, extent_m: f64) -> Self {
-        Self { candidates: 60, rounds: 2, extent_m: Some(extent_m), ..Self::new(max_parts) }
+    pub fn with_extents(max_parts: usize, widths_cm: &[f64]) -> Self {
+        Self {
+            candidates: 120,
+            candidates_around: 40,
+            exact_up_to: 0,
+            rounds: 12,
+            widths_cm: widths_cm.to_vec(),
+            ..Self::new(max_parts)
+        }
     }
 }
 
@@ -144,6 +179,8 @@ pub enum SearchError {
 pub struct Search {
     /// The best tables after each round, never worse than the round before.
     pub rounds: Vec<Front>,
+    /// Whether every bound was tried: no table with these extents is better then.
+    pub exact: bool,
 }
 
 impl Search {
@@ -166,61 +203,73 @@ pub fn search(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Search, SearchError> {
     check(samples)?;
-    let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
+    let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
+    let exact = candidates.complete();
+    let round_count = if exact { 1 } else { options.rounds.max(1) };
     let mut rounds: Vec<Front> = Vec::new();
-    let round_count = options.rounds.max(1);
     for round in 1..=round_count {
-        let total = candidates.bins() * samples.len();
+        let total = candidates.bins();
         let done = AtomicUsize::new(0);
         let step = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(Progress { round, rounds: round_count, done, total });
         };
-        let bins = candidates.bins();
-        // Row a holds the levels [a, b) for b = a + 1, a + 2, ...
-        let mut costs: Vec<_> = (0..bins).map(|a| vec![intervals::Cost::default(); bins - a]).collect();
-        for sample in samples {
-            let share = sample.weight / (total_weight * sample.distances_m.len() as f64);
-            let bin_of_vertex = candidates.bin_of(sample.distances_m);
-            let found = intervals::costs(sample, &bin_of_vertex, bins, options, &step);
-            for (cost, found) in costs.iter_mut().flatten().zip(found.into_iter().flatten()) {
-                cost.parts = cost.parts.saturating_add(found.parts);
-                cost.error += share * found.error;
-            }
-        }
-        let mut found = program::front(&costs, &candidates.inner_cm(), options.max_parts);
-        found.points.iter_mut().for_each(|p| p.extent_m = options.extent_m);
+        let found = one_round(samples, &candidates, &ladder, options.max_parts, &step);
         let front = rounds.last().map_or_else(|| found.clone(), |before| before.union(&found));
         let Some(best) = front.best_within(options.max_parts) else {
             return Err(SearchError::TooFewParts { max_parts: options.max_parts });
         };
-        candidates = candidates.around(&best.inner_bounds_cm, options.candidates);
+        candidates = candidates.around(&best.inner_bounds_cm, options.candidates_around, round);
+        if round == 1 {
+            ladder = Ladder::fine(&options.widths_cm, &options.shapes);
+        }
+        let reached = best.rms_m;
         rounds.push(front);
-    }
-    Ok(Search { rounds })
-}
-
-/// [`search`] at several extents (`None`: levels alone), and the front over all of them; a point tells its extent. Extents at which
-/// no table is coarse enough add nothing.
-///
-/// # Errors
-/// As [`search`], if no extent yields a table.
-pub fn search_extents(
-    samples: &[Sample<'_>],
-    options: &SearchOptions,
-    extents_m: &[Option<f64>],
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Front, SearchError> {
-    let mut front = Front::default();
-    for &extent_m in extents_m {
-        match search(samples, &SearchOptions { extent_m, ..options.clone() }, progress) {
-            Ok(found) => front = front.union(found.front()),
-            Err(SearchError::TooFewParts { .. }) => {}
-            Err(other) => return Err(other),
+        let two_before = round.checked_sub(3).and_then(|i| rounds[i].best_within(options.max_parts));
+        if two_before.is_some_and(|before| reached > 0.999 * before.rms_m) {
+            break;
         }
     }
-    if front.points.is_empty() { Err(SearchError::TooFewParts { max_parts: options.max_parts }) } else { Ok(front) }
+    Ok(Search { rounds, exact })
+}
+
+/// Lower bounds whose levels are evaluated at once: enough for any machine, few enough to hold.
+const BATCH: usize = 64;
+
+/// The front over one set of candidates.
+fn one_round(
+    samples: &[Sample<'_>],
+    candidates: &Candidates,
+    ladder: &Ladder,
+    max_parts: usize,
+    step: &(dyn Fn() + Sync),
+) -> Front {
+    let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
+    let bins = candidates.bins();
+    let members: Vec<Vec<Vec<u32>>> = samples.iter().map(|s| candidates.members(s.distances_m)).collect();
+    let row = |lower: usize| {
+        let mut costs = vec![intervals::Cost::default(); (bins - lower) * ladder.len()];
+        for (sample, members) in samples.iter().zip(&members) {
+            let share = sample.weight / (total_weight * sample.distances_m.len() as f64);
+            let found = intervals::row(sample, &members[lower..], ladder, max_parts);
+            for (cost, found) in costs.iter_mut().zip(found) {
+                cost.parts = cost.parts.saturating_add(found.parts);
+                cost.error += share * found.error;
+            }
+        }
+        step();
+        costs
+    };
+    let mut program = Program::new(bins, max_parts, ladder.len());
+    for from in (0..bins).step_by(BATCH) {
+        let batch = from..bins.min(from + BATCH);
+        let rows: Vec<_> = batch.clone().into_par_iter().with_max_len(1).map(row).collect();
+        for (lower, row) in batch.zip(&rows) {
+            program.take(lower, row);
+        }
+    }
+    program.front(&candidates.inner_cm(), ladder)
 }
 
 fn check(samples: &[Sample<'_>]) -> Result<(), SearchError> {

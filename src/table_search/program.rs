@@ -1,60 +1,117 @@
 //! The dynamic program over candidate bounds: least error for every number of PARTs.
 
+use rayon::prelude::*;
+
 use super::front::{Front, FrontPoint};
 use super::intervals::Cost;
+use super::ladder::Ladder;
+use crate::range_table::Extent;
 
-/// The Pareto front from `costs` (row a: levels [a, a + 1), [a, a + 2), ...) and the inner bounds in cm.
-pub(super) fn front(costs: &[Vec<Cost>], inner_cm: &[f64], max_parts: usize) -> Front {
-    let bins = costs.len();
-    let width = max_parts + 1;
-    // error[b * width + p]: E(b, p); from[...]: the lower bound of its last level.
-    let mut error = vec![f64::INFINITY; (bins + 1) * width];
-    let mut from = vec![0u32; (bins + 1) * width];
-    error[0] = 0.0;
-    for upper in 1..=bins {
-        let (before, after) = error.split_at_mut(upper * width);
-        let (after, from) = (&mut after[..width], &mut from[upper * width..(upper + 1) * width]);
-        for lower in 0..upper {
-            let cost = costs[lower][upper - lower - 1];
-            let parts = cost.parts as usize;
-            if parts > max_parts {
-                continue;
-            }
-            let reach = &before[lower * width..(lower + 1) * width - parts];
-            for ((best, from), &below) in after[parts..].iter_mut().zip(&mut from[parts..]).zip(reach) {
-                // Strictly less: of equals the lowest bound stays, which is the table with fewer levels.
-                if below + cost.error < *best {
-                    *best = below + cost.error;
-                    *from = lower as u32;
-                }
-            }
-        }
-    }
-    let mut points = Vec::new();
-    let mut least = f64::INFINITY;
-    for parts in 0..=max_parts {
-        let squared = error[bins * width + parts];
-        if squared < least {
-            least = squared;
-            let inner_bounds_cm = bounds(costs, &from, inner_cm, parts, width);
-            points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extent_m: None });
-        }
-    }
-    Front { points }
+/// How the best table up to a bound ends.
+#[derive(Debug, Clone, Copy, Default)]
+struct Last {
+    /// Lower bound of its last level.
+    lower: u32,
+    /// PARTs of that level.
+    parts: u32,
+    /// Its step of the ladder.
+    step: u32,
 }
 
-/// The inner bounds of the best table with `parts` PARTs, read back from the end.
-fn bounds(costs: &[Vec<Cost>], from: &[u32], inner_cm: &[f64], mut parts: usize, width: usize) -> Vec<f64> {
-    let mut upper = costs.len();
-    let mut found = Vec::new();
-    while upper > 0 {
-        let lower = from[upper * width + parts] as usize;
-        parts -= costs[lower][upper - lower - 1].parts as usize;
-        if lower > 0 {
-            found.push(inner_cm[lower - 1]);
+/// E(b, p) for every bound b and number of PARTs p, filled from the lowest bound upwards.
+pub(super) struct Program {
+    bins: usize,
+    max_parts: usize,
+    steps: usize,
+    error: Vec<f64>,
+    last: Vec<Last>,
+}
+
+/// The steps of one level with no more PARTs than allowed, without those that another beats in both PARTs and error.
+fn worthwhile(steps: &[Cost], max_parts: usize) -> Vec<(u32, Cost)> {
+    let mut kept: Vec<(u32, Cost)> = (0..).zip(steps.iter().copied()).collect();
+    kept.retain(|(_, cost)| cost.parts as usize <= max_parts);
+    kept.sort_by(|(_, a), (_, b)| a.parts.cmp(&b.parts).then(a.error.total_cmp(&b.error)));
+    let mut least = f64::INFINITY;
+    kept.retain(|(_, cost)| {
+        cost.error < least && {
+            least = cost.error;
+            true
         }
-        upper = lower;
+    });
+    kept
+}
+
+/// Bounds worth a task of their own.
+const GRAIN: usize = 64;
+
+impl Program {
+    /// For so many smallest levels, with so many steps of extents each.
+    pub(super) fn new(bins: usize, max_parts: usize, steps: usize) -> Self {
+        let width = max_parts + 1;
+        let mut error = vec![f64::INFINITY; (bins + 1) * width];
+        error[0] = 0.0;
+        Self { bins, max_parts, steps, error, last: vec![Last::default(); (bins + 1) * width] }
     }
-    found.reverse();
-    found
+
+    /// Takes the levels that start at `lower`: their costs to each upper bound, all steps of one after the other. Rows come in
+    /// ascending order, each once.
+    pub(super) fn take(&mut self, lower: usize, row: &[Cost]) {
+        let (width, max_parts) = (self.max_parts + 1, self.max_parts);
+        let (before, after) = self.error.split_at_mut((lower + 1) * width);
+        let below = &before[lower * width..];
+        let Some(fewest) = below.iter().position(|e| e.is_finite()) else { return };
+        let last = &mut self.last[(lower + 1) * width..];
+        let uppers = after.par_chunks_mut(width).zip(last.par_chunks_mut(width)).zip(row.par_chunks(self.steps));
+        uppers.with_min_len(GRAIN).for_each(|((error, last), steps)| {
+            for (step, cost) in worthwhile(steps, max_parts) {
+                let parts = cost.parts as usize;
+                let level = Last { lower: lower as u32, parts: cost.parts, step };
+                let from = (fewest + parts).min(width);
+                let reach = error[from..].iter_mut().zip(&mut last[from..]).zip(&below[fewest..]);
+                for ((best, last), &below) in reach {
+                    // Strictly less: of equals the lowest bound stays, which is the table with fewer levels.
+                    if below + cost.error < *best {
+                        *best = below + cost.error;
+                        *last = level;
+                    }
+                }
+            }
+        });
+    }
+
+    /// The Pareto front, once all rows are taken.
+    pub(super) fn front(&self, inner_cm: &[f64], ladder: &Ladder) -> Front {
+        let mut points = Vec::new();
+        let mut least = f64::INFINITY;
+        for parts in 0..=self.max_parts {
+            let squared = self.error[self.bins * (self.max_parts + 1) + parts];
+            if squared < least {
+                least = squared;
+                let (inner_bounds_cm, extents) = self.table(parts, inner_cm, ladder);
+                points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extents });
+            }
+        }
+        Front { points }
+    }
+
+    /// The inner bounds and extents of the best table with so many PARTs, read back from the end.
+    fn table(&self, mut parts: usize, inner_cm: &[f64], ladder: &Ladder) -> (Vec<f64>, Vec<Extent>) {
+        let (mut bounds, mut extents) = (Vec::new(), Vec::new());
+        let mut upper = self.bins;
+        while upper > 0 {
+            let last = self.last[upper * (self.max_parts + 1) + parts];
+            parts -= last.parts as usize;
+            upper = last.lower as usize;
+            if let Some(bound) = upper.checked_sub(1) {
+                bounds.push(inner_cm[bound]);
+            }
+            if ladder.cuts() {
+                extents.push(ladder.extent(last.step as usize));
+            }
+        }
+        bounds.reverse();
+        extents.reverse();
+        (bounds, extents)
+    }
 }

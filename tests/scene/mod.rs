@@ -147,6 +147,7 @@ impl Scene {
             upper_m: bounds_cm.get(k).map_or(f64::INFINITY, |b| b / 100.0),
             vertices: levels.iter().filter(|&&l| l == k).count(),
             parts: part_level.iter().filter(|&&l| l == k).count(),
+            extent: None,
         });
         let text = |pairs: &[(&str, &str)]| pairs.iter().map(|&(a, b)| (a.to_owned(), b.to_owned())).collect();
         let panel = Panel {

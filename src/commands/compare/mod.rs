@@ -175,7 +175,9 @@ impl CompareArgs {
             let point: &Point = &plan.points[row.index];
             let placed = bench.placed(point)?;
             let table = point.table.resolve(&placed.distance_m)?;
-            let parts = segment(&placed.scene.topology, &placed.distance_m, &table);
+            let (mesh, topology) = (&placed.scene.garment, &placed.scene.topology);
+            let parts =
+                segment(topology, &placed.distance_m, &table).cut_to_table(mesh, topology, &placed.scene.rest, &table);
             let scene = point.scene_id();
             if first.as_ref().is_none_or(|(of, _)| *of != scene) {
                 first = Some((scene, parts.clone()));

@@ -8,6 +8,7 @@ pub(crate) mod recording;
 pub(crate) mod report;
 pub(crate) mod scenes;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -15,7 +16,7 @@ use anyhow::Context as _;
 use clap::Args;
 use partwise::accuracy::reference::ReferenceCache;
 use partwise::record::{RecordSummary, Sink, Tab};
-use partwise::sweep::{Existing, Plan, Progress, Row, Run, Shard, Status, sweep};
+use partwise::sweep::{Existing, Plan, Point, Progress, Row, Run, Shard, Status, sweep};
 
 use self::kept::Shelf;
 use self::points::{ACCURACY, Against, Bench};
@@ -92,6 +93,9 @@ impl SweepArgs {
         let plan = self.plan()?;
         let folder = self.folder();
         let shelf = Shelf::in_folder(&folder);
+        // Before hours of points, not after them.
+        let scenes: BTreeSet<String> = plan.points.iter().map(Point::scene_id).collect();
+        one_recording(scenes.len(), &folder, &self.sinks)?;
         let bench = Bench::new(&shelf, cache(self.cache.as_ref()));
         let existing = match self.resume {
             true => Existing::Resume { retry_failed: true, adopt: self.adopt },
@@ -192,6 +196,18 @@ pub(crate) fn cache(given: Option<&PathBuf>) -> Option<ReferenceCache> {
     given.cloned().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
 }
 
+/// Refuses a sink that takes one recording where there are several.
+fn one_recording(recordings: usize, folder: &Path, sinks: &SinkArgs) -> anyhow::Result<()> {
+    if recordings > 1 && (sinks.save.is_some() || sinks.serve) {
+        return Err(UserError::new(format!(
+            "--save and --serve take one recording, and this sweep makes {recordings}, one a garment; leave them out, and look at \
+             one of {}/*.rrd with `partwise view`",
+            folder.display()
+        )));
+    }
+    Ok(())
+}
+
 /// Makes the recordings of a sweep, in its folder unless a file was given.
 pub(crate) fn record_all(
     rows: &[Row],
@@ -207,14 +223,7 @@ pub(crate) fn record_all(
             "{missing} points have a row but no drape on disk and are missing from the recording"
         ));
     }
-    if groups.len() > 1 && (sinks.save.is_some() || sinks.serve) {
-        return Err(UserError::new(format!(
-            "--save and --serve take one recording, and this sweep makes {}, one a garment; leave them out, and look at one of \
-             {}/*.rrd with `partwise view`",
-            groups.len(),
-            folder.display()
-        )));
-    }
+    one_recording(groups.len(), folder, sinks)?;
     let mut done = Vec::new();
     for group in &groups {
         let mut sinks = sinks.clone();

@@ -179,6 +179,7 @@ fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
             upper_m: upper * METRES_PER_CM,
             vertices: 0,
             parts: 0,
+            extent: None,
         })
         .collect();
     for &level in &point.level_of_part {

@@ -1,4 +1,4 @@
-//! The search itself: levels alone, then levels cut to each extent; what was best after each iteration; which table is taken.
+//! The search itself: levels alone, then levels and extents; what was best after each iteration; which table is taken.
 
 use partwise::range_table::RangeTable;
 use partwise::table_search::{Front, FrontPoint, Progress, Search, SearchError, SearchOptions, search};
@@ -6,11 +6,11 @@ use partwise::table_search::{Front, FrontPoint, Progress, Search, SearchError, S
 use super::wearer::{Holds, Wearer};
 use crate::commands::{console, interrupt};
 
-/// One iteration: a round of the search at one extent.
+/// One iteration: a round of one search.
 #[derive(Debug, Clone)]
 pub(crate) struct Iteration {
-    /// The extent searched at, m; `None` for levels alone.
-    pub(crate) extent_m: Option<f64>,
+    /// What was searched.
+    pub(crate) what: &'static str,
     /// Its round, from 1.
     pub(crate) round: usize,
     /// All found so far that nothing beats.
@@ -24,6 +24,8 @@ pub(crate) struct Found {
     pub(crate) iterations: Vec<Iteration>,
     /// The front of levels alone.
     pub(crate) levels: Front,
+    /// Whether every bound was tried for it: no table of levels alone is better then.
+    pub(crate) exact: bool,
     /// The front of levels and extents together.
     pub(crate) all: Front,
 }
@@ -33,8 +35,6 @@ pub(crate) struct Found {
 pub(crate) struct Taken {
     /// The table.
     pub(crate) table: RangeTable,
-    /// The extent its PARTs are cut to, m.
-    pub(crate) extent_m: Option<f64>,
     /// What it holds, garment by garment, in the order of the garments it was tuned on.
     pub(crate) holds: Vec<Holds>,
 }
@@ -43,23 +43,24 @@ pub(crate) struct Taken {
 pub(crate) fn find(
     wearers: &[&Wearer],
     max_parts: usize,
-    extents_m: &[f64],
+    (extents_cm, shapes): (&[f64], &[f64]),
     candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
     let samples: Vec<_> = wearers.iter().map(|w| w.sample()).collect();
-    let mut found = Found { iterations: Vec::new(), levels: Front::default(), all: Front::default() };
-    let runs = std::iter::once(None).chain(extents_m.iter().copied().map(Some));
-    for extent_m in runs {
+    let mut found = Found { iterations: Vec::new(), levels: Front::default(), exact: false, all: Front::default() };
+    let levels = ("levels alone", SearchOptions::new(max_parts));
+    let both = (
+        "levels and extents",
+        SearchOptions { shapes: shapes.to_vec(), ..SearchOptions::with_extents(max_parts, extents_cm) },
+    );
+    for (title, mut options) in [levels, both].into_iter().take(if extents_cm.is_empty() { 1 } else { 2 }) {
         if interrupt::requested() {
             break;
         }
-        let mut options = match extent_m {
-            None => SearchOptions::new(max_parts),
-            Some(extent_m) => SearchOptions::with_extent(max_parts, extent_m),
-        };
-        options.candidates = candidates.unwrap_or(options.candidates);
-        let title = extent_m.map_or("levels alone".to_owned(), |m| format!("cut to {:.1} cm", 100.0 * m));
+        if let Some(candidates) = candidates {
+            (options.candidates, options.exact_up_to) = (candidates, candidates);
+        }
         let bar = console::progress(Some(0), &format!("{what}: {title}"));
         let progress = |p: Progress| {
             bar.set_length((p.total * p.rounds) as u64);
@@ -67,21 +68,15 @@ pub(crate) fn find(
         };
         let searched = search(&samples, &options, &progress);
         bar.finish_and_clear();
-        match searched {
-            Ok(Search { rounds }) => {
-                for (round, front) in (1..).zip(&rounds) {
-                    found.iterations.push(Iteration { extent_m, round, front: found.all.union(front) });
-                }
-                let last = rounds.last().cloned().unwrap_or_default();
-                if extent_m.is_none() {
-                    found.levels = last.clone();
-                }
-                found.all = found.all.union(&last);
-            }
-            // Pieces of this extent alone are too many: a larger one may do.
-            Err(SearchError::TooFewParts { .. }) if extent_m.is_some() => {}
-            Err(other) => return Err(other),
+        let Search { rounds, exact } = searched?;
+        for (round, front) in (1..).zip(&rounds) {
+            found.iterations.push(Iteration { what: title, round, front: found.all.union(front) });
         }
+        let last = rounds.last().cloned().unwrap_or_default();
+        if options.widths_cm.is_empty() {
+            (found.levels, found.exact) = (last.clone(), exact);
+        }
+        found.all = found.all.union(&last);
     }
     Ok((!found.all.points.is_empty()).then_some(found))
 }
@@ -105,6 +100,6 @@ pub(crate) fn take(front: &Front, wearers: &[&Wearer], max_parts: usize, name: &
 
 fn taken(point: &FrontPoint, wearers: &[&Wearer], name: &str) -> anyhow::Result<Taken> {
     let table = point.table(name, "")?;
-    let holds = wearers.iter().map(|w| w.holds(&table, point.extent_m)).collect();
-    Ok(Taken { table, extent_m: point.extent_m, holds })
+    let holds = wearers.iter().map(|w| w.holds(&table)).collect();
+    Ok(Taken { table, holds })
 }

@@ -31,7 +31,8 @@ Searches range tables for the least error at every number of PARTs.
 The paper adjusts its table by iteration with a computer and leaves the best one open. The error meant here is the representable \
 error: what remains of the reference drape when each PART moves by the mean of its vertices. No mechanics with one displacement a \
 PART can do better, and it takes no mechanics to compute, so that the best tables for every number of PARTs come out of one exact \
-dynamic program. First levels alone are searched, as the paper asks it, then levels whose PARTs are cut to an extent along the cloth.
+dynamic program. First levels alone are searched, as the paper asks it, over every bound that makes a difference, so that no table is better; then levels \
+each of whose PARTs may be cut to an extent of its own along the cloth.
 
 `partwise compare` then shows what the model makes of a table.";
 
@@ -65,16 +66,26 @@ pub(crate) struct TuneArgs {
     /// Most PARTs a table may make, over all garments tuned together [default: as many as Table 3 makes]
     #[arg(long, value_name = "N", help_heading = "Search")]
     max_parts: Option<usize>,
-    /// Extents to cut PARTs to
+    /// Widths (along the weft) a level may be cut to; not to be cut is always open to it
     #[arg(
         long,
         value_name = "CM[,CM...]",
         value_delimiter = ',',
-        default_value = "14,16,18,20,22,25,30,40,50",
+        default_value = "4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,22,24,26,28,30,33,36,40,45,50,60,70,80",
         help_heading = "Search"
     )]
     extents: Vec<f64>,
-    /// Bounds tried in each round; the time grows with the square [default: 400 for levels alone, 60 with extents]
+    /// Heights of pieces (along the warp) over their widths; 1 alone keeps them as wide as tall
+    #[arg(
+        long,
+        value_name = "H/W[,H/W...]",
+        value_delimiter = ',',
+        default_value = "0.5,1,2,4",
+        help_heading = "Search"
+    )]
+    shapes: Vec<f64>,
+    /// Bounds tried in each round; the time grows with the square [default: all for levels alone on up to 6000 vertices,
+    /// otherwise 400; 120 with extents]
     #[arg(long, value_name = "N", help_heading = "Search")]
     candidates: Option<usize>,
     /// Search levels alone
@@ -111,7 +122,7 @@ impl TuneArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
-        let extents_m = self.extents_m()?;
+        let extents_cm = self.extents_cm()?;
         let fabric = self.fabric()?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
         let names: Vec<String> = if self.garment.is_empty() {
@@ -135,10 +146,11 @@ impl TuneArgs {
             if interrupt::requested() {
                 break;
             }
-            self.tune(set, &held_out, &extents_m, &mut results)?;
+            self.tune(set, &held_out, &extents_cm, &mut results)?;
         }
         let front = report::csv(&results.fronts)?;
         self.write(&self.out.join("front.csv"), &front)?;
+        self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
         match self.format {
             Format::Csv => console::result(&front),
             Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
@@ -166,16 +178,23 @@ impl TuneArgs {
         &self,
         set: &[&Wearer],
         held_out: &[Wearer],
-        extents_m: &[f64],
+        extents_cm: &[f64],
         results: &mut Results,
     ) -> anyhow::Result<()> {
         let name = set.iter().map(|w| stem(&w.name)).collect::<Vec<_>>().join("+");
         let max_parts = self.max_parts.unwrap_or_else(|| set.iter().map(|w| w.table_3.parts).sum());
-        let Some(found) = find(set, max_parts, extents_m, self.candidates, &name)? else { return Ok(()) };
+        let Some(found) = find(set, max_parts, (extents_cm, &self.shapes), self.candidates, &name)? else {
+            return Ok(());
+        };
         let mut taken: Vec<(&'static str, Taken)> = Vec::new();
         let kinds = [("levels", &found.levels), ("levels and extents", &found.all)];
-        for (kind, front) in kinds.into_iter().take(if extents_m.is_empty() { 1 } else { 2 }) {
-            results.text.push_str(&report::front(&format!("{name}, {kind}"), front, set));
+        for (kind, front) in kinds.into_iter().take(if extents_cm.is_empty() { 1 } else { 2 }) {
+            results.text.push_str(&report::front(
+                &format!("{name}, {kind}"),
+                front,
+                set,
+                kind == "levels" && found.exact,
+            ));
             results.fronts.push((name.clone(), kind, front.clone()));
             let Some(best) = take(front, set, max_parts, &format!("{name}, {kind}"))? else { continue };
             let path = self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")));
@@ -211,7 +230,7 @@ impl TuneArgs {
         Ok(())
     }
 
-    fn extents_m(&self) -> anyhow::Result<Vec<f64>> {
+    fn extents_cm(&self) -> anyhow::Result<Vec<f64>> {
         if self.levels_only {
             return Ok(Vec::new());
         }
@@ -220,7 +239,10 @@ impl TuneArgs {
                 "--extents: found {wrong}, expected centimetres above 0; --levels-only for none"
             )));
         }
-        Ok(self.extents.iter().map(|cm| cm / 100.0).collect())
+        if let Some(wrong) = self.shapes.iter().find(|shape| !(shape.is_finite() && **shape > 0.0)) {
+            return Err(UserError::new(format!("--shapes: found {wrong}, expected heights over widths above 0")));
+        }
+        Ok(self.extents.clone())
     }
 
     fn fabric(&self) -> anyhow::Result<Fabric> {

@@ -1,5 +1,5 @@
 //! The recording of a search: a step for Table 3, one for each iteration with the best table so far, and the tables taken side
-//! by side. What is shown as the drape is the best these PARTs can hold: each moved by the mean of the reference's displacement.
+//! by side. No mechanics runs, so there are no forces and no times of stages. What is shown as the drape is the best these PARTs can hold: each moved by the mean of the reference's displacement.
 
 use glam::DVec3;
 use partwise::accuracy::vertex_errors;
@@ -20,7 +20,6 @@ struct Shown<'a> {
     index: i64,
     title: String,
     table: &'a RangeTable,
-    extent_m: Option<f64>,
 }
 
 /// Records what a search found on one of its garments.
@@ -34,32 +33,32 @@ pub(super) fn record(
 ) -> anyhow::Result<RecordSummary> {
     let titles =
         std::iter::once("table-3".to_owned()).chain(taken.iter().map(|(kind, _)| (*kind).to_owned())).collect();
-    let layout = Layout { several_tables: true, error: true, compare: titles, scatter: true, ..Layout::default() };
+    let layout =
+        Layout { several_tables: true, held: true, error: true, compare: titles, scatter: true, ..Layout::default() };
     let name = format!("{}: search", wearer.name);
     let mut recorder = Recorder::open(RecordOptions { sinks, name, layout, ..RecordOptions::default() })?;
     recorder.body(0, &wearer.placed.scene.body_mesh)?;
     recorder.garment(0, &wearer.placed.scene.garment)?;
     let table_3 = RangeTable::table_3();
-    let start = Shown { index: 0, title: "table-3".to_owned(), table: &table_3, extent_m: None };
+    let start = Shown { index: 0, title: "table-3".to_owned(), table: &table_3 };
     step(&mut recorder, wearer, &start)?;
     scatter(&mut recorder, 0, all, &Front::default())?;
     slot(&mut recorder, wearer, 0, &start)?;
     for (index, iteration) in (1..).zip(&found.iterations) {
         let Some(best) = take(&iteration.front, all, max_parts, "best so far")? else { continue };
-        let shown = Shown { index, title: title(iteration), table: &best.table, extent_m: best.extent_m };
+        let shown = Shown { index, title: title(iteration), table: &best.table };
         step(&mut recorder, wearer, &shown)?;
         scatter(&mut recorder, index, all, &iteration.front)?;
     }
     for (place, (kind, taken)) in (1..).zip(taken) {
-        let shown = Shown { index: 0, title: (*kind).to_owned(), table: &taken.table, extent_m: taken.extent_m };
+        let shown = Shown { index: 0, title: (*kind).to_owned(), table: &taken.table };
         slot(&mut recorder, wearer, place, &shown)?;
     }
     Ok(recorder.finish()?)
 }
 
 fn title(iteration: &Iteration) -> String {
-    let where_ = iteration.extent_m.map_or("levels alone".to_owned(), |m| format!("cut to {:.1} cm", 100.0 * m));
-    format!("best after {where_}, round {}", iteration.round)
+    format!("best after {}, round {}", iteration.what, iteration.round)
 }
 
 /// The garment with each PART moved by its mean.
@@ -79,10 +78,10 @@ fn covering(parts: &Parts) -> Vec<u32> {
 }
 
 fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::Result<()> {
-    let parts = wearer.parts(shown.table, shown.extent_m);
+    let parts = wearer.parts(shown.table);
     let positions = held(wearer, &parts);
     let error_mm: Vec<f64> = vertex_errors(&positions, &wearer.reference).iter().map(|e| 1e3 * e).collect();
-    let holds = wearer.holds(shown.table, shown.extent_m);
+    let holds = wearer.holds(shown.table);
     let mut vertices = vec![0; parts.parts_per_level.len()];
     for part in &parts.parts {
         vertices[part.level as usize] += part.vertices.len();
@@ -94,6 +93,7 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
         upper_m: bound.upper_cm * METRES_PER_CM,
         vertices,
         parts,
+        extent: bound.extent.map(|e| e.to_string()),
     });
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let panel = Panel {
@@ -104,7 +104,6 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
             fact("PARTs", holds.parts.to_string()),
             fact("representable error", format!("{:.2} mm RMS", holds.rms_mm)),
             fact("of Table 3's", format!("{:.2}", holds.rms_mm / wearer.table_3.rms_mm)),
-            fact("extent", shown.extent_m.map_or("not cut".to_owned(), |m| format!("{:.1} cm", 100.0 * m))),
             fact("shown as drape", "each PART moved by the reference's mean".to_owned()),
         ],
         command_line: command_line(),
@@ -124,8 +123,8 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
 }
 
 fn slot(recorder: &mut Recorder, wearer: &Wearer, slot: usize, shown: &Shown<'_>) -> anyhow::Result<()> {
-    let parts = wearer.parts(shown.table, shown.extent_m);
-    let holds = wearer.holds(shown.table, shown.extent_m);
+    let parts = wearer.parts(shown.table);
+    let holds = wearer.holds(shown.table);
     recorder.compare(&Chosen {
         index: shown.index,
         slot,

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use comfy_table::{CellAlignment, Table, presets};
-use partwise::range_table::RangeTable;
+use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::Front;
 use serde::Serialize;
 
@@ -22,9 +22,9 @@ pub(super) struct Verdict {
     pub(super) garment: String,
     /// Whether the search did not see this garment.
     pub(super) held_out: bool,
-    /// The extent, cm; none for levels alone.
-    pub(super) extent_cm: Option<f64>,
     pub(super) levels: usize,
+    /// How many of them are cut to an extent.
+    pub(super) cut_levels: usize,
     pub(super) parts: usize,
     pub(super) rms_mm: f64,
     pub(super) table_3_parts: usize,
@@ -35,14 +35,14 @@ pub(super) struct Verdict {
 
 impl Verdict {
     pub(super) fn new(tuned_on: &str, kind: &'static str, taken: &Taken, wearer: &Wearer, held_out: bool) -> Self {
-        let Holds { parts, rms_mm } = wearer.holds(&taken.table, taken.extent_m);
+        let Holds { parts, rms_mm } = wearer.holds(&taken.table);
         Self {
             tuned_on: tuned_on.to_owned(),
             kind,
             garment: wearer.name.clone(),
             held_out,
-            extent_cm: taken.extent_m.map(|m| 100.0 * m),
             levels: taken.table.levels.len(),
+            cut_levels: taken.table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
             parts,
             rms_mm,
             table_3_parts: wearer.table_3.parts,
@@ -59,8 +59,8 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
         "tuned on",
         "what",
         "garment",
-        "extent cm",
         "levels",
+        "cut",
         "PARTs",
         "mm",
         "Table 3: PARTs",
@@ -72,8 +72,8 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
             v.tuned_on.clone(),
             v.kind.to_owned(),
             format!("{}{}", v.garment, if v.held_out { " (held out)" } else { "" }),
-            v.extent_cm.map_or_else(|| "–".to_owned(), |cm| format!("{cm:.1}")),
             v.levels.to_string(),
+            v.cut_levels.to_string(),
             v.parts.to_string(),
             format!("{:.2}", v.rms_mm),
             v.table_3_parts.to_string(),
@@ -93,9 +93,9 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
 const SHOWN: usize = 12;
 
 /// A front for the terminal, thinned.
-pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer]) -> String {
+pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer], exact: bool) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extent cm"]);
+    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extents cm"]);
     let last = front.points.len().saturating_sub(1);
     let mut shown: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();
     shown.dedup();
@@ -104,16 +104,34 @@ pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer]) -> String {
             point.parts.to_string(),
             format!("{:.2}", 1e3 * point.rms_m),
             (point.inner_bounds_cm.len() + 1).to_string(),
-            point.extent_m.map_or_else(|| "–".to_owned(), |m| format!("{:.1}", 100.0 * m)),
+            between(&point.extents),
         ]);
     }
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    let mut out = format!("{title}: {} tables that no other beats\n{table}\n", front.points.len());
+    let beats = if exact { "can beat, every bound tried" } else { "found beats" };
+    let mut out = format!("{title}: {} tables that no other {beats}\n{table}\n", front.points.len());
     let (parts, rms) = table_3(wearers);
     let _ = writeln!(out, "Table 3: {parts} PARTs, {rms:.2} mm\n");
     out
+}
+
+/// The extents of a table in a few letters: the smallest and the largest.
+fn between(extents: &[Extent]) -> String {
+    let area = |e: &&Extent| e.width_cm * e.height_cm;
+    let smallest = extents.iter().min_by(|a, b| area(a).total_cmp(&area(b)));
+    let largest = extents.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
+    match (smallest, largest) {
+        (Some(low), Some(high)) if low != high => format!("{low} to {high}"),
+        (Some(one), Some(_)) => one.to_string(),
+        _ => Extent::UNCUT.to_string(),
+    }
+}
+
+/// An extent in the CSV: `12`, `6x24`, `inf`.
+fn written(extent: &Extent) -> String {
+    extent.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
 }
 
 /// Table 3's PARTs and error over a set, weighted as the search weighs them.
@@ -132,8 +150,21 @@ struct Line<'a> {
     parts: usize,
     rms_mm: f64,
     levels: usize,
-    extent_cm: Option<f64>,
     inner_bounds_cm: String,
+    extents_cm: String,
+}
+
+fn words(numbers: &[f64]) -> String {
+    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Verdicts as CSV.
+pub(super) fn verdicts_csv(all: &[Verdict]) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for verdict in all {
+        writer.serialize(verdict)?;
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
 /// Fronts as CSV.
@@ -147,8 +178,8 @@ pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<St
                 parts: point.parts,
                 rms_mm: 1e3 * point.rms_m,
                 levels: point.inner_bounds_cm.len() + 1,
-                extent_cm: point.extent_m.map(|m| 100.0 * m),
-                inner_bounds_cm: point.inner_bounds_cm.iter().map(f64::to_string).collect::<Vec<_>>().join(" "),
+                inner_bounds_cm: words(&point.inner_bounds_cm),
+                extents_cm: point.extents.iter().map(written).collect::<Vec<_>>().join(" "),
             })?;
         }
     }
@@ -167,10 +198,11 @@ pub(super) fn with_provenance(taken: &Taken, wearers: &[&Wearer]) -> RangeTable 
             )
         })
         .collect();
-    let extent = taken.extent_m.map_or_else(
-        || "levels alone (--max-extent 0)".to_owned(),
-        |m| format!("for PARTs cut to {0} cm (--max-extent {0})", 100.0 * m),
-    );
+    let extent = if taken.table.has_extents() {
+        "every level with its extent, whatever --max-extent says"
+    } else {
+        "levels alone (--max-extent 0)"
+    };
     let source = format!(
         "partwise {} by `{}`, {extent}; representable error on the canonical drape of {}",
         env!("CARGO_PKG_VERSION"),

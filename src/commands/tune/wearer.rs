@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use partwise::assess::{AssessError, AssessOptions, canonical};
 use partwise::fabric::Fabric;
-use partwise::parts::{Parts, representable_rms_m, segment};
+use partwise::parts::{Grain, Parts, representable_rms_m, segment};
 use partwise::range_table::RangeTable;
 use partwise::shapes::BodySpec;
 use partwise::table_search::Sample;
@@ -33,6 +33,8 @@ pub(crate) struct Wearer {
     pub(crate) reference: Vec<DVec3>,
     /// From undraped to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
+    /// Its grain, which pieces narrow and tall follow.
+    grain: Grain,
     /// What Table 3 makes of it.
     pub(crate) table_3: Holds,
 }
@@ -64,12 +66,13 @@ impl Wearer {
         let displacement = reference.positions.iter().zip(start).map(|(a, b)| *a - *b).collect();
         let mut wearer = Self {
             name: name.to_owned(),
+            grain: Grain::new(&placed.scene.garment, &placed.scene.topology, &placed.scene.rest),
             placed,
             reference: reference.positions,
             displacement,
             table_3: Holds { parts: 0, rms_mm: 0.0 },
         };
-        wearer.table_3 = wearer.holds(&RangeTable::table_3(), None);
+        wearer.table_3 = wearer.holds(&RangeTable::table_3());
         Ok(Some(wearer))
     }
 
@@ -78,25 +81,23 @@ impl Wearer {
         Sample {
             mesh: &self.placed.scene.garment,
             topology: &self.placed.scene.topology,
+            grain: &self.grain,
             distances_m: &self.placed.distance_m,
             displacement: &self.displacement,
             weight: 1.0 / self.table_3.rms_mm.max(1e-3).powi(2),
         }
     }
 
-    /// The PARTs of a table, cut to an extent (m) if there is one.
-    pub(crate) fn parts(&self, table: &RangeTable, extent_m: Option<f64>) -> Parts {
+    /// The PARTs of a table, levels with an extent cut to it.
+    pub(crate) fn parts(&self, table: &RangeTable) -> Parts {
         let scene = &self.placed.scene;
         let parts = segment(&scene.topology, &self.placed.distance_m, table);
-        match extent_m {
-            None => parts,
-            Some(extent_m) => parts.cut_to_extent(&scene.garment, &scene.topology, extent_m),
-        }
+        parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
     }
 
     /// What a table holds of the reference.
-    pub(crate) fn holds(&self, table: &RangeTable, extent_m: Option<f64>) -> Holds {
-        let parts = self.parts(table, extent_m);
+    pub(crate) fn holds(&self, table: &RangeTable) -> Holds {
+        let parts = self.parts(table);
         Holds { parts: parts.len(), rms_mm: 1e3 * representable_rms_m(&parts, &self.displacement) }
     }
 }

@@ -22,6 +22,8 @@ pub struct Layout {
     pub several_tables: bool,
     /// How many those steps are, where it is known: plots leave room for their legends then.
     pub table_count: Option<u32>,
+    /// The steps show what PARTs can hold and run no mechanics: no views of forces and of the stages' times.
+    pub held: bool,
     /// Steps of the timeline `iteration` will come: a tab for the solver, and the timeline the recording opens on.
     pub iterations: bool,
     /// The error garment will come.
@@ -127,12 +129,11 @@ impl Layout {
     fn stages(&self, eye: &Eye) -> Node {
         let eye = &self.stage_eye(eye);
         let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
-        let mut views = vec![
-            seen("Distance", "/distance"),
-            seen("PARTs", "/parts"),
-            seen("Force per PART", "/force"),
-            seen("Drape", "/drape"),
-        ];
+        let mut views = vec![seen("Distance", "/distance"), seen("PARTs", "/parts")];
+        if !self.held {
+            views.push(seen("Force per PART", "/force"));
+        }
+        views.push(seen("Drape", "/drape"));
         if self.error {
             views.push(seen("Error", paths::ERROR));
         }
@@ -149,7 +150,9 @@ impl Layout {
         ];
         if self.several_tables {
             below.push((1.0, self.plot("PARTs", "/numbers/part_count", false)));
-            below.push((1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, false)));
+            if !self.held {
+                below.push((1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, false)));
+            }
             if self.error {
                 below.push((1.0, self.plot("Error, mm", "/numbers/error", false)));
             }
