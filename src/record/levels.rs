@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn bars_tile_their_level_and_count_every_vertex_once() {
-        let row = |lower_m, upper_m| LevelRow { lower_m, upper_m, vertices: 0, parts: 0 };
+        let row = |lower_m, upper_m| LevelRow { lower_m, upper_m, vertices: 0, parts: 0, extent: None };
         let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
         // A narrow level has one bar of its own width.
         assert_eq!(bars(&row(0.0, 0.01), &distances, 0.02, 0.1), [(3.0, 0.0, 0.01)]);
