@@ -54,7 +54,8 @@ pub fn refine_with(
     options: &RefineOptions,
     observer: Observer<'_>,
 ) -> Result<Refined, SolveError> {
-    let mut solver = Solver::new(&cloth.pattern)?;
+    // Analysed with the first step: a preview takes none.
+    let mut solver = None;
     let masses: Vec<f64> = cloth.order.iter().map(|&v| cloth.masses[v as usize]).collect();
     let mut x = start;
     let (mut gradient, mut direction) = (Vec::new(), Vec::new());
@@ -109,7 +110,11 @@ pub fn refine_with(
         // After a step, `trial` holds the positions it was taken from.
         let before = tangent.stepped.then_some(&trial[..]);
         let here = State { cloth: now, before, x: &x, contacts: &contacts, gradient: &gradient };
-        tangent.direction(&here, &mut solver, &diagonal, &mut direction)?;
+        let solver = match &mut solver {
+            Some(solver) => solver,
+            none => none.insert(Solver::new(&cloth.pattern)?),
+        };
+        tangent.direction(&here, solver, &diagonal, &mut direction)?;
         let slope: f64 = cloth.order.iter().zip(&direction).map(|(&v, d)| gradient[v as usize].dot(*d)).sum();
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (options.longest_move_m / longest).min(1.0);
