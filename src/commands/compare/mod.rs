@@ -198,7 +198,10 @@ fn levels(table: &RangeTable, parts: &Parts) -> Vec<LevelCount> {
     let counts = bounds.iter().zip(&parts.parts_per_level).zip(vertices);
     let count = |(level, ((bound, &parts), vertices)): (usize, ((&EffectiveLevel, &usize), usize))| {
         let upper_cm = bound.upper_cm.is_finite().then_some(bound.upper_cm);
-        let extent_cm = bound.extent.filter(Extent::cuts).map(|e| e.to_string());
+        let extent_cm = bound
+            .extent
+            .filter(Extent::cuts)
+            .map(|e| e.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x"));
         LevelCount { level, lower_cm: bound.lower_cm, upper_cm, extent_cm, vertices, parts }
     };
     counts.enumerate().map(count).collect()

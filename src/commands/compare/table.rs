@@ -16,7 +16,7 @@ pub(super) struct LevelCount {
     pub(super) lower_cm: f64,
     /// `None` for the open last level.
     pub(super) upper_cm: Option<f64>,
-    /// The extent of the level's own that the model cuts its PARTs to, cm, as people read it.
+    /// The extent of the level's own that the model cuts its PARTs to, cm: `12`, `6x24`.
     pub(super) extent_cm: Option<String>,
     pub(super) vertices: usize,
     pub(super) parts: usize,
@@ -87,7 +87,8 @@ pub(super) fn text(all: &[Compared]) -> String {
 
 fn range(level: &LevelCount) -> String {
     let short = |cm: f64| format!("{cm:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    let own = level.extent_cm.as_ref().map_or_else(String::new, |extent| format!(", cut to {extent}"));
+    let own =
+        level.extent_cm.as_ref().map_or_else(String::new, |extent| format!(", cut to {}", extent.replace('x', " × ")));
     format!("{}–{} cm{own}", short(level.lower_cm), level.upper_cm.map_or_else(|| "∞".to_owned(), short))
 }
 
