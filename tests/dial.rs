@@ -211,7 +211,13 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     ];
     let found = json(&bench.does(&[&tune[..], &["--format", "json"]].concat()));
     let verdicts = found["verdicts"].as_array().unwrap();
-    assert_eq!(verdicts.len(), 4);
+    // Each kind on each garment, and the extents scaled to the garment held out.
+    assert_eq!(verdicts.len(), 5);
+    let fitted = &verdicts[4];
+    assert!(fitted["held_out"] == true && fitted["kind"] == "levels and extents", "{fitted}");
+    assert!(fitted["parts"].as_u64() <= fitted["table_3_parts"].as_u64(), "{fitted}");
+    assert!(verdicts[..4].iter().all(|v| v["extent_factor"] == 1.0));
+    assert!(fitted["extent_factor"] != 1.0, "{fitted}");
     for v in verdicts.iter().filter(|v| v["held_out"] == false) {
         assert!(v["parts"].as_u64() <= v["table_3_parts"].as_u64(), "{v}");
         assert!(v["ratio"].as_f64().unwrap() < 1.0, "{v}");
@@ -236,11 +242,21 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     let promised = verdicts.iter().find(|v| v["held_out"] == false && v["kind"] != "levels").unwrap();
     assert_eq!(json(&bench.does(&run))["part_count"], promised["parts"]);
     assert!(promised["ratio"].as_f64().unwrap() < 0.5, "{promised}");
-    assert_eq!(fs::read_to_string(bench.path("t/verdicts.csv")).unwrap().lines().count(), 1 + 4);
+    assert_eq!(fs::read_to_string(bench.path("t/verdicts.csv")).unwrap().lines().count(), 1 + 5);
     assert!(fs::read_to_string(bench.path("t/front.csv")).unwrap().lines().count() > 10);
     let contents = inspect::read(&bench.path("t/flared-skirt@400.rrd")).unwrap();
     // Table 3, one exact round of levels alone, at least three with extents: a step each.
     assert!(contents.entities["/drape/garment"].rows >= 5);
+    // Together each garment is within what Table 3 makes of it, not only their sum.
+    let together =
+        [&tune[..2], &["flared-skirt@400", "--garment", "pullover-1@400", "--together"], &tune[5..]].concat();
+    let found = json(&bench.does(&[&together[..], &["--no-save", "--format", "json"]].concat()));
+    let verdicts = found["verdicts"].as_array().unwrap();
+    assert_eq!(verdicts.len(), 4);
+    for v in verdicts {
+        assert_eq!(v["tuned_on"], "flared-skirt@400+pullover-1@400");
+        assert!(v["parts"].as_u64() <= v["table_3_parts"].as_u64(), "{v}");
+    }
     bench.refuses(&["tune", "--garment", "toga", "--out", "u"], "toga");
     bench.refuses(&["tune", "--garment", "flared-skirt@400", "--extents", "0", "--out", "u"], "--extents");
     assert!(!Path::new(&bench.path("u")).exists());

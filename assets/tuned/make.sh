@@ -1,11 +1,43 @@
 #!/bin/sh
-# Tuned tables and their figures: each of the five garments by itself, then three together with two held out, twice. About
-# half an hour on two cores; the fronts stay behind, they are large. Needs `partwise` on the path.
+# Tuned tables and their figures: each of the five garments by itself; one table for three with two held out, twice; one for
+# four with one held out, five times. Prints the figures as one table. Everything is computed anew, reference drapes too; the
+# fronts are large and left out. Needs `partwise` on the path.
 set -e
 cd "$(dirname "$0")/.."
-partwise tune --out tuned --no-save
-partwise tune --together --garment pullover-1 --garment flared-skirt --garment long-sleeved-dress \
-    --hold-out pullover-2 --hold-out low-cut-dress --out tuned/held-out-1 --no-save
-partwise tune --together --garment pullover-2 --garment flared-skirt --garment low-cut-dress \
-    --hold-out pullover-1 --hold-out long-sleeved-dress --out tuned/held-out-2 --no-save
-rm tuned/front.csv tuned/held-out-1/front.csv tuned/held-out-2/front.csv
+XDG_CACHE_HOME=$(mktemp -d)
+export XDG_CACHE_HOME
+trap 'rm -r "$XDG_CACHE_HOME"' EXIT
+all="pullover-1 pullover-2 flared-skirt low-cut-dress long-sleeved-dress"
+
+# hold_out FOLDER GARMENT...: a table for all garments but these
+hold_out() {
+    folder=$1
+    shift
+    arguments=
+    for garment in $all; do
+        case " $* " in
+        *" $garment "*) arguments="$arguments --hold-out $garment" ;;
+        *) arguments="$arguments --garment $garment" ;;
+        esac
+    done
+    # shellcheck disable=SC2086 # words are wanted
+    partwise tune --together $arguments --out "tuned/$folder" --no-save >/dev/null
+}
+
+partwise tune --out tuned --no-save >/dev/null
+hold_out held-out-1 pullover-2 low-cut-dress
+hold_out held-out-2 pullover-1 long-sleeved-dress
+for garment in $all; do
+    hold_out "all-but-$garment" "$garment"
+done
+rm tuned/front.csv tuned/*/front.csv
+
+# Columns: tuned_on, kind, garment, held_out, extent_factor, levels, cut_levels, parts, rms_mm, table_3_parts, table_3_rms_mm, ratio
+awk -F, '
+    FNR == 1 { next }
+    FNR == 2 { printf "\n%s\n", $1 }
+    {
+        scaled = $5 == 1 ? "" : sprintf(" x %.2f", $5)
+        printf "  %-26s %-18s %-8s %4d of %4d PARTs  %7.2f of %6.2f mm  %.2f\n",
+            $2 scaled, $3, $4 == "true" ? "held out" : "", $8, $10, $9, $11, $12
+    }' tuned/verdicts.csv tuned/*/verdicts.csv

@@ -20,12 +20,13 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// Evenly spaced ranks, and those of the tables to include; every rank there is where they are few enough.
+    /// Evenly spaced ranks, and those of the tables to include; every rank there is of one garment where they
+    /// are few enough.
     pub(super) fn quantiles(samples: &[Sample<'_>], options: &SearchOptions) -> Self {
         let mut sorted: Vec<f64> = samples.iter().flat_map(|s| s.distances_m).map(|d| d.abs()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         sorted.dedup();
-        if sorted.len() <= options.exact_up_to {
+        if samples.len() == 1 && sorted.len() <= options.exact_up_to {
             let ranks = (1..sorted.len()).collect();
             return Self { every: true, ..Self::of(sorted, ranks, 1) };
         }
@@ -84,6 +85,12 @@ impl Candidates {
     /// Number of smallest levels, between neighbouring candidates.
     pub(super) fn bins(&self) -> usize {
         self.ranks.len() + 1
+    }
+
+    /// How many levels that start at a smallest one, the thinnest first, are thinner than this. The last is open.
+    pub(super) fn too_thin(&self, lower: usize, cm: f64) -> usize {
+        let at = |bin: usize| bin.checked_sub(1).map_or(0.0, |i| bound_cm(&self.sorted, self.ranks[i]));
+        (lower + 1..self.bins()).take_while(|&upper| at(upper) - at(lower) < cm).count()
     }
 
     /// The candidates, cm.

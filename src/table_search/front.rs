@@ -1,5 +1,7 @@
 //! The Pareto front of PART count and representable error.
 
+use super::ladder::Ladder;
+use super::program::Path;
 use crate::range_table::{Extent, RangeTable, TableError};
 
 /// A table that no other found beats in both PARTs and error.
@@ -16,6 +18,19 @@ pub struct FrontPoint {
 }
 
 impl FrontPoint {
+    /// The table of a path with so many PARTs.
+    pub(super) fn on(path: &Path, parts: usize, inner_cm: &[f64], ladder: &Ladder) -> Self {
+        // The first level starts at 0.
+        let bounds = path.levels.iter().filter_map(|level| inner_cm.get(level.lower.checked_sub(1)?).copied());
+        let steps = if ladder.cuts() { &path.levels[..] } else { &[] };
+        Self {
+            parts,
+            rms_m: path.squared.max(0.0).sqrt(),
+            inner_bounds_cm: bounds.collect(),
+            extents: steps.iter().map(|level| ladder.extent(level.step)).collect(),
+        }
+    }
+
     /// As a table with a name, extents and all.
     ///
     /// # Errors
@@ -31,6 +46,9 @@ impl FrontPoint {
 pub struct Front {
     /// The tables.
     pub points: Vec<FrontPoint>,
+    /// The table of least error with which every garment is within its limit. For one garment it is the last of `points`; for
+    /// several it need not be among them, as they count PARTs of all garments together.
+    pub best: Option<FrontPoint>,
 }
 
 impl Front {
@@ -57,6 +75,7 @@ impl Front {
                 points.push(point.clone());
             }
         }
-        Self { points }
+        let best = [&self.best, &other.best].into_iter().flatten().min_by(|a, b| a.rms_m.total_cmp(&b.rms_m));
+        Self { points, best: best.cloned() }
     }
 }

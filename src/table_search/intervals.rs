@@ -20,7 +20,7 @@ pub(super) struct Cost {
 }
 
 /// More PARTs than any table may have.
-const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
+pub(super) const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
 
 impl Cost {
     fn plus(self, other: Self) -> Self {

@@ -10,7 +10,8 @@
 //! E(b, p) = min over a < b and e of E(a, p − c(a, b, e)) + v(a, b, e)
 //! ```
 //!
-//! exact over all tables whose bounds are candidates. For levels alone on a garment of ordinary size every bound that makes a
+//! exact over all tables whose bounds are candidates. Several garments, each with a limit of PARTs, share one program in which PARTs
+//! are charged (see `charges`). For levels alone on one garment of ordinary size every bound that makes a
 //! difference is one, so that no table at all is better. With extents candidates are quantiles of the distances plus the bounds
 //! of given tables (so the front is never worse than those); later rounds put them close around the best table found.
 //!
@@ -25,9 +26,12 @@
 //! reference drape; O(m n + m² p) for m candidates, n vertices and p PARTs without extents, m² cuts with them.
 
 mod candidates;
+mod charges;
+mod error;
 mod front;
 mod intervals;
 mod ladder;
+mod options;
 mod program;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -35,12 +39,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DVec3;
 use rayon::prelude::*;
 
+pub use error::SearchError;
 pub use front::{Front, FrontPoint};
+pub use options::SearchOptions;
 
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Grain;
-use crate::range_table::RangeTable;
 use candidates::Candidates;
+use charges::Charges;
 use ladder::Ladder;
 use program::Program;
 
@@ -59,62 +65,8 @@ pub struct Sample<'a> {
     pub displacement: &'a [DVec3],
     /// How much its squared error counts beside the other garments'; only the ratios matter.
     pub weight: f64,
-}
-
-/// What to search.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SearchOptions {
-    /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
-    /// extents means cut.
-    pub candidates: usize,
-    /// With at most so many distinct distances every bound is a candidate, and one round is exact. Default 12,000 for
-    /// levels alone, 0 with extents.
-    pub exact_up_to: usize,
-    /// Most PARTs a table may yield, over all garments together.
+    /// Most PARTs a table may make of it.
     pub max_parts: usize,
-    /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
-    pub widths_cm: Vec<f64>,
-    /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
-    /// all widths.
-    pub shapes: Vec<f64>,
-    /// Candidate bounds in each round after the first. Default 400, with extents 40.
-    pub candidates_around: usize,
-    /// Rounds: the first over quantiles, the others around the best table so far, with extents finely between the widths and
-    /// shapes given. They end early when two in a row bring less than a thousandth. Default 3, with extents 12.
-    pub rounds: usize,
-    /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
-    pub include: Vec<RangeTable>,
-}
-
-impl SearchOptions {
-    /// Defaults for levels alone with a limit of PARTs.
-    #[must_use]
-    pub fn new(max_parts: usize) -> Self {
-        let include = vec![RangeTable::table_3()];
-        Self {
-            candidates: 400,
-            candidates_around: 400,
-            exact_up_to: 12_000,
-            max_parts,
-            widths_cm: Vec::new(),
-            shapes: vec![0.5, 1.0, 2.0, 4.0],
-            rounds: 3,
-            include,
-        }
-    }
-
-    /// Defaults for levels that may each be cut to one of these widths (cm).
-    #[must_use]
-    pub fn with_extents(max_parts: usize, widths_cm: &[f64]) -> Self {
-        Self {
-            candidates: 120,
-            candidates_around: 40,
-            exact_up_to: 0,
-            rounds: 12,
-            widths_cm: widths_cm.to_vec(),
-            ..Self::new(max_parts)
-        }
-    }
 }
 
 /// How far a search is.
@@ -130,50 +82,6 @@ pub struct Progress {
     pub total: usize,
 }
 
-/// A search that cannot be run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SearchError {
-    /// Nothing to search on.
-    #[error("no garment to tune on, expected at least one")]
-    NoGarment,
-    /// A list that is not one entry per vertex.
-    #[error("garment {garment}: {what} has {found} entries, expected {expected}, one per vertex")]
-    Length {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Which list.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The number of vertices.
-        expected: usize,
-    },
-    /// A weight that is no positive number.
-    #[error("garment {garment} has the weight {found}, expected a positive, finite number")]
-    Weight {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Its weight.
-        found: f64,
-    },
-    /// A distance or displacement that is no number.
-    #[error("garment {garment}: vertex {vertex} has no finite distance and displacement")]
-    NotFinite {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Vertex, from 0.
-        vertex: usize,
-    },
-    /// Even the coarsest table has more PARTs.
-    #[error(
-        "no table tried has {max_parts} PARTs or fewer, not even one single level; allow more PARTs or a larger extent"
-    )]
-    TooFewParts {
-        /// The limit given.
-        max_parts: usize,
-    },
-}
-
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search {
@@ -187,7 +95,7 @@ impl Search {
     /// The final front.
     #[must_use]
     pub fn front(&self) -> &Front {
-        const NONE: &Front = &Front { points: Vec::new() };
+        const NONE: &Front = &Front { points: Vec::new(), best: None };
         self.rounds.last().unwrap_or(NONE)
     }
 }
@@ -202,9 +110,10 @@ pub fn search(
     options: &SearchOptions,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Search, SearchError> {
-    check(samples)?;
+    error::check(samples)?;
     let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
+    let mut charges = Charges::even(samples.len());
     let exact = candidates.complete();
     let round_count = if exact { 1 } else { options.rounds.max(1) };
     let mut rounds: Vec<Front> = Vec::new();
@@ -215,10 +124,13 @@ pub fn search(
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(Progress { round, rounds: round_count, done, total });
         };
-        let found = one_round(samples, &candidates, &ladder, options.max_parts, &step);
+        let found = match samples {
+            [sample] => one_garment(sample, &candidates, &ladder, options, &step),
+            several => charges::round(several, &candidates, &ladder, options, &mut charges, &step),
+        };
         let front = rounds.last().map_or_else(|| found.clone(), |before| before.union(&found));
-        let Some(best) = front.best_within(options.max_parts) else {
-            return Err(SearchError::TooFewParts { max_parts: options.max_parts });
+        let Some(best) = front.best.as_ref() else {
+            return Err(SearchError::TooFewParts { max_parts: samples.iter().map(|s| s.max_parts).collect() });
         };
         candidates = candidates.around(&best.inner_bounds_cm, options.candidates_around, round);
         if round == 1 {
@@ -226,7 +138,7 @@ pub fn search(
         }
         let reached = best.rms_m;
         rounds.push(front);
-        let two_before = round.checked_sub(3).and_then(|i| rounds[i].best_within(options.max_parts));
+        let two_before = round.checked_sub(3).and_then(|i| rounds[i].best.as_ref());
         if two_before.is_some_and(|before| reached > 0.999 * before.rms_m) {
             break;
         }
@@ -237,31 +149,42 @@ pub fn search(
 /// Lower bounds whose levels are evaluated at once: enough for any machine, few enough to hold.
 const BATCH: usize = 64;
 
-/// The front over one set of candidates.
-fn one_round(
-    samples: &[Sample<'_>],
+/// What a vertex of each garment adds to the squared error.
+fn shares(samples: &[Sample<'_>]) -> Vec<f64> {
+    let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
+    samples.iter().map(|s| s.weight / (total_weight * s.distances_m.len() as f64)).collect()
+}
+
+/// Makes the levels no table may have cost more than any has: the first so many as too thin, and whole ones where none may be.
+fn forbid(row: &mut [intervals::Cost], too_thin: usize, ladder: &Ladder, options: &SearchOptions) {
+    for (i, steps) in row.chunks_mut(ladder.len()).enumerate() {
+        if i < too_thin {
+            steps.fill(intervals::TOO_MANY);
+        } else if !options.uncut && ladder.cuts() {
+            steps[0] = intervals::TOO_MANY;
+        }
+    }
+}
+
+/// The front of one garment over one set of candidates.
+fn one_garment(
+    sample: &Sample<'_>,
     candidates: &Candidates,
     ladder: &Ladder,
-    max_parts: usize,
+    options: &SearchOptions,
     step: &(dyn Fn() + Sync),
 ) -> Front {
-    let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
     let bins = candidates.bins();
-    let members: Vec<Vec<Vec<u32>>> = samples.iter().map(|s| candidates.members(s.distances_m)).collect();
+    let members = candidates.members(sample.distances_m);
+    let share = 1.0 / sample.distances_m.len() as f64;
     let row = |lower: usize| {
-        let mut costs = vec![intervals::Cost::default(); (bins - lower) * ladder.len()];
-        for (sample, members) in samples.iter().zip(&members) {
-            let share = sample.weight / (total_weight * sample.distances_m.len() as f64);
-            let found = intervals::row(sample, &members[lower..], ladder, max_parts);
-            for (cost, found) in costs.iter_mut().zip(found) {
-                cost.parts = cost.parts.saturating_add(found.parts);
-                cost.error += share * found.error;
-            }
-        }
+        let mut costs = intervals::row(sample, &members[lower..], ladder, sample.max_parts);
+        costs.iter_mut().for_each(|cost| cost.error *= share);
+        forbid(&mut costs, candidates.too_thin(lower, options.thinnest_cm), ladder, options);
         step();
         costs
     };
-    let mut program = Program::new(bins, max_parts, ladder.len());
+    let mut program = Program::new(bins, sample.max_parts, ladder.len());
     for from in (0..bins).step_by(BATCH) {
         let batch = from..bins.min(from + BATCH);
         let rows: Vec<_> = batch.clone().into_par_iter().with_max_len(1).map(row).collect();
@@ -269,27 +192,8 @@ fn one_round(
             program.take(lower, row);
         }
     }
-    program.front(&candidates.inner_cm(), ladder)
-}
-
-fn check(samples: &[Sample<'_>]) -> Result<(), SearchError> {
-    if samples.is_empty() {
-        return Err(SearchError::NoGarment);
-    }
-    for (garment, s) in (1..).zip(samples) {
-        let expected = s.mesh.vertex_count();
-        for (what, found) in [("the distances", s.distances_m.len()), ("the displacement", s.displacement.len())] {
-            if found != expected {
-                return Err(SearchError::Length { garment, what, found, expected });
-            }
-        }
-        if !(s.weight.is_finite() && s.weight > 0.0) {
-            return Err(SearchError::Weight { garment, found: s.weight });
-        }
-        let finite = |(d, u): (&f64, &DVec3)| d.is_finite() && u.is_finite();
-        if let Some(vertex) = s.distances_m.iter().zip(s.displacement).position(|pair| !finite(pair)) {
-            return Err(SearchError::NotFinite { garment, vertex });
-        }
-    }
-    Ok(())
+    let inner_cm = candidates.inner_cm();
+    let points: Vec<_> =
+        program.paths().iter().map(|path| FrontPoint::on(path, path.parts, &inner_cm, ladder)).collect();
+    Front { best: points.last().cloned(), points }
 }

@@ -1,11 +1,30 @@
-//! The dynamic program over candidate bounds: least error for every number of PARTs.
+//! The dynamic program over candidate bounds: least error for every number of PARTs, or for all they may cost where they are
+//! charged.
 
 use rayon::prelude::*;
 
-use super::front::{Front, FrontPoint};
 use super::intervals::Cost;
-use super::ladder::Ladder;
-use crate::range_table::Extent;
+
+/// A level of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Span {
+    /// Its smallest levels, from the first to the one after its last.
+    pub(super) lower: usize,
+    pub(super) upper: usize,
+    /// Its step of the ladder.
+    pub(super) step: usize,
+}
+
+/// The best table at some number of PARTs.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Path {
+    /// PARTs, or what they cost.
+    pub(super) parts: usize,
+    /// Squared error, m².
+    pub(super) squared: f64,
+    /// Its levels, ascending.
+    pub(super) levels: Vec<Span>,
+}
 
 /// How the best table up to a bound ends.
 #[derive(Debug, Clone, Copy, Default)]
@@ -80,38 +99,32 @@ impl Program {
         });
     }
 
-    /// The Pareto front, once all rows are taken.
-    pub(super) fn front(&self, inner_cm: &[f64], ladder: &Ladder) -> Front {
-        let mut points = Vec::new();
+    /// The Pareto front, once all rows are taken: ascending PARTs, falling error.
+    pub(super) fn paths(&self) -> Vec<Path> {
+        let mut paths = Vec::new();
         let mut least = f64::INFINITY;
         for parts in 0..=self.max_parts {
             let squared = self.error[self.bins * (self.max_parts + 1) + parts];
             if squared < least {
                 least = squared;
-                let (inner_bounds_cm, extents) = self.table(parts, inner_cm, ladder);
-                points.push(FrontPoint { parts, rms_m: squared.max(0.0).sqrt(), inner_bounds_cm, extents });
+                paths.push(Path { parts, squared, levels: self.levels(parts) });
             }
         }
-        Front { points }
+        paths
     }
 
-    /// The inner bounds and extents of the best table with so many PARTs, read back from the end.
-    fn table(&self, mut parts: usize, inner_cm: &[f64], ladder: &Ladder) -> (Vec<f64>, Vec<Extent>) {
-        let (mut bounds, mut extents) = (Vec::new(), Vec::new());
+    /// The levels of the best table with so many PARTs, read back from the end.
+    fn levels(&self, mut parts: usize) -> Vec<Span> {
+        let mut levels = Vec::new();
         let mut upper = self.bins;
         while upper > 0 {
             let last = self.last[upper * (self.max_parts + 1) + parts];
+            let lower = last.lower as usize;
+            levels.push(Span { lower, upper, step: last.step as usize });
             parts -= last.parts as usize;
-            upper = last.lower as usize;
-            if let Some(bound) = upper.checked_sub(1) {
-                bounds.push(inner_cm[bound]);
-            }
-            if ladder.cuts() {
-                extents.push(ladder.extent(last.step as usize));
-            }
+            upper = lower;
         }
-        bounds.reverse();
-        extents.reverse();
-        (bounds, extents)
+        levels.reverse();
+        levels
     }
 }

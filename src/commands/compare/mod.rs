@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use partwise::parts::{Parts, segment};
-use partwise::range_table::RangeTable;
+use partwise::range_table::{EffectiveLevel, Extent, RangeTable};
 use partwise::record::Tab;
 use partwise::sweep::{Plan, Point, Row, Status, row_of};
 
@@ -196,10 +196,13 @@ fn levels(table: &RangeTable, parts: &Parts) -> Vec<LevelCount> {
     }
     let bounds = table.effective_levels();
     let counts = bounds.iter().zip(&parts.parts_per_level).zip(vertices);
-    let count =
-        |(level, ((bound, &parts), vertices)): (usize, ((&partwise::range_table::EffectiveLevel, &usize), usize))| {
-            let upper_cm = bound.upper_cm.is_finite().then_some(bound.upper_cm);
-            LevelCount { level, lower_cm: bound.lower_cm, upper_cm, vertices, parts }
-        };
+    let count = |(level, ((bound, &parts), vertices)): (usize, ((&EffectiveLevel, &usize), usize))| {
+        let upper_cm = bound.upper_cm.is_finite().then_some(bound.upper_cm);
+        let extent_cm = bound
+            .extent
+            .filter(Extent::cuts)
+            .map(|e| e.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x"));
+        LevelCount { level, lower_cm: bound.lower_cm, upper_cm, extent_cm, vertices, parts }
+    };
     counts.enumerate().map(count).collect()
 }

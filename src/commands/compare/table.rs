@@ -16,6 +16,8 @@ pub(super) struct LevelCount {
     pub(super) lower_cm: f64,
     /// `None` for the open last level.
     pub(super) upper_cm: Option<f64>,
+    /// The extent of the level's own that the model cuts its PARTs to, cm: `12`, `6x24`.
+    pub(super) extent_cm: Option<String>,
     pub(super) vertices: usize,
     pub(super) parts: usize,
 }
@@ -85,7 +87,9 @@ pub(super) fn text(all: &[Compared]) -> String {
 
 fn range(level: &LevelCount) -> String {
     let short = |cm: f64| format!("{cm:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    format!("{}–{} cm", short(level.lower_cm), level.upper_cm.map_or_else(|| "∞".to_owned(), short))
+    let own =
+        level.extent_cm.as_ref().map_or_else(String::new, |extent| format!(", cut to {}", extent.replace('x', " × ")));
+    format!("{}–{} cm{own}", short(level.lower_cm), level.upper_cm.map_or_else(|| "∞".to_owned(), short))
 }
 
 fn right(table: &mut Table, columns: std::ops::Range<usize>) {
@@ -103,6 +107,7 @@ struct Line<'a> {
     level: Option<usize>,
     lower_cm: Option<f64>,
     upper_cm: Option<f64>,
+    extent_cm: Option<&'a str>,
     vertices: Option<usize>,
     parts: Option<usize>,
     level_part_count: usize,
@@ -130,6 +135,7 @@ pub(super) fn csv(all: &[Compared]) -> anyhow::Result<String> {
                 level: level.map(|l| l.level),
                 lower_cm: level.map(|l| l.lower_cm),
                 upper_cm: level.and_then(|l| l.upper_cm),
+                extent_cm: level.and_then(|l| l.extent_cm.as_deref()),
                 vertices: level.map(|l| l.vertices),
                 parts: level.map(|l| l.parts),
                 level_part_count: c.level_part_count,

@@ -19,7 +19,7 @@ use partwise::mesh::TriMesh;
 
 use super::packed::{Packer, Unpacker};
 
-const POINT: &[u8; 8] = b"PWPOINT1";
+const POINT: &[u8; 8] = b"PWPOINT2";
 const SCENE: &[u8; 8] = b"PWSCENE1";
 
 /// Body and garment as a recording shows them.
@@ -40,6 +40,8 @@ pub(crate) struct KeptPoint {
     pub(crate) scene: String,
     /// Lower and upper value of each level, cm.
     pub(crate) levels_cm: Vec<[f64; 2]>,
+    /// Width and height each level's PARTs are cut to by the table, cm; zeros for a level without an extent of its own.
+    pub(crate) extents_cm: Vec<[f64; 2]>,
     /// Level of each PART.
     pub(crate) level_of_part: Vec<u32>,
     /// Resultant force on each PART, N.
@@ -57,6 +59,7 @@ impl KeptPoint {
         let mut packer = Packer::new(POINT);
         packer.text(&self.scene);
         packer.doubles(self.levels_cm.as_flattened());
+        packer.doubles(self.extents_cm.as_flattened());
         packer.whole(&self.level_of_part);
         packer.points(&self.force_n);
         packer.whole(&self.part_of_vertex);
@@ -70,6 +73,7 @@ impl KeptPoint {
         Some(Self {
             scene: unpacker.text()?,
             levels_cm: unpacker.doubles()?.as_chunks().0.to_vec(),
+            extents_cm: unpacker.doubles()?.as_chunks().0.to_vec(),
             level_of_part: unpacker.whole()?,
             force_n: unpacker.points()?,
             part_of_vertex: unpacker.whole()?,

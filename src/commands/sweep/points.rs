@@ -15,6 +15,7 @@ use partwise::mechanics::coupled::CoupledOptions;
 use partwise::mechanics::paper::PaperOptions;
 use partwise::mechanics::refine::{Step, Stop};
 use partwise::parts::representable_rms_m;
+use partwise::range_table::EffectiveLevel;
 use partwise::sweep::{self, Measures, ModelChoice, Point, PointError, Solve, Solved, Times, result_hash};
 
 use super::kept::{KeptPoint, KeptScene, Shelf};
@@ -118,9 +119,12 @@ impl<'a> Bench<'a> {
         let Scene { body_mesh, garment, .. } = &pass.placed.scene;
         let parts = &pass.drape.parts;
         let scene = point.scene_id();
+        let levels = pass.settings.table.effective_levels();
+        let extent = |l: &EffectiveLevel| l.extent.map_or([0.0; 2], |e| [e.width_cm, e.height_cm]);
         let kept = KeptPoint {
             scene: scene.clone(),
-            levels_cm: pass.settings.table.effective_levels().iter().map(|l| [l.lower_cm, l.upper_cm]).collect(),
+            levels_cm: levels.iter().map(|l| [l.lower_cm, l.upper_cm]).collect(),
+            extents_cm: levels.iter().map(extent).collect(),
             level_of_part: parts.parts.iter().map(|p| p.level).collect(),
             force_n: pass.drape.outcomes.iter().map(|o| o.force_n).collect(),
             part_of_vertex: parts.part_of_vertex.clone(),

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use partwise::parts::UNASSIGNED;
-use partwise::range_table::METRES_PER_CM;
+use partwise::range_table::{Extent, METRES_PER_CM};
 use partwise::record::{
     Chosen, Layout, LevelRow, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView,
     Tab, When,
@@ -174,12 +174,13 @@ fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
     let mut levels: Vec<LevelRow> = point
         .levels_cm
         .iter()
-        .map(|&[lower, upper]| LevelRow {
+        .zip(&point.extents_cm)
+        .map(|(&[lower, upper], &[width_cm, height_cm])| LevelRow {
             lower_m: lower * METRES_PER_CM,
             upper_m: upper * METRES_PER_CM,
             vertices: 0,
             parts: 0,
-            extent: None,
+            extent: (width_cm > 0.0).then(|| Extent { width_cm, height_cm }.to_string()),
         })
         .collect();
     for &level in &point.level_of_part {

@@ -39,6 +39,26 @@ pub(crate) struct Taken {
     pub(crate) holds: Vec<Holds>,
 }
 
+/// Widths a level may be cut to, cm.
+pub(crate) const WIDTHS_CM: [f64; 30] = [
+    4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 22.0, 24.0, 26.0,
+    28.0, 30.0, 33.0, 36.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0,
+];
+
+/// Heights over widths.
+pub(crate) const SHAPES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// The same for one table for several garments: about a factor of two to either side of 12 cm, so that no level is left nearly whole only
+/// because those searched on hardly move there. Without this and `THINNEST_CM` pullover-1, held out, lost more than with Table 3.
+pub(crate) const WIDTHS_TOGETHER_CM: [f64; 17] =
+    [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 22.0, 24.0];
+
+/// Heights over widths for several garments: cloth folds around the body.
+pub(crate) const SHAPES_TOGETHER: [f64; 3] = [1.0, 2.0, 4.0];
+
+/// Thinnest level of a table for several garments, cm.
+const THINNEST_CM: f64 = 0.5;
+
 /// Searches on all garments together, over so many candidate bounds a round. Where the user stops it, what was found until then.
 pub(crate) fn find(
     wearers: &[&Wearer],
@@ -47,16 +67,19 @@ pub(crate) fn find(
     candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
-    let samples: Vec<_> = wearers.iter().map(|w| w.sample()).collect();
+    let samples: Vec<_> = wearers.iter().zip(limits(wearers, max_parts)).map(|(w, limit)| w.sample(limit)).collect();
     let mut found = Found { iterations: Vec::new(), levels: Front::default(), exact: false, all: Front::default() };
-    let levels = ("levels alone", SearchOptions::new(max_parts));
-    let both = (
-        "levels and extents",
-        SearchOptions { shapes: shapes.to_vec(), ..SearchOptions::with_extents(max_parts, extents_cm) },
-    );
+    let levels = ("levels alone", SearchOptions::default());
+    let both =
+        ("levels and extents", SearchOptions { shapes: shapes.to_vec(), ..SearchOptions::with_extents(extents_cm) });
     for (title, mut options) in [levels, both].into_iter().take(if extents_cm.is_empty() { 1 } else { 2 }) {
         if interrupt::requested() {
             break;
+        }
+        if wearers.len() > 1 && !options.widths_cm.is_empty() {
+            // Meant for garments that are not here: what only fits these ones finely is left out.
+            (options.thinnest_cm, options.uncut) = (THINNEST_CM, false);
+            (options.candidates, options.rounds) = (80, 4);
         }
         if let Some(candidates) = candidates {
             (options.candidates, options.exact_up_to) = (candidates, candidates);
@@ -81,25 +104,18 @@ pub(crate) fn find(
     Ok((!found.all.points.is_empty()).then_some(found))
 }
 
-/// The best table of a front under the limit: each garment at most its share (Table 3's PARTs of it, where that is the
-/// limit), or where none is so even, the total.
-pub(crate) fn take(front: &Front, wearers: &[&Wearer], max_parts: usize, name: &str) -> anyhow::Result<Option<Taken>> {
+/// The most PARTs of each garment: its share of a total, as Table 3 spends them.
+fn limits(wearers: &[&Wearer], max_parts: usize) -> Vec<usize> {
     let total: usize = wearers.iter().map(|w| w.table_3.parts).sum();
-    let mut fallback = None;
-    // Error falls along the front, so the first that is even enough from its end is the best of those.
-    for point in front.points.iter().rev().filter(|p| p.parts <= max_parts) {
-        let taken = taken(point, wearers, name)?;
-        let even = |(holds, w): (&Holds, &&Wearer)| holds.parts * total <= w.table_3.parts * max_parts;
-        if taken.holds.iter().zip(wearers).all(even) {
-            return Ok(Some(taken));
-        }
-        fallback.get_or_insert(taken);
-    }
-    Ok(fallback)
+    wearers.iter().map(|w| w.table_3.parts * max_parts / total.max(1)).collect()
 }
 
-fn taken(point: &FrontPoint, wearers: &[&Wearer], name: &str) -> anyhow::Result<Taken> {
-    let table = point.table(name, "")?;
-    let holds = wearers.iter().map(|w| w.holds(&table)).collect();
-    Ok(Taken { table, holds })
+/// The best table with which every garment is within its limit, and what it holds.
+pub(crate) fn take(front: &Front, wearers: &[&Wearer], name: &str) -> anyhow::Result<Option<Taken>> {
+    let taken = |point: &FrontPoint| {
+        let table = point.table(name, "")?;
+        let holds = wearers.iter().map(|w| w.holds(&table)).collect();
+        Ok(Taken { table, holds })
+    };
+    front.best.as_ref().map(taken).transpose()
 }

@@ -1,6 +1,7 @@
 //! `partwise tune`: range tables on the front of PART count and error, which the paper leaves open.
 
 mod find;
+mod fit;
 mod recording;
 mod report;
 mod wearer;
@@ -14,7 +15,7 @@ use partwise::record::RecordSummary;
 use partwise::shapes::BUILT_IN;
 use partwise::table_search::Front;
 
-use self::find::{Found, Taken, find, take};
+use self::find::{Found, SHAPES, SHAPES_TOGETHER, Taken, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, take};
 use self::report::Verdict;
 use self::wearer::Wearer;
 use super::failure::UserError;
@@ -63,29 +64,20 @@ pub(crate) struct TuneArgs {
     /// Fabric of the reference drape: a built-in name or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "interlock")]
     fabric: String,
-    /// Most PARTs a table may make, over all garments tuned together [default: as many as Table 3 makes]
+    /// Most PARTs a table may make, over all garments tuned together, each its share of Table 3's [default: as many as Table 3
+    /// makes of each]
     #[arg(long, value_name = "N", help_heading = "Search")]
     max_parts: Option<usize>,
-    /// Widths (along the weft) a level may be cut to; not to be cut is always open to it
-    #[arg(
-        long,
-        value_name = "CM[,CM...]",
-        value_delimiter = ',',
-        default_value = "4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,22,24,26,28,30,33,36,40,45,50,60,70,80",
-        help_heading = "Search"
-    )]
+    /// Widths (along the weft) a level may be cut to [default: 30 from 4 to 80, and not to be cut is open to it too;
+    /// for several garments together 17 from 6 to 24]
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', help_heading = "Search")]
     extents: Vec<f64>,
-    /// Heights of pieces (along the warp) over their widths; 1 alone keeps them as wide as tall
-    #[arg(
-        long,
-        value_name = "H/W[,H/W...]",
-        value_delimiter = ',',
-        default_value = "0.5,1,2,4",
-        help_heading = "Search"
-    )]
+    /// Heights of pieces (along the warp) over their widths; 1 alone keeps them as wide as tall [default: 0.5, 1, 2, 4; for
+    /// several garments together 1, 2, 4]
+    #[arg(long, value_name = "H/W[,H/W...]", value_delimiter = ',', help_heading = "Search")]
     shapes: Vec<f64>,
     /// Bounds tried in each round; the time grows with the square [default: all for levels alone on up to 6000 vertices,
-    /// otherwise 400; 120 with extents]
+    /// otherwise 400; with extents 120, for several garments together 80]
     #[arg(long, value_name = "N", help_heading = "Search")]
     candidates: Option<usize>,
     /// Search levels alone
@@ -122,7 +114,7 @@ impl TuneArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
-        let extents_cm = self.extents_cm()?;
+        let ladder = self.ladder()?;
         let fabric = self.fabric()?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
         let names: Vec<String> = if self.garment.is_empty() {
@@ -146,7 +138,7 @@ impl TuneArgs {
             if interrupt::requested() {
                 break;
             }
-            self.tune(set, &held_out, &extents_cm, &mut results)?;
+            self.tune(set, &held_out, (&ladder.0, &ladder.1), &mut results)?;
         }
         let front = report::csv(&results.fronts)?;
         self.write(&self.out.join("front.csv"), &front)?;
@@ -178,12 +170,12 @@ impl TuneArgs {
         &self,
         set: &[&Wearer],
         held_out: &[Wearer],
-        extents_cm: &[f64],
+        (extents_cm, shapes): (&[f64], &[f64]),
         results: &mut Results,
     ) -> anyhow::Result<()> {
         let name = set.iter().map(|w| stem(&w.name)).collect::<Vec<_>>().join("+");
         let max_parts = self.max_parts.unwrap_or_else(|| set.iter().map(|w| w.table_3.parts).sum());
-        let Some(found) = find(set, max_parts, (extents_cm, &self.shapes), self.candidates, &name)? else {
+        let Some(found) = find(set, max_parts, (extents_cm, shapes), self.candidates, &name)? else {
             return Ok(());
         };
         let mut taken: Vec<(&'static str, Taken)> = Vec::new();
@@ -196,16 +188,23 @@ impl TuneArgs {
                 kind == "levels" && found.exact,
             ));
             results.fronts.push((name.clone(), kind, front.clone()));
-            let Some(best) = take(front, set, max_parts, &format!("{name}, {kind}"))? else { continue };
+            let Some(best) = take(front, set, &format!("{name}, {kind}"))? else { continue };
             let path = self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")));
             self.write(&path, &report::with_provenance(&best, set).to_toml())?;
             results.tables.push(path);
-            let on = |w: &Wearer, held_out: bool| Verdict::new(&name, kind, &best, w, held_out);
+            let on = |w: &Wearer, held_out: bool| Verdict::new(&name, kind, &best.table, w, held_out);
             results.verdicts.extend(set.iter().map(|w| on(w, false)));
-            results.verdicts.extend(held_out.iter().map(|w| on(w, true)));
+            for w in held_out {
+                results.verdicts.push(on(w, true));
+                if best.table.has_extents()
+                    && let Some((factor, table)) = fit::fitted(&best.table, w)?
+                {
+                    results.verdicts.push(Verdict::new(&name, kind, &table, w, true).scaled(factor));
+                }
+            }
             taken.push((kind, best));
         }
-        self.record(set, &found, &taken, max_parts, results)
+        self.record(set, &found, &taken, results)
     }
 
     fn record(
@@ -213,7 +212,6 @@ impl TuneArgs {
         set: &[&Wearer],
         found: &Found,
         taken: &[(&'static str, Taken)],
-        max_parts: usize,
         results: &mut Results,
     ) -> anyhow::Result<()> {
         let taken: Vec<(&'static str, &Taken)> = taken.iter().map(|(kind, t)| (*kind, t)).collect();
@@ -224,15 +222,16 @@ impl TuneArgs {
             }
             let sinks = sinks.sinks(&wearer.name);
             if !sinks.is_empty() {
-                results.recordings.push(recording::record(wearer, set, found, &taken, max_parts, sinks)?);
+                results.recordings.push(recording::record(wearer, set, found, &taken, sinks)?);
             }
         }
         Ok(())
     }
 
-    fn extents_cm(&self) -> anyhow::Result<Vec<f64>> {
+    /// Widths (cm) and heights over widths; both empty for levels alone.
+    fn ladder(&self) -> anyhow::Result<(Vec<f64>, Vec<f64>)> {
         if self.levels_only {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), Vec::new()));
         }
         if let Some(wrong) = self.extents.iter().find(|cm| !(cm.is_finite() && **cm > 0.0)) {
             return Err(UserError::new(format!(
@@ -242,7 +241,11 @@ impl TuneArgs {
         if let Some(wrong) = self.shapes.iter().find(|shape| !(shape.is_finite() && **shape > 0.0)) {
             return Err(UserError::new(format!("--shapes: found {wrong}, expected heights over widths above 0")));
         }
-        Ok(self.extents.clone())
+        let together = self.together && self.garment.len() != 1;
+        let widths = if together { &WIDTHS_TOGETHER_CM[..] } else { &WIDTHS_CM };
+        let shapes = if together { &SHAPES_TOGETHER[..] } else { &SHAPES };
+        let or = |given: &[f64], default: &[f64]| if given.is_empty() { default } else { given }.to_vec();
+        Ok((or(&self.extents, widths), or(&self.shapes, shapes)))
     }
 
     fn fabric(&self) -> anyhow::Result<Fabric> {

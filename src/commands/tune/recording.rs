@@ -28,7 +28,6 @@ pub(super) fn record(
     all: &[&Wearer],
     found: &Found,
     taken: &[(&'static str, &Taken)],
-    max_parts: usize,
     sinks: Vec<Sink>,
 ) -> anyhow::Result<RecordSummary> {
     let titles =
@@ -45,7 +44,7 @@ pub(super) fn record(
     scatter(&mut recorder, 0, all, &Front::default())?;
     slot(&mut recorder, wearer, 0, &start)?;
     for (index, iteration) in (1..).zip(&found.iterations) {
-        let Some(best) = take(&iteration.front, all, max_parts, "best so far")? else { continue };
+        let Some(best) = take(&iteration.front, all, "best so far")? else { continue };
         let shown = Shown { index, title: title(iteration), table: &best.table };
         step(&mut recorder, wearer, &shown)?;
         scatter(&mut recorder, index, all, &iteration.front)?;

@@ -22,6 +22,8 @@ pub(super) struct Verdict {
     pub(super) garment: String,
     /// Whether the search did not see this garment.
     pub(super) held_out: bool,
+    /// What the extents are multiplied by, so that the PARTs of a garment held out come to Table 3's number; 1 for the table as it is.
+    pub(super) extent_factor: f64,
     pub(super) levels: usize,
     /// How many of them are cut to an extent.
     pub(super) cut_levels: usize,
@@ -34,21 +36,27 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn new(tuned_on: &str, kind: &'static str, taken: &Taken, wearer: &Wearer, held_out: bool) -> Self {
-        let Holds { parts, rms_mm } = wearer.holds(&taken.table);
+    pub(super) fn new(tuned_on: &str, kind: &'static str, table: &RangeTable, wearer: &Wearer, held_out: bool) -> Self {
+        let Holds { parts, rms_mm } = wearer.holds(table);
         Self {
             tuned_on: tuned_on.to_owned(),
             kind,
             garment: wearer.name.clone(),
             held_out,
-            levels: taken.table.levels.len(),
-            cut_levels: taken.table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
+            extent_factor: 1.0,
+            levels: table.levels.len(),
+            cut_levels: table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
             parts,
             rms_mm,
             table_3_parts: wearer.table_3.parts,
             table_3_rms_mm: wearer.table_3.rms_mm,
             ratio: rms_mm / wearer.table_3.rms_mm,
         }
+    }
+
+    /// The same of a table with its extents scaled.
+    pub(super) fn scaled(self, extent_factor: f64) -> Self {
+        Self { extent_factor, ..self }
     }
 }
 
@@ -70,7 +78,7 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
     for v in all {
         table.add_row([
             v.tuned_on.clone(),
-            v.kind.to_owned(),
+            if v.extent_factor == 1.0 { v.kind.to_owned() } else { format!("{} × {:.2}", v.kind, v.extent_factor) },
             format!("{}{}", v.garment, if v.held_out { " (held out)" } else { "" }),
             v.levels.to_string(),
             v.cut_levels.to_string(),
@@ -137,7 +145,7 @@ fn written(extent: &Extent) -> String {
 /// Table 3's PARTs and error over a set, weighted as the search weighs them.
 pub(super) fn table_3(wearers: &[&Wearer]) -> (usize, f64) {
     let parts = wearers.iter().map(|w| w.table_3.parts).sum();
-    let weights = wearers.iter().map(|w| w.sample().weight);
+    let weights = wearers.iter().map(|w| w.weight());
     let total: f64 = weights.clone().sum();
     let mean = wearers.iter().zip(weights).map(|(w, weight)| weight * w.table_3.rms_mm.powi(2)).sum::<f64>() / total;
     (parts, mean.sqrt())

@@ -76,15 +76,21 @@ impl Wearer {
         Ok(Some(wearer))
     }
 
-    /// As the search sees it. Errors count relative to Table 3's, so that a wide skirt does not outweigh a pullover.
-    pub(crate) fn sample(&self) -> Sample<'_> {
+    /// How much its squared error counts: relative to Table 3's, so that a wide skirt does not outweigh a pullover.
+    pub(crate) fn weight(&self) -> f64 {
+        1.0 / self.table_3.rms_mm.max(1e-3).powi(2)
+    }
+
+    /// As the search sees it, with the most PARTs it may have.
+    pub(crate) fn sample(&self, max_parts: usize) -> Sample<'_> {
         Sample {
             mesh: &self.placed.scene.garment,
             topology: &self.placed.scene.topology,
             grain: &self.grain,
             distances_m: &self.placed.distance_m,
             displacement: &self.displacement,
-            weight: 1.0 / self.table_3.rms_mm.max(1e-3).powi(2),
+            weight: self.weight(),
+            max_parts,
         }
     }
 
