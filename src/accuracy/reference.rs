@@ -17,8 +17,9 @@ use glam::DVec3;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, TriMesh};
 
-/// First bytes of a file; the digit is the format's version and part of every key.
-const MAGIC: &[u8; 8] = b"PWREF\x001\n";
+/// First bytes of a file, and part of every key; the digit goes up with the format and with the mechanics, so that a drape
+/// of an older solver is never taken for the reference of a newer one.
+const MAGIC: &[u8; 8] = b"PWREF\x002\n";
 
 /// Length of a BLAKE3 hash.
 const HASH: usize = blake3::OUT_LEN;
