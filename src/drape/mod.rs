@@ -29,7 +29,8 @@ pub struct StageTimes {
     pub segment: Duration,
     /// Stage two.
     pub mechanics: Duration,
-    /// Newton steps at full resolution, setting them up included.
+    /// Newton steps at full resolution, setting them up included; zero where none are asked for, though the preview's energy
+    /// and residual are still measured.
     pub refine: Duration,
 }
 
@@ -138,6 +139,9 @@ pub fn drape(
     warnings.extend(stage.warnings);
     let start = stage.start.as_deref().unwrap_or(&stage.positions);
     let refined = timed(&mut times.refine, || refine_further(scene, settings, start, observer))?;
+    if settings.refine == Refine::Steps(0) {
+        times.refine = Duration::ZERO;
+    }
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
         Some((cloth, refined)) => {

@@ -149,7 +149,7 @@ mod tests {
         }
         assert!(!text.contains("Fabric"));
         let mut cut = panel.clone();
-        (cut.levels[0].extent, cut.levels[1].extent) = (Some("6 × 12".into()), Some("not cut".into()));
+        (cut.levels[0].extent, cut.levels[2].extent) = (Some("6 × 12".into()), Some("not cut".into()));
         let text = cut.markdown();
         for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 6 × 12 |", "| 9 | 1 | not cut |"] {
             assert!(text.contains(piece), "{piece} in {text}");
