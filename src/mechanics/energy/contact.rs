@@ -187,8 +187,8 @@ impl<'b> Contacts<'b> {
             Met::Exact(body) => *body,
             Met::Rounded(field) => field.body(),
         };
-        // Over a sharp edge the rounded distance is up to a third of the lattice's side more than the exact one.
-        let near = self.touches.iter().filter(|t| self.offset - t.depth < SIDE / 3.0);
+        // The rounded distance is more than the exact one by less than the lattice's side: see `field`.
+        let near = self.touches.iter().filter(|t| self.offset - t.depth < SIDE);
         let exact = near.map(|t| -body.nearest(x[t.vertex as usize]).signed_distance);
         exact.filter(|&d| d > 0.0).fold((0, 0.0), |(n, deepest), d| (n + 1, d.max(deepest)))
     }

@@ -7,7 +7,8 @@
 //! q̃(x) = Σ N(x/h − i) q(h i), N(t) = n(t₁) n(t₂) n(t₃),
 //!
 //! the quadratic B-spline n over a lattice of side h with the exact distances as coefficients. A crease is rounded over h and a
-//! bit; a plane is reproduced as it is, a curved surface to h²/8 times its curvature.
+//! bit; a plane is reproduced as it is, a curved surface to h²/8 times its curvature. Since q has slope at most one and the spline's
+//! weights a spread of √¾ h, |q̃ − q| < h everywhere.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -25,8 +26,8 @@ use rayon::prelude::*;
 
 use crate::distance::Body;
 
-/// h, m: about the gap of an undergarment's ease, and a quarter of a dress form's triangles. A surface of 5 cm radius is
-/// off by 0.06 mm; two planes that meet at 10 degrees by 0.1 mm in the crease.
+/// h, m. A surface of 5 cm radius is off by 0.06 mm for each of its curvatures; two planes that meet at 10 degrees by 0.1 to 0.2 mm
+/// in the crease.
 pub const SIDE: f64 = 5e-3;
 
 /// Lattice values about one cell, x slowest.

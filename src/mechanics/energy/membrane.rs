@@ -105,7 +105,7 @@ impl Stiffness {
 /// Share of the stiffness that is left where the cloth would be compressed. Cloth does not push: a strip of B = 10 µN·m held at
 /// every centimetre buckles between under B π²/ℓ² = 1 N/m, a hundredth of what a woven's k would put up at 2 %
 /// compression, into wrinkles finer than the mesh. A tenth drops most of that and keeps the triangles in shape; with all of
-/// it a stiff woven locks into facets and settles in twice the steps.
+/// it a stiff woven locks into facets.
 const SLACK: f64 = 0.1;
 
 /// Share of the buckling stress that the bearing Hessian keeps: at three tenths the whole is not positive every now
@@ -199,25 +199,17 @@ impl Triangle {
     /// problems discretized via displacement-based finite elements", CMAME 313, 2017.)
     #[must_use]
     pub fn hessian(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [DMat3; 6] {
-        let [fu, fv] = self.deformation(x);
-        let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
-        let (u, v) = (fu / lu, fv / lv);
-        let k = c.tangent(lu - 1.0, lv - 1.0);
-        let [tu, tv, tau] = self.predicted_stress(c, x, before);
-        let n = fu.cross(fv).normalize_or_zero();
-        let (wu, wv) = (n.cross(u), n.cross(v));
-        let (a, b, t) = positive_part(tu / lu, tv / lv, tau);
-        let nn = outer(n, n);
-        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * (tu / lu).max(0.0) + nn * a;
-        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * (tv / lv).max(0.0) + nn * b;
-        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + nn * t;
-        self.blocks(huu, huv, hvv)
+        self.second(c, x, before, false)
     }
 
     /// The bearing Hessian, in the order and with the predicted stress of [`hessian`](Self::hessian): exact but for
     /// compression past what the triangle bears. Not always positive.
     #[must_use]
     pub fn hessian_bearing(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [DMat3; 6] {
+        self.second(c, x, before, true)
+    }
+
+    fn second(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>, bearing: bool) -> [DMat3; 6] {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
         let (u, v) = (fu / lu, fv / lv);
@@ -225,12 +217,15 @@ impl Triangle {
         let [tu, tv, tau] = self.predicted_stress(c, x, before);
         let n = fu.cross(fv).normalize_or_zero();
         let (wu, wv) = (n.cross(u), n.cross(v));
-        let least = -c.bearing / self.area;
+        // Least stress out of the plane and sideways, and the shear's share within the plane.
+        let (least, sideways, in_plane) =
+            if bearing { (-c.bearing / self.area, f64::NEG_INFINITY, tau) } else { (0.0, 0.0, 0.0) };
         let (a, b, t) = positive_part(tu / lu - least, tv / lv - least, tau);
         let nn = outer(n, n);
-        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * (tu / lu) + nn * (a + least);
-        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * (tv / lv) + nn * (b + least);
-        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * tau + nn * t;
+        let (su, sv) = ((tu / lu).max(sideways), (tv / lv).max(sideways));
+        let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * su + nn * (a + least);
+        let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * sv + nn * (b + least);
+        let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * in_plane + nn * t;
         self.blocks(huu, huv, hvv)
     }
 
