@@ -2,7 +2,7 @@
 //!
 //! The *own continuation* is the drape refined to convergence from the very result (`accuracy.rms_mm`); the *canonical drape*
 //! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it
-//! and drapes from starts perturbed by a millimetre (`accuracy.canonical_spread_mm`): a garment has several equilibria, and an
+//! and drapes from starts put on a little differently (`accuracy.canonical_spread_mm`, [`perturbed`]): a garment has several equilibria, and an
 //! error under the spread says nothing. References are kept on disk under their content hash; see
 //! [`reference`](crate::accuracy::reference).
 
@@ -19,8 +19,14 @@ use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::refine::{RefineOptions, SolveError, Step, Stop, refine};
 use crate::wrinkles::{self, Wrinkles};
 
-/// Amplitude of a perturbed start, m: below what a hand could place, above what rounding makes.
-const PERTURBATION: f64 = 1e-3;
+/// RMS of a perturbation, m: what previews by different range tables differ by, and less than two hands would.
+const PERTURBATION: f64 = 5e-3;
+
+/// Wave numbers of a perturbation along each axis, 1/m, are up to this: waves of 20 cm and more, a fold's length.
+const WAVE_NUMBER: f64 = 30.0;
+
+/// Plane waves in a perturbation.
+const WAVES: usize = 8;
 
 /// Why a drape could not be assessed.
 #[derive(Debug, thiserror::Error)]
@@ -124,11 +130,12 @@ pub fn canonical(
     Ok((reference, references.warnings))
 }
 
-/// Start positions moved by up to a millimetre along each axis, the same for the same seed on any machine.
+/// Start positions moved as if the garment had been put on a little differently: by a smooth random field of 5 mm RMS, the same
+/// for the same seed. Noise at single vertices would say nothing: the first relaxation takes it off.
 #[must_use]
 pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
     let mut state = seed;
-    let mut noise = || {
+    let mut random = || {
         // SplitMix64 (Steele, Lea, Flood 2014): three lines, the same bits everywhere.
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
@@ -136,8 +143,14 @@ pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
     };
+    let mut vector = || DVec3::new(random(), random(), random());
+    let waves: [(DVec3, DVec3, DVec3); WAVES] =
+        std::array::from_fn(|_| (WAVE_NUMBER * vector(), std::f64::consts::PI * vector(), vector()));
+    let field = |p: DVec3| -> DVec3 { waves.iter().map(|(k, phase, along)| *along * (k.dot(p) + phase.x).sin()).sum() };
+    let moves: Vec<DVec3> = positions.iter().map(|&p| field(p)).collect();
+    let rms = (moves.iter().map(|m| m.length_squared()).sum::<f64>() / moves.len().max(1) as f64).sqrt();
     let mut moved: Vec<DVec3> =
-        positions.iter().map(|&p| p + PERTURBATION * DVec3::new(noise(), noise(), noise())).collect();
+        positions.iter().zip(moves).map(|(p, m)| *p + m * (PERTURBATION / rms.max(f64::MIN_POSITIVE))).collect();
     for &v in held {
         moved[v as usize] = positions[v as usize];
     }
@@ -213,5 +226,26 @@ mod tests {
         assert_eq!(moved[7], start[7]);
         let farthest = moved.iter().zip(&start).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
         assert!(farthest > 0.5 * PERTURBATION && farthest <= PERTURBATION, "{farthest}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_perturbation_is_smooth_of_5_mm_and_the_same_for_its_seed() {
+        let sheet: Vec<DVec3> =
+            (0..400).map(|i| DVec3::new(f64::from(i % 20), 0.0, f64::from(i / 20)) * 0.01).collect();
+        let moved = perturbed(&sheet, &[7], 3);
+        assert_eq!(moved, perturbed(&sheet, &[7], 3));
+        assert_ne!(moved, perturbed(&sheet, &[7], 4));
+        assert_eq!(moved[7], sheet[7]);
+        let moves: Vec<DVec3> = moved.iter().zip(&sheet).map(|(m, s)| *m - *s).collect();
+        let rms = (moves.iter().map(|m| m.length_squared()).sum::<f64>() / 400.0).sqrt();
+        assert!((rms - PERTURBATION).abs() < 1e-4, "{rms}");
+        let steepest = (0..399).filter(|i| i % 20 != 19 && ![6, 7].contains(i));
+        let steepest = steepest.map(|i| moves[i].distance(moves[i + 1]) / 0.01).fold(0.0, f64::max);
+        assert!(steepest < 0.5, "neighbours are strained by {steepest}");
     }
 }

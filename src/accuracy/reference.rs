@@ -19,7 +19,7 @@ use crate::mesh::{RestShape, TriMesh};
 
 /// First bytes of a file, and part of every key; the digit goes up with the format and with the mechanics, so that a drape
 /// of an older solver is never taken for the reference of a newer one.
-const MAGIC: &[u8; 8] = b"PWREF\x002\n";
+const MAGIC: &[u8; 8] = b"PWREF\x003\n";
 
 /// Length of a BLAKE3 hash.
 const HASH: usize = blake3::OUT_LEN;

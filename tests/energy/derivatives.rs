@@ -114,7 +114,7 @@ fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64
 /// The same for the bearing Hessian.
 fn check_bearing(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
     let mut blocks = Vec::new();
-    cloth.hessian_bearing(None, x, contacts, &mut blocks);
+    cloth.hessian_bearing(x, contacts, &mut blocks);
     check_blocks(cloth, x, contacts, &blocks, tolerance);
 }
 

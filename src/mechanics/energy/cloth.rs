@@ -246,19 +246,13 @@ impl Cloth {
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
     pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.hessian_after(None, x, contacts, blocks);
-    }
-
-    /// [`hessian`](Self::hessian) for the step after the one that led from `before` to `x`, with the stress which that
-    /// step predicted: see [`Triangle::hessian`].
-    pub fn hessian_after(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(|t| t.hessian(&self.stiffness, x, before), x, contacts, blocks);
+        self.assemble(|t| t.hessian(&self.stiffness, x), x, contacts, blocks);
     }
 
     /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
-    /// than [`hessian_after`](Self::hessian_after), and not always positive.
-    pub fn hessian_bearing(&self, before: Option<&[DVec3]>, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(|t| t.hessian_bearing(&self.stiffness, x, before), x, contacts, blocks);
+    /// than [`hessian`](Self::hessian), and not always positive.
+    pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.assemble(|t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
     }
 
     fn assemble(

@@ -191,30 +191,25 @@ impl Triangle {
     }
 
     /// The positive part of the Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m.
-    ///
-    /// With `before`, the positions a step was taken from, the stress that stiffens the cloth sideways is the one that
-    /// step predicted, linear in it, not the one at `x`: a step that turns a triangle stretches it by half the angle squared, which
-    /// the next step takes back, and a Hessian made of that passing stress would hold the cloth still. (Magisano, Leonetti,
-    /// Garcea: "How to improve efficiency and robustness of the Newton method in geometrically non-linear structural
-    /// problems discretized via displacement-based finite elements", CMAME 313, 2017.)
     #[must_use]
-    pub fn hessian(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [DMat3; 6] {
-        self.second(c, x, before, false)
+    pub fn hessian(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 6] {
+        self.second(c, x, false)
     }
 
-    /// The bearing Hessian, in the order and with the predicted stress of [`hessian`](Self::hessian): exact but for
-    /// compression past what the triangle bears. Not always positive.
+    /// The bearing Hessian, in the order of [`hessian`](Self::hessian): exact but for compression past what the triangle
+    /// bears. Not always positive.
     #[must_use]
-    pub fn hessian_bearing(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [DMat3; 6] {
-        self.second(c, x, before, true)
+    pub fn hessian_bearing(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 6] {
+        self.second(c, x, true)
     }
 
-    fn second(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>, bearing: bool) -> [DMat3; 6] {
+    fn second(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
         let (u, v) = (fu / lu, fv / lv);
         let k = c.tangent(lu - 1.0, lv - 1.0);
-        let [tu, tv, tau] = self.predicted_stress(c, x, before);
+        let (su, sv) = (lu - 1.0, lv - 1.0);
+        let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * fu.dot(fv));
         let n = fu.cross(fv).normalize_or_zero();
         let (wu, wv) = (n.cross(u), n.cross(v));
         // Least stress out of the plane and sideways, and the shear's share within the plane.
@@ -229,20 +224,6 @@ impl Triangle {
         self.blocks(huu, huv, hvv)
     }
 
-    /// Stresses σ_u, σ_v and τ at `x`, or as the step from `before` to `x` predicted them, linear in it.
-    fn predicted_stress(&self, c: &Stiffness, x: &[DVec3], before: Option<&[DVec3]>) -> [f64; 3] {
-        let [fu, fv] = self.deformation(x);
-        let (mut su, mut sv, mut gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
-        if let Some(before) = before {
-            let [gu, gv] = self.deformation(before);
-            su = gu.normalize_or(fu.normalize_or_zero()).dot(fu) - 1.0;
-            sv = gv.normalize_or(fv.normalize_or_zero()).dot(fv) - 1.0;
-            gamma = gu.dot(fv) + gv.dot(fu) - gu.dot(gv);
-        }
-        let k = c.tangent(su, sv);
-        [k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * gamma]
-    }
-
     /// From second derivatives by F_u and F_v to those by the corners.
     fn blocks(&self, huu: DMat3, huv: DMat3, hvv: DMat3) -> [DMat3; 6] {
         let block = |i: usize, j: usize| {
@@ -254,7 +235,7 @@ impl Triangle {
 }
 
 /// a bᵀ.
-pub(super) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 

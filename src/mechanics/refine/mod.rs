@@ -3,7 +3,8 @@
 //! Each step solves (∇²E + ε M) d = −∇E and goes along d as far as Armijo's condition allows, so the energy never rises; ε
 //! (Levenberg, Marquardt) falls while full steps succeed and grows where they do not. The Hessian keeps the compression that the
 //! cloth bears ([`Cloth::hessian_bearing`](super::energy::Cloth::hessian_bearing)); where that is not positive, the step
-//! takes its positive part. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight, is
+//! takes its positive part. A step that stretches or presses the cloth more than it gains is not cut short at once: what is local
+//! and stiff in it is first relaxed by a few iterations without a factorisation ([`relax`]), and so is every step that is taken. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight, is
 //! under the tolerance and no vertex is inside the body.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
@@ -19,6 +20,7 @@
 //! | t | step length, at most 1 | – |
 
 mod newton;
+mod relax;
 mod solver;
 
 use std::ops::ControlFlow;
@@ -48,7 +50,7 @@ pub const STEP_LIMIT: usize = 2000;
 
 impl Default for RefineOptions {
     fn default() -> Self {
-        Self { max_steps: None, tolerance: 1e-3, damping: 300.0, longest_move_m: 0.1, soft_strain: 0.005 }
+        Self { max_steps: None, tolerance: 1e-3, damping: 100.0, longest_move_m: 0.1, soft_strain: 0.005 }
     }
 }
 

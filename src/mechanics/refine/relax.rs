@@ -1,0 +1,249 @@
+//! Relaxation: what a Newton step leaves in the stiff directions, taken off cheaply.
+//!
+//! A Newton step turns triangles, and a turn by θ stretches by θ²/2; it also carries vertices into the body that did not touch
+//! where it began. Both are local and stiff, so a line search that judges the step with them in cuts it to a fraction, and a
+//! factorisation is spent on a millimetre. A few iterations of L-BFGS on the same energy take them off,
+//!
+//! d = −H₀ ∇E updated by the last m pairs (s, y), H₀ = γ diag(D_i⁻¹), γ = sᵀy / yᵀ diag(D_i⁻¹) y,
+//!
+//! each at the price of a gradient: a fiftieth of a factorisation. Every iteration lowers the energy (Armijo). Source: Nocedal,
+//! Wright: "Numerical Optimization" (2006), algorithm 7.4; in a multigrid method this is the smoother.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | s, y | change of positions and of the gradient over an iteration | m, N |
+//! | D_i | diagonal block of the damped Hessian of vertex i | N/m |
+//! | m | pairs kept, [`MEMORY`] | – |
+//!
+//! Limits: takes off what is as short as a few triangles; a whole fold it moves by next to nothing.
+
+use glam::{DMat3, DVec3};
+
+use crate::mechanics::energy::membrane::outer;
+use crate::mechanics::energy::{Cloth, Contacts};
+
+/// m: more pairs cost more than they bring.
+const MEMORY: usize = 6;
+
+/// Longest move of a vertex in one iteration, m: a fraction of a triangle.
+const LONGEST_MOVE: f64 = 3e-3;
+
+/// γ of the first iteration: neighbours pull as much as a vertex itself.
+const FIRST_SCALE: f64 = 0.3;
+
+/// The share of the predicted decrease that an iteration must bring.
+const ARMIJO: f64 = 1e-4;
+
+/// Shorter than this share of an iteration is rounding.
+const SHORTEST: f64 = 1e-3;
+
+/// D⁻¹ and the vectors of the iteration, kept from call to call; by vertex, zero where it is held.
+#[derive(Debug, Default)]
+pub(super) struct Relaxation {
+    inverse: Vec<DMat3>,
+    /// Vertices whose contact is in D⁻¹, and those that came to it in this call, with what they had before.
+    known: Vec<bool>,
+    touched: Vec<(u32, DMat3)>,
+    pairs: Vec<Pair>,
+    spare: Vec<Pair>,
+    gradient: Vec<DVec3>,
+    trial: Vec<DVec3>,
+    trial_gradient: Vec<DVec3>,
+    direction: Vec<DVec3>,
+}
+
+#[derive(Debug, Default)]
+struct Pair {
+    s: Vec<DVec3>,
+    y: Vec<DVec3>,
+    /// 1 / sᵀy, 1/J.
+    rho: f64,
+}
+
+impl Relaxation {
+    /// Takes D from a Hessian's `blocks` and its `diagonal` (N/m), both by unknown; together they must be positive.
+    pub(super) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, blocks: &[DMat3], diagonal: &[f64]) {
+        self.touched.clear();
+        self.known.clear();
+        self.known.resize(cloth.vertex_count(), false);
+        for t in contacts.touches() {
+            self.known[t.vertex as usize] = true;
+        }
+        self.inverse.clear();
+        self.inverse.resize(cloth.vertex_count(), DMat3::ZERO);
+        for (i, (&v, &shift)) in cloth.order.iter().zip(diagonal).enumerate() {
+            let block = blocks[cloth.pattern.starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(shift));
+            self.inverse[v as usize] = block.inverse();
+        }
+    }
+
+    /// Up to `iterations` from `x`, where `contacts` must be up to date and are afterwards; returns the energy, J.
+    pub(super) fn run(
+        &mut self,
+        cloth: &Cloth,
+        contacts: &mut Contacts<'_>,
+        x: &mut Vec<DVec3>,
+        iterations: usize,
+    ) -> f64 {
+        let mut energy = cloth.gradient(x, contacts, &mut self.gradient);
+        self.spare.append(&mut self.pairs);
+        for (v, before) in self.touched.drain(..) {
+            self.inverse[v as usize] = before;
+            self.known[v as usize] = false;
+        }
+        let mut scale = FIRST_SCALE;
+        for _ in 0..iterations {
+            self.touch(contacts);
+            self.turn(scale);
+            let slope = dot(&self.gradient, &self.direction);
+            let longest = self.direction.iter().map(|d| d.length_squared()).fold(0.0, f64::max).sqrt();
+            let mut t = (LONGEST_MOVE / longest).min(1.0);
+            loop {
+                self.trial.clear();
+                self.trial.extend(x.iter().zip(&self.direction).map(|(x, d)| *x + *d * t));
+                contacts.update(&self.trial);
+                let there = cloth.gradient(&self.trial, contacts, &mut self.trial_gradient);
+                if there <= energy + ARMIJO * t * slope {
+                    energy = there;
+                    break;
+                }
+                t *= 0.3;
+                // Also where t is not a number: nothing pulls any more.
+                if t.is_nan() || t <= SHORTEST {
+                    contacts.update(x);
+                    return energy;
+                }
+            }
+            scale = self.remember(x, scale);
+            std::mem::swap(x, &mut self.trial);
+            std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
+        }
+        energy
+    }
+
+    /// Adds κ A n nᵀ to the D of vertices that have come to touch (Sherman and Morrison's formula).
+    fn touch(&mut self, contacts: &Contacts<'_>) {
+        for t in contacts.touches() {
+            let v = t.vertex as usize;
+            if !std::mem::replace(&mut self.known[v], true) {
+                let before = self.inverse[v];
+                let w = before * t.normal;
+                self.inverse[v] -= outer(w, w) * (t.stiffness / (1.0 + t.stiffness * t.normal.dot(w)));
+                self.touched.push((t.vertex, before));
+            }
+        }
+    }
+
+    /// Fills the direction: the two loops of L-BFGS.
+    fn turn(&mut self, scale: f64) {
+        let d = &mut self.direction;
+        d.clear();
+        d.extend(self.gradient.iter().map(|g| -*g));
+        let mut shares = [0.0; MEMORY];
+        for (share, pair) in shares.iter_mut().zip(&self.pairs).rev() {
+            *share = pair.rho * dot(&pair.s, d);
+            add(d, -*share, &pair.y);
+        }
+        for (d, inverse) in d.iter_mut().zip(&self.inverse) {
+            *d = *inverse * *d * scale;
+        }
+        for (share, pair) in shares.iter().zip(&self.pairs) {
+            let back = pair.rho * dot(&pair.y, d);
+            add(d, share - back, &pair.s);
+        }
+    }
+
+    /// Keeps the pair of the iteration from `x` to the trial; returns γ.
+    fn remember(&mut self, x: &[DVec3], scale: f64) -> f64 {
+        let mut pair =
+            if self.pairs.len() == MEMORY { self.pairs.remove(0) } else { self.spare.pop().unwrap_or_default() };
+        pair.s.clear();
+        pair.s.extend(self.trial.iter().zip(x).map(|(to, from)| *to - *from));
+        pair.y.clear();
+        pair.y.extend(self.trial_gradient.iter().zip(&self.gradient).map(|(to, from)| *to - *from));
+        let curvature = dot(&pair.s, &pair.y);
+        if curvature <= 0.0 {
+            self.spare.push(pair);
+            return scale;
+        }
+        pair.rho = 1.0 / curvature;
+        let scale = curvature / pair.y.iter().zip(&self.inverse).map(|(y, m)| y.dot(*m * *y)).sum::<f64>();
+        self.pairs.push(pair);
+        scale
+    }
+}
+
+fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+/// a ← a + t b.
+fn add(a: &mut [DVec3], t: f64, b: &[DVec3]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += *b * t;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fabric::Fabric;
+    use crate::mesh::{RestShape, Topology, TriMesh};
+
+    /// A hanging sheet of 30 by 30 vertices, a centimetre apart, its upper edge held.
+    fn sheet() -> (Cloth, Vec<DVec3>) {
+        let n = 30;
+        let at = |i: u32| DVec3::new(f64::from(i % n), 0.0, f64::from(i / n)) * 0.01;
+        let quads = (0..n * n).filter(|i| i % n + 1 < n && i / n + 1 < n);
+        let triangles = quads.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
+        let mesh = TriMesh::new((0..n * n).map(at).collect(), triangles);
+        let held: Vec<u32> = (n * (n - 1)..n * n).collect();
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let fabric = Fabric::by_name("cotton").unwrap();
+        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &held).unwrap();
+        (cloth, mesh.positions)
+    }
+
+    fn relaxed(cloth: &Cloth, x: &mut Vec<DVec3>, iterations: usize) -> [f64; 2] {
+        let mut contacts = Contacts::none();
+        let (mut blocks, mut relaxation) = (Vec::new(), Relaxation::default());
+        cloth.hessian(x, &contacts, &mut blocks);
+        let diagonal: Vec<f64> = cloth.order.iter().map(|&v| 100.0 * cloth.masses[v as usize]).collect();
+        relaxation.prepare(cloth, &contacts, &blocks, &diagonal);
+        let before = cloth.energy(x, &contacts);
+        let after = relaxation.run(cloth, &mut contacts, x, iterations);
+        assert_eq!(after, cloth.energy(x, &contacts));
+        [before, after]
+    }
+
+    #[test]
+    fn takes_off_what_is_as_short_as_a_triangle() {
+        let (cloth, flat) = sheet();
+        let weight_alone = cloth.energy(&flat, &Contacts::none());
+        let mut x = flat.clone();
+        for (i, x) in x.iter_mut().enumerate() {
+            if !cloth.held[i] {
+                *x += DVec3::new(1e-3, 1e-3, 0.0) * if (i + i / 30) % 2 == 0 { 1.0 } else { -1.0 };
+            }
+        }
+        let [before, after] = relaxed(&cloth, &mut x, 15);
+        assert!(after - weight_alone < 0.01 * (before - weight_alone), "{before} to {after} J, flat {weight_alone} J");
+        for (i, held) in cloth.held.iter().enumerate() {
+            assert!(!held || x[i] == flat[i], "held vertex {i} moved");
+        }
+    }
+
+    #[test]
+    fn energy_falls_with_every_iteration() {
+        let (cloth, mut x) = sheet();
+        for (i, x) in x.iter_mut().enumerate().filter(|(i, _)| !cloth.held[*i]) {
+            x.y += 2e-3 * (0.7 * i as f64).sin();
+        }
+        let mut last = f64::INFINITY;
+        for iterations in 0..12 {
+            let [_, after] = relaxed(&cloth, &mut x.clone(), iterations);
+            assert!(after < last, "{iterations} iterations: {last} to {after} J");
+            last = after;
+        }
+    }
+}
