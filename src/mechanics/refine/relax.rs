@@ -212,7 +212,7 @@ mod tests {
         relaxation.prepare(cloth, &contacts, &blocks, &diagonal);
         let before = cloth.energy(x, &contacts);
         let after = relaxation.run(cloth, &mut contacts, x, iterations);
-        assert_eq!(after, cloth.energy(x, &contacts));
+        assert!((after - cloth.energy(x, &contacts)).abs() < 1e-12 * before.abs());
         [before, after]
     }
 
