@@ -22,7 +22,10 @@
 //!
 //! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::fan::Fan;
 use crate::fabric::Fabric;
@@ -73,9 +76,11 @@ impl Bending {
                 share[v as usize] += area * part / sum;
             }
         }
-        for (v, fan) in fans.iter().enumerate() {
-            if let Some(fan) = fan {
-                bending.push_ring(v as u32, fan, stiffness * share[v]);
+        let weights_of = |fan: &Option<Fan>| fan.as_ref().and_then(|fan| second_derivatives(&fan.spokes));
+        let weights: Vec<Option<Vec<DVec3>>> = fans.par_iter().with_min_len(64).map(weights_of).collect();
+        for (v, (fan, weights)) in fans.iter().zip(weights).enumerate() {
+            if let (Some(fan), Some(weights)) = (fan, weights) {
+                bending.push_ring(v as u32, fan, weights, stiffness * share[v]);
             }
         }
         let mean = 0.25 * (weft + 2.0 * bias + warp);
@@ -88,8 +93,7 @@ impl Bending {
         bending
     }
 
-    fn push_ring(&mut self, centre: u32, fan: &Fan, stiffness: DVec3) {
-        let Some(weights) = second_derivatives(&fan.spokes) else { return };
+    fn push_ring(&mut self, centre: u32, fan: &Fan, weights: Vec<DVec3>, stiffness: DVec3) {
         let start = self.vertices.len() as u32;
         self.vertices.push(centre);
         self.weights.push(-weights.iter().copied().sum::<DVec3>());
@@ -139,20 +143,32 @@ impl Bending {
         d
     }
 
-    /// Energy, J.
+    /// Number of elements, rings and hinges.
     #[must_use]
-    pub fn energy(&self, x: &[DVec3]) -> f64 {
-        self.elements.iter().map(|e| Self::cost(e, &self.derivatives(e, x))).sum()
+    pub fn len(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// Whether nothing bends.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.elements.is_empty()
+    }
+
+    /// Energy of the elements in `range`, J.
+    #[must_use]
+    pub fn energy(&self, range: Range<usize>, x: &[DVec3]) -> f64 {
+        self.elements[range].iter().map(|e| Self::cost(e, &self.derivatives(e, x))).sum()
     }
 
     fn cost(e: &Element, d: &[DVec3; 3]) -> f64 {
         0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
     }
 
-    /// Adds the gradient, N; returns the energy.
-    pub fn add_gradient(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+    /// Adds the gradient of the elements in `range`, N; returns their energy.
+    pub fn add_gradient(&self, range: Range<usize>, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let mut energy = 0.0;
-        for e in &self.elements {
+        for e in &self.elements[range] {
             let d = self.derivatives(e, x);
             energy += Self::cost(e, &d);
             let [p, q, r] = [d[0] * e.stiffness.x, d[1] * e.stiffness.y, d[2] * e.stiffness.z];

@@ -7,6 +7,8 @@
 //! | ∇E | gradient, minus the force | N |
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
 
 use super::bending::Bending;
@@ -222,9 +224,13 @@ impl Cloth {
     /// E at `x`, J; `contacts` must have been updated at `x`.
     #[must_use]
     pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
-        let membrane: f64 = self.triangles.iter().map(|t| t.energy(&self.stiffness, x)).sum();
-        let bending = self.bending.energy(x);
-        gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
+        let elastic = |[triangles, rings]: [Range<usize>; 2]| -> f64 {
+            let membrane: f64 = self.triangles[triangles].iter().map(|t| t.energy(&self.stiffness, x)).sum();
+            membrane + self.bending.energy(rings, x)
+        };
+        let [first, second] = self.halves();
+        let (a, b) = rayon::join(|| elastic(first), || elastic(second));
+        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
     }
 
     /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
@@ -232,16 +238,26 @@ impl Cloth {
         gradient.clear();
         gradient.resize(x.len(), DVec3::ZERO);
         gravity::add_gradient(&self.masses, gradient);
-        let membrane: f64 = self.triangles.iter().map(|t| t.add_gradient(&self.stiffness, x, gradient)).sum();
-        let bending = self.bending.add_gradient(x, gradient);
+        let elastic = |[triangles, rings]: [Range<usize>; 2], gradient: &mut [DVec3]| -> f64 {
+            let of_triangle = |t: &Triangle| t.add_gradient(&self.stiffness, x, gradient);
+            let membrane: f64 = self.triangles[triangles].iter().map(of_triangle).sum();
+            membrane + self.bending.add_gradient(rings, x, gradient)
+        };
+        let [first, second] = self.halves();
+        let mut other = vec![DVec3::ZERO; x.len()];
+        let (a, b) = rayon::join(|| elastic(first, gradient), || elastic(second, &mut other));
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
-        for (g, &held) in gradient.iter_mut().zip(&self.held) {
-            if held {
-                *g = DVec3::ZERO;
-            }
+        for ((g, other), &held) in gradient.iter_mut().zip(&other).zip(&self.held) {
+            *g = if held { DVec3::ZERO } else { *g + *other };
         }
-        gravity::energy(&self.masses, x) + membrane + bending + contacts.energy() + contacts.friction.energy(x)
+        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
+    }
+
+    /// The triangles and the bending elements in two halves, one a core: always the same two, so that sums are the same bits.
+    fn halves(&self) -> [[Range<usize>; 2]; 2] {
+        let (triangles, rings) = (self.triangles.len(), self.bending.len());
+        [[0..triangles / 2, 0..rings / 2], [triangles / 2..triangles, rings / 2..rings]]
     }
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
