@@ -19,7 +19,9 @@ GARMENTS = ["pullover-1", "pullover-2", "flared-skirt", "low-cut-dress", "long-s
 VIEWS = {"undraped": (0.0, 0.085, 0.19, 0.735), "drape": (0.572, 0.085, 0.762, 0.735)}
 COLUMNS = [
     ("undraped", "undraped", "front", ["--refine", "0"]),
+    ("undraped, side", "undraped", "side", ["--refine", "0"]),
     ("preview", "drape", "front", ["--refine", "0"]),
+    ("preview, side", "drape", "side", ["--refine", "0"]),
     ("converged", "drape", "front", []),
     ("converged, side", "drape", "side", []),
     ("converged, back", "drape", "back", []),

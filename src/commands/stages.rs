@@ -29,7 +29,7 @@ pub(crate) struct StageArgs {
     #[arg(long, value_name = "NAME|FILE", default_value = "table-3")]
     table: String,
     /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam; 1 is the
-    /// paper's definition
+    /// paper's definition. `coupled` joins those smaller than its finest extent in any case
     #[arg(long, value_name = "N", default_value_t = 1)]
     min_part: usize,
     /// Model of stage two

@@ -26,7 +26,7 @@
 //! | `model` | `models` | `paper`, `coupled` | `coupled` |
 //! | `table` | `tables` | see [`tables`](super::tables) | `table-3` |
 //! | `extent_cm` | `extents_cm` | cm; 0 or `none` for not cut; a list for a cascade, coarse to fine | `none` |
-//! | `min_part` | `min_parts` | vertices | 1 |
+//! | `min_part` | `min_parts` | vertices; `coupled` joins PARTs smaller than its finest extent in any case | 1 |
 //! | `refine` | `refine` | steps or `converged` | 0 |
 //! | `seed` | `seeds` | 0 is the undisturbed start | 0 |
 //! | `options` | `options` | `{ name = value, ... }`: whatever else the solver understands | none |

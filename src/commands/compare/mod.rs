@@ -57,11 +57,11 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_enum, default_value_t = ModelName::Coupled, help_heading = "Stages")]
     model: ModelName,
     /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "8", help_heading = "Stages")]
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "6", help_heading = "Stages")]
     max_extent: Vec<f64>,
-    /// Join PARTs of fewer vertices than this to a neighbour [default: 6 for `coupled`, 1 for `paper`]
-    #[arg(long, value_name = "N", help_heading = "Stages")]
-    min_part: Option<usize>,
+    /// Join PARTs of fewer vertices than this to a neighbour; `coupled` joins those smaller than its finest extent in any case
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Stages")]
+    min_part: usize,
     /// Newton steps at full resolution, or `converged`
     #[arg(long, value_name = "N|converged", default_value = "0", help_heading = "Stages")]
     refine: String,
@@ -141,12 +141,12 @@ impl CompareArgs {
         let mut base = toml::Table::new();
         base.insert("body".into(), text(&self.body));
         base.insert("fabric".into(), text(&self.fabric));
-        let (model, min_part) = match self.model {
-            ModelName::Coupled => ("coupled", 6),
-            ModelName::Paper => ("paper", 1),
+        let model = match self.model {
+            ModelName::Coupled => "coupled",
+            ModelName::Paper => "paper",
         };
         base.insert("model".into(), model.into());
-        let min_part = i64::try_from(self.min_part.unwrap_or(min_part))?;
+        let min_part = i64::try_from(self.min_part)?;
         base.insert("min_part".into(), min_part.into());
         let extents: Vec<f64> = self.max_extent.iter().copied().filter(|cm| *cm != 0.0).collect();
         base.insert("extent_cm".into(), if extents.is_empty() { "none".into() } else { extents.into() });

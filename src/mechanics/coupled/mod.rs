@@ -85,11 +85,9 @@ pub fn solve(
     if let Some(&bad) = options.extents_m.iter().find(|e| e.is_nan() || **e <= 0.0) {
         return Err(CoupledError::Extent(bad));
     }
-    let joined = if options.min_vertices > 1 {
-        parts.join_small(garment.topology, garment.mesh, options.min_vertices)
-    } else {
-        parts.clone()
-    };
+    let min_vertices = options.min_vertices.max(least_vertices(garment, parts, options));
+    let joined =
+        if min_vertices > 1 { parts.join_small(garment.topology, garment.mesh, min_vertices) } else { parts.clone() };
     let mut result = CoupledResult {
         positions: start.to_vec(),
         parts: joined.clone(),
@@ -108,6 +106,17 @@ pub fn solve(
         out.displacement = part.vertices.iter().map(|&v| moved[v as usize]).sum::<DVec3>() / part.vertices.len() as f64;
     }
     Ok(result)
+}
+
+/// Vertices that the least area of a PART holds on average; 1 where the range table says itself how PARTs are cut.
+fn least_vertices(garment: &Garment<'_>, parts: &Parts, options: &CoupledOptions) -> usize {
+    if parts.own_extent.contains(&true) {
+        return 1;
+    }
+    let finest = options.extents_m.iter().copied().filter(|e| e.is_finite()).fold(f64::INFINITY, f64::min);
+    let area: f64 = garment.rest.areas().iter().sum();
+    let least = options.least_area * finest * finest * garment.mesh.vertex_count() as f64 / area;
+    if least.is_finite() { least as usize } else { 1 }
 }
 
 /// One solve: cut, settle, blend, push out.

@@ -32,6 +32,9 @@ const ALLOWED: f64 = 0.25;
 /// Longest move of a node in one step, m: about the extent of a PART, over which the Hessian says nothing any more.
 const LONGEST_MOVE: f64 = 0.1;
 
+/// Longest move of the last step where the residual ends a solve, m: many nodes that fall freely have a small one, too.
+const NEAR: f64 = 1e-2;
+
 /// Range of the damping ε, 1/s²: from next to nothing to a millimetre's fall a step.
 const DAMPING: [f64; 2] = [1e-2, 1e4];
 
@@ -79,7 +82,8 @@ pub(super) fn settle(
         softened: false,
     }];
     for iteration in 1..=goal.max_steps {
-        if history.last().is_some_and(|h| h.residual_over_weight < goal.tolerance) {
+        let near = |h: &Record| h.residual_over_weight < goal.tolerance && h.largest_move_m < NEAR;
+        if iteration > 1 && history.last().is_some_and(near) {
             break;
         }
         cloth.hessian(&x, contacts, &mut blocks);
