@@ -111,6 +111,7 @@ pub fn refine_with(
             contacts.update(&x);
             contacts.friction_refresh(&x);
             energy = cloth.gradient(&x, &contacts, &mut gradient);
+            residual = norm(&gradient) / cloth.weight;
         }
         if iteration >= limit {
             break Stop::StepsDone;
