@@ -6,7 +6,6 @@
 //! error under the spread says nothing. References are kept on disk under their content hash; see
 //! [`reference`](crate::accuracy::reference).
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -16,7 +15,7 @@ use crate::accuracy::{self, Accuracy, AccuracyError, Comparison};
 use crate::drape::{Drape, Scene, Settings};
 use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mechanics::refine::{RefineOptions, SolveError, Step, Stop, refine};
+use crate::mechanics::refine::{Observer, RefineOptions, SolveError, Stop, refine};
 use crate::wrinkles::{self, Wrinkles};
 
 /// RMS of a perturbation, m: what previews by different range tables differ by, and less than two hands would.
@@ -78,7 +77,7 @@ pub fn assess(
     settings: &Settings,
     drape: &Drape,
     options: &AssessOptions,
-    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+    observer: Observer<'_>,
 ) -> Result<Assessment, AssessError> {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
     let mut references = References { scene, fabric: &settings.fabric, cloth: &cloth, options, warnings: Vec::new() };
@@ -122,7 +121,7 @@ pub fn canonical(
     scene: &Scene,
     fabric: &Fabric,
     options: &AssessOptions,
-    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+    observer: Observer<'_>,
 ) -> Result<(Reference, Vec<String>), AssessError> {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
     let mut references = References { scene, fabric, cloth: &cloth, options, warnings: Vec::new() };
@@ -166,11 +165,7 @@ struct References<'a> {
 }
 
 impl References<'_> {
-    fn from(
-        &mut self,
-        start: &[DVec3],
-        observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
-    ) -> Result<Reference, AssessError> {
+    fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, AssessError> {
         let solver = RefineOptions::default();
         let key = ReferenceKey::new(&ReferenceInput {
             garment: &self.scene.garment,

@@ -9,7 +9,7 @@ use glam::DVec3;
 use partwise::accuracy::reference::ReferenceCache;
 use partwise::assess::{AssessOptions, Assessment, assess};
 use partwise::drape::{Drape, Settings, drape};
-use partwise::mechanics::refine::Step;
+use partwise::mechanics::refine::Observer;
 use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
 
 use super::inputs::{InputArgs, Inputs};
@@ -300,7 +300,7 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
 }
 
 /// Runs `work` with the solver's progress shown and Ctrl-C heard.
-pub(crate) fn refining<T>(what: &str, work: impl FnOnce(&mut dyn FnMut(&Step<'_>) -> ControlFlow<()>) -> T) -> T {
+pub(crate) fn refining<T>(what: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
     let bar = console::progress(None, what);
     let out = work(&mut |step| {
         bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));

@@ -15,7 +15,7 @@ use crate::mechanics::coupled::{self, CoupledError, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::paper::{self, PaperError, PartForces};
-use crate::mechanics::refine::{self, RefineOptions, Refined, SolveError, Step, Stop};
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, SolveError, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::{Parts, segment};
 pub use settings::{Model, Refine, Scene, Settings};
@@ -29,7 +29,7 @@ pub struct StageTimes {
     pub segment: Duration,
     /// Stage two.
     pub mechanics: Duration,
-    /// Newton steps at full resolution, setting them up included; zero where none are asked for, though the preview's energy
+    /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked for, though the preview's energy
     /// and residual are still measured.
     pub refine: Duration,
 }
@@ -115,11 +115,12 @@ pub enum DrapeError {
 ///
 /// # Errors
 /// [`DrapeError`] where a constant of the fabric or an option cannot be used.
-pub fn drape(
-    scene: &Scene,
-    settings: &Settings,
-    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
-) -> Result<Drape, DrapeError> {
+pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    // In the pool: hundreds of short joins follow, and each from outside it would put the caller to sleep and wake it.
+    rayon::scope(|_| stages(scene, settings, observer))
+}
+
+fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     let mut times = StageTimes::default();
     let surface = timed(&mut times.distance, || scene.body.nearest_all(&scene.garment.positions));
     // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
@@ -135,10 +136,16 @@ pub fn drape(
     });
     let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();
-    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts))?;
+    // The cloth at full resolution does not depend on stage two; a preview, which is timed alone, makes it afterwards.
+    let ahead = settings.refine != Refine::Steps(0);
+    let (stage, cloth) = rayon::join(
+        || timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts)),
+        || ahead.then(|| full_cloth(scene, settings)),
+    );
+    let stage = stage?;
     warnings.extend(stage.warnings);
     let start = stage.start.as_deref().unwrap_or(&stage.positions);
-    let refined = timed(&mut times.refine, || refine_further(scene, settings, start, observer))?;
+    let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, start, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
@@ -237,19 +244,24 @@ fn stage_two(
     }
 }
 
+fn full_cloth(scene: &Scene, settings: &Settings) -> Result<Cloth, EnergyError> {
+    Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)
+}
+
 /// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
 fn refine_further(
     scene: &Scene,
     settings: &Settings,
+    cloth: Option<Result<Cloth, EnergyError>>,
     start: &[DVec3],
-    observer: &mut dyn FnMut(&Step<'_>) -> ControlFlow<()>,
+    observer: Observer<'_>,
 ) -> Result<Option<(Cloth, Refined)>, DrapeError> {
     let max_steps = match settings.refine {
         Refine::Steps(0) if matches!(settings.model, Model::Paper(_)) => return Ok(None),
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
-    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
+    let cloth = cloth.unwrap_or_else(|| full_cloth(scene, settings))?;
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
     let floor = scene.body_mesh.bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
     let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {

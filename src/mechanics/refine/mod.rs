@@ -25,6 +25,7 @@
 mod newton;
 mod relax;
 mod solver;
+mod tangent;
 
 use std::ops::ControlFlow;
 
@@ -53,7 +54,7 @@ pub const STEP_LIMIT: usize = 2000;
 
 impl Default for RefineOptions {
     fn default() -> Self {
-        Self { max_steps: None, tolerance: 1e-3, damping: 100.0, longest_move_m: 0.1, soft_strain: 0.005 }
+        Self { max_steps: None, tolerance: 1e-3, damping: 300.0, longest_move_m: 0.1, soft_strain: 0.005 }
     }
 }
 
@@ -124,4 +125,4 @@ pub struct Refined {
 }
 
 /// Told of every step; may end the run.
-pub type Observer<'a> = &'a mut dyn FnMut(&Step<'_>) -> ControlFlow<()>;
+pub type Observer<'a> = &'a mut (dyn FnMut(&Step<'_>) -> ControlFlow<()> + Send);

@@ -1,8 +1,9 @@
 //! Newton's method with a line search and Levenberg damping.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::relax::Relaxation;
+use super::tangent::{State, Tangent};
 use super::{Observer, Record, RefineOptions, Refined, STEP_LIMIT, SolveError, Solver, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -26,14 +27,15 @@ const FAR_FROM_REST: f64 = 0.5;
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
-/// Iterations of a relaxation: with ten knits take a third more steps, with twenty none fewer.
-const RELAXING: usize = 15;
+/// Iterations of a relaxation at the start and after a step.
+const RELAXING: usize = 20;
+
+/// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. With 25 the five
+/// garments and the peers' two skirts, all knit, take 42 steps together, with 60 31, with 80 34.
+const RELAXING_TRIAL: usize = 60;
 
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
 const RELAXED_TRIALS: usize = 2;
-
-/// Steps with the positive Hessian, at most, after one whose bearing Hessian failed.
-const LONGEST_PAUSE: usize = 4;
 
 /// Settles `cloth` on `body` from `start`.
 ///
@@ -55,6 +57,17 @@ pub fn refine(
 /// # Errors
 /// As [`refine`].
 pub fn refine_with(
+    cloth: &Cloth,
+    contacts: Contacts<'_>,
+    start: Vec<DVec3>,
+    options: &RefineOptions,
+    observer: Observer<'_>,
+) -> Result<Refined, SolveError> {
+    // In the pool: a join from outside it puts the caller to sleep, and a gradient, of which there are hundreds, is one.
+    rayon::scope(|_| settle(cloth, contacts, start, options, observer))
+}
+
+fn settle(
     cloth: &Cloth,
     mut contacts: Contacts<'_>,
     start: Vec<DVec3>,
@@ -121,7 +134,9 @@ pub fn refine_with(
         if std::mem::take(&mut fresh) {
             now.hessian(&x, &contacts, &mut tangent.blocks);
             relaxation.prepare(now, &contacts, &tangent.blocks, &diagonal);
-            relaxation.run(now, &mut contacts, &mut x, RELAXING);
+            let relax = || relaxation.run(now, &mut contacts, &mut x, RELAXING);
+            let analyse = || solver.take().map_or_else(|| Solver::new(&cloth.pattern), Ok);
+            solver = Some(rayon::join(relax, analyse).1?);
             contacts.friction_refresh(&x);
             energy = now.gradient(&x, &contacts, &mut gradient);
         }
@@ -148,7 +163,7 @@ pub fn refine_with(
                 break true;
             }
             relaxed += 1;
-            if relaxed <= RELAXED_TRIALS && relaxation.run(now, &mut contacts, &mut trial, RELAXING) <= most {
+            if relaxed <= RELAXED_TRIALS && relaxation.run(now, &mut contacts, &mut trial, RELAXING_TRIAL) <= most {
                 break true;
             }
             t *= 0.5;
@@ -209,64 +224,6 @@ pub fn refine_with(
         stop,
         contact_stiffness,
     })
-}
-
-/// Which Hessian is taken, and its blocks.
-#[derive(Debug, Default)]
-struct Tangent {
-    blocks: Vec<DMat3>,
-    /// Whether the last factorisation was of the bearing Hessian.
-    bearing: bool,
-    /// Steps yet to be taken with the positive Hessian.
-    waiting: usize,
-    /// How many those were the last time.
-    pause: usize,
-}
-
-/// Where a step is taken from.
-struct State<'a> {
-    cloth: &'a Cloth,
-    x: &'a [DVec3],
-    contacts: &'a Contacts<'a>,
-    gradient: &'a [DVec3],
-}
-
-impl Tangent {
-    /// The step d, by the bearing Hessian, or where that is not positive, by the positive one, for a few steps more each time.
-    fn direction(
-        &mut self,
-        here: &State<'_>,
-        solver: &mut Solver,
-        diagonal: &[f64],
-        d: &mut Vec<DVec3>,
-    ) -> Result<(), SolveError> {
-        let State { cloth, x, contacts, gradient } = *here;
-        let mut solve = |blocks: &[DMat3], positive: bool| {
-            d.clear();
-            d.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
-            solver.solve(&cloth.pattern, blocks, diagonal, positive, d)
-        };
-        if self.waiting == 0 {
-            cloth.hessian_bearing(x, contacts, &mut self.blocks);
-            self.bearing = solve(&self.blocks, false).is_ok();
-            if self.bearing {
-                self.pause = 0;
-                return Ok(());
-            }
-            self.pause = (2 * self.pause).clamp(1, LONGEST_PAUSE);
-            self.waiting = self.pause;
-        }
-        self.waiting -= 1;
-        self.bearing = false;
-        cloth.hessian(x, contacts, &mut self.blocks);
-        solve(&self.blocks, true)
-    }
-
-    /// After a step that led nowhere: whether the positive Hessian is left to try.
-    fn pause(&mut self) -> bool {
-        self.waiting = LONGEST_PAUSE;
-        std::mem::take(&mut self.bearing)
-    }
 }
 
 /// The longest side of the box about `x`, m: about the length that hangs, whichever way the cloth lies as yet.
