@@ -24,6 +24,9 @@ const MOST_DAMPING: f64 = 1e4;
 /// drape that has settled before is well under it.
 const FAR_FROM_REST: f64 = 0.5;
 
+/// Residual over weight under which damping falls faster: only the softest ways to move are left, and those it holds back most.
+const CLOSE: f64 = 1e-2;
+
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
@@ -194,7 +197,7 @@ fn settle(
             energy = cloth.gradient(&x, &contacts, &mut gradient);
             residual = norm(&gradient) / cloth.weight;
         } else if t >= first {
-            damping = (damping * 0.5).max(LEAST_DAMPING);
+            damping = (damping * if residual < CLOSE { 0.1 } else { 0.5 }).max(LEAST_DAMPING);
         } else if t < 0.3 * first {
             damping = (damping * 2.0).min(MOST_DAMPING);
         }
