@@ -8,7 +8,7 @@
 //!
 //! **Steps are relaxed.** A step also stretches what it turns, and carries vertices into the body that did not touch before. Both are
 //! local and stiff, so a trial that fails for them is first relaxed by a few iterations without a factorisation (`relax.rs`)
-//! and judged again, and every step that is taken is relaxed as well: a drape takes half to a quarter of the steps.
+//! and judged again, and every step that is taken is relaxed as well: a drape takes half to a seventh of the steps.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
 //! in thousands, so it creeps into its folds a millimetre at a time. Far from rest it is therefore first settled with its stiffness
