@@ -138,6 +138,28 @@ fn a_hanging_sheet_stretches_as_its_closed_form_says() {
 }
 
 #[test]
+fn a_strap_one_part_wide_holds() {
+    // Four centimetres wide, cut to twelve: a chain of PARTs of which no three meet.
+    let (length, k) = (0.4, 60.0);
+    let mesh = sheet(4, 40, 0.01);
+    let topology = Topology::new(&mesh);
+    let rest = RestShape::from_edges(&mesh).unwrap();
+    let (cloth, body) = (fabric(k), far_away());
+    let held: Vec<u32> = (0..=4).collect();
+    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &held };
+    let parts = pieces(&mesh, &topology, 10.0);
+    let chain = parts.cut_to_extent(&mesh, &topology, 0.12);
+    let coarse = CoarseMesh::new(&mesh, &topology, &chain, &vec![false; mesh.vertex_count()]);
+    assert!(coarse.triangles.is_empty() && chain.len() > 2, "{} PARTs are no chain", chain.len());
+    let result = solve(&garment, &body, &parts, &mesh.positions, &single(0.12)).unwrap();
+    assert!(result.warnings.is_empty(), "{:?}", result.warnings);
+    let lower = -result.positions.last().unwrap().z - length;
+    // ρ g L² / 2k: 2.6 mm, and no more than the lumping of some PARTs of 3 cm off.
+    let expected = cloth.density_kg_per_m2 * partwise::GRAVITY * length * length / (2.0 * k);
+    assert!((lower / expected - 1.0).abs() < 0.2, "{lower} against {expected}");
+}
+
+#[test]
 fn forces_balance_at_every_free_node() {
     let mesh = sheet(20, 30, 0.01);
     let topology = Topology::new(&mesh);

@@ -29,26 +29,37 @@ impl Parts {
         let extent = |level: u32| levels.get(level as usize)?.extent.map(|e| e.evened());
         let uneven = levels.iter().any(|l| l.extent.is_some_and(|e| e.evened().0 != UNCUT.0));
         let grain = uneven.then(|| Grain::new(mesh, topology, rest));
-        self.cut(mesh, topology, grain.as_ref(), |level| extent(level).unwrap_or(UNCUT))
+        self.cut(mesh, topology, grain.as_ref(), |p| extent(self.parts[p].level).unwrap_or(UNCUT))
     }
 
     /// The same PARTs, each cut until none is wider than `extent_m` metres along the cloth. PARTs of levels with an extent of
     /// their own stay as they are.
     #[must_use]
     pub fn cut_to_extent(&self, mesh: &TriMesh, topology: &Topology, extent_m: f64) -> Self {
-        let own = |level: u32| self.own_extent.get(level as usize) == Some(&true);
-        self.cut(mesh, topology, None, |level| if own(level) { UNCUT } else { ([1.0, 1.0], extent_m) })
+        self.cut_some_to_extent(mesh, topology, extent_m, &vec![true; self.len()])
     }
 
-    /// Each PART cut to the extent of its level, m, after lengths along weft and warp are multiplied.
+    /// As [`cut_to_extent`](Self::cut_to_extent), those PARTs alone that are `chosen`.
+    pub(crate) fn cut_some_to_extent(
+        &self,
+        mesh: &TriMesh,
+        topology: &Topology,
+        extent_m: f64,
+        chosen: &[bool],
+    ) -> Self {
+        let own = |p: usize| self.own_extent.get(self.parts[p].level as usize) == Some(&true);
+        self.cut(mesh, topology, None, |p| if own(p) || !chosen[p] { UNCUT } else { ([1.0, 1.0], extent_m) })
+    }
+
+    /// Each PART cut to its own extent, m, after lengths along weft and warp are multiplied.
     fn cut(
         &self,
         mesh: &TriMesh,
         topology: &Topology,
         grain: Option<&Grain>,
-        extent_of: impl Fn(u32) -> ([f64; 2], f64) + Sync,
+        extent_of: impl Fn(usize) -> ([f64; 2], f64) + Sync,
     ) -> Self {
-        if self.parts.iter().all(|part| extent_of(part.level).1 == f64::INFINITY) {
+        if (0..self.len()).all(|p| extent_of(p).1 == f64::INFINITY) {
             return self.clone();
         }
         let mut place = vec![0u32; self.part_of_vertex.len()];
@@ -60,7 +71,7 @@ impl Parts {
         let pieces = self.map(|number, part| {
             let inside = |w: u32| self.part_of_vertex[w as usize] == number as u32;
             let local = |w: u32| inside(w).then(|| place[w as usize] as usize);
-            let (factors, extent_m) = extent_of(part.level);
+            let (factors, extent_m) = extent_of(number);
             let grain = grain.filter(|_| factors != UNCUT.0).map(|grain| (grain, factors));
             nearest_seeds(&part.vertices, local, Ruler { mesh, topology, grain }, extent_m)
         });

@@ -22,6 +22,7 @@
 //! near that limit comes out too stiff; the body is felt at the nodes only until the push-out.
 
 mod blend;
+mod bridges;
 mod clearance;
 mod nodes;
 mod options;
@@ -43,6 +44,7 @@ use crate::distance::Body;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::Parts;
+use bridges::cut_at_bridges;
 use settle::{Goal, settle};
 
 /// Distance a node keeps from the body, m: room for the body's roundness between nodes and for the softness of the contact.
@@ -136,7 +138,7 @@ fn stage(
         let count = mesh.vertex_count();
         *is_held.get_mut(vertex as usize).ok_or(EnergyError::Held { vertex, count })? = true;
     }
-    let coarse = CoarseMesh::new(mesh, topology, &parts, &is_held);
+    let (parts, coarse) = cut_at_bridges(mesh, topology, parts, &is_held, extent_m);
     if coarse.triangles.is_empty() {
         return Err(CoupledError::NoCloth { parts: parts.len() });
     }
