@@ -10,8 +10,9 @@
 //! | node of p | the vertex of PART p nearest its centroid, held before free, edge before inner | – |
 //! | junction | the garment triangle a coarse triangle comes from | – |
 //!
-//! Limits: a PART that meets fewer than two others in a triangle (a whole ring, what of a strip one PART wide `bridges.rs` could
-//! not cut) is in no coarse triangle. Such a node is *loose*: it has no stiffness, so it takes the mean displacement of its neighbours.
+//! Limits: a PART that meets fewer than two others in a triangle (a whole ring, what of a strip one PART wide `bridges.rs`
+//! could not cut) is in no coarse triangle. Such a node is *loose*: it has no stiffness, so it takes the mean displacement of
+//! its neighbours.
 
 use std::collections::BTreeSet;
 

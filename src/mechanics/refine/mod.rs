@@ -1,10 +1,10 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
 //! Each step solves (∇²E + ε M) d = −∇E and goes along d as far as Armijo's condition allows, so the energy never rises; ε
-//! (Levenberg, Marquardt) falls while full steps succeed, faster near the end, and grows where they do not. The Hessian keeps the compression that the
-//! cloth bears ([`Cloth::hessian_bearing`](super::energy::Cloth::hessian_bearing)); where that is not positive, the step
-//! takes its positive part. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight, is
-//! under the tolerance and no vertex is inside the body.
+//! (Levenberg, Marquardt) falls while full steps succeed, faster near the end, and grows where they do not. The Hessian keeps
+//! the compression that the cloth bears ([`Cloth::hessian_bearing`](super::energy::Cloth::hessian_bearing)); where that is
+//! not positive, the step takes its positive part. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the
+//! garment's weight, is under the tolerance and no vertex is inside the body.
 //!
 //! **Steps are relaxed.** A step also stretches what it turns, and carries vertices into the body that did not touch before. Both are
 //! local and stiff, so a trial that fails for them is first relaxed by a few iterations without a factorisation (`relax.rs`)
