@@ -1,9 +1,9 @@
 //! A drape against its references: how far it is from where it would settle, and from the canonical drape.
 //!
 //! The *own continuation* is the drape refined to convergence from the very result (`accuracy.rms_mm`); the *canonical drape*
-//! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it
-//! and drapes from starts put on a little differently (`accuracy.canonical_spread_mm`, [`perturbed`]): a garment has several equilibria, and an
-//! error under the spread says nothing. References are kept on disk under their content hash; see
+//! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it and
+//! drapes from starts put on a little differently (`accuracy.canonical_spread_mm`, [`perturbed`]): a garment has several
+//! equilibria, and an error under the spread says nothing. References are kept on disk under their content hash; see
 //! [`reference`](crate::accuracy::reference).
 
 use std::time::Instant;

@@ -29,8 +29,8 @@ pub struct StageTimes {
     pub segment: Duration,
     /// Stage two.
     pub mechanics: Duration,
-    /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked for, though the preview's energy
-    /// and residual are still measured.
+    /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked
+    /// for, though the preview's energy and residual are still measured.
     pub refine: Duration,
 }
 

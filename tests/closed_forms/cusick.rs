@@ -43,6 +43,9 @@ fn the_results_beside_the_code_are_what_the_code_gives() {
     let kept = include_str!("../../assets/cusick/results.csv");
     let drawn = results_csv(&["interlock"], 10).unwrap();
     let row = drawn.lines().nth(1).unwrap();
-    assert!(kept.lines().any(|line| line == row), "assets/cusick/results.csv lacks `{row}`: write it again");
+    assert!(
+        kept.lines().any(|line| line == row),
+        "assets/cusick/results.csv lacks `{row}`: `partwise cusick --rows 10 --csv` writes it again"
+    );
     assert_eq!(kept.lines().count(), 1 + partwise::fabric::BUILT_IN.len());
 }

@@ -36,7 +36,7 @@ pub(super) fn cut_at_bridges(
     (parts, coarse)
 }
 
-/// Whether each PART has a neighbour that it shares no coarse triangle with.
+/// Whether each PART has a neighbour that it shares no coarse triangle with, and may be cut.
 fn beside_bridges(parts: &Parts, coarse: &CoarseMesh) -> Vec<bool> {
     let mut held_together: Vec<[u32; 2]> = coarse
         .triangles
@@ -48,8 +48,8 @@ fn beside_bridges(parts: &Parts, coarse: &CoarseMesh) -> Vec<bool> {
     let mut beside = vec![false; parts.len()];
     for seam in &parts.seams {
         if held_together.binary_search(&seam.parts).is_err() {
-            for p in seam.parts {
-                beside[p as usize] = true;
+            for p in seam.parts.map(|p| p as usize) {
+                beside[p] = parts.own_extent.get(parts.parts[p].level as usize) != Some(&true);
             }
         }
     }

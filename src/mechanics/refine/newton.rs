@@ -34,7 +34,8 @@ const SOFT_TOLERANCE: f64 = 1e-2;
 const RELAXING: usize = 20;
 
 /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. With 25 the five
-/// garments and two plain skirts of 4,000 and 16,000 vertices, all knit, take 42 steps together, with 60 31, with 80 34.
+/// garments and two plain skirts of 4,000 and 16,000 vertices, all knit, take 42 steps together, with 60 31, with 80 34
+/// (damping from 100).
 const RELAXING_TRIAL: usize = 60;
 
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
