@@ -153,7 +153,8 @@ pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
     let state = State::of(c.cloth, c.body, c.result);
     let reference_energy = State::of(c.cloth, c.body, c.reference).energy_j;
     let hem = shape::hem_heights(c.topology, c.result, c.reference);
-    let representable = c.parts.map(|p| representable::representable(c.topology, p, c.start, c.reference));
+    let representable =
+        c.parts.map(|p| representable::representable(c.topology, p, &c.cloth.held, c.start, c.reference));
     Ok(Accuracy {
         vertices: ErrorSummary::of(&errors),
         contact: zone(true),

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledError, Garment};
+use crate::distance::{Body, SurfacePoint};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::paper::{self, PaperError, PartForces};
@@ -122,30 +122,30 @@ pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Resu
 
 fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     let mut times = StageTimes::default();
-    let surface = timed(&mut times.distance, || scene.body.nearest_all(&scene.garment.positions));
-    // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
-    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
-    let parts = timed(&mut times.segment, || {
-        let parts = segment(&scene.topology, &distance, &settings.table);
-        let joined = if settings.min_part > 1 {
-            parts.join_small(&scene.topology, &scene.garment, settings.min_part)
-        } else {
-            parts
-        };
-        joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
-    });
+    let needs_cloth = matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0);
+    let StageTimes { distance: distance_time, segment: segment_time, .. } = &mut times;
+    let ((surface, distance, parts), cloth) = rayon::join(
+        || {
+            let surface = timed(distance_time, || scene.body.nearest_all(&scene.garment.positions));
+            // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
+            let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
+            let parts = timed(segment_time, || stage_one(scene, settings, &distance));
+            (surface, distance, parts)
+        },
+        || {
+            let began = Instant::now();
+            let cloth = needs_cloth.then(|| full_cloth(scene, settings)).transpose();
+            cloth.map(|cloth| (cloth, began.elapsed()))
+        },
+    );
+    let (cloth, cloth_time) = cloth?;
     let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();
-    // The cloth at full resolution does not depend on stage two; a preview, which is timed alone, makes it afterwards.
-    let ahead = settings.refine != Refine::Steps(0);
-    let (stage, cloth) = rayon::join(
-        || timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts)),
-        || ahead.then(|| full_cloth(scene, settings)),
-    );
+    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts, cloth.as_ref()));
+    times.mechanics += cloth_time;
     let stage = stage?;
     warnings.extend(stage.warnings);
-    let start = stage.start.as_deref().unwrap_or(&stage.positions);
-    let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, start, observer))?;
+    let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.positions, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
@@ -187,24 +187,36 @@ struct StageTwo {
     parts: Parts,
     outcomes: Vec<PartOutcome>,
     positions: Vec<DVec3>,
-    /// Where the refinement starts, if not from the positions.
-    start: Option<Vec<DVec3>>,
     warnings: Vec<String>,
 }
 
-/// A coarse cloth whose residual is more than this share of its weight has not come to rest anywhere: other people's
-/// undraped panels, with seams metres too long, may slip off the body before it does.
-const ASTRAY: f64 = 0.5;
+/// Stage one: the PARTs that the range table makes.
+fn stage_one(scene: &Scene, settings: &Settings, distance: &[f64]) -> Parts {
+    let parts = segment(&scene.topology, distance, &settings.table);
+    let joined = if settings.min_part > 1 {
+        parts.join_small(&scene.topology, &scene.garment, settings.min_part)
+    } else {
+        parts
+    };
+    joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
+}
 
 fn stage_two(
     scene: &Scene,
     settings: &Settings,
     surface: &[SurfacePoint],
     parts: Parts,
+    cloth: Option<&Cloth>,
 ) -> Result<StageTwo, DrapeError> {
-    let Scene { garment: mesh, topology, body, rest, held, .. } = scene;
+    let Scene { garment: mesh, topology, body, .. } = scene;
     let fabric = &settings.fabric;
     match &settings.model {
+        Model::Coupled(options) => {
+            let made = if cloth.is_none() { Some(full_cloth(scene, settings)?) } else { None };
+            let Some(cloth) = cloth.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
+            let garment = Garment { mesh, topology, cloth, fabric };
+            couple(&garment, body, parts, options)
+        }
         Model::Paper(options) => {
             let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
             let outcome =
@@ -213,35 +225,36 @@ fn stage_two(
                 parts,
                 outcomes: result.parts.iter().map(outcome).collect(),
                 positions: result.positions,
-                start: None,
                 warnings: result.warnings.iter().map(ToString::to_string).collect(),
             })
         }
-        Model::Coupled(options) => {
-            let garment = Garment { mesh, topology, rest, fabric, held };
-            let result = coupled::solve(&garment, body, &parts, &mesh.positions, options)?;
-            let outcome = |p: &coupled::PartResult| PartOutcome {
-                force_n: p.reaction,
-                displacement: p.displacement,
-                contact: p.in_contact,
-            };
-            let mut warnings = result.warnings.clone();
-            let astray = result.residual_over_weight() > ASTRAY && settings.refine != Refine::Steps(0);
-            if astray {
-                warnings.push(
-                    "the coarse cloth has gone astray: the steps at full resolution start from the undraped garment"
-                        .into(),
-                );
-            }
-            Ok(StageTwo {
-                outcomes: result.part_results.iter().map(outcome).collect(),
-                parts: result.parts,
-                positions: result.positions,
-                start: astray.then(|| mesh.positions.clone()),
-                warnings,
-            })
-        }
     }
+}
+
+/// Stage two by the coupled model: the PARTs of the table, or those cut to one extent after the other.
+fn couple(garment: &Garment<'_>, body: &Body, parts: Parts, options: &CoupledOptions) -> Result<StageTwo, DrapeError> {
+    let placed = &garment.mesh.positions;
+    let mut stage = StageTwo { parts, outcomes: Vec::new(), positions: placed.clone(), warnings: Vec::new() };
+    let table = stage.parts.clone();
+    let uncut = [f64::INFINITY];
+    for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
+        stage.parts = table.cut_to_extent(garment.mesh, garment.topology, extent);
+        let result = coupled::solve(garment, body, &stage.parts, &stage.positions, options)?;
+        let outcome = |p: &coupled::PartResult| PartOutcome {
+            force_n: p.reaction,
+            displacement: p.displacement,
+            contact: p.in_contact,
+        };
+        stage.outcomes = result.parts.iter().map(outcome).collect();
+        stage.positions = result.positions;
+        stage.warnings.extend(result.warnings);
+    }
+    // Of a cascade the displacement of a PART counts from the garment as placed.
+    for (part, outcome) in stage.parts.parts.iter().zip(&mut stage.outcomes) {
+        let moved = part.vertices.iter().map(|&v| stage.positions[v as usize] - placed[v as usize]);
+        outcome.displacement = moved.sum::<DVec3>() / part.vertices.len() as f64;
+    }
+    Ok(stage)
 }
 
 fn full_cloth(scene: &Scene, settings: &Settings) -> Result<Cloth, EnergyError> {
@@ -252,16 +265,15 @@ fn full_cloth(scene: &Scene, settings: &Settings) -> Result<Cloth, EnergyError> 
 fn refine_further(
     scene: &Scene,
     settings: &Settings,
-    cloth: Option<Result<Cloth, EnergyError>>,
+    cloth: Option<Cloth>,
     start: &[DVec3],
     observer: Observer<'_>,
 ) -> Result<Option<(Cloth, Refined)>, DrapeError> {
+    let Some(cloth) = cloth else { return Ok(None) };
     let max_steps = match settings.refine {
-        Refine::Steps(0) if matches!(settings.model, Model::Paper(_)) => return Ok(None),
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
-    let cloth = cloth.unwrap_or_else(|| full_cloth(scene, settings))?;
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
     let floor = scene.body_mesh.bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
     let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {
@@ -285,10 +297,7 @@ fn unassigned_warning(parts: &Parts) -> Vec<String> {
     if parts.unassigned == 0 {
         return Vec::new();
     }
-    vec![format!(
-        "{} vertices lie in no level of the range table and stay where they are; widen its first or last row",
-        parts.unassigned
-    )]
+    vec![format!("{} vertices lie in no level of the range table: widen its first or last row", parts.unassigned)]
 }
 
 fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {

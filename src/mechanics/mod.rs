@@ -4,5 +4,6 @@ pub mod coupled;
 pub mod cusick;
 pub mod energy;
 pub mod fit;
+pub(crate) mod newton;
 pub mod paper;
 pub mod refine;

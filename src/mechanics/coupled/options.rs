@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::mechanics::energy::EnergyError;
-use crate::mechanics::refine::{Record, SolveError};
-use crate::parts::Parts;
+use crate::mechanics::newton::SolveError;
+use crate::mechanics::refine::Record;
 
 /// Why PARTs could not be solved together.
 #[derive(Debug, thiserror::Error)]
@@ -21,75 +22,86 @@ pub enum CoupledError {
         /// The length it must have.
         expected: usize,
     },
-    /// An extent that cuts nothing sensible.
-    #[error("an extent of {0} m cannot cut a garment: give a positive length, a few centimetres")]
-    Extent(f64),
-    /// No three PARTs meet.
-    #[error(
-        "no three of the {parts} PARTs meet in a triangle, so they make no cloth: cut them to an extent of a few centimetres"
-    )]
-    NoCloth {
-        /// PARTs there are.
-        parts: usize,
-    },
-    /// The coarse cloth cannot be set up.
-    #[error("the coarse cloth: {0}")]
+    /// No PART that could move.
+    #[error("none of the garment's vertices lies in a level of the range table: widen its first or last row")]
+    NoParts,
+    /// The cloth cannot be set up.
+    #[error(transparent)]
     Energy(#[from] EnergyError),
-    /// The coarse cloth cannot be solved.
-    #[error("the coarse cloth: {0}")]
+    /// The motions cannot be solved.
+    #[error("the motions of the PARTs: {0}")]
     Solve(#[from] SolveError),
 }
 
+/// How a PART moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Motion {
+    /// An affine map: it is shifted, turned, stretched and sheared.
+    #[default]
+    Affine,
+    /// One displacement, as in the paper.
+    Translation,
+}
+
+impl Motion {
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Affine => "affine",
+            Self::Translation => "translation",
+        }
+    }
+}
+
+impl std::str::FromStr for Motion {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Self::Affine, Self::Translation]
+            .into_iter()
+            .find(|m| m.name() == text)
+            .ok_or_else(|| format!("found `{text}`, expected affine or translation"))
+    }
+}
+
 /// How PARTs are solved together.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct CoupledOptions {
-    /// Largest extents along the cloth, m, coarse to fine: one solve each, from where the one before ended. Empty: the PARTs
-    /// as they are.
+    /// How a PART moves.
+    pub motion: Motion,
+    /// Largest extents of PARTs along the cloth, m, coarse to fine: one solve each, from where the one before ended. Empty: the
+    /// PARTs as the range table makes them.
     pub extents_m: Vec<f64>,
-    /// PARTs under this many vertices are joined to a neighbour before they are cut.
-    pub min_vertices: usize,
-    /// So are PARTs of an area under this share of the finest extent squared.
-    pub least_area: f64,
-    /// Sweeps of the blend; `None` for as many as half a PART is wide.
-    pub blend_sweeps: Option<usize>,
-    /// Residual over weight at which a coarse cloth counts as settled, once its steps are short.
-    pub tolerance: f64,
-    /// A whole Newton step that moves no node by more than this, m, ends a solve as well.
-    pub least_move_m: f64,
-    /// Newton steps of each solve at most.
+    /// Newton steps at most.
     pub max_steps: usize,
+    /// A whole step that moves no vertex by more than this, m, ends the solve, once the damping is low.
+    pub least_move_m: f64,
     /// Damping ε to begin with, 1/s².
     pub damping: f64,
-    /// Strain that the coarse cloth may have where it hangs by its whole height: its membrane stiffness is at most ρ g H over
-    /// this. Flat triangles of stiff cloth can only fold along their edges, which is no way for cloth to fall.
-    pub coarse_strain: f64,
-    /// Share of the fabric's bending stiffness that the coarse cloth has.
-    pub bending_share: f64,
-    /// Share of its membrane stiffness that the coarse cloth keeps under compression.
-    pub compression_share: f64,
+    /// Strain that the cloth may have where it hangs by its whole height: its membrane stiffness is at most ρ g H over this.
+    /// Stiff cloth lets a step go a millimetre.
+    pub soft_strain: f64,
+    /// Iterations of a relaxation after each step.
+    pub relaxing: usize,
+    /// Iterations of a relaxation of a step that failed.
+    pub relaxing_trial: usize,
 }
 
 impl Default for CoupledOptions {
     fn default() -> Self {
         Self {
-            // On the knit skirt and dresses 8 cm are farther from their own drape, 5 cm no nearer in all and over a tenth of the time.
-            extents_m: vec![0.06],
-            min_vertices: 1,
-            // A small node costs as much as any other: a tenth of the PARTs fewer, the preview as near.
-            least_area: 0.75,
-            blend_sweeps: None,
-            // A preview is millimetres off whatever the coarse cloth does: at 1e-2 and 1 mm it takes up to half as many steps
-            // more, and comes no nearer.
-            tolerance: 5e-2,
-            // A third of the error a preview is meant to have.
+            motion: Motion::Affine,
+            extents_m: Vec::new(),
+            max_steps: 40,
             least_move_m: 3e-3,
-            max_steps: 60,
-            damping: 3.0,
-            // A 60 cm skirt then hangs at most 1.5 mm too long, and folds while it may.
-            coarse_strain: 0.005,
-            // With all of it a knit skirt folds in four where its drape has eight; with a tenth it crumples.
-            bending_share: 0.3,
-            compression_share: 0.03,
+            damping: 30.0,
+            // A 60 cm skirt then hangs at most 1.5 mm too long.
+            soft_strain: 0.005,
+            relaxing: 20,
+            relaxing_trial: 60,
         }
     }
 }
@@ -109,35 +121,8 @@ pub struct PartResult {
     pub resultant: f64,
     /// Whether the body carries some of it.
     pub in_contact: bool,
-    /// Whether its node is held.
+    /// Whether one of its vertices is held.
     pub held: bool,
-}
-
-/// One solve of the cascade.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stage {
-    /// Largest extent, m; infinite where nothing was cut.
-    pub extent_m: f64,
-    /// PARTs.
-    pub part_count: usize,
-    /// Triangles of the coarse cloth.
-    pub triangle_count: usize,
-    /// Newton steps.
-    pub steps: usize,
-    /// Residual over weight of the coarse cloth at the end.
-    pub residual_over_weight: f64,
-    /// Energy of the coarse cloth, J.
-    pub energy: f64,
-    /// Vertices after this stage, m.
-    pub positions: Vec<DVec3>,
-    /// Newton's steps on the coarse cloth, the start first.
-    pub history: Vec<Record>,
-    /// Time for the PARTs and the coarse cloth.
-    pub setup: Duration,
-    /// Time for Newton's steps.
-    pub solve: Duration,
-    /// Time for the blend and the push-out.
-    pub blend: Duration,
 }
 
 /// The garment after the coupled solve.
@@ -145,28 +130,28 @@ pub struct Stage {
 pub struct CoupledResult {
     /// Vertex positions, m.
     pub positions: Vec<DVec3>,
-    /// The PARTs of the last stage.
-    pub parts: Parts,
-    /// What each of them did.
-    pub part_results: Vec<PartResult>,
-    /// Every solve, coarse to fine.
-    pub stages: Vec<Stage>,
-    /// Vertices that the blend left within the cloth's thickness of the body and that were pushed out.
+    /// What each PART did.
+    pub parts: Vec<PartResult>,
+    /// Every Newton step, the start first.
+    pub history: Vec<Record>,
+    /// Unknown vectors: four a PART that moves by an affine map.
+    pub unknowns: usize,
+    /// Residual force over weight in the PARTs' own coordinates.
+    pub residual_over_weight: f64,
+    /// Vertices that were left within the cloth's thickness of the body and pushed out.
     pub pushed_out: usize,
+    /// Time for the weights and the pattern.
+    pub setup: Duration,
+    /// Time for Newton's steps.
+    pub solve: Duration,
     /// What a user should know.
     pub warnings: Vec<String>,
 }
 
 impl CoupledResult {
-    /// Residual over weight of the last coarse cloth.
-    #[must_use]
-    pub fn residual_over_weight(&self) -> f64 {
-        self.stages.last().map_or(0.0, |s| s.residual_over_weight)
-    }
-
-    /// Newton steps of all stages.
+    /// Newton steps.
     #[must_use]
     pub fn steps(&self) -> usize {
-        self.stages.iter().map(|s| s.steps).sum()
+        self.history.last().map_or(0, |h| h.iteration)
     }
 }

@@ -22,8 +22,6 @@
 //!
 //! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
 
-use std::ops::Range;
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -38,12 +36,16 @@ const RIDGE: f64 = 1e-6;
 /// A floor for H as a share of B_u + B_v, so that a saddle always costs something.
 const LEAST_TWIST: f64 = 0.1;
 
-/// All bending elements of a cloth, as rows of weights over a few vertices each.
+/// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum: E = ½ Σ Q_ij x_i·x_j.
 #[derive(Debug, Clone, Default)]
 pub struct Bending {
     elements: Vec<Element>,
     vertices: Vec<u32>,
     weights: Vec<DVec3>,
+    /// First entry of each vertex's row of Q.
+    starts: Vec<u32>,
+    /// Columns and scalars Q_ij, N/m.
+    entries: Vec<(u32, f64)>,
 }
 
 /// One ring or hinge: its part of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
@@ -90,7 +92,29 @@ impl Bending {
                 bending.push_hinge(mesh, rest, edge, [s, t], mean);
             }
         }
+        bending.sum_up(mesh.vertex_count());
         bending
+    }
+
+    /// Sums the elements up to Q, whose product with the positions costs a sixth of the elements one by one.
+    fn sum_up(&mut self, vertices: usize) {
+        let mut all: Vec<(u32, u32, f64)> = Vec::new();
+        for ([i, j], scalar) in self.hessian() {
+            all.push((i, j, scalar));
+            if i != j {
+                all.push((j, i, scalar));
+            }
+        }
+        // Stable, so that equal entries are summed in the order of their elements.
+        all.sort_by_key(|&(i, j, _)| (i, j));
+        self.starts = vec![0; vertices + 1];
+        for same in all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            self.entries.push((same[0].1, same.iter().map(|e| e.2).sum()));
+            self.starts[same[0].0 as usize + 1] += 1;
+        }
+        for v in 0..vertices {
+            self.starts[v + 1] += self.starts[v];
+        }
     }
 
     fn push_ring(&mut self, centre: u32, fan: &Fan, weights: Vec<DVec3>, stiffness: DVec3) {
@@ -130,54 +154,39 @@ impl Bending {
         (&self.vertices[range.clone()], &self.weights[range])
     }
 
-    /// x_uu, x_uv, x_vv of one element.
-    fn derivatives(&self, e: &Element, x: &[DVec3]) -> [DVec3; 3] {
+    /// Vertices, weights of x_uu, x_uv, x_vv, and stiffness A·(B_u, H, B_v) of every element.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = (&[u32], &[DVec3], DVec3)> + '_ {
+        self.elements.iter().map(|e| {
+            let (vertices, weights) = self.parts(e);
+            (vertices, weights, e.stiffness)
+        })
+    }
+
+    /// (Q x)_v, N: what bending adds to the gradient at a vertex. Its energy is half the sum of x_v · (Q x)_v.
+    #[inline]
+    #[must_use]
+    pub fn gradient_at(&self, v: usize, x: &[DVec3]) -> DVec3 {
+        let row = &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize];
+        // About the vertex itself: the rows of Q sum to zero, and differences keep digits that coordinates lose.
+        let here = x[v];
+        row.iter().fold(DVec3::ZERO, |sum, &(j, scalar)| sum + (x[j as usize] - here) * scalar)
+    }
+
+    /// Energy of all elements, J.
+    #[must_use]
+    pub fn energy(&self, x: &[DVec3]) -> f64 {
+        self.elements.iter().map(|e| self.cost(e, x)).sum()
+    }
+
+    fn cost(&self, e: &Element, x: &[DVec3]) -> f64 {
         let (vertices, weights) = self.parts(e);
         let mut d = [DVec3::ZERO; 3];
         for (&v, w) in vertices.iter().zip(weights) {
-            let p = x[v as usize];
-            d[0] += p * w.x;
-            d[1] += p * w.y;
-            d[2] += p * w.z;
-        }
-        d
-    }
-
-    /// Number of elements, rings and hinges.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.elements.len()
-    }
-
-    /// Whether nothing bends.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.elements.is_empty()
-    }
-
-    /// Energy of the elements in `range`, J.
-    #[must_use]
-    pub fn energy(&self, range: Range<usize>, x: &[DVec3]) -> f64 {
-        self.elements[range].iter().map(|e| Self::cost(e, &self.derivatives(e, x))).sum()
-    }
-
-    fn cost(e: &Element, d: &[DVec3; 3]) -> f64 {
-        0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
-    }
-
-    /// Adds the gradient of the elements in `range`, N; returns their energy.
-    pub fn add_gradient(&self, range: Range<usize>, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
-        let mut energy = 0.0;
-        for e in &self.elements[range] {
-            let d = self.derivatives(e, x);
-            energy += Self::cost(e, &d);
-            let [p, q, r] = [d[0] * e.stiffness.x, d[1] * e.stiffness.y, d[2] * e.stiffness.z];
-            let (vertices, weights) = self.parts(e);
-            for (&v, w) in vertices.iter().zip(weights) {
-                gradient[v as usize] += p * w.x + q * w.y + r * w.z;
+            for (d, w) in d.iter_mut().zip(w.to_array()) {
+                *d += x[v as usize] * w;
             }
         }
-        energy
+        0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
     }
 
     /// Every pair of vertices that bend together, each once per element, the first not before the second.

@@ -91,7 +91,7 @@ pub struct Cloth {
     pub triangles: Vec<Triangle>,
     /// The rings that bend.
     pub bending: Bending,
-    stiffness: Stiffness,
+    pub(crate) stiffness: Stiffness,
     triangle_slots: Vec<[Slot; 6]>,
     bending_blocks: Vec<f64>,
 }
@@ -198,10 +198,13 @@ impl Cloth {
         Some(Self { stiffness, ..self.clone() })
     }
 
-    /// The same cloth with another share of its membrane stiffness left under compression.
+    /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle.
     #[must_use]
-    pub fn with_slack(self, slack: f64) -> Self {
-        Self { stiffness: self.stiffness.with_slack(slack), ..self }
+    pub fn with_slack(mut self, slack: &[f64]) -> Self {
+        for (t, &slack) in self.triangles.iter_mut().zip(slack) {
+            t.slack = slack;
+        }
+        self
     }
 
     /// Number of vertices, held or free.
@@ -224,9 +227,9 @@ impl Cloth {
     /// E at `x`, J; `contacts` must have been updated at `x`.
     #[must_use]
     pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
-        let elastic = |[triangles, rings]: [Range<usize>; 2]| -> f64 {
+        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> f64 {
             let membrane: f64 = self.triangles[triangles].iter().map(|t| t.energy(&self.stiffness, x)).sum();
-            membrane + self.bending.energy(rings, x)
+            membrane + vertices.map(|v| 0.5 * x[v].dot(self.bending.gradient_at(v, x))).sum::<f64>()
         };
         let [first, second] = self.halves();
         let (a, b) = rayon::join(|| elastic(first), || elastic(second));
@@ -235,29 +238,34 @@ impl Cloth {
 
     /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
     pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
-        gradient.clear();
-        gradient.resize(x.len(), DVec3::ZERO);
-        gravity::add_gradient(&self.masses, gradient);
-        let elastic = |[triangles, rings]: [Range<usize>; 2], gradient: &mut [DVec3]| -> f64 {
-            let of_triangle = |t: &Triangle| t.add_gradient(&self.stiffness, x, gradient);
+        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> (f64, Vec<DVec3>) {
+            let mut gradient = vec![DVec3::ZERO; x.len()];
+            let of_triangle = |t: &Triangle| t.add_gradient(&self.stiffness, x, &mut gradient);
             let membrane: f64 = self.triangles[triangles].iter().map(of_triangle).sum();
-            membrane + self.bending.add_gradient(rings, x, gradient)
+            let mut bending = 0.0;
+            for v in vertices {
+                let g = self.bending.gradient_at(v, x);
+                bending += 0.5 * x[v].dot(g);
+                gradient[v] += g;
+            }
+            (membrane + bending, gradient)
         };
         let [first, second] = self.halves();
-        let mut other = vec![DVec3::ZERO; x.len()];
-        let (a, b) = rayon::join(|| elastic(first, gradient), || elastic(second, &mut other));
+        let ((a, half), (b, mut other)) = rayon::join(|| elastic(first), || elastic(second));
+        std::mem::swap(gradient, &mut other);
+        gravity::add_gradient(&self.masses, gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
-        for ((g, other), &held) in gradient.iter_mut().zip(&other).zip(&self.held) {
-            *g = if held { DVec3::ZERO } else { *g + *other };
+        for ((g, half), &held) in gradient.iter_mut().zip(&half).zip(&self.held) {
+            *g = if held { DVec3::ZERO } else { *g + *half };
         }
         gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
     }
 
-    /// The triangles and the bending elements in two halves, one a core: always the same two, so that sums are the same bits.
+    /// The triangles and the vertices in two halves, one a core: always the same two, so that sums are the same bits.
     fn halves(&self) -> [[Range<usize>; 2]; 2] {
-        let (triangles, rings) = (self.triangles.len(), self.bending.len());
-        [[0..triangles / 2, 0..rings / 2], [triangles / 2..triangles, rings / 2..rings]]
+        let (triangles, vertices) = (self.triangles.len(), self.masses.len());
+        [[0..triangles / 2, 0..vertices / 2], [triangles / 2..triangles, vertices / 2..vertices]]
     }
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
@@ -269,6 +277,27 @@ impl Cloth {
     /// than [`hessian`](Self::hessian), and not always positive.
     pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
         self.assemble(|t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
+    }
+
+    /// Each unknown's own block of the positive part of ∇²E + ε M at `x`, N/m, in elimination order.
+    pub(crate) fn own_blocks(&self, x: &[DVec3], contacts: &Contacts, damping: f64, blocks: &mut Vec<DMat3>) {
+        let starts = &self.pattern.starts;
+        blocks.clear();
+        blocks.extend(self.order.iter().zip(starts).map(|(&v, &s)| {
+            DMat3::from_diagonal(DVec3::splat(self.bending_blocks[s as usize] + damping * self.masses[v as usize]))
+        }));
+        for t in &self.triangles {
+            for (&v, block) in t.vertices.iter().zip(t.own_blocks(&self.stiffness, x)) {
+                if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
+                    *sum += block;
+                }
+            }
+        }
+        for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
+            if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
+                *sum += block;
+            }
+        }
     }
 
     fn assemble(

@@ -47,6 +47,8 @@ pub struct Triangle {
     pub area: f64,
     /// Gradients b_i of the shape functions, 1/m.
     pub gradients: [DVec2; 3],
+    /// Share r of the stiffness that is left under compression.
+    pub slack: f64,
 }
 
 /// Membrane stiffness, N/m.
@@ -60,8 +62,6 @@ pub struct Stiffness {
     weft: f64,
     warp: f64,
     poisson: f64,
-    /// Share left under compression, r.
-    slack: f64,
     /// What a triangle bears in compression times its area, N·m.
     bearing: f64,
 }
@@ -84,13 +84,7 @@ impl Stiffness {
     fn of(k_u: f64, k_v: f64, shear: f64, nu: f64, bearing: f64) -> Self {
         let d = 1.0 - nu * nu;
         let (uu, uv, vv) = (k_u / d, nu * (k_u * k_v).sqrt() / d, k_v / d);
-        Self { uu, uv, vv, shear, weft: k_u, warp: k_v, poisson: nu, slack: SLACK, bearing }
-    }
-
-    /// The same with another share r of the stiffness left under compression.
-    #[must_use]
-    pub fn with_slack(self, slack: f64) -> Self {
-        Self { slack, ..self }
+        Self { uu, uv, vv, shear, weft: k_u, warp: k_v, poisson: nu, bearing }
     }
 
     /// The same with no constant over `most` (N/m); `None` where none is.
@@ -98,7 +92,7 @@ impl Stiffness {
     pub fn capped(&self, most: f64) -> Option<Self> {
         let stiffer = self.weft.max(self.warp).max(self.shear) > most;
         let (weft, warp, shear) = (self.weft.min(most), self.warp.min(most), self.shear.min(most));
-        stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.bearing).with_slack(self.slack))
+        stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.bearing))
     }
 }
 
@@ -106,7 +100,7 @@ impl Stiffness {
 /// every centimetre buckles between under B π²/ℓ² = 1 N/m, a hundredth of what a woven's k would put up at 2 %
 /// compression, into wrinkles finer than the mesh. A tenth drops most of that and keeps the triangles in shape; with all of
 /// it a stiff woven locks into facets.
-const SLACK: f64 = 0.1;
+pub const SLACK: f64 = 0.1;
 
 /// Share of the buckling stress that the bearing Hessian keeps: at three tenths the whole is not positive every now
 /// and then, at one tenth hardly ever.
@@ -123,9 +117,9 @@ struct Tangent {
 impl Stiffness {
     /// The tangent at strains s_u, s_v: the energy is quadratic within each of the four states, so it also gives the
     /// stresses and the energy.
-    fn tangent(&self, su: f64, sv: f64) -> Tangent {
+    fn tangent(&self, r: f64, su: f64, sv: f64) -> Tangent {
         let (tu, tv) = (self.uu * su + self.uv * sv, self.uv * su + self.vv * sv);
-        let (r, q) = (self.slack, 1.0 - self.slack);
+        let q = 1.0 - r;
         let (uu, uv, vv) = (r * self.uu, r * self.uv, r * self.vv);
         if tu >= 0.0 && tv >= 0.0 {
             Tangent { uu: self.uu, uv: self.uv, vv: self.vv }
@@ -154,7 +148,12 @@ impl Triangle {
         }
         // ∇N_i is the opposite side turned by 90 degrees, over twice the signed area.
         let gradient = |p: DVec2, q: DVec2| (q - p).perp() / double;
-        Some(Self { vertices, area: 0.5 * double.abs(), gradients: [gradient(b, c), gradient(c, a), gradient(a, b)] })
+        Some(Self {
+            vertices,
+            area: 0.5 * double.abs(),
+            gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
+            slack: SLACK,
+        })
     }
 
     /// F_u and F_v.
@@ -171,7 +170,7 @@ impl Triangle {
     pub fn energy(&self, c: &Stiffness, x: &[DVec3]) -> f64 {
         let [fu, fv] = self.deformation(x);
         let (su, sv, gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
-        let k = c.tangent(su, sv);
+        let k = c.tangent(self.slack, su, sv);
         self.area * (0.5 * k.uu * su * su + k.uv * su * sv + 0.5 * k.vv * sv * sv + 0.5 * c.shear * gamma * gamma)
     }
 
@@ -180,7 +179,7 @@ impl Triangle {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length(), fv.length());
         let (su, sv, gamma) = (lu - 1.0, lv - 1.0, fu.dot(fv));
-        let k = c.tangent(su, sv);
+        let k = c.tangent(self.slack, su, sv);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * gamma);
         let pu = self.area * (fu * (tu / lu.max(SHORTEST)) + fv * tau);
         let pv = self.area * (fv * (tv / lv.max(SHORTEST)) + fu * tau);
@@ -204,10 +203,16 @@ impl Triangle {
     }
 
     fn second(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
+        let [huu, huv, hvv] = self.by_gradient(c, x, bearing);
+        self.blocks(huu, huv, hvv)
+    }
+
+    /// Second derivatives of ψ by F_u and F_v: uu, uv, vv, N/m.
+    pub(crate) fn by_gradient(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 3] {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
         let (u, v) = (fu / lu, fv / lv);
-        let k = c.tangent(lu - 1.0, lv - 1.0);
+        let k = c.tangent(self.slack, lu - 1.0, lv - 1.0);
         let (su, sv) = (lu - 1.0, lv - 1.0);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * fu.dot(fv));
         let n = fu.cross(fv).normalize_or_zero();
@@ -221,7 +226,14 @@ impl Triangle {
         let huu = outer(u, u) * k.uu + outer(fv, fv) * c.shear + outer(wu, wu) * su + nn * (a + least);
         let hvv = outer(v, v) * k.vv + outer(fu, fu) * c.shear + outer(wv, wv) * sv + nn * (b + least);
         let huv = outer(u, v) * k.uv + outer(fv, fu) * c.shear + (DMat3::IDENTITY - nn) * in_plane + nn * t;
-        self.blocks(huu, huv, hvv)
+        [huu, huv, hvv]
+    }
+
+    /// The corners' own blocks of [`hessian`](Self::hessian), N/m.
+    pub(crate) fn own_blocks(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 3] {
+        let [huu, huv, hvv] = self.by_gradient(c, x, false);
+        let both = huv + huv.transpose();
+        self.gradients.map(|g| (huu * (g.x * g.x) + hvv * (g.y * g.y) + both * (g.x * g.y)) * self.area)
     }
 
     /// From second derivatives by F_u and F_v to those by the corners.

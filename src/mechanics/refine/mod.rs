@@ -1,38 +1,21 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
-//! Each step solves (∇²E + ε M) d = −∇E and goes along d as far as Armijo's condition allows, so the energy never rises; ε
-//! (Levenberg, Marquardt) falls while full steps succeed, faster near the end, and grows where they do not. The Hessian keeps
-//! the compression that the cloth bears ([`Cloth::hessian_bearing`](super::energy::Cloth::hessian_bearing)); where that is
-//! not positive, the step takes its positive part. Stops where the residual ‖∇E‖₂ over the free vertices, divided by the
-//! garment's weight, is under the tolerance and no vertex is inside the body.
-//!
-//! **Steps are relaxed.** A step also stretches what it turns, and carries vertices into the body that did not touch before. Both are
-//! local and stiff, so a trial that fails for them is first relaxed by a few iterations without a factorisation (`relax.rs`)
-//! and judged again, and every step that is taken is relaxed as well: a drape takes half to a seventh of the steps.
+//! The steps are those of [`newton`](super::newton) in all vertices. Stops where the residual ‖∇E‖₂ over the free vertices, divided
+//! by the garment's weight, is under the tolerance and no vertex is inside the body.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
 //! in thousands, so it creeps into its folds a millimetre at a time. Far from rest it is therefore first settled with its stiffness
 //! capped at what its own weight strains by [`RefineOptions::soft_strain`]; with a few millimetres left to go, it continues
 //! with its true stiffness. Each of the two energies falls; [`Record::softened`] says which one a step belongs to.
-//!
-//! | symbol | meaning | unit |
-//! |---|---|---|
-//! | d | step | m |
-//! | ε | damping | 1/s² |
-//! | M | lumped masses | kg |
-//! | t | step length, at most 1 | – |
 
-mod newton;
-mod relax;
-mod solver;
-mod tangent;
+mod settle;
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-pub use newton::{refine, refine_with};
-pub use solver::{SolveError, Solver};
+pub use super::newton::{SolveError, Solver};
+pub use settle::{refine, refine_with};
 
 /// When to stop, and how carefully to go.
 #[derive(Debug, Clone, PartialEq)]

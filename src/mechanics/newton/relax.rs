@@ -34,12 +34,15 @@ const FIRST_SCALE: f64 = 0.3;
 /// The share of the predicted decrease that an iteration must bring.
 const ARMIJO: f64 = 1e-4;
 
+/// Iterations by which the end of a relaxation is told.
+const LATE: usize = 3;
+
 /// Shorter than this share of an iteration is rounding.
 const SHORTEST: f64 = 1e-3;
 
 /// D⁻¹ and the vectors of the iteration, kept from call to call; by vertex, zero where it is held.
 #[derive(Debug, Default)]
-pub(super) struct Relaxation {
+pub(crate) struct Relaxation {
     inverse: Vec<DMat3>,
     /// Vertices whose contact is in D⁻¹, and those that came to it in this call, with what they had before.
     known: Vec<bool>,
@@ -50,6 +53,8 @@ pub(super) struct Relaxation {
     trial: Vec<DVec3>,
     trial_gradient: Vec<DVec3>,
     direction: Vec<DVec3>,
+    /// Share of the decrease under which the last iterations end a call; 0 never does.
+    ending: f64,
 }
 
 #[derive(Debug, Default)]
@@ -61,8 +66,8 @@ struct Pair {
 }
 
 impl Relaxation {
-    /// Takes D from a Hessian's `blocks` and its `diagonal` (N/m), both by unknown; together they must be positive.
-    pub(super) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, blocks: &[DMat3], diagonal: &[f64]) {
+    /// Takes D from the `blocks` (N/m) of the unknowns, in elimination order; they must be positive.
+    pub(crate) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, blocks: &[DMat3]) {
         self.touched.clear();
         self.known.clear();
         self.known.resize(cloth.vertex_count(), false);
@@ -71,14 +76,19 @@ impl Relaxation {
         }
         self.inverse.clear();
         self.inverse.resize(cloth.vertex_count(), DMat3::ZERO);
-        for (i, (&v, &shift)) in cloth.order.iter().zip(diagonal).enumerate() {
-            let block = blocks[cloth.pattern.starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(shift));
+        for (&v, block) in cloth.order.iter().zip(blocks) {
             self.inverse[v as usize] = block.inverse();
         }
     }
 
+    /// Ends a relaxation whose last iterations brought less than this share of what all brought.
+    pub(crate) fn ending_at(mut self, share: f64) -> Self {
+        self.ending = share;
+        self
+    }
+
     /// Up to `iterations` from `x`, where `contacts` must be up to date and are afterwards; returns the energy, J.
-    pub(super) fn run(
+    pub(crate) fn run(
         &mut self,
         cloth: &Cloth,
         contacts: &mut Contacts<'_>,
@@ -92,7 +102,11 @@ impl Relaxation {
             self.known[v as usize] = false;
         }
         let mut scale = FIRST_SCALE;
+        let mut energies = vec![energy];
         for _ in 0..iterations {
+            if self.has_ended(&energies) {
+                break;
+            }
             self.touch(contacts);
             self.turn(scale);
             let slope = dot(&self.gradient, &self.direction);
@@ -105,6 +119,7 @@ impl Relaxation {
                 let there = cloth.gradient(&self.trial, contacts, &mut self.trial_gradient);
                 if there <= energy + ARMIJO * t * slope {
                     energy = there;
+                    energies.push(energy);
                     break;
                 }
                 t *= 0.3;
@@ -119,6 +134,12 @@ impl Relaxation {
             std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
         }
         energy
+    }
+
+    /// Whether the last [`LATE`] of these energies fell by too little to go on.
+    fn has_ended(&self, energies: &[f64]) -> bool {
+        let [first, .., last] = energies else { return false };
+        energies.len() > 2 * LATE && energies[energies.len() - 1 - LATE] - last < self.ending * (first - last)
     }
 
     /// Adds κ A n nᵀ to the D of vertices that have come to touch (Sherman and Morrison's formula).
@@ -173,8 +194,17 @@ impl Relaxation {
     }
 }
 
+/// a·b, in four sums that do not wait for each other.
 fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+    let mut sums = [DVec3::ZERO; 4];
+    let (fours, others) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() / 4 * 4);
+    for (a, b) in fours {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += *a * *b;
+        }
+    }
+    let rest: f64 = a[others..].iter().zip(&b[others..]).map(|(a, b)| a.dot(*b)).sum();
+    ((sums[0] + sums[1]) + (sums[2] + sums[3])).element_sum() + rest
 }
 
 /// a ← a + t b.

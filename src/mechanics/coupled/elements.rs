@@ -1,0 +1,197 @@
+//! Which PARTs move each triangle, each bending ring and each vertex, and where their blocks of the reduced Hessian are.
+//!
+//! An element couples every pair of PARTs that have weight at one of its vertices. The pattern is built PART by PART: the
+//! column of a PART's unknown holds what is left of its own block, then its neighbours that come later in the order of elimination.
+
+use crate::mechanics::energy::ordering::nested_dissection;
+use crate::mechanics::energy::pattern::Pattern;
+use crate::mechanics::energy::{Cloth, bending::Bending};
+
+use super::motions::Motions;
+use super::weights::Weights;
+
+/// Elements of this many for each PART are sampled for the Hessian: a PART has twelve unknowns, a triangle says three things. The
+/// energy and its gradient take them all.
+const ENOUGH: f64 = 12.0;
+
+/// The PARTs of elements of one kind.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Elements {
+    starts: Vec<u32>,
+    parts: Vec<u32>,
+    weight_starts: Vec<u32>,
+    weights: Vec<f64>,
+    pair_starts: Vec<u32>,
+    pairs: Vec<Pair>,
+    /// The elements that are sampled, and how many each stands for.
+    pub(super) sampled: Vec<(u32, f64)>,
+}
+
+/// The blocks of two PARTs of an element, by their places in its list: rows of the later, columns of the earlier.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair {
+    pub(super) row: u8,
+    pub(super) column: u8,
+    /// Blocks between the column's own and the row's.
+    pub(super) skip: u32,
+}
+
+impl Elements {
+    /// From the vertices of each element.
+    fn new<'a>(weights: &Weights, parts: usize, all: impl Iterator<Item = &'a [u32]>) -> Self {
+        let mut e = Self { starts: vec![0], weight_starts: vec![0], ..Self::default() };
+        for vertices in all {
+            let first = e.parts.len();
+            for &v in vertices {
+                for &(p, _) in weights.of(v as usize) {
+                    if !e.parts[first..].contains(&p) {
+                        e.parts.push(p);
+                    }
+                }
+            }
+            e.parts[first..].sort_unstable();
+            for &p in &e.parts[first..] {
+                let of = |&v: &u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
+                e.weights.extend(vertices.iter().map(of));
+            }
+            e.starts.push(e.parts.len() as u32);
+            e.weight_starts.push(e.weights.len() as u32);
+        }
+        e.sample(parts);
+        e
+    }
+
+    /// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each PART.
+    fn sample(&mut self, parts: usize) {
+        const GOLDEN: f64 = 0.618_033_988_749_895;
+        let mut size = vec![0.0; parts];
+        for i in 0..self.len() {
+            let list = self.parts(i);
+            for &p in list {
+                size[p as usize] += 1.0 / list.len() as f64;
+            }
+        }
+        for i in 0..self.len() {
+            let rate = self.parts(i).iter().map(|&p| ENOUGH / size[p as usize]).fold(0.0, f64::max).min(1.0);
+            if (i as f64 * GOLDEN).fract() < rate {
+                self.sampled.push((i as u32, rate.recip()));
+            }
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// PARTs of an element, ascending.
+    pub(super) fn parts(&self, i: usize) -> &[u32] {
+        &self.parts[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    /// Their weights at its vertices, PART after PART.
+    pub(super) fn weights(&self, i: usize) -> &[f64] {
+        &self.weights[self.weight_starts[i] as usize..self.weight_starts[i + 1] as usize]
+    }
+
+    /// The pairs of its PARTs.
+    pub(super) fn pairs(&self, i: usize) -> &[Pair] {
+        &self.pairs[self.pair_starts[i] as usize..self.pair_starts[i + 1] as usize]
+    }
+
+    fn lay_out(&mut self, motions: &Motions, columns: &[Vec<(u32, u32)>]) {
+        self.pair_starts.push(0);
+        for i in 0..self.len() {
+            let list = self.parts(i).to_vec();
+            for (k, &p) in list.iter().enumerate() {
+                for (l, &q) in list[..=k].iter().enumerate() {
+                    let (row, column) =
+                        if motions.first[p as usize] >= motions.first[q as usize] { (k, l) } else { (l, k) };
+                    let later = motions.first[list[row] as usize];
+                    let of = &columns[list[column] as usize];
+                    let skip = of.binary_search_by_key(&later, |e| e.0).map_or(0, |at| of[at].1);
+                    self.pairs.push(Pair { row: row as u8, column: column as u8, skip });
+                }
+            }
+            self.pair_starts.push(self.pairs.len() as u32);
+        }
+    }
+}
+
+/// Elements of all kinds.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    /// The reduced Hessian's pattern.
+    pub(super) pattern: Pattern,
+    pub(super) triangles: Elements,
+    pub(super) rings: Elements,
+    pub(super) vertices: Elements,
+}
+
+impl Layout {
+    /// Finds the elements, numbers the motions for elimination and lays out the pattern.
+    pub(super) fn new(cloth: &Cloth, motions: &mut Motions) -> Self {
+        let parts = motions.first.len();
+        let weights = &motions.weights;
+        let of = |all: Vec<&[u32]>| Elements::new(weights, parts, all.into_iter());
+        let (mut triangles, (mut rings, mut vertices)) = rayon::join(
+            || of(cloth.triangles.iter().map(|t| &t.vertices[..]).collect()),
+            || {
+                let numbers: Vec<u32> = (0..cloth.vertex_count() as u32).collect();
+                (of(Bending::elements(&cloth.bending).map(|e| e.0).collect()), of(numbers.chunks(1).collect()))
+            },
+        );
+        let neighbours = neighbours(parts, &[&triangles, &rings]);
+        let free: Vec<u32> = (0..parts as u32).filter(|&p| motions.count[p as usize] > 0).collect();
+        let order = nested_dissection(free, motions.centres(), &neighbours);
+        motions.number(order.iter().copied());
+        // Of each PART its later neighbours by first unknown, with the unknowns in between.
+        let mut columns: Vec<Vec<(u32, u32)>> = vec![Vec::new(); parts];
+        let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
+        for &q in &order {
+            let own = motions.first[q as usize];
+            let count = |p: u32| u32::from(motions.count[p as usize]);
+            let later = neighbours[q as usize].iter().copied().filter(|&p| motions.first[p as usize] > own);
+            let mut later: Vec<u32> = later.filter(|&p| count(p) > 0).collect();
+            later.sort_unstable_by_key(|&p| motions.first[p as usize]);
+            let mut skip = 0;
+            for &p in &later {
+                columns[q as usize].push((motions.first[p as usize], skip));
+                skip += count(p);
+            }
+            for b in 0..count(q) {
+                pattern.rows.extend(own + b..own + count(q));
+                for &p in &later {
+                    pattern.rows.extend(motions.first[p as usize]..motions.first[p as usize] + count(p));
+                }
+                pattern.starts.push(pattern.rows.len() as u32);
+            }
+        }
+        for elements in [&mut triangles, &mut rings, &mut vertices] {
+            elements.lay_out(motions, &columns);
+        }
+        Self { pattern, triangles, rings, vertices }
+    }
+}
+
+/// PARTs that share an element with each, ascending.
+fn neighbours(parts: usize, all: &[&Elements]) -> Vec<Vec<u32>> {
+    let mut neighbours = vec![Vec::new(); parts];
+    for elements in all {
+        let mut last: &[u32] = &[];
+        for i in 0..elements.len() {
+            let list = elements.parts(i);
+            // Inside a PART one element is like the one before.
+            if list.len() > 1 && list != last {
+                for &p in list {
+                    neighbours[p as usize].extend(list.iter().copied().filter(|&q| q != p));
+                }
+            }
+            last = list;
+        }
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
+}

@@ -1,0 +1,235 @@
+//! The PARTs' motions as coordinates of the cloth.
+//!
+//! u(v) = Σ_p w_p(v) [D_p + A_p (x_v − c_p)],
+//!
+//! with blending weights w_p and, for each PART, a displacement D_p and a displacement gradient A_p. About positions x it is linear in
+//! the unknowns, four vectors a PART: D_p and the columns of A_p along the PART's own axes, each divided by the PART's spread along
+//! it. Every Newton step takes x, c_p and axes as they are by then, so turns add up as turns do, and a PART can be turned
+//! by any angle without being stretched. A PART of three vertices or fewer has its displacement alone, as every PART does with one
+//! [`Motion::Translation`] each: the paper's.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | w_p | blending weight | – |
+//! | D_p, A_p | displacement and its gradient | m, – |
+//! | c_p | middle of the PART, by its weights | m |
+//!
+//! Limits: within a PART nothing bends; what the blend strains at the seams is relaxed vertex by vertex.
+
+use glam::{DMat3, DVec3};
+
+use super::options::Motion;
+use super::weights::Weights;
+use crate::mechanics::energy::pattern::Pattern;
+use crate::mechanics::newton::{SolveError, Solver};
+use crate::parts::Parts;
+
+/// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
+pub(super) type Values = [f64; 4];
+
+/// Vertices of a PART that has its displacement alone.
+const SMALL: usize = 3;
+
+/// Least spread along an axis, relative to the largest: a flat PART is not turned by what it is thick.
+const FLATTEST: f64 = 0.05;
+
+/// No PART is smaller than this, m.
+const LEAST_SPREAD: f64 = 1e-4;
+
+/// Share of a diagonal block's trace that is added to it: flat PARTs leave some of their functions nearly alike.
+pub(super) const RIDGE: f64 = 1e-6;
+
+/// Blended motions of PARTs about the positions they were last centred at.
+#[derive(Debug, Clone)]
+pub struct Motions {
+    pub(super) weights: Weights,
+    /// First unknown of each PART, in elimination order.
+    pub(super) first: Vec<u32>,
+    /// Unknowns of each PART: 0, 1 or 4.
+    pub(super) count: Vec<u8>,
+    centre: Vec<DVec3>,
+    axes: Vec<[DVec3; 3]>,
+    unknowns: usize,
+}
+
+impl Motions {
+    /// Motions of `parts` about `x`, blended by `weights` (none at vertices that do not move).
+    #[must_use]
+    pub fn new(parts: &Parts, weights: Weights, x: &[DVec3], motion: Motion) -> Self {
+        let affine = |vertices: usize| motion == Motion::Affine && vertices > SMALL;
+        let mut count: Vec<u8> = parts.parts.iter().map(|p| if affine(p.vertices.len()) { 4 } else { 1 }).collect();
+        let mut moves = vec![false; parts.len()];
+        for v in 0..x.len() {
+            for &(p, _) in weights.of(v) {
+                moves[p as usize] = true;
+            }
+        }
+        for (count, moves) in count.iter_mut().zip(&moves) {
+            *count *= u8::from(*moves);
+        }
+        let n = parts.len();
+        let (centre, axes) = (vec![DVec3::ZERO; n], vec![[DVec3::ZERO; 3]; n]);
+        let mut motions = Self { weights, first: vec![0; n], count, centre, axes, unknowns: 0 };
+        motions.number(0..n as u32);
+        motions.centre_at(x);
+        motions
+    }
+
+    /// Numbers the unknowns PART by PART in this order.
+    pub(super) fn number(&mut self, order: impl IntoIterator<Item = u32>) {
+        let mut next = 0;
+        for p in order {
+            self.first[p as usize] = next;
+            next += u32::from(self.count[p as usize]);
+        }
+        self.unknowns = next as usize;
+    }
+
+    /// Unknown vectors.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.unknowns
+    }
+
+    /// The middles c_p, m.
+    pub(super) fn centres(&self) -> &[DVec3] {
+        &self.centre
+    }
+
+    /// Takes middles and axes from `x`.
+    pub fn centre_at(&mut self, x: &[DVec3]) {
+        let n = self.first.len();
+        let mut sum = vec![0.0; n];
+        self.centre = vec![DVec3::ZERO; n];
+        for (v, x) in x.iter().enumerate() {
+            for &(p, w) in self.weights.of(v) {
+                sum[p as usize] += w;
+                self.centre[p as usize] += *x * w;
+            }
+        }
+        for (centre, sum) in self.centre.iter_mut().zip(&sum) {
+            *centre /= sum.max(f64::MIN_POSITIVE);
+        }
+        let mut spread = vec![DMat3::ZERO; n];
+        for (v, x) in x.iter().enumerate() {
+            for &(p, w) in self.weights.of(v) {
+                let d = *x - self.centre[p as usize];
+                spread[p as usize] += DMat3::from_cols(d * d.x, d * d.y, d * d.z) * w;
+            }
+        }
+        for (((axes, spread), sum), _) in
+            self.axes.iter_mut().zip(spread).zip(sum).zip(&self.count).filter(|(_, count)| **count == 4)
+        {
+            let (squares, directions) = principal(spread * sum.max(f64::MIN_POSITIVE).recip());
+            let lengths = squares.map(|s| s.max(0.0).sqrt());
+            let least = (FLATTEST * lengths.iter().copied().fold(0.0, f64::max)).max(LEAST_SPREAD);
+            for ((axis, direction), length) in axes.iter_mut().zip(directions).zip(lengths) {
+                *axis = direction / length.max(least);
+            }
+        }
+    }
+
+    /// The functions of PART p at x, where its weight is w.
+    #[inline]
+    pub(super) fn values(&self, p: u32, w: f64, x: DVec3) -> Values {
+        let y = (x - self.centre[p as usize]) * w;
+        let [a, b, c] = &self.axes[p as usize];
+        [w, y.dot(*a), y.dot(*b), y.dot(*c)]
+    }
+
+    /// From a force (or any covector) at each vertex to that of each unknown.
+    pub fn restrict(&self, x: &[DVec3], force: &[DVec3], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.resize(self.unknowns, DVec3::ZERO);
+        for (v, (x, force)) in x.iter().zip(force).enumerate() {
+            for &(p, w) in self.weights.of(v) {
+                let first = self.first[p as usize] as usize;
+                let slots = &mut out[first..first + self.count[p as usize] as usize];
+                for (slot, value) in slots.iter_mut().zip(self.values(p, w, *x)) {
+                    *slot += *force * value;
+                }
+            }
+        }
+    }
+
+    /// From the unknowns to the displacement of each vertex, m.
+    pub fn prolong(&self, x: &[DVec3], unknowns: &[DVec3], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.extend(x.iter().enumerate().map(|(v, x)| {
+            let mut d = DVec3::ZERO;
+            for &(p, w) in self.weights.of(v) {
+                let first = self.first[p as usize] as usize;
+                let slots = &unknowns[first..first + self.count[p as usize] as usize];
+                for (slot, value) in slots.iter().zip(self.values(p, w, *x)) {
+                    d += *slot * value;
+                }
+            }
+            d
+        }));
+    }
+
+    /// The displacement that comes nearest to `u` (m, from `x`, where the motions must be centred), by least squares over
+    /// the vertices: no mechanics can bring these PARTs nearer.
+    ///
+    /// # Errors
+    /// [`SolveError`] where positions are not finite.
+    pub fn nearest(&self, x: &[DVec3], u: &[DVec3]) -> Result<Vec<DVec3>, SolveError> {
+        let mut pairs = Vec::new();
+        for v in 0..x.len() {
+            let row = self.weights.of(v);
+            pairs.extend(row.iter().flat_map(|&(p, _)| row.iter().map(move |&(q, _)| (p, q))));
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let span = |p: u32| (self.first[p as usize]..).take(self.count[p as usize] as usize);
+        let all = pairs.iter().flat_map(|&(p, q)| span(p).flat_map(move |i| span(q).map(move |j| (i, j))));
+        let pattern = Pattern::new(self.unknowns, all);
+        let mut blocks = vec![0.0; pattern.rows.len()];
+        for (v, x) in x.iter().enumerate() {
+            let functions: Vec<(u32, f64)> =
+                self.weights.of(v).iter().flat_map(|&(p, w)| span(p).zip(self.values(p, w, *x))).collect();
+            for (k, &(i, a)) in functions.iter().enumerate() {
+                for &(j, b) in &functions[..=k] {
+                    blocks[pattern.slot(i, j).block as usize] += a * b;
+                }
+            }
+        }
+        let mut blocks: Vec<DMat3> = blocks.into_iter().map(|b| DMat3::from_diagonal(DVec3::splat(b))).collect();
+        for &diagonal in &pattern.starts[..self.unknowns] {
+            let block = &mut blocks[diagonal as usize];
+            *block += *block * RIDGE + DMat3::from_diagonal(DVec3::splat(f64::MIN_POSITIVE.sqrt()));
+        }
+        let mut unknowns = Vec::new();
+        self.restrict(x, u, &mut unknowns);
+        let none = vec![0.0; self.unknowns];
+        Solver::new(&pattern)?.solve(&pattern, &blocks, &none, true, &mut unknowns)?;
+        let mut out = Vec::new();
+        self.prolong(x, &unknowns, &mut out);
+        Ok(out)
+    }
+}
+
+/// Eigenvalues and unit eigenvectors of a symmetric matrix, by Jacobi's rotations; three sweeps more than it ever takes.
+fn principal(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
+    let mut m = m.to_cols_array_2d();
+    let mut v = [DVec3::X, DVec3::Y, DVec3::Z];
+    for _ in 0..8 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if m[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+            let c = t.hypot(1.0).recip();
+            let s = t * c;
+            for k in 0..3 {
+                (m[k][p], m[k][q]) = (c * m[k][p] - s * m[k][q], s * m[k][p] + c * m[k][q]);
+            }
+            for k in 0..3 {
+                (m[p][k], m[q][k]) = (c * m[p][k] - s * m[q][k], s * m[p][k] + c * m[q][k]);
+            }
+            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
+        }
+    }
+    ([m[0][0], m[1][1], m[2][2]], v)
+}

@@ -1,0 +1,175 @@
+//! Blending weights: how much of each PART's motion a vertex takes.
+//!
+//! w_p(v) = κ(δ_p(v)/b_p) / Σ_q κ(δ_q(v)/b_q), κ(t) = (1 − t)² for t < 1, else 0,
+//!
+//! with δ_p(v) the distance from v to PART p along garment edges, zero on p itself, and b_p p's half-width: how far its innermost
+//! vertex is from its seams. So two PARTs share a seam in halves, with one slope on both sides of it, and no farther
+//! than a neighbour is wide does anything reach. The weights of a vertex sum to one.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | δ_p | distance to PART p along the cloth, as placed | m |
+//! | b_p | half-width of PART p | m |
+//!
+//! Source: own; a partition of unity after Shepard ("A two-dimensional interpolation function for irregularly-spaced data", ACM
+//! 1968), with a limit to its reach. Tried: three quarters to twice the half-width; half of it folds less well (10 mm instead of 4 on a
+//! skirt in 343 PARTs), twice takes more time for the same. Limits: a vertex in no PART goes with the nearest along the cloth.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+use ordered_float::OrderedFloat;
+use rayon::prelude::*;
+
+use crate::mesh::Topology;
+use crate::parts::{Parts, UNASSIGNED};
+
+/// Weights under this share are left out: they cost as much as any and move nothing.
+const LEAST: f64 = 0.01;
+
+/// The PARTs that move each vertex, and by how much; sorted by PART.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    starts: Vec<u32>,
+    entries: Vec<(u32, f64)>,
+}
+
+impl Weights {
+    /// Weights of every vertex; one of a piece of garment without any PART has none.
+    #[must_use]
+    pub fn new(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Self {
+        let owner = owners(topology, placed, parts);
+        let mut members = vec![Vec::new(); parts.len()];
+        for (v, &p) in owner.iter().enumerate().filter(|&(_, &p)| p != UNASSIGNED) {
+            members[p as usize].push(v as u32);
+        }
+        let bands: Vec<Vec<(u32, f64)>> = members
+            .par_iter()
+            .enumerate()
+            .map_init(|| Flow::new(topology, placed), |flow, (p, members)| band(flow, &owner, p as u32, members))
+            .collect();
+        let mut rows: Vec<Vec<(u32, f64)>> =
+            owner.iter().map(|&p| if p == UNASSIGNED { Vec::new() } else { vec![(p, 1.0)] }).collect();
+        for (p, band) in bands.iter().enumerate() {
+            for &(v, kernel) in band {
+                rows[v as usize].push((p as u32, kernel));
+            }
+        }
+        let mut weights = Self { starts: vec![0], entries: Vec::new() };
+        for mut row in rows {
+            let sum: f64 = row.iter().map(|e| e.1).sum();
+            row.retain(|e| e.1 >= LEAST * sum);
+            let sum: f64 = row.iter().map(|e| e.1).sum();
+            row.sort_unstable_by_key(|e| e.0);
+            weights.entries.extend(row.into_iter().map(|(p, kernel)| (p, kernel / sum)));
+            weights.starts.push(weights.entries.len() as u32);
+        }
+        weights
+    }
+
+    /// PARTs and weights of a vertex, by PART number.
+    #[must_use]
+    pub fn of(&self, v: usize) -> &[(u32, f64)] {
+        &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize]
+    }
+
+    /// The same with no weight at the vertices that are held.
+    #[must_use]
+    pub fn without(&self, held: &[bool]) -> Self {
+        let mut weights = Self { starts: vec![0], entries: Vec::with_capacity(self.entries.len()) };
+        for (v, &held) in held.iter().enumerate() {
+            if !held {
+                weights.entries.extend_from_slice(self.of(v));
+            }
+            weights.starts.push(weights.entries.len() as u32);
+        }
+        weights
+    }
+}
+
+/// The PART of each vertex; one that lies in no level goes with the nearest PART along the cloth, if there is one.
+fn owners(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Vec<u32> {
+    let mut owner = parts.part_of_vertex.clone();
+    if parts.unassigned > 0 {
+        let sources: Vec<u32> = (0..owner.len() as u32).filter(|&v| owner[v as usize] != UNASSIGNED).collect();
+        let mut flow = Flow::new(topology, placed);
+        flow.run(&sources, f64::INFINITY, |_| true);
+        for &v in &flow.reached {
+            owner[v as usize] = parts.part_of_vertex[flow.source[v as usize] as usize];
+        }
+    }
+    owner
+}
+
+/// Vertices outside PART p within its reach, and κ there.
+fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32, f64)> {
+    let (placed, topology) = (flow.placed, flow.topology);
+    let inside = |v: u32| owner[v as usize] == p;
+    let across = |v: u32| topology.neighbours(v).iter().copied().filter(|&w| !inside(w));
+    let seam: Vec<u32> = members.iter().copied().filter(|&v| across(v).next().is_some()).collect();
+    let crossing = seam.iter().flat_map(|&v| across(v).map(move |w| (v, w)));
+    let lengths = crossing.map(|(v, w)| placed[v as usize].distance(placed[w as usize]));
+    let (sum, count) = lengths.fold((0.0, 0.0), |(s, c), l| (s + l, c + 1.0));
+    if count == 0.0 {
+        return Vec::new();
+    }
+    // The seam runs half an edge beyond the PART's own vertices.
+    let half = 0.5 * sum / count;
+    flow.run(&seam, f64::INFINITY, inside);
+    let reach = half + flow.reached.iter().map(|&v| flow.distance[v as usize]).fold(0.0, f64::max);
+    flow.run(&seam, reach + half, |v| !inside(v));
+    let kernel = |v: u32| {
+        let t = (flow.distance[v as usize] - half).max(0.0) / reach;
+        (!inside(v) && t < 1.0).then(|| (v, (1.0 - t) * (1.0 - t)))
+    };
+    flow.reached.iter().filter_map(|&v| kernel(v)).collect()
+}
+
+/// Dijkstra's algorithm along garment edges, its memory kept from run to run.
+struct Flow<'a> {
+    topology: &'a Topology,
+    placed: &'a [DVec3],
+    distance: Vec<f64>,
+    source: Vec<u32>,
+    reached: Vec<u32>,
+    heap: BinaryHeap<Reverse<(OrderedFloat<f64>, u32)>>,
+}
+
+impl<'a> Flow<'a> {
+    fn new(topology: &'a Topology, placed: &'a [DVec3]) -> Self {
+        let n = placed.len();
+        let (distance, source) = (vec![f64::INFINITY; n], vec![0; n]);
+        Self { topology, placed, distance, source, reached: Vec::new(), heap: BinaryHeap::new() }
+    }
+
+    /// Distances, m, from `sources` over what is `allowed`, as far as `most`.
+    fn run(&mut self, sources: &[u32], most: f64, allowed: impl Fn(u32) -> bool) {
+        for v in self.reached.drain(..) {
+            self.distance[v as usize] = f64::INFINITY;
+        }
+        for &v in sources {
+            self.distance[v as usize] = 0.0;
+            self.source[v as usize] = v;
+            self.reached.push(v);
+            self.heap.push(Reverse((OrderedFloat(0.0), v)));
+        }
+        while let Some(Reverse((OrderedFloat(d), v))) = self.heap.pop() {
+            if d > self.distance[v as usize] {
+                continue;
+            }
+            for &w in self.topology.neighbours(v) {
+                let there = d + self.placed[v as usize].distance(self.placed[w as usize]);
+                let before = self.distance[w as usize];
+                if there < most && there < before && allowed(w) {
+                    if before == f64::INFINITY {
+                        self.reached.push(w);
+                    }
+                    self.distance[w as usize] = there;
+                    self.source[w as usize] = self.source[v as usize];
+                    self.heap.push(Reverse((OrderedFloat(there), w)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Newton's method with a line search, Levenberg's damping and relaxed steps: one loop for the whole cloth and for its PARTs.
+//!
+//! An iteration takes a step d from its [`Tangent`], which solves (H + ε M) d = −∇E in the coordinates it has: all vertices
+//! ([`Whole`]), or the motions of the PARTs ([`coupled`](super::coupled)). It goes along d as far as Armijo's condition
+//! allows, so the energy never rises; ε (Levenberg, Marquardt) falls while whole steps succeed and grows where they do not.
+//!
+//! **Steps are relaxed.** A step also stretches what it turns, and carries vertices into the body that did not touch before.
+//! Both are local and stiff, so a trial that fails for them is first relaxed by a few iterations without a factorisation
+//! (`relax.rs`) and judged again, and every step that is taken is relaxed as well.
+//!
+//! When to stop, and what to change between iterations, is the caller's: [`refine`](super::refine) goes on to a residual,
+//! [`coupled`](super::coupled) until its steps are short.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | d | step | m |
+//! | t | step length, at most 1 | – |
+//! | ε | damping | 1/s² |
+//! | M | lumped masses | kg |
+
+pub(crate) mod relax;
+mod solver;
+mod whole;
+
+use glam::{DMat3, DVec3};
+
+use super::energy::{Cloth, Contacts};
+use relax::Relaxation;
+pub use solver::{SolveError, Solver};
+pub(crate) use whole::Whole;
+
+/// Armijo's constant: the share of the predicted decrease that a step must bring.
+const ARMIJO: f64 = 1e-4;
+
+/// Shorter steps than this are rounding.
+const SHORTEST_STEP: f64 = 1e-6;
+
+/// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
+const RELAXED_TRIALS: usize = 2;
+
+/// Times the damping is raised tenfold for a Hessian that is not positive before the step is given up.
+const DAMPED_AGAIN: usize = 10;
+
+/// Where a step is taken from.
+pub(crate) struct State<'a> {
+    pub(crate) cloth: &'a Cloth,
+    pub(crate) x: &'a [DVec3],
+    pub(crate) contacts: &'a Contacts<'a>,
+    pub(crate) gradient: &'a [DVec3],
+    /// ε, 1/s².
+    pub(crate) damping: f64,
+}
+
+/// Coordinates to take Newton steps in, and the Hessian in them.
+pub(crate) trait Tangent {
+    /// The step of every vertex, m, zero where held.
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>) -> Result<(), SolveError>;
+
+    /// Each unknown vertex's own block of H + ε M at the last step's start, N/m, in elimination order.
+    fn diagonal(&self, here: &State<'_>, blocks: &mut Vec<DMat3>);
+
+    /// After a step that led nowhere: whether there is another Hessian left to try.
+    fn pause(&mut self) -> bool;
+}
+
+/// How boldly to go.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pace {
+    /// Longest move of a vertex in one step, m.
+    pub(crate) longest_move_m: f64,
+    /// Iterations of a relaxation after a step.
+    pub(crate) relaxing: usize,
+    /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation.
+    pub(crate) relaxing_trial: usize,
+}
+
+/// What an iteration did.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Advance {
+    /// Whether a step was taken.
+    pub(crate) accepted: bool,
+    /// Its length t over the longest that was tried.
+    pub(crate) share: f64,
+    /// Its length t.
+    pub(crate) step_length: f64,
+    /// Largest move of a vertex, m.
+    pub(crate) largest_move_m: f64,
+}
+
+/// A cloth on its way down.
+pub(crate) struct Descent<'c, 'b> {
+    /// The energy that falls.
+    pub(crate) cloth: &'c Cloth,
+    /// What is touched at `x`.
+    pub(crate) contacts: Contacts<'b>,
+    /// Positions, m.
+    pub(crate) x: Vec<DVec3>,
+    /// E at `x`, J.
+    pub(crate) energy: f64,
+    /// ‖∇E‖₂ over the weight at `x`.
+    pub(crate) residual: f64,
+    /// ε, 1/s².
+    pub(crate) damping: f64,
+    gradient: Vec<DVec3>,
+    relaxation: Relaxation,
+    blocks: Vec<DMat3>,
+    direction: Vec<DVec3>,
+    trial: Vec<DVec3>,
+}
+
+impl<'c, 'b> Descent<'c, 'b> {
+    /// Starts at `x`, where `contacts` are up to date.
+    pub(crate) fn new(cloth: &'c Cloth, contacts: Contacts<'b>, x: Vec<DVec3>, damping: f64) -> Self {
+        let mut descent = Self {
+            cloth,
+            contacts,
+            trial: x.clone(),
+            x,
+            energy: 0.0,
+            residual: 0.0,
+            damping,
+            gradient: Vec::new(),
+            relaxation: Relaxation::default(),
+            blocks: Vec::new(),
+            direction: Vec::new(),
+        };
+        descent.evaluate();
+        descent
+    }
+
+    /// The same with relaxations that end where the last iterations brought less than this share of what all brought.
+    pub(crate) fn relaxed_to(mut self, share: f64) -> Self {
+        self.relaxation = self.relaxation.ending_at(share);
+        self
+    }
+
+    /// Where it is.
+    pub(crate) fn state(&self) -> State<'_> {
+        let Self { cloth, x, contacts, gradient, damping, .. } = self;
+        State { cloth, x, contacts, gradient, damping: *damping }
+    }
+
+    /// Takes energy and residual anew, after positions, contacts or the cloth have changed.
+    pub(crate) fn evaluate(&mut self) {
+        self.energy = self.cloth.gradient(&self.x, &self.contacts, &mut self.gradient);
+        self.residual = norm(&self.gradient) / self.cloth.weight;
+    }
+
+    /// Relaxes the start itself, `beside` something else, by a Hessian's own blocks.
+    pub(crate) fn relax<T: Send>(&mut self, iterations: usize, beside: impl FnOnce() -> T + Send) -> T {
+        self.cloth.own_blocks(&self.x, &self.contacts, self.damping, &mut self.blocks);
+        self.relaxation.prepare(self.cloth, &self.contacts, &self.blocks);
+        let Self { cloth, contacts, x, relaxation, .. } = self;
+        let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
+        self.contacts.friction_refresh(&self.x);
+        self.evaluate();
+        out
+    }
+
+    /// One iteration. The damping is the caller's to change afterwards.
+    pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: Pace) -> Result<Advance, SolveError> {
+        self.direct(tangent)?;
+        let Self { cloth, contacts, x, relaxation, direction, trial, gradient, energy, .. } = self;
+        let cloth = *cloth;
+        relaxation.prepare(cloth, contacts, &self.blocks);
+        let slope: f64 = gradient.iter().zip(&*direction).map(|(g, d)| g.dot(*d)).sum();
+        let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
+        let first = (pace.longest_move_m / longest).min(1.0);
+        let mut t = first;
+        let mut relaxed = 0;
+        let accepted = loop {
+            trial.clear();
+            trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
+            contacts.update(trial);
+            let most = *energy + ARMIJO * t * slope;
+            if cloth.energy(trial, contacts) <= most {
+                break true;
+            }
+            relaxed += 1;
+            if relaxed <= RELAXED_TRIALS
+                && pace.relaxing_trial > 0
+                && relaxation.run(cloth, contacts, trial, pace.relaxing_trial) <= most
+            {
+                break true;
+            }
+            t *= 0.5;
+            // Also where t is not a number: nothing pulls any more.
+            if t.is_nan() || t < SHORTEST_STEP {
+                break false;
+            }
+        };
+        let mut largest_move_m = 0.0;
+        if accepted {
+            relaxation.run(cloth, contacts, trial, pace.relaxing);
+            std::mem::swap(x, trial);
+            largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
+        } else {
+            contacts.update(x);
+        }
+        self.contacts.friction_refresh(&self.x);
+        self.evaluate();
+        Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m })
+    }
+
+    /// Fills the direction and the blocks; a Hessian that is not positive gets more damping.
+    fn direct(&mut self, tangent: &mut dyn Tangent) -> Result<(), SolveError> {
+        let mut damping = self.damping;
+        for again in 0.. {
+            let Self { cloth, x, contacts, gradient, direction, blocks, .. } = self;
+            let here = State { cloth, x, contacts, gradient, damping };
+            match tangent.step(&here, direction) {
+                Ok(()) => {
+                    tangent.diagonal(&here, blocks);
+                    break;
+                }
+                Err(SolveError::NotPositive { .. }) if again < DAMPED_AGAIN => damping = 10.0 * damping.max(0.1),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// ‖g‖₂, N.
+fn norm(gradient: &[DVec3]) -> f64 {
+    gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt()
+}

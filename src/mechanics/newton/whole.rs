@@ -1,0 +1,81 @@
+//! Newton steps of the whole cloth, every vertex its own unknown, and which Hessian they are taken with.
+//!
+//! The bearing Hessian ([`Cloth::hessian_bearing`](crate::mechanics::energy::Cloth::hessian_bearing)) keeps the compression that
+//! a triangle's bending holds, and is closer to the energy; it is not always positive. Where it is not, the positive one takes
+//! over for a few steps, more each time.
+
+use glam::{DMat3, DVec3};
+
+use super::{SolveError, Solver, State, Tangent};
+
+/// Steps with the positive Hessian, at most, after one whose bearing Hessian failed.
+const LONGEST_PAUSE: usize = 4;
+
+/// The Hessian of all free vertices, and its factor.
+#[derive(Debug, Default)]
+pub(crate) struct Whole {
+    /// Analysed with the first step, if not before: a preview takes none.
+    pub(crate) solver: Option<Solver>,
+    blocks: Vec<DMat3>,
+    damped: Vec<f64>,
+    unknowns: Vec<DVec3>,
+    /// Whether the last factorisation was of the bearing Hessian.
+    bearing: bool,
+    /// Steps yet to be taken with the positive Hessian.
+    waiting: usize,
+    /// How many those were the last time.
+    pause: usize,
+}
+
+impl Whole {
+    /// Solves with `blocks`; the solution is in `unknowns`.
+    fn solve(&mut self, here: &State<'_>, positive: bool) -> Result<(), SolveError> {
+        let State { cloth, gradient, damping, .. } = *here;
+        let solver = match &mut self.solver {
+            Some(solver) => solver,
+            none => none.insert(Solver::new(&cloth.pattern)?),
+        };
+        self.damped.clear();
+        self.damped.extend(cloth.order.iter().map(|&v| cloth.masses[v as usize] * damping));
+        self.unknowns.clear();
+        self.unknowns.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
+        solver.solve(&cloth.pattern, &self.blocks, &self.damped, positive, &mut self.unknowns)
+    }
+}
+
+impl Tangent for Whole {
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>) -> Result<(), SolveError> {
+        let State { cloth, x, contacts, .. } = *here;
+        let mut solved = false;
+        if self.waiting == 0 {
+            cloth.hessian_bearing(x, contacts, &mut self.blocks);
+            solved = self.solve(here, false).is_ok();
+            self.pause = if solved { 0 } else { (2 * self.pause).clamp(1, LONGEST_PAUSE) };
+            self.waiting = self.pause;
+        }
+        self.bearing = solved;
+        if !solved {
+            self.waiting -= 1;
+            cloth.hessian(x, contacts, &mut self.blocks);
+            self.solve(here, true)?;
+        }
+        d.clear();
+        d.resize(x.len(), DVec3::ZERO);
+        for (&v, step) in cloth.order.iter().zip(&self.unknowns) {
+            d[v as usize] = *step;
+        }
+        Ok(())
+    }
+
+    fn diagonal(&self, here: &State<'_>, blocks: &mut Vec<DMat3>) {
+        let starts = &here.cloth.pattern.starts;
+        let own = self.damped.iter().zip(starts);
+        blocks.clear();
+        blocks.extend(own.map(|(m, &s)| self.blocks[s as usize] + DMat3::from_diagonal(DVec3::splat(*m))));
+    }
+
+    fn pause(&mut self) -> bool {
+        self.waiting = LONGEST_PAUSE;
+        std::mem::take(&mut self.bearing)
+    }
+}
