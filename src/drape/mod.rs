@@ -3,6 +3,7 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
+mod error;
 mod settings;
 
 use std::ops::ControlFlow;
@@ -11,14 +12,17 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledError, Garment};
+use crate::mechanics::coupled::{self, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
-use crate::mechanics::paper::{self, PaperError, PartForces};
-use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, SolveError, Stop};
+use crate::mechanics::paper::{self, PartForces};
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::{Parts, segment};
-pub use settings::{Model, Refine, Scene, Settings};
+use crate::range_table::RangeTable;
+pub use crate::scene::Scene;
+pub use error::DrapeError;
+pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
 /// How long each stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -32,6 +36,8 @@ pub struct StageTimes {
     /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked
     /// for, though the preview's energy and residual are still measured.
     pub refine: Duration,
+    /// All of it, start to end; more than the sum by what lies between.
+    pub total: Duration,
 }
 
 /// The outcome of stage two for one PART.
@@ -69,6 +75,8 @@ pub struct Drape {
     pub surface: Vec<SurfacePoint>,
     /// Unsigned distances to the body, m.
     pub distance: Vec<f64>,
+    /// The range table of stage one, with the rows that its rule made for this garment.
+    pub table: RangeTable,
     /// The PARTs of stage one; cut to an extent where the model does so.
     pub parts: Parts,
     /// How many PARTs the range table alone made.
@@ -93,23 +101,6 @@ pub struct Drape {
     pub warnings: Vec<String>,
 }
 
-/// Why nothing came out.
-#[derive(Debug, thiserror::Error)]
-pub enum DrapeError {
-    /// The equations refused their input.
-    #[error(transparent)]
-    Paper(#[from] PaperError),
-    /// The PARTs could not be solved together.
-    #[error(transparent)]
-    Coupled(#[from] CoupledError),
-    /// The cloth cannot be set up at full resolution.
-    #[error(transparent)]
-    Energy(#[from] EnergyError),
-    /// The cloth cannot be solved at full resolution.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-}
-
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is told of each and may end
 /// them.
 ///
@@ -120,21 +111,34 @@ pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Resu
     rayon::scope(|_| stages(scene, settings, observer))
 }
 
+/// An observer for who does not look.
+pub fn unobserved(_: &refine::Step<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
 fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    let began = Instant::now();
     let mut times = StageTimes::default();
     let surface = timed(&mut times.distance, || scene.body.nearest_all(&scene.garment.positions));
     // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
+    let table = settings.table.resolve(&distance)?;
     let parts = timed(&mut times.segment, || {
-        let parts = segment(&scene.topology, &distance, &settings.table);
+        let parts = segment(&scene.topology, &distance, &table);
         let joined = if settings.min_part > 1 {
             parts.join_small(&scene.topology, &scene.garment, settings.min_part)
         } else {
             parts
         };
-        joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
+        joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &table)
     });
-    let mut warnings = unassigned_warning(&parts);
+    let mut warnings = Vec::new();
+    if parts.unassigned > 0 {
+        warnings.push(format!(
+            "{} vertices lie in no level of the range table and stay where they are; widen its first or last row",
+            parts.unassigned
+        ));
+    }
     let level_part_count = parts.len();
     // The cloth at full resolution does not depend on stage two; a preview, which is timed alone, makes it afterwards.
     let ahead = settings.refine != Refine::Steps(0);
@@ -158,7 +162,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-    if let (Some((low, _)), true) = (scene.body_mesh.bounds(), state.is_some())
+    if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
         && positions.iter().all(|x| x.z < low.z)
     {
         warnings.push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
@@ -166,15 +170,18 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let inside =
         scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
     let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
+    let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
+    times.total = began.elapsed();
     Ok(Drape {
         surface,
         distance,
+        table,
         parts: stage.parts,
         level_part_count,
         outcomes: stage.outcomes,
         preview: stage.positions,
         state,
-        self_intersecting_pairs: self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len(),
+        self_intersecting_pairs,
         positions,
         penetrating_vertices,
         penetration,
@@ -263,7 +270,7 @@ fn refine_further(
     };
     let cloth = cloth.unwrap_or_else(|| full_cloth(scene, settings))?;
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    let floor = scene.body_mesh.bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
+    let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
     let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {
         // What has fallen past the feet meets nothing any more, and would fall for ever.
         if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
@@ -279,16 +286,6 @@ fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
             state.steps, state.residual_over_weight
         )
     })
-}
-
-fn unassigned_warning(parts: &Parts) -> Vec<String> {
-    if parts.unassigned == 0 {
-        return Vec::new();
-    }
-    vec![format!(
-        "{} vertices lie in no level of the range table and stay where they are; widen its first or last row",
-        parts.unassigned
-    )]
 }
 
 fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {

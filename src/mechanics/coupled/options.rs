@@ -41,7 +41,8 @@ pub enum CoupledError {
 }
 
 /// How PARTs are solved together.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct CoupledOptions {
     /// Largest extents along the cloth, m, coarse to fine: one solve each, from where the one before ended. Empty: the PARTs
     /// as they are.
