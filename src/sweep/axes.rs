@@ -165,40 +165,23 @@ fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
     let expected = "{ name = value, ... } with accuracy = \"none\", \"canonical\" or \"own\", or a key of the scene such as \
                     rest = \"texture\", hold, unit, up, weld";
     let wrong = |what: &str| source.wrong(value, "options", format!("{expected}{what}"));
-    let given = value.get_ref().as_table().ok_or_else(|| wrong(""))?;
-    let mut edits: Vec<Edit> = Vec::new();
-    for (key, v) in given.clone() {
-        let text = match &v {
-            Value::String(text) => text.clone(),
-            Value::Array(_) | Value::Table(_) => return Err(wrong("")),
-            other => other.to_string(),
-        };
-        if key == "accuracy" {
-            let against = text.parse().map_err(|e: String| wrong(&format!("; {e}")))?;
-            edits.push(Box::new(move |point| point.job.accuracy = against));
-            continue;
-        }
-        if ["body", "garment"].contains(&key.as_str()) || (key == "rest" && names_a_file(&text)) {
-            return Err(wrong("; bodies and garments have axes of their own, and options name no file"));
-        }
-        let set = move |scene: &crate::SceneSpec| -> Result<crate::SceneSpec, String> {
-            let mut table = toml::Table::try_from(scene).map_err(|e| e.to_string())?;
-            table.insert(key.clone(), v.clone());
-            let set = table.try_into().map_err(|e: toml::de::Error| e.message().replace('\n', ", "))?;
-            Ok(set)
-        };
-        set(&crate::SceneSpec::default()).map_err(|e| wrong(&format!("; {e}")))?;
-        edits.push(Box::new(move |point| {
-            // Tried above: what fits one scene fits any.
-            if let Ok(scene) = set(&point.job.scene) {
-                point.job.scene = scene;
+    let given = value.get_ref().as_table().ok_or_else(|| wrong(""))?.clone();
+    let set = move |point: &mut Point| -> Result<(), String> {
+        let mut scene = toml::Table::try_from(&point.job.scene).map_err(|e| e.to_string())?;
+        for (key, v) in &given {
+            let text = v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+            match key.as_str() {
+                "accuracy" => point.job.accuracy = text.parse()?,
+                "body" | "garment" => return Err("bodies and garments have axes of their own".to_owned()),
+                "rest" if names_a_file(&text) => return Err("options name no file".to_owned()),
+                _ => drop(scene.insert(key.clone(), v.clone())),
             }
-        }));
-    }
-    let given: Vec<(String, String)> =
-        given.iter().map(|(key, v)| (key.clone(), v.as_str().map_or_else(|| v.to_string(), str::to_owned))).collect();
-    Ok(one(move |point| {
-        edits.iter().for_each(|edit| edit(point));
-        point.options.extend(given.iter().cloned());
-    }))
+            point.options.insert(key.clone(), text);
+        }
+        point.job.scene = scene.try_into().map_err(|e: toml::de::Error| e.message().replace('\n', ", "))?;
+        Ok(())
+    };
+    set(&mut Point::of(Job::default())).map_err(|e| wrong(&format!("; {e}")))?;
+    // Tried above: what fits one point fits any.
+    Ok(one(move |point| set(point).unwrap_or_default()))
 }
