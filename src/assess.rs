@@ -171,7 +171,7 @@ impl References<'_> {
             garment: &self.scene.garment,
             rest: &self.scene.rest,
             fabric: self.fabric,
-            body: &self.scene.body_mesh,
+            body: self.scene.body.mesh(),
             held: &self.scene.held,
             start,
             options: &format!("{solver:?}"),

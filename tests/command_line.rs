@@ -128,6 +128,16 @@ fn one_json_object_with_the_promised_keys() {
 }
 
 #[test]
+fn vertices_in_no_level_are_warned_of_and_recorded() {
+    let bench = Bench::new();
+    bench.write("near.toml", "name = \"near\"\nunit = \"cm\"\nlevels = [[0.0, 3.0]]\n");
+    let report = json(&bench.drape(&["--table", "near.toml", "--model", "paper", "--format", "json"]));
+    assert!(report["unassigned_vertices"].as_u64().unwrap() > 0, "{report}");
+    assert!(report["warnings"].to_string().contains("no level"), "{report}");
+    assert!(bench.folder.path().join("recordings/garment.rrd").exists());
+}
+
+#[test]
 fn the_same_bits_with_one_thread_and_with_two() {
     let bench = Bench::new();
     let mut exports = Vec::new();

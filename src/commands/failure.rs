@@ -3,13 +3,13 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use partwise::distance::DistanceError;
 use partwise::fabric::FabricError;
+use partwise::files::Unreadable;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
-use partwise::mesh::rest::RestError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
+use partwise::scene::SceneError;
 use partwise::shapes::ShapeError;
 use partwise::sweep::{MergeError, PlanError, StoreError};
 use partwise::table_search::SearchError;
@@ -39,8 +39,8 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
     recording
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
-        || cause.is::<RestError>()
-        || cause.is::<DistanceError>()
+        || cause.is::<SceneError>()
+        || cause.is::<Unreadable>()
         || cause.is::<TableError>()
         || cause.is::<FabricError>()
         || cause.is::<ShapeError>()

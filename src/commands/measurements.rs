@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
+use partwise::files::read_text;
 use partwise::shapes::BodySpec;
-
-use super::inputs::read_text;
 
 /// Measurements of the built-in dress form, in centimetres. What is left out is European size 38.
 #[derive(Debug, Clone, Args)]

@@ -19,6 +19,7 @@ mod sweep;
 mod tune;
 mod view;
 mod watch;
+mod work;
 
 use std::process::ExitCode;
 

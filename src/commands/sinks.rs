@@ -1,6 +1,6 @@
 //! Where the recording goes: arguments shared by every command that records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -61,9 +61,14 @@ pub(crate) struct SinkArgs {
 impl SinkArgs {
     /// The sinks asked for; `name` names the file where the user did not.
     pub(crate) fn sinks(&self, name: &str) -> Vec<Sink> {
+        self.sinks_in(Path::new("recordings"), name)
+    }
+
+    /// The same with the file in another folder.
+    pub(crate) fn sinks_in(&self, folder: &Path, name: &str) -> Vec<Sink> {
         let mut sinks = Vec::new();
         if !self.no_save {
-            let default = || PathBuf::from("recordings").join(format!("{name}.rrd"));
+            let default = || folder.join(format!("{name}.rrd"));
             sinks.push(Sink::File(self.save.clone().unwrap_or_else(default)));
         }
         if self.spawn {

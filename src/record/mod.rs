@@ -33,7 +33,7 @@ use rerun::{Scalars, TextDocument};
 pub use blueprint::layout::{Layout, Tab};
 pub use compare::Chosen;
 pub use error::RecordError;
-pub use panel::{LevelRow, Panel};
+pub use panel::Panel;
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};

@@ -5,6 +5,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::error::StoreError;
+use crate::mesh::WholeFile;
 
 /// Where lines are appended: a file, or what a test puts in its place.
 pub trait Append: Send {
@@ -49,22 +50,10 @@ pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> 
     }
 }
 
-/// Writes a file beside its place and renames it: whoever looks, and whatever breaks, sees the old or the new one.
+/// Writes a file whole or not at all, so that it outlasts a power cut.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".new");
-    let beside = Path::new(&beside);
-    let write = || {
-        let mut file = File::create(beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(beside, path)
-    };
-    write().map_err(|source| {
-        // Best effort: on a full disk the half-written file is in the way of everything else.
-        let _ = fs::remove_file(beside);
-        StoreError::Io { path: path.to_owned(), doing: "cannot be written", source }
-    })?;
+    let written = WholeFile::write(path, bytes);
+    written.map_err(|source| StoreError::Io { path: path.to_owned(), doing: "cannot be written", source })?;
     sync_folder(path);
     Ok(())
 }

@@ -23,8 +23,8 @@ pub enum PlanError {
     },
     /// Not TOML, or a key that is missing, unknown or of another type.
     #[error(
-        "{place}: {message}; a sweep file has name = \"...\", and [grid] with lists or [[points]] one by one, or both; \
-         [base] holds what all share"
+        "{place}: {message}; a sweep file has name = \"...\", and [grid] with lists (tables = [...]) or [[points]] one by \
+         one (table = ...), or both; [base] holds what all share"
     )]
     Syntax {
         /// File and line.

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use partwise::Job;
 use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, merge, sweep};
 
-use super::{files, plan, run_all, solve, uninterrupted};
+use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 
 fn run_shards(folder: &Path, plan: &Plan, count: usize) -> Vec<PathBuf> {
     let stop = AtomicBool::new(false);
@@ -15,7 +16,7 @@ fn run_shards(folder: &Path, plan: &Plan, count: usize) -> Vec<PathBuf> {
         .map(|i| {
             let part = folder.join(i.to_string());
             let shard: Shard = format!("{i}/{count}").parse().unwrap();
-            let outcome = sweep(plan, Some(shard), &part, Existing::Refuse, &run, &solve).unwrap();
+            let outcome = sweep(plan, Some(shard), &part, Existing::Refuse, &run, &rows_by(solve)).unwrap();
             assert_eq!((outcome.total, outcome.stopped), (outcome.rows.len(), false));
             part
         })
@@ -54,7 +55,8 @@ fn missing_points_are_listed() {
 fn shards_of_other_plans_and_versions_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let parts = run_shards(folder.path(), &plan(), 2);
-    let other = Plan::parse("name = \"other\"\n[grid]\nseeds = [1, 2]", "other.toml", Path::new("")).unwrap();
+    let other =
+        Plan::parse("name = \"other\"\n[grid]\nseeds = [1, 2]", "other.toml", Path::new(""), &Job::preview()).unwrap();
     let others = run_shards(&folder.path().join("other"), &other, 2);
     let out = folder.path().join("out");
     let error = merge(&[parts[0].clone(), others[1].clone()], &out).unwrap_err();

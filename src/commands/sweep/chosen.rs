@@ -8,9 +8,14 @@ pub(crate) const MOST: usize = 6;
 /// And at least, where there are so many rows: two that nothing beats say little about the rest.
 const FEWEST: usize = 4;
 
-/// The error a row is judged by, mm: against its own continuation, else against the canonical drape.
+/// The error a row is judged by, mm.
 pub(crate) fn error_mm(row: &Row) -> Option<f64> {
-    row.rms_mm.or(row.canonical_rms_mm)
+    row.figures.as_ref()?.error_mm()
+}
+
+/// The time a row took, ms.
+pub(crate) fn total_ms(row: &Row) -> Option<f64> {
+    Some(row.timing.as_ref()?.time_total_ms)
 }
 
 /// The table's name, and whatever else differs within the rows.
@@ -45,7 +50,7 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
         return (0..rows.len()).collect();
     }
     let figures: Vec<Option<(usize, f64)>> =
-        rows.iter().map(|row| Some((row.part_count?, error_mm(row).unwrap_or(0.0)))).collect();
+        rows.iter().map(|row| Some((row.figures.as_ref()?.part_count, error_mm(row).unwrap_or(0.0)))).collect();
     let beaten = |mine: (usize, f64)| {
         figures
             .iter()
@@ -83,12 +88,12 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use partwise::figures::Figures;
 
     fn row(table: &str, parts: usize, error: f64) -> Row {
         Row {
             table: table.to_owned(),
-            part_count: Some(parts),
-            canonical_rms_mm: Some(error),
+            figures: Some(Figures { part_count: parts, canonical_rms_mm: Some(error), ..Figures::default() }),
             extent_cm: "8".to_owned(),
             ..Row::default()
         }

@@ -3,10 +3,10 @@
 use clap::ValueEnum;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use partwise::record::RecordSummary;
-use partwise::sweep::{Row, Status};
+use partwise::sweep::{Row, Status, csv_text};
 use serde_json::json;
 
-use super::chosen::labels;
+use super::chosen::{labels, total_ms};
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -45,7 +45,7 @@ impl Report<'_> {
         match format {
             Format::Text => Ok(self.table()),
             Format::Json => Ok(serde_json::to_string(&self.json())?),
-            Format::Csv => csv(self.rows),
+            Format::Csv => Ok(String::from_utf8(csv_text(self.rows))?),
         }
     }
 
@@ -123,16 +123,16 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             table.add_row([index, garment, format!("{label}: {}", row.error)]);
             continue;
         }
-        let parts = row.part_count.map_or_else(String::new, |n| n.to_string());
+        let Some(figures) = &row.figures else { continue };
         table.add_row([
             index,
             garment,
             label,
-            parts,
-            mm(row.time_total_ms),
-            mm(row.rms_mm),
-            mm(row.canonical_rms_mm),
-            mm(row.representable_rms_mm),
+            figures.part_count.to_string(),
+            mm(total_ms(row)),
+            mm(figures.rms_mm),
+            mm(figures.canonical_rms_mm),
+            mm(figures.representable_rms_mm),
         ]);
     }
     for column in [0, 3, 4, 5, 6, 7] {
@@ -141,13 +141,4 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
         }
     }
     table
-}
-
-/// The rows as CSV, with the columns of `rows.csv`.
-pub(crate) fn csv(rows: &[Row]) -> anyhow::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row)?;
-    }
-    Ok(String::from_utf8(writer.into_inner()?)?)
 }
