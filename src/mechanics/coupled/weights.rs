@@ -26,7 +26,7 @@ use crate::mesh::Topology;
 use crate::parts::{Parts, UNASSIGNED};
 
 /// Weights under this share are left out: they cost as much as any and move nothing.
-const LEAST: f64 = 0.01;
+const LEAST: f64 = 0.03;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
 #[derive(Debug, Clone, PartialEq)]

@@ -172,6 +172,13 @@ impl Bending {
         row.iter().fold(DVec3::ZERO, |sum, &(j, scalar)| sum + (x[j as usize] - here) * scalar)
     }
 
+    /// Q_vv, N/m.
+    #[must_use]
+    pub fn own_scalar(&self, v: usize) -> f64 {
+        let row = &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize];
+        row.binary_search_by_key(&(v as u32), |e| e.0).map_or(0.0, |at| row[at].1)
+    }
+
     /// Energy of all elements, J.
     #[must_use]
     pub fn energy(&self, x: &[DVec3]) -> f64 {

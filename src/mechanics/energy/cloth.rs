@@ -8,6 +8,7 @@
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
 
 use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3};
 
@@ -16,8 +17,8 @@ use super::contact::Contacts;
 use super::friction::Friction;
 use super::gravity;
 use super::membrane::{Stiffness, Triangle};
-use super::ordering::nested_dissection;
-use super::pattern::{HELD, Pattern, Slot};
+use super::layout::Layout;
+use super::pattern::{HELD, Pattern};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::fabric::Fabric;
@@ -81,19 +82,13 @@ pub struct Cloth {
     pub offset: f64,
     /// Coulomb friction against the body.
     pub friction: f64,
-    /// Vertex of each unknown, in elimination order.
-    pub order: Vec<u32>,
-    /// Unknown of each vertex, [`HELD`] where it is held.
-    pub unknown: Vec<u32>,
-    /// Where the Hessian's blocks are.
-    pub pattern: Pattern,
     /// The triangles' rest data.
     pub triangles: Vec<Triangle>,
     /// The rings that bend.
-    pub bending: Bending,
+    pub bending: Arc<Bending>,
     pub(crate) stiffness: Stiffness,
-    triangle_slots: Vec<[Slot; 6]>,
-    bending_blocks: Vec<f64>,
+    placed: Arc<Vec<DVec3>>,
+    layout: Arc<OnceLock<Layout>>,
 }
 
 impl Cloth {
@@ -135,58 +130,40 @@ impl Cloth {
         }
         let masses: Vec<f64> = areas.iter().map(|a| a * fabric.density_kg_per_m2).collect();
         let bending = Bending::new(mesh, topology, rest, fabric);
-        let free: Vec<u32> = (0..n as u32).filter(|&v| !is_held[v as usize]).collect();
-        if free.is_empty() {
+        if !is_held.contains(&false) {
             return Err(EnergyError::NothingFree { count: n });
         }
-        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &bending));
-        let mut unknown = vec![HELD; n];
-        for (i, &v) in order.iter().enumerate() {
-            unknown[v as usize] = i as u32;
-        }
-        let mut cloth = Self {
+        Ok(Self {
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
             areas,
             held: is_held,
             offset: fabric.thickness_m + sag(mesh),
             friction: fabric.friction,
-            order,
-            unknown,
-            pattern: Pattern::default(),
             triangles,
-            bending,
+            bending: Arc::new(bending),
             stiffness: Stiffness::new(fabric),
-            triangle_slots: Vec::new(),
-            bending_blocks: Vec::new(),
-        };
-        cloth.lay_out(topology);
-        Ok(cloth)
+            placed: Arc::new(mesh.positions.clone()),
+            layout: Arc::new(OnceLock::new()),
+        })
     }
 
-    /// Builds the pattern, the triangles' slots in it and bending's constant blocks.
-    fn lay_out(&mut self, topology: &Topology) {
-        let u = &self.unknown;
-        let edges = topology.edges.iter().copied().chain(self.bending.pairs());
-        let pairs = edges.map(|[a, b]| (u[a as usize], u[b as usize])).filter(|&(i, j)| i != HELD && j != HELD);
-        let pattern = Pattern::new(self.order.len(), pairs);
-        let slot = |a: u32, b: u32| pattern.slot(u[a as usize], u[b as usize]);
-        self.triangle_slots = self
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.vertices;
-                [slot(a, a), slot(b, b), slot(c, c), slot(b, a), slot(c, a), slot(c, b)]
-            })
-            .collect();
-        self.bending_blocks = vec![0.0; pattern.rows.len()];
-        for ([a, b], scalar) in self.bending.hessian() {
-            let s = slot(a, b);
-            if s.block != HELD {
-                self.bending_blocks[s.block as usize] += scalar;
-            }
-        }
-        self.pattern = pattern;
+    /// Unknowns and pattern of the Hessian, made when first asked for.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        self.layout.get_or_init(|| Layout::new(&self.placed, &self.triangles, &self.bending, &self.held))
+    }
+
+    /// The unknown vertices in elimination order.
+    #[must_use]
+    pub fn order(&self) -> &[u32] {
+        &self.layout().order
+    }
+
+    /// Where the Hessian's blocks are.
+    #[must_use]
+    pub fn pattern(&self) -> &Pattern {
+        &self.layout().pattern
     }
 
     /// The same cloth with its membrane no stiffer than what lets a length of `height_m` (m) of it stretch by `strain` where
@@ -279,24 +256,19 @@ impl Cloth {
         self.assemble(|t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
     }
 
-    /// Each unknown's own block of the positive part of ∇²E + ε M at `x`, N/m, in elimination order.
+    /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
     pub(crate) fn own_blocks(&self, x: &[DVec3], contacts: &Contacts, damping: f64, blocks: &mut Vec<DMat3>) {
-        let starts = &self.pattern.starts;
         blocks.clear();
-        blocks.extend(self.order.iter().zip(starts).map(|(&v, &s)| {
-            DMat3::from_diagonal(DVec3::splat(self.bending_blocks[s as usize] + damping * self.masses[v as usize]))
+        blocks.extend(self.masses.iter().enumerate().map(|(v, mass)| {
+            DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))
         }));
         for t in &self.triangles {
             for (&v, block) in t.vertices.iter().zip(t.own_blocks(&self.stiffness, x)) {
-                if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
-                    *sum += block;
-                }
+                blocks[v as usize] += block;
             }
         }
         for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
-            if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
-                *sum += block;
-            }
+            blocks[v as usize] += block;
         }
     }
 
@@ -307,9 +279,10 @@ impl Cloth {
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
     ) {
+        let layout = self.layout();
         blocks.clear();
-        blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
-        for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
+        blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
+        for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
             let parts = of_triangle(t);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
@@ -318,32 +291,19 @@ impl Cloth {
             }
         }
         for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
-            let i = self.unknown[v as usize];
+            let i = layout.unknown[v as usize];
             if i != HELD {
-                blocks[self.pattern.starts[i as usize] as usize] += block;
+                blocks[layout.pattern.starts[i as usize] as usize] += block;
             }
         }
     }
 
     /// H d for a Hessian in [`hessian`](Self::hessian)'s blocks, both over the unknowns in elimination order.
     pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
-        self.pattern.multiply(blocks, d, out);
+        self.pattern().multiply(blocks, d, out);
     }
 }
 
-/// Which vertices share a block with each.
-fn block_neighbours(n: usize, topology: &Topology, bending: &Bending) -> Vec<Vec<u32>> {
-    let mut neighbours: Vec<Vec<u32>> = (0..n as u32).map(|v| topology.neighbours(v).to_vec()).collect();
-    for [a, b] in bending.pairs() {
-        neighbours[a as usize].push(b);
-        neighbours[b as usize].push(a);
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    neighbours
-}
 /// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
 /// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
 fn sag(mesh: &TriMesh) -> f64 {

@@ -66,8 +66,8 @@ struct Pair {
 }
 
 impl Relaxation {
-    /// Takes D from the `blocks` (N/m) of the unknowns, in elimination order; they must be positive.
-    pub(crate) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, blocks: &[DMat3]) {
+    /// Takes D from each vertex's own block (N/m), which must be positive where it is not held.
+    pub(crate) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, own: &[DMat3]) {
         self.touched.clear();
         self.known.clear();
         self.known.resize(cloth.vertex_count(), false);
@@ -75,10 +75,8 @@ impl Relaxation {
             self.known[t.vertex as usize] = true;
         }
         self.inverse.clear();
-        self.inverse.resize(cloth.vertex_count(), DMat3::ZERO);
-        for (&v, block) in cloth.order.iter().zip(blocks) {
-            self.inverse[v as usize] = block.inverse();
-        }
+        let inverse = |(block, &held): (&DMat3, &bool)| if held { DMat3::ZERO } else { block.inverse() };
+        self.inverse.extend(own.iter().zip(&cloth.held).map(inverse));
     }
 
     /// Ends a relaxation whose last iterations brought less than this share of what all brought.
@@ -238,8 +236,9 @@ mod tests {
         let mut contacts = Contacts::none();
         let (mut blocks, mut relaxation) = (Vec::new(), Relaxation::default());
         cloth.hessian(x, &contacts, &mut blocks);
-        let diagonal: Vec<f64> = cloth.order.iter().map(|&v| 100.0 * cloth.masses[v as usize]).collect();
-        relaxation.prepare(cloth, &contacts, &blocks, &diagonal);
+        let mut own = Vec::new();
+        cloth.own_blocks(x, &contacts, 100.0, &mut own);
+        relaxation.prepare(cloth, &contacts, &own);
         let before = cloth.energy(x, &contacts);
         let after = relaxation.run(cloth, &mut contacts, x, iterations);
         assert!((after - cloth.energy(x, &contacts)).abs() < 1e-12 * before.abs());
