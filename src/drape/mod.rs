@@ -195,11 +195,7 @@ struct StageTwo {
 /// Stage one: the PARTs that the range table makes.
 fn stage_one(scene: &Scene, min_part: usize, table: &RangeTable, distance: &[f64]) -> Parts {
     let parts = segment(&scene.topology, distance, table);
-    let joined = if min_part > 1 {
-        parts.join_small(&scene.topology, &scene.garment, min_part)
-    } else {
-        parts
-    };
+    let joined = if min_part > 1 { parts.join_small(&scene.topology, &scene.garment, min_part) } else { parts };
     joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
 }
 

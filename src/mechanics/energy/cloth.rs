@@ -16,8 +16,8 @@ use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
 use super::gravity;
-use super::membrane::{Stiffness, Triangle};
 use super::layout::Layout;
+use super::membrane::{Stiffness, Triangle};
 use super::pattern::{HELD, Pattern};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -259,9 +259,12 @@ impl Cloth {
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
     pub(crate) fn own_blocks(&self, x: &[DVec3], contacts: &Contacts, damping: f64, blocks: &mut Vec<DMat3>) {
         blocks.clear();
-        blocks.extend(self.masses.iter().enumerate().map(|(v, mass)| {
-            DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))
-        }));
+        blocks.extend(
+            self.masses
+                .iter()
+                .enumerate()
+                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))),
+        );
         for t in &self.triangles {
             for (&v, block) in t.vertices.iter().zip(t.own_blocks(&self.stiffness, x)) {
                 blocks[v as usize] += block;
