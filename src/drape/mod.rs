@@ -15,6 +15,7 @@ use crate::distance::{Body, SurfacePoint};
 use crate::mechanics::coupled::{self, CoupledOptions, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
+use crate::mechanics::folds::{Folds, folds};
 use crate::mechanics::paper::{self, PartForces};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -85,6 +86,8 @@ pub struct Drape {
     pub outcomes: Vec<PartOutcome>,
     /// The garment after stage two, before any step at full resolution, m.
     pub preview: Vec<DVec3>,
+    /// Cloth that the preview has no room for, and folds of PARTs do not show; the coupled model's alone.
+    pub folds: Option<Folds>,
     /// The displaced garment, m.
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
@@ -144,6 +147,10 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     times.mechanics += cloth_time;
     let stage = stage?;
     warnings.extend(stage.warnings);
+    let preview_folds = match settings.model {
+        Model::Coupled(_) => cloth.as_ref().map(|cloth| folds(cloth, &stage.positions)),
+        Model::Paper(_) => None,
+    };
     let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.positions, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
@@ -175,6 +182,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         level_part_count,
         outcomes: stage.outcomes,
         preview: stage.positions,
+        folds: preview_folds,
         state,
         self_intersecting_pairs,
         positions,

@@ -4,6 +4,8 @@ pub mod coupled;
 pub mod cusick;
 pub mod energy;
 pub mod fit;
+pub mod folds;
 pub(crate) mod newton;
 pub mod paper;
+pub(crate) mod principal;
 pub mod refine;

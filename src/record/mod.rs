@@ -8,6 +8,7 @@ pub mod colour_map;
 pub mod colours;
 pub mod compare;
 pub mod error;
+mod folds;
 pub mod eye;
 pub mod inspect;
 mod labels;
@@ -33,6 +34,7 @@ use rerun::{Scalars, TextDocument};
 pub use blueprint::layout::{Layout, Tab};
 pub use compare::Chosen;
 pub use error::RecordError;
+pub use folds::FoldView;
 pub use panel::Panel;
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
@@ -193,6 +195,14 @@ impl Recorder {
     /// A slice that does not fit the garment; what Rerun refuses.
     pub fn wrinkles(&mut self, view: &WrinkleView<'_>) -> Result<(), RecordError> {
         self.timed(|open| wrinkles::log(open, view))
+    }
+
+    /// Lines along the folds that no PART shows.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| folds::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.
