@@ -35,7 +35,8 @@ pub fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut area = vec![0.0; x.len()];
     for triangle in &cloth.triangles {
         let (excess, across) = excess(triangle.deformation(x));
-        let tensor = DMat3::from_cols(across * across.x, across * across.y, across * across.z) * (excess * triangle.area);
+        let tensor =
+            DMat3::from_cols(across * across.x, across * across.y, across * across.z) * (excess * triangle.area);
         for v in triangle.vertices.map(|v| v as usize) {
             sum[v] += tensor;
             area[v] += triangle.area;

@@ -193,9 +193,21 @@ impl Cloth {
     /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
     #[must_use]
     pub fn contacts<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+        self.found(self.untouched(body), x)
+    }
+
+    /// The same by tangent planes: see [`Contacts::by_planes`].
+    #[must_use]
+    pub fn contacts_by_planes<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+        self.found(self.untouched(body).by_planes(), x)
+    }
+
+    fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let stiffness = HALF_THICKNESS_PRESSURE / (0.5 * self.offset);
-        let friction = Friction::new(self.friction);
-        let mut contacts = Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, friction);
+        Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, Friction::new(self.friction))
+    }
+
+    fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
         contacts.update(x);
         contacts.friction_refresh(x);
         contacts
