@@ -22,9 +22,11 @@ pub mod parts;
 pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
+pub mod sealed;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;
+pub mod whole_file;
 pub mod wrinkles;
 
 pub use glam::DVec3;

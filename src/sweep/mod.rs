@@ -35,7 +35,7 @@ pub use disk::Append;
 pub use error::{MergeError, PlanError, StoreError};
 pub use garments::DEFAULT_GARMENT;
 pub use journal::Medium;
-pub use manifest::{Listed, Manifest, Shard};
+pub use manifest::{Listed, Manifest, Shard, is_id};
 pub use merge::{join, merge};
 pub use plan::Plan;
 pub use point::{Point, VERSION};

@@ -10,6 +10,7 @@ use partwise::parts::{Parts, segment};
 use partwise::range_table::{EffectiveLevel, Extent, RangeTable};
 use partwise::record::Tab;
 use partwise::sweep::{Plan, Point, Row, Status, row_of};
+use partwise::whole_file::WholeFile;
 
 use self::changes::Changes;
 use self::table::{Compared, LevelCount};
@@ -97,6 +98,7 @@ impl CompareArgs {
             )));
         }
         use_threads(self.threads)?;
+        self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
         interrupt::listen();
         let plan = self.plan()?;
         let shelf = Shelf::in_memory();
@@ -115,7 +117,7 @@ impl CompareArgs {
         }
         let compared = self.compared(&plan, &rows, &bench)?;
         if let Some(path) = &self.csv {
-            let written = std::fs::write(path, table::csv(&compared)?);
+            let written = WholeFile::write(path, table::csv(&compared)?);
             written.map_err(|e| {
                 UserError::new(format!("{}: cannot be written: {e}; choose another file", path.display()))
             })?;

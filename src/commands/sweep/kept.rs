@@ -16,27 +16,35 @@ use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use partwise::mesh::TriMesh;
+use partwise::parts::UNASSIGNED;
+use partwise::sealed::{self, Kind};
+use partwise::sweep::is_id;
+use partwise::whole_file::WholeFile;
+use serde::{Deserialize, Serialize};
 
-use super::packed::{Packer, Unpacker};
+use super::single;
 
-const POINT: &[u8; 8] = b"PWPOINT2";
-const SCENE: &[u8; 8] = b"PWSCENE1";
+const POINT: &Kind = b"PWPOINT3";
+const SCENE: &Kind = b"PWSCENE2";
 
 /// Body and garment as a recording shows them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct KeptScene {
     /// The body, m.
+    #[serde(with = "single::mesh")]
     pub(crate) body: TriMesh,
     /// The garment, undraped, m.
+    #[serde(with = "single::mesh")]
     pub(crate) garment: TriMesh,
     /// Unsigned distance of each garment vertex to the body, m.
+    #[serde(with = "single::numbers")]
     pub(crate) distance_m: Vec<f64>,
 }
 
 /// One point as a recording shows it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct KeptPoint {
-    /// Id of its scene.
+    /// Id of its scene; the first field, so that it can be told from the head of a file.
     pub(crate) scene: String,
     /// Lower and upper value of each level, cm.
     pub(crate) levels_cm: Vec<[f64; 2]>,
@@ -45,60 +53,37 @@ pub(crate) struct KeptPoint {
     /// Level of each PART.
     pub(crate) level_of_part: Vec<u32>,
     /// Resultant force on each PART, N.
+    #[serde(with = "single::points")]
     pub(crate) force_n: Vec<DVec3>,
     /// PART of each vertex.
     pub(crate) part_of_vertex: Vec<u32>,
     /// The displaced garment, m.
+    #[serde(with = "single::points")]
     pub(crate) positions: Vec<DVec3>,
     /// Distance of each vertex to the reference drape, mm; empty where nobody asked.
+    #[serde(with = "single::numbers")]
     pub(crate) error_mm: Vec<f64>,
 }
 
-impl KeptPoint {
-    fn pack(&self) -> Packer {
-        let mut packer = Packer::new(POINT);
-        packer.text(&self.scene);
-        packer.doubles(self.levels_cm.as_flattened());
-        packer.doubles(self.extents_cm.as_flattened());
-        packer.whole(&self.level_of_part);
-        packer.points(&self.force_n);
-        packer.whole(&self.part_of_vertex);
-        packer.points(&self.positions);
-        packer.singles(&self.error_mm);
-        packer
-    }
-
-    fn unpack(bytes: &[u8]) -> Option<Self> {
-        let mut unpacker = Unpacker::new(bytes, POINT)?;
-        Some(Self {
-            scene: unpacker.text()?,
-            levels_cm: unpacker.doubles()?.as_chunks().0.to_vec(),
-            extents_cm: unpacker.doubles()?.as_chunks().0.to_vec(),
-            level_of_part: unpacker.whole()?,
-            force_n: unpacker.points()?,
-            part_of_vertex: unpacker.whole()?,
-            positions: unpacker.points()?,
-            error_mm: unpacker.singles()?,
-        })
+impl KeptScene {
+    /// Whether every index points at something: a file may be somebody else's.
+    fn is_sound(&self) -> bool {
+        let whole = |mesh: &TriMesh| mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.vertex_count());
+        whole(&self.body) && whole(&self.garment) && self.distance_m.len() == self.garment.vertex_count()
     }
 }
 
-impl KeptScene {
-    fn pack(&self) -> Packer {
-        let mut packer = Packer::new(SCENE);
-        for mesh in [&self.body, &self.garment] {
-            packer.points(&mesh.positions);
-            packer.triples(&mesh.triangles);
-        }
-        packer.singles(&self.distance_m);
-        packer
-    }
-
-    fn unpack(bytes: &[u8]) -> Option<Self> {
-        let mut unpacker = Unpacker::new(bytes, SCENE)?;
-        let mut mesh = || Some(TriMesh::new(unpacker.points()?, unpacker.triples()?));
-        let (body, garment) = (mesh()?, mesh()?);
-        Some(Self { body, garment, distance_m: unpacker.singles()? })
+impl KeptPoint {
+    /// Whether every index points at something, and the scene's id is one.
+    fn is_sound(&self) -> bool {
+        let parts = self.level_of_part.len();
+        is_id(&self.scene)
+            && self.extents_cm.len() == self.levels_cm.len()
+            && self.level_of_part.iter().all(|&level| (level as usize) < self.levels_cm.len())
+            && self.force_n.len() == parts
+            && self.part_of_vertex.len() == self.positions.len()
+            && self.part_of_vertex.iter().all(|&part| (part as usize) < parts || part == UNASSIGNED)
+            && (self.error_mm.is_empty() || self.error_mm.len() == self.positions.len())
     }
 }
 
@@ -133,7 +118,7 @@ impl Shelf {
     /// Keeps a point.
     pub(crate) fn put_point(&self, id: &str, point: KeptPoint) -> io::Result<()> {
         match self {
-            Self::Folder(folder) => write(&Self::point_path(folder, id), point.pack()),
+            Self::Folder(folder) => write(&Self::point_path(folder, id), POINT, &point),
             Self::Memory(kept) => {
                 kept.lock().unwrap_or_else(PoisonError::into_inner).1.insert(id.to_owned(), point);
                 Ok(())
@@ -145,8 +130,9 @@ impl Shelf {
     pub(crate) fn put_scene(&self, id: &str, scene: impl FnOnce() -> KeptScene) -> io::Result<()> {
         match self {
             Self::Folder(folder) => {
-                let path = Self::scene_path(folder, id);
-                if path.exists() { Ok(()) } else { write(&path, scene().pack()) }
+                // One that is there and damaged is written again: for ever in the way of --resume otherwise.
+                let whole = self.scene(id).is_some();
+                if whole { Ok(()) } else { write(&Self::scene_path(folder, id), SCENE, &scene()) }
             }
             Self::Memory(kept) => {
                 kept.lock().unwrap_or_else(PoisonError::into_inner).0.entry(id.to_owned()).or_insert_with(scene);
@@ -158,7 +144,9 @@ impl Shelf {
     /// A point, if it is there and whole.
     pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
         match self {
-            Self::Folder(folder) => KeptPoint::unpack(&fs::read(Self::point_path(folder, id)).ok()?),
+            Self::Folder(folder) => {
+                sealed::open(POINT, &fs::read(Self::point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+            }
             Self::Memory(kept) => kept.lock().unwrap_or_else(PoisonError::into_inner).1.get(id).cloned(),
         }
     }
@@ -170,7 +158,7 @@ impl Shelf {
                 let mut head = Vec::new();
                 let file = fs::File::open(Self::point_path(folder, id)).ok()?;
                 file.take(256).read_to_end(&mut head).ok()?;
-                Unpacker::unchecked(&head, POINT)?.text()
+                sealed::peek(POINT, &head).filter(|scene: &String| is_id(scene))
             }
             Self::Memory(kept) => Some(kept.lock().unwrap_or_else(PoisonError::into_inner).1.get(id)?.scene.clone()),
         }
@@ -179,7 +167,9 @@ impl Shelf {
     /// A scene, if it is there and whole.
     pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
         match self {
-            Self::Folder(folder) => KeptScene::unpack(&fs::read(Self::scene_path(folder, id)).ok()?),
+            Self::Folder(folder) => {
+                sealed::open(SCENE, &fs::read(Self::scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+            }
             Self::Memory(kept) => kept.lock().unwrap_or_else(PoisonError::into_inner).0.get(id).cloned(),
         }
     }
@@ -194,9 +184,75 @@ impl Shelf {
     }
 }
 
-fn write(path: &Path, packer: Packer) -> io::Result<()> {
+fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
     }
-    packer.write(path).map(|_| ())
+    WholeFile::write(path, sealed::seal(kind, value)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE_ID: &str = "0123456789abcdef0123456789abcdef";
+
+    fn scene() -> KeptScene {
+        let mesh = TriMesh::new(vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.25], vec![[0, 1, 2]]);
+        KeptScene { body: mesh.clone(), garment: mesh, distance_m: vec![0.5, 0.25, 0.125] }
+    }
+
+    fn point() -> KeptPoint {
+        KeptPoint {
+            scene: SCENE_ID.to_owned(),
+            levels_cm: vec![[0.0, f64::INFINITY]],
+            extents_cm: vec![[0.0; 2]],
+            level_of_part: vec![0],
+            force_n: vec![DVec3::Z * -0.5],
+            part_of_vertex: vec![0, 0, UNASSIGNED],
+            positions: scene().garment.positions,
+            error_mm: vec![0.5, 1.0, 2.0],
+        }
+    }
+
+    #[test]
+    fn what_is_kept_reads_back_and_a_truncated_scene_is_written_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let shelf = Shelf::in_folder(folder.path());
+        shelf.put_scene(SCENE_ID, scene).unwrap();
+        shelf.put_point("a", point()).unwrap();
+        assert_eq!((shelf.scene(SCENE_ID), shelf.point("a")), (Some(scene()), Some(point())));
+        assert_eq!(shelf.scene_of("a").as_deref(), Some(SCENE_ID));
+        let path = Shelf::scene_path(folder.path(), SCENE_ID);
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(shelf.scene(SCENE_ID), None);
+        shelf.put_scene(SCENE_ID, scene).unwrap();
+        assert_eq!(shelf.scene(SCENE_ID), Some(scene()), "--resume would fail for ever");
+    }
+
+    #[test]
+    fn indices_that_point_nowhere_and_ids_that_are_paths_read_as_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let shelf = Shelf::in_folder(folder.path());
+        let spoil: [fn(&mut KeptPoint); 5] = [
+            |p| p.scene = "../../outside".to_owned(),
+            |p| p.level_of_part = vec![7],
+            |p| p.part_of_vertex[0] = 3,
+            |p| p.force_n.clear(),
+            |p| p.error_mm.truncate(1),
+        ];
+        for (i, spoil) in spoil.into_iter().enumerate() {
+            let mut spoilt = point();
+            spoil(&mut spoilt);
+            shelf.put_point("b", spoilt).unwrap();
+            assert_eq!(shelf.point("b"), None, "{i}");
+        }
+        shelf.put_point("b", KeptPoint { scene: "../../outside".to_owned(), ..point() }).unwrap();
+        assert_eq!(shelf.scene_of("b"), None);
+        let mut far = scene();
+        far.garment.triangles[0][2] = 3;
+        shelf.put_scene(SCENE_ID, || far).unwrap();
+        assert_eq!(shelf.scene(SCENE_ID), None);
+    }
 }

@@ -2,11 +2,11 @@
 
 pub(crate) mod chosen;
 pub(crate) mod kept;
-mod packed;
 pub(crate) mod points;
 pub(crate) mod recording;
 pub(crate) mod report;
 pub(crate) mod scenes;
+mod single;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use self::kept::Shelf;
 use self::points::{ACCURACY, Against, Bench};
 use self::report::{Format, Report};
 use super::failure::UserError;
-use super::run::use_threads;
+use super::run::{MOST_THREADS, use_threads};
 use super::sinks::SinkArgs;
 use super::{console, interrupt};
 
@@ -89,6 +89,12 @@ impl SweepArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
+        if !(1..=MOST_THREADS).contains(&self.jobs) {
+            let found = self.jobs;
+            return Err(UserError::new(format!(
+                "--jobs {found}: found {found}, expected 1 to {MOST_THREADS} points at a time"
+            )));
+        }
         interrupt::listen();
         let plan = self.plan()?;
         let folder = self.folder();

@@ -14,6 +14,7 @@ use partwise::fabric::Fabric;
 use partwise::record::RecordSummary;
 use partwise::shapes::BUILT_IN;
 use partwise::table_search::Front;
+use partwise::whole_file::WholeFile;
 
 use self::find::{Found, SHAPES, SHAPES_TOGETHER, Taken, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, take};
 use self::report::Verdict;
@@ -143,13 +144,15 @@ impl TuneArgs {
         let front = report::csv(&results.fronts)?;
         self.write(&self.out.join("front.csv"), &front)?;
         self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
+        // JSON is Unicode; names of files need not be.
+        let name = |path: &PathBuf| path.display().to_string();
         match self.format {
             Format::Csv => console::result(&front),
             Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
                 "verdicts": results.verdicts,
-                "tables": results.tables,
-                "front": self.out.join("front.csv"),
-                "recordings": results.recordings.iter().map(|r| &r.path).collect::<Vec<_>>(),
+                "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
+                "front": name(&self.out.join("front.csv")),
+                "recordings": results.recordings.iter().map(|r| r.path.as_ref().map(name)).collect::<Vec<_>>(),
             }))?),
             Format::Text => {
                 let recordings: String = results.recordings.iter().map(line).collect();
@@ -256,7 +259,7 @@ impl TuneArgs {
     }
 
     fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let written = std::fs::create_dir_all(&self.out).and_then(|()| std::fs::write(path, text));
+        let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
         written.map_err(|e| {
             UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
         })
