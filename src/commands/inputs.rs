@@ -124,7 +124,7 @@ impl InputArgs {
         let body = if self.open_body { Body::new_open(&body_mesh)? } else { Body::new(&body_mesh)? };
         let placed = self.load_garment(&body_mesh, &body, body_import.as_ref(), &mut notes)?;
         let mut mesh = placed.mesh;
-        check_near(&mesh, &body)?;
+        check_near(&mesh, &body).with_context(|| self.garment.clone())?;
         if !self.no_push_out {
             let (pushed, report) = push_out(&mesh, &body, PUSHED_CLEARANCE);
             if !report.is_clean() {
@@ -137,7 +137,7 @@ impl InputArgs {
         let topology = Topology::new(&mesh);
         let held = match &self.hold {
             None => placed.held,
-            Some(what) => held_edge(&mesh, &topology, what)?,
+            Some(what) => held_edge(&mesh, &topology, what).with_context(|| self.garment.clone())?,
         };
         Ok(Inputs {
             scene: Scene { body_mesh, body, garment: mesh, topology, rest: placed.rest, held },
@@ -221,9 +221,10 @@ impl InputArgs {
     }
 
     fn imported_rest(&self, imported: &Imported) -> anyhow::Result<RestShape> {
+        let garment = || self.garment.clone();
         Ok(match self.rest.as_deref() {
-            None | Some("own") => RestShape::from_edges(&imported.mesh)?,
-            Some("texture") => RestShape::from_texture(&imported.mesh, &imported.texture, 1.0)?,
+            None | Some("own") => RestShape::from_edges(&imported.mesh).with_context(garment)?,
+            Some("texture") => RestShape::from_texture(&imported.mesh, &imported.texture, 1.0).with_context(garment)?,
             Some(file) => {
                 let frame = imported.frame();
                 let options = ImportOptions {
@@ -232,7 +233,8 @@ impl InputArgs {
                     ..self.options(self.garment_group.as_ref())
                 };
                 let other = import_garment(Path::new(file), &options, &Beside::File(frame))?;
-                RestShape::from_mesh(&imported.mesh, &imported.in_the_shape_of(&other)?)?
+                let shape = imported.in_the_shape_of(&other)?;
+                RestShape::from_mesh(&imported.mesh, &shape).with_context(|| file.to_owned())?
             }
         })
     }
@@ -247,8 +249,8 @@ fn held_edge(mesh: &TriMesh, topology: &Topology, what: &str) -> anyhow::Result<
     }
     let Some(group) = mesh.groups.iter().position(|g| g == what) else {
         return Err(UserError::new(format!(
-            "--hold: no group \"{what}\" in the garment; expected `top` or one of {}",
-            mesh.groups.join(", ")
+            "--hold: found no group \"{what}\" in the garment, expected `top`{}",
+            or_one_of(&mesh.groups)
         )));
     };
     let on_edge = topology.boundary_vertices();
@@ -260,6 +262,17 @@ fn held_edge(mesh: &TriMesh, topology: &Topology, what: &str) -> anyhow::Result<
     held.sort_unstable();
     held.dedup();
     Ok(held)
+}
+
+/// The groups to choose from, the first of many.
+fn or_one_of(groups: &[String]) -> String {
+    const SHOWN: usize = 20;
+    if groups.is_empty() {
+        return ", as its file has no groups (lines that begin with g or o)".to_owned();
+    }
+    let shown = groups.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = if groups.len() > SHOWN { format!(" and {} more", groups.len() - SHOWN) } else { String::new() };
+    format!(" or one of {shown}{more}")
 }
 
 /// Whether an argument names a file rather than something built in.
