@@ -178,7 +178,8 @@ impl InputArgs {
                 self.body
             )));
         }
-        Ok((dress_form(&self.measurements.spec()?)?, None))
+        let form = dress_form(&self.measurements.spec()?).with_context(|| self.measurements.place())?;
+        Ok((form, None))
     }
 
     fn load_garment(

@@ -34,7 +34,12 @@ impl ViewArgs {
         }
         interrupt::listen();
         self.try_to_read()?;
-        let served = web::serve_file(&self.file, self.web_port, self.grpc_port)?;
+        // The decoder's panics come back as errors; what they print on the way is for nobody.
+        let loud = std::panic::take_hook();
+        std::panic::set_hook(Box::new(|_| {}));
+        let served = web::serve_file(&self.file, self.web_port, self.grpc_port);
+        std::panic::set_hook(loud);
+        let served = served?;
         console::result(served.url());
         console::note("open this address in a browser; Ctrl-C ends");
         interrupt::wait();

@@ -12,6 +12,7 @@ use super::{Bench, GARMENT, SCENE};
 fn numbers_beyond_all_measure_are_refused_with_their_limit() {
     let bench = Bench::new();
     bench.drape(&["--no-save", "--threads", "100000"]).with(2, &["--threads", "1024"]);
+    bench.run(&["sweep", "none.toml", "--jobs", "100000"]).with(2, &["--jobs", "1024"]);
     for rows in ["3", "100000", "18446744073709551615"] {
         bench.run(&["cusick", "silk", "--rows", rows]).with(2, &["--rows", "4..=100"]);
     }
@@ -28,6 +29,8 @@ fn what_the_user_can_mend_ends_with_two() {
     bench.run(&["cusick", "nope"]).with(2, &["nope", "silk"]);
     bench.drape(&["--no-save", "--hold", "cuff"]).with(2, &["garment.obj", "cuff", "no groups"]);
     bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
+    bench.write("large.toml", "bust_cm = 900\n");
+    bench.run(&["--no-save", "--measurements", "large.toml"]).with(2, &["large.toml", "900"]);
     bench.write("far.obj", &GARMENT.replace(" 1.6", " 41.6"));
     let far = ["--body", "body.obj", "--garment", "far.obj", "--unit", "m", "--up", "z", "--no-save"];
     bench.run(&far).with(2, &["far.obj", "no body near"]);
@@ -91,7 +94,7 @@ fn mutated_recordings_are_viewed_or_refused() {
     let whole = fs::read(bench.path("whole.rrd")).unwrap();
     let mut random = Random(13);
     let mut refused = 0;
-    for i in 0..60 {
+    for i in 0..120 {
         let mut bytes = whole.clone();
         for _ in 0..=random.below(8) {
             let at = random.below(bytes.len());
@@ -121,5 +124,5 @@ fn mutated_recordings_are_viewed_or_refused() {
             child.wait().unwrap();
         }
     }
-    assert!((10..60).contains(&refused), "{refused} of 60 were refused");
+    assert!((20..120).contains(&refused), "{refused} of 120 were refused");
 }
