@@ -50,9 +50,11 @@ pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod scene;
+pub mod sealed;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;
+pub mod whole_file;
 pub mod wrinkles;
 
 pub use drape::Settings;

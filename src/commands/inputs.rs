@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
+use partwise::scene::{Loaded, SceneError};
 
 use super::measurements::MeasurementArgs;
 
@@ -66,6 +67,14 @@ impl InputArgs {
             hold: self.hold.clone(),
             push_out: !self.no_push_out,
             measurements: self.measurements.spec()?,
+        })
+    }
+
+    /// Loads a scene of these flags, saying where measurements that make no body were given.
+    pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
+        spec.load().map_err(|error| match error {
+            SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
+            other => other.into(),
         })
     }
 

@@ -164,7 +164,9 @@ fn without_state(mut accuracy: Value) -> Value {
 
 /// The command line as typed, the program by its bare name.
 pub(crate) fn command_line() -> String {
-    let arguments = std::env::args().skip(1).map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
+    // Names of files need not be Unicode.
+    let typed = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    let arguments = typed.map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 

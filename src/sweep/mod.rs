@@ -31,7 +31,7 @@ pub use bench::{Bench, Pass, PointError, result_hash, row_of};
 pub use disk::Append;
 pub use error::{MergeError, PlanError, StoreError};
 pub use journal::Medium;
-pub use manifest::{Listed, Manifest, Shard};
+pub use manifest::{Listed, Manifest, Shard, is_id};
 pub use merge::{join, merge};
 pub use plan::Plan;
 pub use point::{Point, VERSION};

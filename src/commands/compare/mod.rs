@@ -10,11 +10,11 @@ use clap::Args;
 use partwise::drape::{Refine, Settings};
 use partwise::figures::LevelCount;
 use partwise::job::Against;
-use partwise::mesh::WholeFile;
 use partwise::parts::{Parts, segment};
 use partwise::range_table::{RangeTable, TableRule};
 use partwise::record::Tab;
 use partwise::sweep::{Bench, Plan, Row, Status};
+use partwise::whole_file::WholeFile;
 use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
@@ -93,6 +93,7 @@ impl CompareArgs {
             )));
         }
         use_threads(self.threads)?;
+        self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
         interrupt::listen();
         let plan = self.plan()?;
         let store = PointStore::in_memory();
@@ -111,7 +112,7 @@ impl CompareArgs {
         }
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
-            let written = WholeFile::write(path, table::csv(&compared)?.as_bytes());
+            let written = WholeFile::write(path, table::csv(&compared)?);
             written.map_err(|e| {
                 UserError::new(format!("{}: cannot be written: {e}; choose another file", path.display()))
             })?;

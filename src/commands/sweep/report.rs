@@ -59,10 +59,12 @@ impl Report<'_> {
     }
 
     fn json(&self) -> serde_json::Value {
+        // JSON is Unicode; names of files need not be.
+        let name = |r: &RecordSummary| r.path.as_ref().map(|path| path.display().to_string());
         let recordings: Vec<_> = self
             .recordings
             .iter()
-            .map(|r| json!({ "path": r.path, "bytes": r.bytes, "raw_bytes": r.raw_bytes, "log_ms": r.log_ms }))
+            .map(|r| json!({ "path": name(r), "bytes": r.bytes, "raw_bytes": r.raw_bytes, "log_ms": r.log_ms }))
             .collect();
         json!({
             "sweep": self.name,
