@@ -1,7 +1,7 @@
 //! Values as bytes that are known again: a kind, the value (postcard), and the BLAKE3 hash of both.
 //!
-//! What does not match its kind or its hash is no value of ours, half of one, or damaged: it opens as nothing, and whoever
-//! asked makes it again.
+//! What does not match its kind or its hash is no value of ours, half of one, or damaged: it opens as nothing, and
+//! whoever asked makes it again.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

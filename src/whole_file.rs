@@ -1,8 +1,8 @@
 //! A file that is there whole or not at all: the one place that writes and renames.
 //!
 //! What is written grows beside its place under a random name that nobody can have planted (created with `O_EXCL`), and
-//! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What is
-//! no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was.
+//! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What
+//! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -13,8 +13,8 @@ use tempfile::TempPath;
 /// Links to follow before a chain of them is taken for a circle: the system's own limit.
 const MOST_LINKS: usize = 40;
 
-/// A file in the making. Dropped before [`finish`](Self::finish), it removes what it wrote and leaves an older file as it
-/// was.
+/// A file in the making. Dropped before [`finish`](Self::finish), it removes what it wrote and leaves an older file as
+/// it was.
 #[derive(Debug)]
 pub struct WholeFile {
     path: PathBuf,
@@ -27,7 +27,8 @@ impl WholeFile {
     /// Begins a file that will be called `path`.
     ///
     /// # Errors
-    /// What the system says where the folder is missing or not writable, where the path is a folder or a circle of links.
+    /// What the system says where the folder is missing or not writable, where the path is a folder or a circle of
+    /// links.
     pub fn create(path: impl AsRef<Path>) -> io::Result<Self> {
         let path = place(path.as_ref())?;
         let found = fs::metadata(&path).ok();

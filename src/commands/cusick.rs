@@ -17,8 +17,8 @@ const MOST_ROWS: u64 = 100;
 /// Arguments of `cusick`.
 #[derive(Debug, Args)]
 pub(crate) struct CusickArgs {
-    /// Built-in fabrics to test [default: all of them]
-    #[arg(value_name = "FABRIC")]
+    /// Fabrics to test: built-in names or TOML files [default: all that are built in]
+    #[arg(value_name = "NAME|FILE")]
     fabrics: Vec<String>,
     /// Rows of the mesh from the plates' edge to the rim, 4 to 100: 12 is half a centimetre
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(4..=MOST_ROWS))]

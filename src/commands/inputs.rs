@@ -41,7 +41,8 @@ pub(crate) struct InputArgs {
     /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces
     #[arg(long, value_name = "own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
     rest: String,
-    /// Hold an edge of the garment where it is: `top` (the highest edge, a waistband) or the edges of a group of the file
+    /// Hold an edge of the garment where it is: `top` (its highest edge, a waistband, say) or the edges that a group of
+    /// its file lies on [default: the waistband of a built-in skirt; of a file nothing]
     #[arg(long, value_name = "top|GROUP")]
     hold: Option<String>,
     /// Leave garment vertices that start inside the body where they are

@@ -140,7 +140,8 @@ impl Loaded {
         notes
     }
 
-    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture coordinates.
+    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
+    /// coordinates.
     ///
     /// # Errors
     /// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.

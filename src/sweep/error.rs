@@ -1,5 +1,5 @@
-//! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of these:
-//! it is a row.
+//! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of
+//! these: it is a row.
 
 use std::io;
 use std::path::PathBuf;

@@ -64,7 +64,8 @@ pub(crate) struct CompareArgs {
     /// Timed passes of each; the median is reported
     #[arg(long, value_name = "N", default_value = "3", help_heading = "Stages")]
     repeats: NonZeroUsize,
-    /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own` continuation too
+    /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own`
+    /// continuation too
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Stages")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]

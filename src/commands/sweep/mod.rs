@@ -69,8 +69,8 @@ pub(crate) struct SweepArgs {
     /// Points at a time; more than one makes the timings of all of them worse
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
     jobs: usize,
-    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and fabric), or
-    /// `own` continuation too, a converged drape for every point, seconds each
+    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and
+    /// fabric), or `own` continuation too, a converged drape for every point, seconds each
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Rows")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]

@@ -1,7 +1,7 @@
 //! The recording of a sweep: one file a garment, each table a step, the few chosen side by side, speed against error.
 //!
-//! It is put together at the end from what is kept in the store, in the plan's order, so that a sweep that was interrupted, cut
-//! into shards or run with several jobs gives the recording of an undisturbed one.
+//! It is put together at the end from what is kept in the store, in the plan's order, so that a sweep that was
+//! interrupted, cut into shards or run with several jobs gives the recording of an undisturbed one.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -148,6 +148,7 @@ fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
         ("model", row.model.clone()),
         ("fabric", row.fabric.clone()),
         ("extent, cm", row.extent_cm.clone()),
+        ("motion", row.motion.clone()),
         ("refinement", row.refine.clone()),
     ];
     let measured = row.figures.iter().flat_map(Figures::facts);
