@@ -1,7 +1,7 @@
 //! The figures of a drape: one view, which the terminal, scripts, the rows of a sweep and the recording read from.
 //!
-//! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a reference
-//! drape is there where somebody asked for one.
+//! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
+//! reference drape is there where somebody asked for one.
 
 use serde::{Deserialize, Serialize};
 
@@ -114,6 +114,9 @@ pub struct Figures {
     pub canonical_spread_mm: Option<f64>,
     /// RMS of the canonical drape that one displacement per PART cannot show, mm.
     pub representable_rms_mm: Option<f64>,
+    /// RMS of it that one affine map per PART, blended over the seams, cannot show, mm: what the coupled model's PARTs
+    /// could hold it to at best.
+    pub representable_affine_rms_mm: Option<f64>,
     /// ‖∇E‖ over the weight of the drape as a state without a history, where friction holds as much as it can: see
     /// [`accuracy::state`].
     pub residual_at_rest_over_weight: Option<f64>,
@@ -204,8 +207,11 @@ impl Figures {
         );
         let spread = |mm| format!("{mm:.1} mm RMS between drapes from perturbed starts");
         add("spread", self.canonical_spread_mm.map(spread));
-        let best = |mm| format!("{mm:.1} mm RMS remain with one displacement a PART");
-        add("representable", self.representable_rms_mm.map(best));
+        let best = self.representable_affine_rms_mm.zip(self.representable_rms_mm).map(|(affine, one)| {
+            format!("its PARTs could hold it to {affine:.1} mm by affine maps, {one:.1} mm by one displacement each")
+        });
+        let single = |mm| format!("its PARTs could hold it to {mm:.1} mm by one displacement each");
+        add("representable", best.or(self.representable_rms_mm.map(single)));
         let rank = |r| format!("rank correlation {r:.2} of PART jumps with the mean curvature");
         add("wrinkles", self.wrinkle_rank_correlation.map(rank));
         found
@@ -218,6 +224,7 @@ impl Figures {
             ("error/rms_mm", self.rms_mm),
             ("error/canonical_rms_mm", self.canonical_rms_mm),
             ("error/representable_rms_mm", self.representable_rms_mm),
+            ("error/representable_affine_rms_mm", self.representable_affine_rms_mm),
             ("displacement_rms_mm", Some(self.displacement_rms_mm)),
             ("levels", Some(self.levels as f64)),
             ("singletons", Some(self.singletons as f64)),

@@ -1,14 +1,14 @@
 //! One job: what is draped over what, by which dials, from which start, and what is measured of it.
 //!
-//! A [`Job`] is plain data, and the same for everybody who fills one: the flags of `run`, the points of a sweep, `compare`,
-//! a script that sends JSON. `Job::default()` is `partwise run` without a flag.
+//! A [`Job`] is plain data, and the same for everybody who fills one: the flags of `run`, the points of a sweep,
+//! `compare`, a script that sends JSON. `Job::default()` is `partwise run` without a flag.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::accuracy::{self, reference::ReferenceCache};
+use crate::accuracy::{self, reference::ReferenceCache, representable::representable};
 use crate::assess::{AssessError, AssessOptions, Assessment, assess, canonical, perturbed};
 use crate::drape::{Drape, DrapeError, Refine, Settings, drape};
 use crate::figures::Figures;
@@ -61,7 +61,8 @@ pub struct Job {
     pub seed: u64,
     /// What the result is measured against.
     pub accuracy: Against,
-    /// Canonical drapes from this many perturbed starts, for the spread between equilibria; where measured against its own.
+    /// Canonical drapes from this many perturbed starts, for the spread between equilibria; where measured against its
+    /// own.
     pub spread_starts: u64,
 }
 
@@ -79,8 +80,8 @@ pub struct Measured {
 }
 
 impl Job {
-    /// A job that ends after the two stages, which is where range tables differ: what sweeps and comparisons start from. Its
-    /// table goes by the name it would be asked for, as all do there.
+    /// A job that ends after the two stages, which is where range tables differ: what sweeps and comparisons start
+    /// from. Its table goes by the name it would be asked for, as all do there.
     #[must_use]
     pub fn preview() -> Self {
         let Settings { table, .. } = Settings::default();
@@ -130,9 +131,14 @@ impl Job {
             }
         };
         let moved: Vec<_> = reference.iter().zip(&scene.garment.positions).map(|(a, b)| *a - *b).collect();
+        let mut held = vec![false; moved.len()];
+        scene.held.iter().for_each(|&v| held[v as usize] = true);
+        let best = representable(&scene.topology, &drape.parts, &held, &scene.garment.positions, &reference);
+        let affine = Some(best.blended_affine_rms_mm).filter(|mm| mm.is_finite());
         let mut figures = Figures {
             canonical_rms_mm: Some(accuracy::rms_mm(&drape.positions, &reference)),
             representable_rms_mm: Some(1e3 * representable_rms_m(&drape.parts, &moved)),
+            representable_affine_rms_mm: affine,
             ..figures
         };
         let error_mm = match &assessment {

@@ -6,8 +6,8 @@
 //! centimetres, as in the paper. A name that carries another unit says so (`_mm`, `_cm`, `_kpa`, `_ms`).
 //!
 //! # Draping a mesh
-//! A [`SceneSpec`] names body and garment: built in, as here, or OBJ files (`SceneSpec::new("me.obj", "shirt.obj")`), whose unit
-//! and up axis are guessed, and said in the notes.
+//! A [`SceneSpec`] names body and garment: built in, as here, or OBJ files (`SceneSpec::new("me.obj", "shirt.obj")`),
+//! whose unit and up axis are guessed, and said in the notes.
 //!
 //! ```
 //! use partwise::{SceneSpec, Settings, drape};
@@ -25,15 +25,15 @@
 //! # }
 //! ```
 //!
-//! `Settings::default()` without the third line goes on until the drape rests. A [`Job`] is the same as plain data, with what is
-//! to be measured; `examples/` drapes an OBJ, sweeps tables, and records into a Rerun stream of one's own.
+//! `Settings::default()` without the third line goes on until the drape rests. A [`Job`] is the same as plain data,
+//! with what is to be measured; `examples/` drapes an OBJ, sweeps tables, and records into a Rerun stream of one's own.
 //!
 //! # Module map
 //! Data flows one way:
-//! [`mesh`] → [`distance`] → [`scene`] → [`parts`] → [`mechanics`] → [`drape()`](drape::drape) → [`job`] → `record` → the command
-//! line. [`shapes`] makes the built-in body and garments, [`range_table`] and [`fabric`] hold the two inputs a user tunes,
-//! [`accuracy`] measures a result against a reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the
-//! hundred. Only `record` knows Rerun; only the binary knows clap.
+//! [`mesh`] → [`distance`] → [`scene`] → [`parts`] → [`mechanics`] → [`drape()`](drape::drape) → [`job`] → `record` →
+//! the command line. [`shapes`] makes the built-in body and garments, [`range_table`] and [`fabric`] hold the two
+//! inputs a user tunes, [`accuracy`] measures a result against a reference, [`figures`] are what everybody reads of it,
+//! [`sweep`] runs jobs by the hundred. Only `record` knows Rerun; only the binary knows clap.
 
 pub mod accuracy;
 pub mod assess;
@@ -50,9 +50,11 @@ pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod scene;
+pub mod sealed;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;
+pub mod whole_file;
 pub mod wrinkles;
 
 pub use drape::Settings;

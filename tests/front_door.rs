@@ -72,7 +72,8 @@ fn meshes_in_memory_and_in_files_are_one_scene_whichever_way_they_face() {
     let held = SceneSpec { hold: Some("top".into()), ..spec.clone() }.load().unwrap();
     assert_eq!(held.scene.held.len(), 48);
     let error = SceneSpec { hold: Some("cuff".into()), ..spec }.load().unwrap_err();
-    assert!(matches!(error, SceneError::UnknownGroup { .. }), "{error}");
+    let SceneError::In { name, source } = error else { panic!("{error}") };
+    assert!(name.ends_with("sheet.obj") && matches!(*source, SceneError::UnknownGroup { .. }), "{name}: {source}");
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl CheckArgs {
         let mut spec = SceneSpec { push_out: false, ..self.input.spec()? };
         spec.body = self.body_file.clone().unwrap_or(spec.body);
         spec.garment = self.garment_file.clone().unwrap_or(spec.garment);
-        let loaded = spec.load()?;
+        let loaded = self.input.load(&spec)?;
         let scene = &loaded.scene;
         let report = Report {
             body: health(scene.body.mesh()),

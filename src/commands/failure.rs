@@ -33,10 +33,8 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
 }
 
 fn users_own(cause: &(dyn Error + 'static)) -> bool {
-    let recording = cause.downcast_ref::<RecordError>().is_some_and(|e| {
-        !matches!(e, RecordError::Incomplete { .. } | RecordError::Mismatch { .. } | RecordError::Rerun(_))
-    });
-    recording
+    let store = |error: &StoreError| !matches!(error, StoreError::Write { .. } | StoreError::Io { .. });
+    cause.downcast_ref::<RecordError>().is_some_and(RecordError::is_users)
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
         || cause.is::<SceneError>()
@@ -47,8 +45,10 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<PaperError>()
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
-        || cause
-            .downcast_ref::<StoreError>()
-            .is_some_and(|e| !matches!(e, StoreError::Write { .. } | StoreError::Io { .. }))
-        || cause.downcast_ref::<MergeError>().is_some_and(|e| !matches!(e, MergeError::Store(_)))
+        || cause.downcast_ref::<StoreError>().is_some_and(store)
+        || cause.downcast_ref::<MergeError>().is_some_and(|error| match error {
+            // Said in the store's own words, so it is no cause of its own.
+            MergeError::Store(error) => store(error),
+            _ => true,
+        })
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
+use partwise::scene::{Loaded, SceneError};
 
 use super::measurements::MeasurementArgs;
 
@@ -40,7 +41,8 @@ pub(crate) struct InputArgs {
     /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces
     #[arg(long, value_name = "own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
     rest: String,
-    /// Hold an edge of the garment where it is: `top` (the highest edge, a waistband) or the edges of a group of the file
+    /// Hold an edge of the garment where it is: `top` (its highest edge, a waistband, say) or the edges that a group of
+    /// its file lies on [default: the waistband of a built-in skirt; of a file nothing]
     #[arg(long, value_name = "top|GROUP")]
     hold: Option<String>,
     /// Leave garment vertices that start inside the body where they are
@@ -66,6 +68,14 @@ impl InputArgs {
             hold: self.hold.clone(),
             push_out: !self.no_push_out,
             measurements: self.measurements.spec()?,
+        })
+    }
+
+    /// Loads a scene of these flags, saying where measurements that make no body were given.
+    pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
+        spec.load().map_err(|error| match error {
+            SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
+            other => other.into(),
         })
     }
 

@@ -46,6 +46,12 @@ impl MeasurementArgs {
         self.measurements.as_deref()
     }
 
+    /// Where measurements that make no body were given, for the messages.
+    pub(crate) fn place(&self) -> String {
+        let flags = "--bust, --waist, --measure and the like";
+        self.file().map_or_else(|| flags.to_owned(), |file| format!("{}, or {flags}", file.display()))
+    }
+
     /// File and flags together.
     pub(crate) fn spec(&self) -> anyhow::Result<BodySpec> {
         let mut spec = match &self.measurements {

@@ -88,7 +88,8 @@ impl RunArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        interrupt::listen();
+        self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
+        interrupt::listen_at_once();
         let start = Instant::now();
         let mut solved = self.solve(self.job()?, start, None)?;
         let mut recorder = Recorder::open(self.record_options(&solved))?;
@@ -148,7 +149,7 @@ impl RunArgs {
 
     /// Runs every stage of a job; `kept` saves reading body and garment again.
     fn solve(&self, mut job: Job, start: Instant, kept: Option<Loaded>) -> anyhow::Result<Solved> {
-        let loaded = kept.map_or_else(|| job.scene.load(), Ok)?;
+        let loaded = kept.map_or_else(|| self.input.load(&job.scene), Ok)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
         let mut snapshots = Vec::new();

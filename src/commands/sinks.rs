@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use partwise::record::Sink;
+use partwise::whole_file::same_place;
+
+use super::failure::UserError;
 
 /// Where the views of a recording look from when it opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -59,6 +62,21 @@ pub(crate) struct SinkArgs {
 }
 
 impl SinkArgs {
+    /// Refuses an output that would be written over the recording, or over another output.
+    pub(crate) fn refuse_twice(&self, outputs: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
+        let all = std::iter::once(("--save", self.save.as_deref())).chain(outputs.iter().copied());
+        let given: Vec<(&str, &Path)> = all.filter_map(|(flag, path)| Some((flag, path?))).collect();
+        for (i, (flag, path)) in given.iter().enumerate() {
+            if let Some((other, _)) = given[..i].iter().find(|(_, before)| same_place(before, path)) {
+                let path = path.display();
+                return Err(UserError::new(format!(
+                    "{path}: found both {other} and {flag} writing here, expected two files; give one of them another name"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// The sinks asked for; `name` names the file where the user did not.
     pub(crate) fn sinks(&self, name: &str) -> Vec<Sink> {
         self.sinks_in(Path::new("recordings"), name)

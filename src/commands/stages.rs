@@ -6,24 +6,31 @@ use clap::Args;
 use partwise::drape::{Model, Refine, Settings};
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::files::names_a_file;
+use partwise::mechanics::coupled::Motion;
 use partwise::range_table::{GapRule, RangeTable, TABLE_3};
 
+use super::failure::UserError;
 use super::readings::{self, Reading};
 
 /// Stage one's and stage two's arguments beside the range table.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Stages")]
 pub(crate) struct DialArgs {
-    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam; 1 is the
-    /// paper's definition. `coupled` joins those smaller than its finest extent in any case
+    /// Join PARTs of fewer vertices than this to the neighbour with the longest common seam, before any is cut; 1 is
+    /// the paper's definition
     #[arg(long, value_name = "N", default_value_t = 1)]
     min_part: usize,
     /// Model of stage two: `coupled` (all PARTs at once) or `paper` (equations (2) to (9), every PART for itself)
     #[arg(long, value_name = "coupled|paper", default_value = "coupled", value_parser = model)]
     model: Model,
-    /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade from coarse to fine; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_values_t = Model::default().extents_cm())]
+    /// Cut PARTs to this extent along the cloth, for `coupled`; several, falling, make a cascade; by default, and with
+    /// 0, the table alone makes them
+    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', value_parser = extent)]
     max_extent: Vec<f64>,
+    /// How a PART moves, for `coupled`: by an `affine` map (shifted, turned, stretched, sheared) or by one
+    /// displacement, a `translation`, as in the paper; blended over the seams either way
+    #[arg(long, value_name = "affine|translation", default_value = Motion::default().name())]
+    motion: Motion,
     #[arg(long = "reading", value_name = "KEY=VALUE", value_parser = readings::parse, help = readings::HELP)]
     readings: Vec<Reading>,
     /// Fabric: a built-in name or a TOML file
@@ -52,9 +59,15 @@ impl DialArgs {
     /// The dials over those of `start`.
     pub(crate) fn over(&self, start: Settings) -> anyhow::Result<Settings> {
         let extents: Vec<f64> = self.max_extent.iter().copied().filter(|cm| *cm != 0.0).collect();
+        if !extents.is_sorted_by(|a, b| a > b) {
+            let found = extents.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            return Err(UserError::new(format!(
+                "--max-extent {found}: found extents that do not fall, expected a cascade from coarse to fine, e.g. 12,6"
+            )));
+        }
         let model = match &self.model {
             Model::Paper(_) => Model::Paper(readings::options(&self.readings)?),
-            coupled => coupled.clone().with_extents_cm(&extents),
+            coupled => coupled.clone().with_extents_cm(&extents).with_motion(self.motion),
         };
         Ok(Settings { min_part: self.min_part, model, fabric: Fabric::by_name(&self.fabric)?, ..start })
     }
@@ -80,6 +93,11 @@ impl StageArgs {
 
 fn model(name: &str) -> Result<Model, String> {
     Model::by_name(name).ok_or_else(|| format!("found `{name}`, expected coupled or paper"))
+}
+
+fn extent(text: &str) -> Result<f64, String> {
+    let known = text.trim().parse().ok().filter(|cm: &f64| cm.is_finite() && *cm >= 0.0);
+    known.ok_or_else(|| format!("found `{text}`, expected centimetres, or 0 for PARTs as the table makes them"))
 }
 
 fn gap_rule(text: &str) -> Result<GapRule, String> {

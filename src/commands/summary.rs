@@ -23,6 +23,7 @@ pub(crate) struct Summary {
     body: String,
     garment: String,
     model: &'static str,
+    motion: &'static str,
     fabric: String,
     table: String,
     #[serde(flatten)]
@@ -64,6 +65,7 @@ impl Summary {
             body: loaded.body_name.clone(),
             garment: loaded.garment_name.clone(),
             model: settings.model.name(),
+            motion: settings.model.motion().name(),
             fabric: settings.fabric.name.clone(),
             table: drape.table.name.clone(),
             figures: measured.figures.clone(),
@@ -100,8 +102,8 @@ impl Summary {
         );
         let _ = writeln!(
             out,
-            "{:<20}model {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
-            "stage two", self.model, self.fabric, figures.contact_parts, figures.displacement_rms_mm
+            "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
+            "stage two", self.model, self.motion, self.fabric, figures.contact_parts, figures.displacement_rms_mm
         );
         for (name, value) in figures.findings() {
             let _ = writeln!(out, "{name:<20}{value}");
@@ -119,7 +121,8 @@ impl Summary {
 
     /// For the recording's text panel.
     pub(crate) fn panel(&self, fabric: &Fabric) -> Panel {
-        let facts = std::iter::once(("model", self.model.to_owned())).chain(self.figures.facts());
+        let of_model = [("model", self.model.to_owned()), ("motion", self.motion.to_owned())];
+        let facts = of_model.into_iter().chain(self.figures.facts());
         Panel {
             title: format!("{} on {}", self.garment, self.body),
             table: self.table.clone(),
@@ -164,7 +167,9 @@ fn without_state(mut accuracy: Value) -> Value {
 
 /// The command line as typed, the program by its bare name.
 pub(crate) fn command_line() -> String {
-    let arguments = std::env::args().skip(1).map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
+    // Names of files need not be Unicode.
+    let typed = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    let arguments = typed.map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::fabric::Fabric;
-use crate::mechanics::coupled::CoupledOptions;
+use crate::mechanics::coupled::{CoupledOptions, Motion};
 use crate::mechanics::paper::PaperOptions;
 use crate::range_table::{METRES_PER_CM, RangeTable, TableError, TableRule};
 
-/// Extents PARTs are cut to unless asked otherwise, cm; none leaves them to the table alone.
-pub const DEFAULT_EXTENTS_CM: &[f64] = &[6.0];
+/// Extents PARTs are cut to unless asked otherwise, cm: none, so that the table alone makes them.
+pub const DEFAULT_EXTENTS_CM: &[f64] = &[];
 
 /// The two models of stage two.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,6 +64,24 @@ impl Model {
             Self::Coupled(options) => {
                 options.extents_m.iter().map(|m| (m / METRES_PER_CM * 1e6).round() / 1e6).collect()
             }
+        }
+    }
+
+    /// With PARTs that move like this; those of the paper's model have one displacement whatever is asked.
+    #[must_use]
+    pub fn with_motion(mut self, motion: Motion) -> Self {
+        if let Self::Coupled(options) = &mut self {
+            options.motion = motion;
+        }
+        self
+    }
+
+    /// How its PARTs move.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        match self {
+            Self::Paper(_) => Motion::Translation,
+            Self::Coupled(options) => options.motion,
         }
     }
 

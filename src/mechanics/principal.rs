@@ -15,12 +15,12 @@ pub(crate) fn principal(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
             let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
             let c = t.hypot(1.0).recip();
             let s = t * c;
-            for k in 0..3 {
-                (m[k][p], m[k][q]) = (c * m[k][p] - s * m[k][q], s * m[k][p] + c * m[k][q]);
+            for row in &mut m {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
-            for k in 0..3 {
-                (m[p][k], m[q][k]) = (c * m[p][k] - s * m[q][k], s * m[p][k] + c * m[q][k]);
-            }
+            let (a, b) = (m[p], m[q]);
+            m[p] = std::array::from_fn(|k| c * a[k] - s * b[k]);
+            m[q] = std::array::from_fn(|k| s * a[k] + c * b[k]);
             (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
         }
     }

@@ -17,13 +17,16 @@ mod levels;
 mod meshes;
 mod native;
 mod open;
+mod page;
 pub mod panel;
 pub mod paths;
+mod remote;
 pub mod scatter;
 pub mod sinks;
 pub mod step;
 pub mod web;
 pub mod wrinkles;
+mod writer;
 
 use std::path::PathBuf;
 use std::time::Instant;

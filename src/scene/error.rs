@@ -49,21 +49,47 @@ pub enum SceneError {
         /// The body.
         body: String,
     },
+    /// Measurements, given as numbers, that make no body.
+    #[error("the dress form's measurements make no body: {0}")]
+    Measurements(#[source] ShapeError),
     /// Nothing to hold.
     #[error("--hold top: the garment has no edge to hold")]
     NoEdge,
     /// A group to hold that is not there.
-    #[error("--hold: no group \"{found}\" in the garment; expected `top` or one of {known}")]
+    #[error("--hold: found no group \"{found}\" in the garment, expected `top`{}", or_one_of(known))]
     UnknownGroup {
         /// What was asked for.
         found: String,
         /// What there is.
-        known: String,
+        known: Vec<String>,
+    },
+    /// Any of these, where it does not say itself which body, garment or file it is about.
+    #[error("{name}: {source}")]
+    In {
+        /// The name or file.
+        name: String,
+        /// What is wrong with it.
+        source: Box<SceneError>,
     },
 }
 
 impl SceneError {
+    pub(super) fn about<E: Into<Self>>(name: &str) -> impl FnOnce(E) -> Self {
+        move |source| Self::In { name: name.to_owned(), source: Box::new(source.into()) }
+    }
+
     pub(super) fn in_file(file: &str) -> impl FnOnce(ShapeError) -> Self {
         move |source| Self::ShapeFile { file: file.to_owned(), source }
     }
+}
+
+/// The groups to choose from, the first of many.
+fn or_one_of(groups: &[String]) -> String {
+    const SHOWN: usize = 20;
+    if groups.is_empty() {
+        return ", as its file has no groups (lines that begin with g or o)".to_owned();
+    }
+    let shown = groups.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = if groups.len() > SHOWN { format!(" and {} more", groups.len() - SHOWN) } else { String::new() };
+    format!(" or one of {shown}{more}")
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Scene, SceneError, SceneSpec};
 use crate::distance::Body;
-use crate::files::stem;
+use crate::files::{names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::push_out::PushOutReport;
@@ -47,10 +47,11 @@ impl SceneSpec {
     pub fn load(&self) -> Result<Loaded, SceneError> {
         let (body, of_body) = self.load_body()?;
         let unplaced = self.load_garment(&body, of_body.as_ref())?;
-        let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)?;
+        let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
+            .map_err(SceneError::about(&self.garment))?;
         scene.held = match &self.hold {
             None => unplaced.held,
-            Some(what) => scene.edge(what)?,
+            Some(what) => scene.edge(what).map_err(SceneError::about(&self.garment))?,
         };
         let reports = of_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
         Ok(Loaded {
@@ -67,7 +68,12 @@ impl SceneSpec {
         self.check_names()?;
         let new = if self.open_body { Body::new_open } else { Body::new };
         if !self.body_is_a_mesh() {
-            return Ok((new(&dress_form(&self.form()?)?)?, None));
+            let of_numbers = !names_a_file(&self.body);
+            let form = dress_form(&self.form()?).map_err(|source| match of_numbers {
+                true => SceneError::Measurements(source),
+                false => SceneError::in_file(&self.body)(source),
+            })?;
+            return Ok((new(&form)?, None));
         }
         let imported = import_body(self.body.as_ref(), &self.import_options(self.body_group.as_ref()))?;
         Ok((new(&imported.mesh)?, Some(imported)))
@@ -95,9 +101,13 @@ impl SceneSpec {
     }
 
     fn imported_rest(&self, imported: &Imported) -> Result<RestShape, SceneError> {
+        let about = SceneError::about;
         Ok(match self.rest.as_str() {
-            "own" => RestShape::from_edges(&imported.mesh)?,
-            "texture" => RestShape::from_texture(&imported.mesh, &imported.texture, 1.0)?,
+            "own" => RestShape::from_edges(&imported.mesh).map_err(about(&self.garment))?,
+            "texture" => {
+                let rest = RestShape::from_texture(&imported.mesh, &imported.texture, 1.0);
+                rest.map_err(about(&self.garment))?
+            }
             file => {
                 let frame = imported.frame();
                 let options = ImportOptions {
@@ -106,7 +116,8 @@ impl SceneSpec {
                     ..self.import_options(self.garment_group.as_ref())
                 };
                 let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
-                RestShape::from_mesh(&imported.mesh, &imported.in_the_shape_of(&other)?)?
+                let shape = imported.in_the_shape_of(&other)?;
+                RestShape::from_mesh(&imported.mesh, &shape).map_err(about(file))?
             }
         })
     }
@@ -129,7 +140,8 @@ impl Loaded {
         notes
     }
 
-    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture coordinates.
+    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
+    /// coordinates.
     ///
     /// # Errors
     /// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.
@@ -154,7 +166,7 @@ impl Scene {
             return highest.ok_or(SceneError::NoEdge);
         }
         let Some(group) = mesh.groups.iter().position(|g| g == what) else {
-            return Err(SceneError::UnknownGroup { found: what.to_owned(), known: mesh.groups.join(", ") });
+            return Err(SceneError::UnknownGroup { found: what.to_owned(), known: mesh.groups.clone() });
         };
         let on_edge = topology.boundary_vertices();
         let mut held: Vec<u32> = (mesh.triangles.iter().zip(&mesh.triangle_group))

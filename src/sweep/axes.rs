@@ -1,6 +1,7 @@
 //! The values of every axis of a sweep, read from its file, and their full grid.
 //!
-//! A value of an axis is an edit of a [`Point`]: what the file does not say stays as the job the sweep starts from has it.
+//! A value of an axis is an edit of a [`Point`]: what the file does not say stays as the job the sweep starts from has
+//! it.
 
 use toml::Value;
 
@@ -15,9 +16,10 @@ use crate::drape::{Model, Refine};
 use crate::fabric::Fabric;
 use crate::files::names_a_file;
 use crate::job::Job;
+use crate::mechanics::coupled::Motion;
 
-/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and its
-/// points take 200 MB of memory).
+/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and
+/// its points take 200 MB of memory).
 const LIMIT: usize = 100_000;
 
 /// What a value of an axis does to a point.
@@ -45,6 +47,15 @@ impl Axes {
                 Ok(one(move |point| {
                     let model = std::mem::take(&mut point.job.settings.model);
                     point.job.settings.model = model.with_extents_cm(&extents);
+                }))
+            })?,
+            axis.edits(["motion", "motions"], |v| {
+                let expected = "\"affine\" or \"translation\"";
+                let motion: Option<Motion> = v.get_ref().as_str().and_then(|text| text.parse().ok());
+                let motion = motion.ok_or_else(|| source.wrong(v, "motion", expected))?;
+                Ok(one(move |point| {
+                    let model = std::mem::take(&mut point.job.settings.model);
+                    point.job.settings.model = model.with_motion(motion);
                 }))
             })?,
             axis.edits(["min_part", "min_parts"], |v| {

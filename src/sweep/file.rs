@@ -25,8 +25,9 @@
 //! | `fabric` | `fabrics` | built-in name or file | `interlock` |
 //! | `model` | `models` | `paper`, `coupled` | `coupled` |
 //! | `table` | `tables` | see [`tables`](super::tables) | `table-3` |
-//! | `extent_cm` | `extents_cm` | cm; 0 or `none` for not cut; a list for a cascade, coarse to fine | as `run` |
-//! | `min_part` | `min_parts` | vertices; `coupled` joins PARTs smaller than its finest extent in any case | 1 |
+//! | `extent_cm` | `extents_cm` | cm; 0 or `none` for not cut; a list for a cascade, coarse to fine | `none` |
+//! | `motion` | `motions` | of a PART in `coupled`: `affine`, `translation` | `affine` |
+//! | `min_part` | `min_parts` | vertices; PARTs of fewer are joined before any is cut | 1 |
 //! | `refine` | `refine` | steps or `converged` | 0 |
 //! | `seed` | `seeds` | 0 is the undisturbed start | 0 |
 //! | `options` | `options` | `{ name = value, ... }`: `accuracy`, and the keys of a [`SceneSpec`](crate::SceneSpec) such as `rest` | none |
@@ -48,7 +49,7 @@ pub(super) type Single = BTreeMap<String, At>;
 pub(super) type Grid = BTreeMap<String, Spanned<Vec<At>>>;
 
 /// The keys of `[base]` and `[[points]]`, and those of `[grid]`, in the order in which a grid is nested.
-const KEYS: [[&str; 2]; 11] = [
+const KEYS: [[&str; 2]; 12] = [
     ["body", "bodies"],
     ["garment", "garments"],
     ["size", "sizes"],
@@ -56,6 +57,7 @@ const KEYS: [[&str; 2]; 11] = [
     ["model", "models"],
     ["table", "tables"],
     ["extent_cm", "extents_cm"],
+    ["motion", "motions"],
     ["min_part", "min_parts"],
     ["refine", "refine"],
     ["seed", "seeds"],

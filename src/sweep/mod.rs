@@ -1,11 +1,12 @@
 //! Sweeps: a file of range tables and other parameters run point by point, a row on disk after each.
 //!
-//! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row yet, with
-//! whatever makes rows of points (a [`Bench`], as a rule), and keeps the rows in a [`Store`]; [`merge`] joins the stores of
-//! shards. Equal plans give equal rows, whatever was interrupted, however many jobs and shards there were, timings aside.
+//! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row
+//! yet, with whatever makes rows of points (a [`Bench`], as a rule), and keeps the rows in a [`Store`]; [`merge`] joins
+//! the stores of shards. Equal plans give equal rows, whatever was interrupted, however many jobs and shards there
+//! were, timings aside.
 //!
-//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points, [`point`] what their
-//! ids are made of, [`store`] the files.
+//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points,
+//! [`point`] what their ids are made of, [`store`] the files.
 
 mod axes;
 mod bench;
@@ -31,7 +32,7 @@ pub use bench::{Bench, Pass, PointError, result_hash, row_of};
 pub use disk::Append;
 pub use error::{MergeError, PlanError, StoreError};
 pub use journal::Medium;
-pub use manifest::{Listed, Manifest, Shard};
+pub use manifest::{Listed, Manifest, Shard, is_id};
 pub use merge::{join, merge};
 pub use plan::Plan;
 pub use point::{Point, VERSION};

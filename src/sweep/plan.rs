@@ -1,9 +1,10 @@
 //! From a sweep file to its points.
 //!
 //! # Order
-//! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, smallest PART, refinement, seed,
-//! options (the last fastest), each axis in the order written; then the single points as written. A point that equals an earlier one in
-//! all that determines its result (Table 3 scaled by 1, say) is left out, and [`Plan::notes`] says so.
+//! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, motion, smallest PART,
+//! refinement, seed, options (the last fastest), each axis in the order written; then the single points as written. A
+//! point that equals an earlier one in all that determines its result (Table 3 scaled by 1, say) is left out, and
+//! [`Plan::notes`] says so.
 
 use std::collections::BTreeMap;
 use std::fs;

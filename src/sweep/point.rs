@@ -1,9 +1,9 @@
 //! One point of a sweep: a job, what its body and garment are called, and its name by content.
 //!
 //! A point's id is the blake3 hash of the JSON of all that determines its result: the version of the program and the
-//! [`Job`]. A file counts by its contents, not by its name or place, so that a moved folder or a shard on another machine has
-//! the same ids; a range table counts by its bounds, extents and gap rule, a fabric by its constants. What changes nothing but
-//! timings (repeats, jobs, threads) is no part of it.
+//! [`Job`]. A file counts by its contents, not by its name or place, so that a moved folder or a shard on another
+//! machine has the same ids; a range table counts by its bounds, extents and gap rule, a fabric by its constants. What
+//! changes nothing but timings (repeats, jobs, threads) is no part of it.
 
 use std::collections::BTreeMap;
 
@@ -77,18 +77,20 @@ impl Point {
         let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
         let options = self.options.iter().map(|(key, value)| format!(", {key} {value}")).collect::<String>();
         format!(
-            "body {body}, garment {garment}, fabric {}, {}, table {}, extent {}, min-part {}, refine {}, seed {seed}{options}",
+            "body {body}, garment {garment}, fabric {}, {}, table {}, extent {}, motion {}, \
+             min-part {}, refine {}, seed {seed}{options}",
             settings.fabric.name,
             settings.model.name(),
             settings.table.name(),
             self.extent_text(),
+            settings.model.motion().name(),
             settings.min_part,
             settings.refine,
         )
     }
 
-    /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one fabric
-    /// their references.
+    /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one
+    /// fabric their references.
     #[must_use]
     pub fn scene_id(&self) -> String {
         content_id(&self.scene_key())
@@ -113,8 +115,8 @@ impl Point {
 
 /// Hash of a value's JSON, 128 bits in hexadecimal: enough that no two points of any sweep meet, and short in a CSV.
 pub(super) fn content_id(value: &impl Serialize) -> String {
-    // Structs keep their order of fields whatever features serde_json is built with; a map might not. Writing plain data
-    // to memory does not fail; if it did, the ids would collide and the plan would drop points, which it reports.
+    // Structs keep their order of fields whatever features serde_json is built with; a map might not. Writing plain
+    // data to memory does not fail; if it did, the ids would collide and the plan would drop points, which it reports.
     let json = serde_json::to_vec(value).unwrap_or_default();
     blake3::hash(&json).to_hex()[..32].to_owned()
 }

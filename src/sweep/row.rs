@@ -2,8 +2,8 @@
 //!
 //! Figures are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
 //! digits every reader's parser gives back the same bits, so that rows that were read and written again do not drift.
-//! The identity of results, bit for bit, is `result_hash`'s task. A point that failed has no figures and no times: empty cells
-//! in the CSV, no keys in its line.
+//! The identity of results, bit for bit, is `result_hash`'s task. A point that failed has no figures and no times:
+//! empty cells in the CSV, no keys in its line.
 //!
 //! Columns that are timings, and nothing else, start with `time_`; comparisons drop them.
 
@@ -47,6 +47,8 @@ pub struct Row {
     pub table: String,
     /// `none`, one extent, or a cascade `12>6>3`, cm.
     pub extent_cm: String,
+    /// How a PART moves: `affine` or `translation`.
+    pub motion: String,
     /// PARTs of fewer vertices were joined.
     pub min_part: usize,
     /// Steps, or `converged`.
@@ -83,6 +85,7 @@ impl Row {
             model: settings.model.name().to_owned(),
             table: settings.table.name().to_owned(),
             extent_cm: point.extent_text(),
+            motion: settings.model.motion().name().to_owned(),
             min_part: settings.min_part,
             refine: settings.refine.to_string(),
             seed: point.job.seed,

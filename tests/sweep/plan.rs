@@ -90,6 +90,27 @@ fn equal_points_are_left_out_and_said() {
 }
 
 #[test]
+fn parts_are_the_tables_and_move_by_affine_maps_unless_asked_otherwise() {
+    let plan = parse("name = \"n\"\n[grid]\nmotions = [\"affine\", \"translation\"]\nextents_cm = [\"none\", 8]");
+    let found: Vec<_> = plan.points.iter().map(|p| (p.extent_text(), p.job.settings.model.motion().name())).collect();
+    let [none, eight] = ["none", "8"].map(str::to_owned);
+    let expected = [(none.clone(), "affine"), (none, "translation"), (eight.clone(), "affine"), (eight, "translation")];
+    assert_eq!(found, expected);
+    assert!(
+        plan.points[1].label().contains("extent none, motion translation, min-part 1"),
+        "{}",
+        plan.points[1].label()
+    );
+    let ids: BTreeSet<_> = plan.points.iter().map(|p| &p.id).collect();
+    assert_eq!(ids.len(), 4);
+    // What a file leaves out is the first of these.
+    assert_eq!(parse("name = \"n\"\n[grid]").points[0].id, plan.points[0].id);
+    // The paper's PARTs have one displacement each, whatever is asked.
+    let paper = parse("name = \"n\"\n[base]\nmodel = \"paper\"\n[grid]\nmotions = [\"affine\", \"translation\"]");
+    assert_eq!((paper.points.len(), paper.points[0].job.settings.model.motion().name()), (1, "translation"));
+}
+
+#[test]
 fn ids_are_made_of_contents_not_of_names_or_timings() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -187,6 +208,7 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         (format!("{point}model = \"rubber\""), "s.toml:3: model: found \"rubber\"", "coupled"),
         (format!("{point}extent_cm = [3, 6]"), "s.toml:3: extent_cm: found [3, 6]", "falling"),
         (format!("{point}extent_cm = -1"), "s.toml:3: extent_cm: found -1", "none"),
+        (format!("{point}motion = \"rigid\""), "s.toml:3: motion: found \"rigid\"", "translation"),
         (format!("{point}refine = \"fully\""), "s.toml:3: refine: found \"fully\"", "converged"),
         (format!("{point}min_part = 0"), "s.toml:3: min_part: found 0", "1 for"),
         (format!("{point}body = {{ bust = \"wide\" }}"), "s.toml:3: body: found", "centimetres"),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use partwise::Job;
-use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, merge, sweep};
+use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
 
 use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 
@@ -49,6 +49,31 @@ fn missing_points_are_listed() {
     assert!(error.starts_with("66 of 200 points are missing: 2 (body form, garment low-cut-dress"), "{error}");
     assert!(error.contains("and 56 more"), "{error}");
     assert!(matches!(merge(&[], folder.path()), Err(MergeError::Nothing)));
+}
+
+#[test]
+fn a_manifest_made_by_somebody_else_is_taken_for_no_path_and_does_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = run_shards(folder.path(), &plan(), 2);
+    let manifest = parts[0].join("plan.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    let id = text.split("\"id\": \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    let out = folder.path().join("out");
+    for hostile in ["../../../../escaped", "a/b", "..", "", "x".repeat(32).as_str(), "ABCDEF0123456789ABCDEF0123456789"]
+    {
+        fs::write(&manifest, text.replace(&id, hostile)).unwrap();
+        let rows = fs::read_to_string(parts[0].join("rows.jsonl")).unwrap();
+        fs::write(parts[0].join("rows.jsonl"), rows.replace(&id, hostile)).unwrap();
+        let error = merge(&parts, &out).unwrap_err();
+        assert!(matches!(&error, MergeError::Store(StoreError::BadId { .. })), "{error}");
+        assert!(error.to_string().contains("plan.json") && error.to_string().contains("32 hexadecimal"), "{error}");
+        fs::write(parts[0].join("rows.jsonl"), rows).unwrap();
+    }
+    // Eight letters of the plan's hash are shown, and these are of two bytes.
+    let hash = text.split("\"plan\": \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    fs::write(&manifest, text.replace(&hash, "xéééééééééé")).unwrap();
+    let error = merge(&parts, &out).unwrap_err().to_string();
+    assert!(error.contains("plan xééééééé"), "{error}");
 }
 
 #[test]

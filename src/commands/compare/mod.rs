@@ -10,11 +10,11 @@ use clap::Args;
 use partwise::drape::{Refine, Settings};
 use partwise::figures::LevelCount;
 use partwise::job::Against;
-use partwise::mesh::WholeFile;
 use partwise::parts::{Parts, segment};
 use partwise::range_table::{RangeTable, TableRule};
 use partwise::record::Tab;
 use partwise::sweep::{Bench, Plan, Row, Status};
+use partwise::whole_file::WholeFile;
 use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
@@ -64,7 +64,8 @@ pub(crate) struct CompareArgs {
     /// Timed passes of each; the median is reported
     #[arg(long, value_name = "N", default_value = "3", help_heading = "Stages")]
     repeats: NonZeroUsize,
-    /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own` continuation too
+    /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own`
+    /// continuation too
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Stages")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]
@@ -93,6 +94,7 @@ impl CompareArgs {
             )));
         }
         use_threads(self.threads)?;
+        self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
         interrupt::listen();
         let plan = self.plan()?;
         let store = PointStore::in_memory();
@@ -111,7 +113,7 @@ impl CompareArgs {
         }
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
-            let written = WholeFile::write(path, table::csv(&compared)?.as_bytes());
+            let written = WholeFile::write(path, table::csv(&compared)?);
             written.map_err(|e| {
                 UserError::new(format!("{}: cannot be written: {e}; choose another file", path.display()))
             })?;

@@ -87,7 +87,7 @@ fn right(table: &mut Table, columns: std::ops::Range<usize>) {
 }
 
 /// Columns of the CSV: of the row, and of the level.
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 19] = [
     "garment",
     "table",
     "level",
@@ -105,6 +105,7 @@ const COLUMNS: [&str; 18] = [
     "rms_mm",
     "canonical_rms_mm",
     "representable_rms_mm",
+    "representable_affine_rms_mm",
     "error",
 ];
 

@@ -26,25 +26,26 @@ pub(crate) fn labels(rows: &[&Row]) -> Vec<String> {
             row.model.clone(),
             row.fabric.clone(),
             if row.extent_cm == "none" { "not cut".to_owned() } else { format!("{} cm", row.extent_cm) },
+            row.motion.clone(),
             format!("min {}", row.min_part),
             if row.refine == "converged" { row.refine.clone() } else { format!("{} steps", row.refine) },
             format!("seed {}", row.seed),
             row.options.clone(),
         ]
     };
-    let all: Vec<[String; 8]> = rows.iter().map(|row| fields(row)).collect();
-    let varies: Vec<bool> = (0..8).map(|i| all.windows(2).any(|pair| pair[0][i] != pair[1][i])).collect();
+    let all: Vec<[String; 9]> = rows.iter().map(|row| fields(row)).collect();
+    let varies: Vec<bool> = (0..9).map(|i| all.windows(2).any(|pair| pair[0][i] != pair[1][i])).collect();
     let some = varies.contains(&true);
-    let label = |fields: &[String; 8]| {
+    let label = |fields: &[String; 9]| {
         let kept = fields.iter().zip(&varies).enumerate().filter(|(i, (_, v))| **v || (*i == 0 && !some));
         kept.map(|(_, (field, _))| field.as_str()).collect::<Vec<_>>().join(", ")
     };
     all.iter().map(label).collect()
 }
 
-/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with), and an even choice from those that no
-/// other row beats in both PART count and error; if those are few, those whose PART counts lie farthest from the chosen. All are deterministic
-/// figures, so that shards choose alike.
+/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with),
+/// and an even choice from those that no other row beats in both PART count and error; if those are few, those whose
+/// PART counts lie farthest from the chosen. All are deterministic figures, so that shards choose alike.
 pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     if rows.len() <= MOST {
         return (0..rows.len()).collect();

@@ -1,10 +1,10 @@
 //! `partwise sweep`: every point of a sweep file, a row on disk after each, and a recording of them all.
 
 pub(crate) mod chosen;
-mod codec;
 pub(crate) mod points;
 pub(crate) mod recording;
 pub(crate) mod report;
+mod single;
 pub(crate) mod store;
 
 use std::collections::BTreeSet;
@@ -23,7 +23,7 @@ use self::report::{Format, Report};
 use self::store::PointStore;
 use super::failure::UserError;
 use super::sinks::SinkArgs;
-use super::work::{cache, use_threads};
+use super::work::{MOST_THREADS, cache, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -69,8 +69,8 @@ pub(crate) struct SweepArgs {
     /// Points at a time; more than one makes the timings of all of them worse
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
     jobs: usize,
-    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and fabric), or
-    /// `own` continuation too, a converged drape for every point, seconds each
+    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and
+    /// fabric), or `own` continuation too, a converged drape for every point, seconds each
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Rows")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]
@@ -90,6 +90,12 @@ impl SweepArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
+        if !(1..=MOST_THREADS).contains(&self.jobs) {
+            let found = self.jobs;
+            return Err(UserError::new(format!(
+                "--jobs {found}: found {found}, expected 1 to {MOST_THREADS} points at a time"
+            )));
+        }
         interrupt::listen();
         let plan = self.plan()?;
         let folder = self.folder();

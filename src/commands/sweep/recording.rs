@@ -1,7 +1,7 @@
 //! The recording of a sweep: one file a garment, each table a step, the few chosen side by side, speed against error.
 //!
-//! It is put together at the end from what is kept in the store, in the plan's order, so that a sweep that was interrupted, cut
-//! into shards or run with several jobs gives the recording of an undisturbed one.
+//! It is put together at the end from what is kept in the store, in the plan's order, so that a sweep that was
+//! interrupted, cut into shards or run with several jobs gives the recording of an undisturbed one.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,7 +13,7 @@ use partwise::record::{
 use partwise::sweep::{Row, Status, Timing};
 
 use super::chosen::{choose, error_mm, labels, total_ms};
-use super::store::{KeptPoint, PointStore, wide};
+use super::store::{KeptPoint, PointStore};
 
 /// A recording to be made.
 pub(crate) struct Group<'a> {
@@ -82,20 +82,18 @@ pub(crate) fn record(
     };
     let name = format!("{}: {sweep}", group.name);
     let mut recorder = Recorder::open(RecordOptions { sinks, name, layout, ..RecordOptions::default() })?;
-    recorder.body(0, &scene.body.mesh())?;
-    recorder.garment(0, &scene.garment.mesh())?;
-    let distance_m = wide(&scene.distance_m);
+    recorder.body(0, &scene.body)?;
+    recorder.garment(0, &scene.garment)?;
     for (index, (row, label)) in (0..).zip(rows.iter().zip(&label)) {
         let Some(point) = store.point(&row.point) else { continue };
-        let error_mm = wide(&point.error_mm);
-        let error = Overlay { name: "error", unit: "mm", values: &error_mm };
-        let overlays = if error_mm.is_empty() { &[][..] } else { std::slice::from_ref(&error) };
+        let error = Overlay { name: "error", unit: "mm", values: &point.error_mm };
+        let overlays = if point.error_mm.is_empty() { &[][..] } else { std::slice::from_ref(&error) };
         recorder.step(&StepView {
             index,
-            distance_m: &distance_m,
+            distance_m: &scene.distance_m,
             part_of_vertex: &point.part_of_vertex,
-            part_force_n: &point.force_n.wide(),
-            draped: &point.positions.wide(),
+            part_force_n: &point.force_n,
+            draped: &point.positions,
             panel: &panel(row, label, sweep, &point),
             scalars: &row.figures.as_ref().map(Figures::scalars).unwrap_or_default(),
             overlays,
@@ -112,7 +110,7 @@ pub(crate) fn record(
                 index: 0,
                 slot,
                 caption: &caption(rows[i]),
-                draped: &point.positions.wide(),
+                draped: &point.positions,
                 part_of_vertex: &point.part_of_vertex,
                 overlay: None,
             })?;
@@ -150,6 +148,7 @@ fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
         ("model", row.model.clone()),
         ("fabric", row.fabric.clone()),
         ("extent, cm", row.extent_cm.clone()),
+        ("motion", row.motion.clone()),
         ("refinement", row.refine.clone()),
     ];
     let measured = row.figures.iter().flat_map(Figures::facts);

@@ -14,97 +14,66 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use partwise::drape::Drape;
 use partwise::figures::LevelCount;
 use partwise::mesh::TriMesh;
+use partwise::parts::UNASSIGNED;
 use partwise::scene::Scene;
+use partwise::sealed::{self, Kind};
+use partwise::sweep::is_id;
+use partwise::whole_file::WholeFile;
 use serde::{Deserialize, Serialize};
 
-use super::codec::{self, Kind};
+use super::single;
 
-/// Points or vectors in single precision.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Points(Vec<[f32; 3]>);
-
-impl Points {
-    fn of(points: impl IntoIterator<Item = DVec3>) -> Self {
-        Self(points.into_iter().map(|p| p.as_vec3().to_array()).collect())
-    }
-
-    /// In double precision again.
-    pub(crate) fn wide(&self) -> Vec<DVec3> {
-        self.0.iter().map(|p| Vec3::from_array(*p).as_dvec3()).collect()
-    }
-}
-
-/// A triangle mesh without its groups.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Surface(Points, Vec<[u32; 3]>);
-
-impl Surface {
-    fn of(mesh: &TriMesh) -> Self {
-        Self(Points::of(mesh.positions.iter().copied()), mesh.triangles.clone())
-    }
-
-    /// As a mesh.
-    pub(crate) fn mesh(&self) -> TriMesh {
-        TriMesh::new(self.0.wide(), self.1.clone())
-    }
-}
-
-/// Numbers in double precision again.
-pub(crate) fn wide(numbers: &[f32]) -> Vec<f64> {
-    numbers.iter().copied().map(f64::from).collect()
-}
-
-fn narrow(numbers: &[f64]) -> Vec<f32> {
-    numbers.iter().map(|&x| x as f32).collect()
-}
+const POINT: &Kind = b"PWPOINT4";
+const SCENE: &Kind = b"PWSCENE3";
 
 /// Body and garment as a recording shows them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct KeptScene {
     /// The body, m.
-    pub(crate) body: Surface,
+    #[serde(with = "single::mesh")]
+    pub(crate) body: TriMesh,
     /// The garment, undraped, m.
-    pub(crate) garment: Surface,
+    #[serde(with = "single::mesh")]
+    pub(crate) garment: TriMesh,
     /// Unsigned distance of each garment vertex to the body, m.
-    pub(crate) distance_m: Vec<f32>,
+    #[serde(with = "single::numbers")]
+    pub(crate) distance_m: Vec<f64>,
 }
 
 /// One point as a recording shows it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct KeptPoint {
-    /// Id of its scene; first, so that it can be read alone.
+    /// Id of its scene; the first field, so that it can be told from the head of a file.
     pub(crate) scene: String,
     /// The levels of its table.
     pub(crate) levels: Vec<LevelCount>,
     /// Resultant force on each PART, N.
-    pub(crate) force_n: Points,
+    #[serde(with = "single::points")]
+    pub(crate) force_n: Vec<DVec3>,
     /// PART of each vertex.
     pub(crate) part_of_vertex: Vec<u32>,
     /// The displaced garment, m.
-    pub(crate) positions: Points,
+    #[serde(with = "single::points")]
+    pub(crate) positions: Vec<DVec3>,
     /// Distance of each vertex to the reference drape, mm; empty where nobody asked.
-    pub(crate) error_mm: Vec<f32>,
-}
-
-impl Kind for KeptScene {
-    const KIND: &'static [u8; 8] = b"PWSCENE2";
-}
-
-impl Kind for KeptPoint {
-    const KIND: &'static [u8; 8] = b"PWPOINT3";
+    #[serde(with = "single::numbers")]
+    pub(crate) error_mm: Vec<f64>,
 }
 
 impl KeptScene {
     fn of(scene: &Scene) -> Self {
-        Self {
-            body: Surface::of(scene.body.mesh()),
-            garment: Surface::of(&scene.garment),
-            distance_m: narrow(&scene.distances_m()),
-        }
+        let (body, garment) = (scene.body.mesh().clone(), scene.garment.clone());
+        Self { body, garment, distance_m: scene.distances_m() }
+    }
+
+    /// Whether every index points at something: a file may be somebody else's.
+    fn is_sound(&self) -> bool {
+        let whole = |mesh: &TriMesh| mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.vertex_count());
+        whole(&self.body) && whole(&self.garment) && self.distance_m.len() == self.garment.vertex_count()
     }
 }
 
@@ -114,11 +83,23 @@ impl KeptPoint {
         Self {
             scene,
             levels: LevelCount::all(&drape.table, &drape.parts),
-            force_n: Points::of(drape.outcomes.iter().map(|o| o.force_n)),
+            force_n: drape.outcomes.iter().map(|o| o.force_n).collect(),
             part_of_vertex: drape.parts.part_of_vertex.clone(),
-            positions: Points::of(drape.positions.iter().copied()),
-            error_mm: narrow(error_mm),
+            positions: drape.positions.clone(),
+            error_mm: error_mm.to_vec(),
         }
+    }
+
+    /// Whether every index points at something, levels and PARTs add up, and the scene's id is one.
+    fn is_sound(&self) -> bool {
+        let parts = self.force_n.len();
+        let counted = self.levels.iter().try_fold(0_usize, |sum, level| sum.checked_add(level.parts));
+        is_id(&self.scene)
+            && self.levels.iter().enumerate().all(|(i, level)| level.level == i)
+            && counted == Some(parts)
+            && self.part_of_vertex.len() == self.positions.len()
+            && self.part_of_vertex.iter().all(|&part| (part as usize) < parts || part == UNASSIGNED)
+            && (self.error_mm.is_empty() || self.error_mm.len() == self.positions.len())
     }
 }
 
@@ -164,13 +145,13 @@ impl PointStore {
     fn put_both(&self, id: &str, point: KeptPoint, scene: impl FnOnce() -> KeptScene) -> io::Result<()> {
         match self {
             Self::Folder(folder, lock) => {
-                let path = scene_path(folder, &point.scene);
                 let writing = lock.lock().unwrap_or_else(PoisonError::into_inner);
-                if !path.exists() {
-                    write(&path, &scene())?;
+                // One that is there and damaged is written again: for ever in the way of --resume otherwise.
+                if self.scene(&point.scene).is_none() {
+                    write(&scene_path(folder, &point.scene), SCENE, &scene())?;
                 }
                 drop(writing);
-                write(&point_path(folder, id), &point)
+                write(&point_path(folder, id), POINT, &point)
             }
             Self::Memory(kept) => {
                 let (scenes, points) = &mut *open(kept);
@@ -184,7 +165,9 @@ impl PointStore {
     /// A point, if it is there and whole.
     pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
         match self {
-            Self::Folder(folder, _) => codec::read(&fs::read(point_path(folder, id)).ok()?),
+            Self::Folder(folder, _) => {
+                sealed::open(POINT, &fs::read(point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+            }
             Self::Memory(kept) => open(kept).1.get(id).cloned(),
         }
     }
@@ -195,7 +178,7 @@ impl PointStore {
             Self::Folder(folder, _) => {
                 let mut head = Vec::new();
                 fs::File::open(point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
-                codec::first_text::<KeptPoint>(&head)
+                sealed::peek(POINT, &head).filter(|scene: &String| is_id(scene))
             }
             Self::Memory(kept) => Some(open(kept).1.get(id)?.scene.clone()),
         }
@@ -204,7 +187,9 @@ impl PointStore {
     /// A scene, if it is there and whole.
     pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
         match self {
-            Self::Folder(folder, _) => codec::read(&fs::read(scene_path(folder, id)).ok()?),
+            Self::Folder(folder, _) => {
+                sealed::open(SCENE, &fs::read(scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+            }
             Self::Memory(kept) => open(kept).0.get(id).cloned(),
         }
     }
@@ -217,9 +202,75 @@ impl PointStore {
     }
 }
 
-fn write<T: Kind>(path: &Path, value: &T) -> io::Result<()> {
+fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
     }
-    codec::write(path, value)
+    WholeFile::write(path, sealed::seal(kind, value)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE_ID: &str = "0123456789abcdef0123456789abcdef";
+
+    fn scene() -> KeptScene {
+        let mesh = TriMesh::new(vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.25], vec![[0, 1, 2]]);
+        KeptScene { body: mesh.clone(), garment: mesh, distance_m: vec![0.5, 0.25, 0.125] }
+    }
+
+    fn point() -> KeptPoint {
+        let (lower_cm, upper_cm) = (0.0, f64::INFINITY);
+        KeptPoint {
+            scene: SCENE_ID.to_owned(),
+            levels: vec![LevelCount { level: 0, lower_cm, upper_cm, extent: None, vertices: 2, parts: 1 }],
+            force_n: vec![DVec3::Z * -0.5],
+            part_of_vertex: vec![0, 0, UNASSIGNED],
+            positions: scene().garment.positions,
+            error_mm: vec![0.5, 1.0, 2.0],
+        }
+    }
+
+    #[test]
+    fn what_is_kept_reads_back_and_a_truncated_scene_is_written_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = PointStore::in_folder(folder.path());
+        store.put_both("a", point(), scene).unwrap();
+        assert_eq!((store.scene(SCENE_ID), store.point("a")), (Some(scene()), Some(point())));
+        assert_eq!(store.scene_of("a").as_deref(), Some(SCENE_ID));
+        let path = scene_path(folder.path(), SCENE_ID);
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(store.scene(SCENE_ID), None);
+        store.put_both("a", point(), scene).unwrap();
+        assert_eq!(store.scene(SCENE_ID), Some(scene()), "--resume would fail for ever");
+    }
+
+    #[test]
+    fn indices_that_point_nowhere_and_ids_that_are_paths_read_as_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = PointStore::in_folder(folder.path());
+        let spoil: [fn(&mut KeptPoint); 6] = [
+            |p| p.scene = "outside".to_owned(),
+            |p| p.levels[0].level = 7,
+            |p| p.levels[0].parts = 2,
+            |p| p.part_of_vertex[0] = 3,
+            |p| p.force_n.clear(),
+            |p| p.error_mm.truncate(1),
+        ];
+        for (i, spoil) in spoil.into_iter().enumerate() {
+            let mut spoilt = point();
+            spoil(&mut spoilt);
+            write(&point_path(folder.path(), "b"), POINT, &spoilt).unwrap();
+            assert_eq!(store.point("b"), None, "{i}");
+        }
+        let outside = KeptPoint { scene: "../../outside".to_owned(), ..point() };
+        write(&point_path(folder.path(), "b"), POINT, &outside).unwrap();
+        assert_eq!((store.scene_of("b"), store.point("b")), (None, None));
+        let mut far = scene();
+        far.garment.triangles[0][2] = 3;
+        write(&scene_path(folder.path(), SCENE_ID), SCENE, &far).unwrap();
+        assert_eq!(store.scene(SCENE_ID), None);
+    }
 }

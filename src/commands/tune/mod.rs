@@ -12,11 +12,11 @@ use clap::Args;
 use partwise::assess::AssessOptions;
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::files::stem;
-use partwise::mesh::WholeFile;
 use partwise::record::RecordSummary;
 use partwise::scene::DRESS_FORM;
 use partwise::shapes::BUILT_IN;
 use partwise::table_search::Front;
+use partwise::whole_file::WholeFile;
 
 use self::find::{Found, SHAPES, SHAPES_TOGETHER, Taken, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, take};
 use self::garment::Garment;
@@ -144,13 +144,15 @@ impl TuneArgs {
         let front = report::csv(&results.fronts)?;
         self.write(&self.out.join("front.csv"), &front)?;
         self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
+        // JSON is Unicode; names of files need not be.
+        let name = |path: &PathBuf| path.display().to_string();
         match self.format {
             Format::Csv => console::result(&front),
             Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
                 "verdicts": results.verdicts,
-                "tables": results.tables,
-                "front": self.out.join("front.csv"),
-                "recordings": results.recordings.iter().map(|r| &r.path).collect::<Vec<_>>(),
+                "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
+                "front": name(&self.out.join("front.csv")),
+                "recordings": results.recordings.iter().map(|r| r.path.as_ref().map(name)).collect::<Vec<_>>(),
             }))?),
             Format::Text => {
                 let recordings: String = results.recordings.iter().map(line).collect();
@@ -246,7 +248,7 @@ impl TuneArgs {
     }
 
     fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text.as_bytes()));
+        let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
         written.map_err(|e| {
             UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
         })

@@ -121,7 +121,7 @@ fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32
     flow.run(&seam, reach + half, |v| !inside(v));
     let kernel = |v: u32| {
         let t = (flow.distance[v as usize] - half).max(0.0) / reach;
-        (!inside(v) && t < 1.0).then(|| (v, (1.0 - t) * (1.0 - t)))
+        (!inside(v) && t < 1.0).then_some((v, (1.0 - t) * (1.0 - t)))
     };
     flow.reached.iter().filter_map(|&v| kernel(v)).collect()
 }

@@ -46,15 +46,15 @@ pub enum EnergyError {
         mesh: usize,
     },
     /// A triangle without rest area has no strain.
-    #[error("triangle {triangle} (from 0) has no area in the rest shape: repair the mesh or the pattern first")]
+    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
     Degenerate {
-        /// Its index.
+        /// Its index, from 0.
         triangle: usize,
     },
     /// A held vertex that is not there.
-    #[error("held vertex {vertex} does not exist: the garment has {count} vertices, numbered from 0")]
+    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
     Held {
-        /// Index asked for.
+        /// Index asked for, from 0.
         vertex: u32,
         /// Vertices there are.
         count: usize,
