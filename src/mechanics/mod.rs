@@ -4,6 +4,7 @@ pub mod coupled;
 pub mod cusick;
 pub mod energy;
 pub mod fit;
+pub(crate) mod lanes;
 pub(crate) mod newton;
 pub mod paper;
 pub mod refine;

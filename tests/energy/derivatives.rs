@@ -46,11 +46,17 @@ fn bending_gradient() {
     let mesh = sheet();
     let cloth = cloth(&mesh, &[]);
     let x = deformed(&mesh);
-    let mut gradient = vec![DVec3::ZERO; x.len()];
-    for (v, g) in gradient.iter_mut().enumerate() {
-        *g += cloth.bending.gradient_at(v, &x);
-    }
+    // What the whole gradient has beside membrane and gravity.
+    let stiffness = Stiffness::new(&fabric());
+    let mut gradient = Vec::new();
+    let whole = cloth.gradient(&x, &Contacts::none(), &mut gradient);
+    let mut others = vec![DVec3::ZERO; x.len()];
+    gravity::add_gradient(&cloth.masses, &mut others);
+    let membrane: f64 = cloth.triangles.iter().map(|t| t.add_gradient(&stiffness, &x, &mut others)).sum();
+    gradient.iter_mut().zip(&others).for_each(|(g, other)| *g -= *other);
     check_gradient(&x, |x| cloth.bending.energy(x), &gradient, "bending");
+    let rest = whole - membrane - gravity::energy(&cloth.masses, &x);
+    assert!((rest - cloth.bending.energy(&x)).abs() < 1e-12 * whole.abs(), "{rest} J");
 }
 
 #[test]

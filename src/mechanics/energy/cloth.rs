@@ -7,16 +7,14 @@
 //! | ∇E | gradient, minus the force | N |
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
 
-use std::ops::Range;
-
 use glam::{DMat3, DVec3};
 
 use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
-use super::gravity;
 use super::membrane::{Stiffness, Triangle};
 use super::ordering::nested_dissection;
+use super::packs::TrianglePack;
 use super::pattern::{HELD, Pattern, Slot};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -92,6 +90,8 @@ pub struct Cloth {
     /// The rings that bend.
     pub bending: Bending,
     pub(crate) stiffness: Stiffness,
+    /// The triangles by fours.
+    pub(super) packs: Vec<TrianglePack>,
     triangle_slots: Vec<[Slot; 6]>,
     bending_blocks: Vec<f64>,
 }
@@ -145,6 +145,7 @@ impl Cloth {
             unknown[v as usize] = i as u32;
         }
         let mut cloth = Self {
+            packs: TrianglePack::all(&triangles),
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
             areas,
@@ -204,6 +205,7 @@ impl Cloth {
         for (t, &slack) in self.triangles.iter_mut().zip(slack) {
             t.slack = slack;
         }
+        self.packs = TrianglePack::all(&self.triangles);
         self
     }
 
@@ -222,50 +224,6 @@ impl Cloth {
         contacts.update(x);
         contacts.friction_refresh(x);
         contacts
-    }
-
-    /// E at `x`, J; `contacts` must have been updated at `x`.
-    #[must_use]
-    pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
-        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> f64 {
-            let membrane: f64 = self.triangles[triangles].iter().map(|t| t.energy(&self.stiffness, x)).sum();
-            membrane + vertices.map(|v| 0.5 * x[v].dot(self.bending.gradient_at(v, x))).sum::<f64>()
-        };
-        let [first, second] = self.halves();
-        let (a, b) = rayon::join(|| elastic(first), || elastic(second));
-        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
-    }
-
-    /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
-    pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
-        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> (f64, Vec<DVec3>) {
-            let mut gradient = vec![DVec3::ZERO; x.len()];
-            let of_triangle = |t: &Triangle| t.add_gradient(&self.stiffness, x, &mut gradient);
-            let membrane: f64 = self.triangles[triangles].iter().map(of_triangle).sum();
-            let mut bending = 0.0;
-            for v in vertices {
-                let g = self.bending.gradient_at(v, x);
-                bending += 0.5 * x[v].dot(g);
-                gradient[v] += g;
-            }
-            (membrane + bending, gradient)
-        };
-        let [first, second] = self.halves();
-        let ((a, half), (b, mut other)) = rayon::join(|| elastic(first), || elastic(second));
-        std::mem::swap(gradient, &mut other);
-        gravity::add_gradient(&self.masses, gradient);
-        contacts.add_gradient(gradient);
-        contacts.friction.add_gradient(x, gradient);
-        for ((g, half), &held) in gradient.iter_mut().zip(&half).zip(&self.held) {
-            *g = if held { DVec3::ZERO } else { *g + *half };
-        }
-        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
-    }
-
-    /// The triangles and the vertices in two halves, one a core: always the same two, so that sums are the same bits.
-    fn halves(&self) -> [[Range<usize>; 2]; 2] {
-        let (triangles, vertices) = (self.triangles.len(), self.masses.len());
-        [[0..triangles / 2, 0..vertices / 2], [triangles / 2..triangles, vertices / 2..vertices]]
     }
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).

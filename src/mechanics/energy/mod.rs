@@ -16,14 +16,18 @@
 pub mod bending;
 mod cloth;
 pub mod contact;
+mod evaluate;
 pub mod fan;
 pub mod field;
 pub mod friction;
 pub mod gravity;
 pub mod membrane;
 pub mod ordering;
+mod packs;
 pub mod pattern;
+mod plate;
 
 pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;
+pub use evaluate::Scratch;
 pub use friction::Friction;
