@@ -22,11 +22,15 @@
 //!
 //! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::fan::Fan;
+use super::plate::Plate;
 use crate::fabric::Fabric;
+use crate::mechanics::lanes::{Four, Lanes};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
@@ -36,16 +40,14 @@ const RIDGE: f64 = 1e-6;
 /// A floor for H as a share of B_u + B_v, so that a saddle always costs something.
 const LEAST_TWIST: f64 = 0.1;
 
-/// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum: E = ½ Σ Q_ij x_i·x_j.
+/// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum.
 #[derive(Debug, Clone, Default)]
 pub struct Bending {
     elements: Vec<Element>,
     vertices: Vec<u32>,
     weights: Vec<DVec3>,
-    /// First entry of each vertex's row of Q.
-    starts: Vec<u32>,
-    /// Columns and scalars Q_ij, N/m.
-    entries: Vec<(u32, f64)>,
+    /// All of them summed up.
+    plate: Plate,
 }
 
 /// One ring or hinge: its part of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
@@ -92,29 +94,8 @@ impl Bending {
                 bending.push_hinge(mesh, rest, edge, [s, t], mean);
             }
         }
-        bending.sum_up(mesh.vertex_count());
+        bending.plate = Plate::new(mesh.vertex_count(), bending.hessian());
         bending
-    }
-
-    /// Sums the elements up to Q, whose product with the positions costs a sixth of the elements one by one.
-    fn sum_up(&mut self, vertices: usize) {
-        let mut all: Vec<(u32, u32, f64)> = Vec::new();
-        for ([i, j], scalar) in self.hessian() {
-            all.push((i, j, scalar));
-            if i != j {
-                all.push((j, i, scalar));
-            }
-        }
-        // Stable, so that equal entries are summed in the order of their elements.
-        all.sort_by_key(|&(i, j, _)| (i, j));
-        self.starts = vec![0; vertices + 1];
-        for same in all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            self.entries.push((same[0].1, same.iter().map(|e| e.2).sum()));
-            self.starts[same[0].0 as usize + 1] += 1;
-        }
-        for v in 0..vertices {
-            self.starts[v + 1] += self.starts[v];
-        }
     }
 
     fn push_ring(&mut self, centre: u32, fan: &Fan, weights: Vec<DVec3>, stiffness: DVec3) {
@@ -162,21 +143,28 @@ impl Bending {
         })
     }
 
-    /// (Q x)_v, N: what bending adds to the gradient at a vertex. Its energy is half the sum of x_v · (Q x)_v.
-    #[inline]
-    #[must_use]
-    pub fn gradient_at(&self, v: usize, x: &[DVec3]) -> DVec3 {
-        let row = &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize];
-        // About the vertex itself: the rows of Q sum to zero, and differences keep digits that coordinates lose.
-        let here = x[v];
-        row.iter().fold(DVec3::ZERO, |sum, &(j, scalar)| sum + (x[j as usize] - here) * scalar)
+    /// The vertices in two ranges, of about as much work each for [`add_gradient`](Self::add_gradient).
+    pub(super) fn halves(&self) -> [Range<usize>; 2] {
+        self.plate.halves()
+    }
+
+    /// Adds the gradient of the pairs of `vertices` (each with those before it) to `gradient`, N, which must be zero before;
+    /// returns their energy, J.
+    #[inline(always)]
+    pub(super) fn add_gradient<L: Lanes>(
+        &self,
+        l: L,
+        vertices: Range<usize>,
+        x: &[Four],
+        gradient: &mut [Four],
+    ) -> f64 {
+        self.plate.add_gradient(l, vertices, x, gradient)
     }
 
     /// Q_vv, N/m.
     #[must_use]
     pub fn own_scalar(&self, v: usize) -> f64 {
-        let row = &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize];
-        row.binary_search_by_key(&(v as u32), |e| e.0).map_or(0.0, |at| row[at].1)
+        self.plate.own(v)
     }
 
     /// Energy of all elements, J.

@@ -7,7 +7,6 @@
 //! | ∇E | gradient, minus the force | N |
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
 
-use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3};
@@ -15,9 +14,9 @@ use glam::{DMat3, DVec3};
 use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
-use super::gravity;
 use super::layout::Layout;
 use super::membrane::{Stiffness, Triangle};
+use super::packs::TrianglePack;
 use super::pattern::{HELD, Pattern};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -87,6 +86,8 @@ pub struct Cloth {
     /// The rings that bend.
     pub bending: Arc<Bending>,
     pub(crate) stiffness: Stiffness,
+    /// The triangles by fours.
+    pub(super) packs: Vec<TrianglePack>,
     placed: Arc<Vec<DVec3>>,
     layout: Arc<OnceLock<Layout>>,
 }
@@ -134,6 +135,7 @@ impl Cloth {
             return Err(EnergyError::NothingFree { count: n });
         }
         Ok(Self {
+            packs: TrianglePack::all(&triangles),
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
             areas,
@@ -181,6 +183,7 @@ impl Cloth {
         for (t, &slack) in self.triangles.iter_mut().zip(slack) {
             t.slack = slack;
         }
+        self.packs = TrianglePack::all(&self.triangles);
         self
     }
 
@@ -211,50 +214,6 @@ impl Cloth {
         contacts.update(x);
         contacts.friction_refresh(x);
         contacts
-    }
-
-    /// E at `x`, J; `contacts` must have been updated at `x`.
-    #[must_use]
-    pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
-        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> f64 {
-            let membrane: f64 = self.triangles[triangles].iter().map(|t| t.energy(&self.stiffness, x)).sum();
-            membrane + vertices.map(|v| 0.5 * x[v].dot(self.bending.gradient_at(v, x))).sum::<f64>()
-        };
-        let [first, second] = self.halves();
-        let (a, b) = rayon::join(|| elastic(first), || elastic(second));
-        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
-    }
-
-    /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
-    pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
-        let elastic = |[triangles, vertices]: [Range<usize>; 2]| -> (f64, Vec<DVec3>) {
-            let mut gradient = vec![DVec3::ZERO; x.len()];
-            let of_triangle = |t: &Triangle| t.add_gradient(&self.stiffness, x, &mut gradient);
-            let membrane: f64 = self.triangles[triangles].iter().map(of_triangle).sum();
-            let mut bending = 0.0;
-            for v in vertices {
-                let g = self.bending.gradient_at(v, x);
-                bending += 0.5 * x[v].dot(g);
-                gradient[v] += g;
-            }
-            (membrane + bending, gradient)
-        };
-        let [first, second] = self.halves();
-        let ((a, half), (b, mut other)) = rayon::join(|| elastic(first), || elastic(second));
-        std::mem::swap(gradient, &mut other);
-        gravity::add_gradient(&self.masses, gradient);
-        contacts.add_gradient(gradient);
-        contacts.friction.add_gradient(x, gradient);
-        for ((g, half), &held) in gradient.iter_mut().zip(&half).zip(&self.held) {
-            *g = if held { DVec3::ZERO } else { *g + *half };
-        }
-        gravity::energy(&self.masses, x) + (a + b) + contacts.energy() + contacts.friction.energy(x)
-    }
-
-    /// The triangles and the vertices in two halves, one a core: always the same two, so that sums are the same bits.
-    fn halves(&self) -> [[Range<usize>; 2]; 2] {
-        let (triangles, vertices) = (self.triangles.len(), self.masses.len());
-        [[0..triangles / 2, 0..vertices / 2], [triangles / 2..triangles, vertices / 2..vertices]]
     }
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).

@@ -54,13 +54,13 @@ pub struct Triangle {
 /// Membrane stiffness, N/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffness {
-    uu: f64,
-    uv: f64,
-    vv: f64,
-    shear: f64,
+    pub(super) uu: f64,
+    pub(super) uv: f64,
+    pub(super) vv: f64,
+    pub(super) shear: f64,
     /// Uniaxial k_u and k_v.
-    weft: f64,
-    warp: f64,
+    pub(super) weft: f64,
+    pub(super) warp: f64,
     poisson: f64,
     /// What a triangle bears in compression times its area, N·m.
     bearing: f64,
@@ -134,7 +134,7 @@ impl Stiffness {
 }
 
 /// Shorter than this (relative to rest) a triangle's side has no direction: the strain is then constant to first order.
-const SHORTEST: f64 = 1e-12;
+pub(super) const SHORTEST: f64 = 1e-12;
 
 impl Triangle {
     /// Rest data of a triangle with flat corners `rest`; `None` where it has no area.

@@ -16,6 +16,7 @@
 pub mod bending;
 mod cloth;
 pub mod contact;
+mod evaluate;
 pub mod fan;
 pub mod field;
 pub mod friction;
@@ -23,9 +24,12 @@ pub mod gravity;
 mod layout;
 pub mod membrane;
 pub mod ordering;
+mod packs;
 pub mod pattern;
+mod plate;
 
 pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;
+pub use evaluate::Scratch;
 pub use friction::Friction;
 pub use layout::Layout;

@@ -20,11 +20,12 @@
 
 pub(crate) mod relax;
 mod solver;
+mod vectors;
 mod whole;
 
 use glam::{DMat3, DVec3};
 
-use super::energy::{Cloth, Contacts};
+use super::energy::{Cloth, Contacts, Scratch};
 use relax::Relaxation;
 pub use solver::{SolveError, Solver};
 pub(crate) use whole::Whole;
@@ -103,6 +104,8 @@ pub(crate) struct Descent<'c, 'b> {
     blocks: Vec<DMat3>,
     direction: Vec<DVec3>,
     trial: Vec<DVec3>,
+    trial_gradient: Vec<DVec3>,
+    scratch: Scratch,
 }
 
 impl<'c, 'b> Descent<'c, 'b> {
@@ -120,6 +123,8 @@ impl<'c, 'b> Descent<'c, 'b> {
             relaxation: Relaxation::default(),
             blocks: Vec::new(),
             direction: Vec::new(),
+            trial_gradient: Vec::new(),
+            scratch: Scratch::default(),
         };
         descent.evaluate();
         descent
@@ -139,7 +144,8 @@ impl<'c, 'b> Descent<'c, 'b> {
 
     /// Takes energy and residual anew, after positions, contacts or the cloth have changed.
     pub(crate) fn evaluate(&mut self) {
-        self.energy = self.cloth.gradient(&self.x, &self.contacts, &mut self.gradient);
+        let Self { cloth, x, contacts, gradient, scratch, .. } = self;
+        self.energy = cloth.evaluate(x, contacts, gradient, scratch);
         self.residual = norm(&self.gradient) / self.cloth.weight;
     }
 
@@ -157,7 +163,9 @@ impl<'c, 'b> Descent<'c, 'b> {
     /// One iteration. The damping is the caller's to change afterwards.
     pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: Pace) -> Result<Advance, SolveError> {
         self.direct(tangent)?;
-        let Self { cloth, contacts, x, relaxation, direction, trial, gradient, energy, .. } = self;
+        let Self {
+            cloth, contacts, x, relaxation, direction, trial, gradient, energy, trial_gradient, scratch, ..
+        } = self;
         let cloth = *cloth;
         relaxation.prepare(cloth, contacts, &self.blocks);
         let slope: f64 = gradient.iter().zip(&*direction).map(|(g, d)| g.dot(*d)).sum();
@@ -170,7 +178,7 @@ impl<'c, 'b> Descent<'c, 'b> {
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
             contacts.update(trial);
             let most = *energy + ARMIJO * t * slope;
-            if cloth.energy(trial, contacts) <= most {
+            if cloth.evaluate(trial, contacts, trial_gradient, scratch) <= most {
                 break true;
             }
             relaxed += 1;

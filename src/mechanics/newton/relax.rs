@@ -13,17 +13,15 @@
 //! |---|---|---|
 //! | s, y | change of positions and of the gradient over an iteration | m, N |
 //! | D_i | diagonal block of the damped Hessian of vertex i | N/m |
-//! | m | pairs kept, [`MEMORY`] | – |
+//! | m | pairs kept, six: more cost more than they bring | – |
 //!
 //! Limits: takes off what is as short as a few triangles; a whole fold it moves by next to nothing.
 
 use glam::{DMat3, DVec3};
 
+use super::vectors::{self, Blocks, Flat, MEMORY, Pair};
 use crate::mechanics::energy::membrane::outer;
-use crate::mechanics::energy::{Cloth, Contacts};
-
-/// m: more pairs cost more than they bring.
-const MEMORY: usize = 6;
+use crate::mechanics::energy::{Cloth, Contacts, Scratch};
 
 /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
 const LONGEST_MOVE: f64 = 3e-3;
@@ -43,26 +41,22 @@ const SHORTEST: f64 = 1e-3;
 /// D⁻¹ and the vectors of the iteration, kept from call to call; by vertex, zero where it is held.
 #[derive(Debug, Default)]
 pub(crate) struct Relaxation {
-    inverse: Vec<DMat3>,
+    inverse: Blocks,
     /// Vertices whose contact is in D⁻¹, and those that came to it in this call, with what they had before.
     known: Vec<bool>,
     touched: Vec<(u32, DMat3)>,
     pairs: Vec<Pair>,
     spare: Vec<Pair>,
-    gradient: Vec<DVec3>,
+    /// −∇E where it is, and at the trial.
+    down: Flat,
+    trial_down: Flat,
+    direction: Flat,
     trial: Vec<DVec3>,
-    trial_gradient: Vec<DVec3>,
-    direction: Vec<DVec3>,
+    gradient: Vec<DVec3>,
+    energies: Vec<f64>,
+    scratch: Scratch,
     /// Share of the decrease under which the last iterations end a call; 0 never does.
     ending: f64,
-}
-
-#[derive(Debug, Default)]
-struct Pair {
-    s: Vec<DVec3>,
-    y: Vec<DVec3>,
-    /// 1 / sᵀy, 1/J.
-    rho: f64,
 }
 
 impl Relaxation {
@@ -74,9 +68,10 @@ impl Relaxation {
         for t in contacts.touches() {
             self.known[t.vertex as usize] = true;
         }
-        self.inverse.clear();
-        let inverse = |(block, &held): (&DMat3, &bool)| if held { DMat3::ZERO } else { block.inverse() };
-        self.inverse.extend(own.iter().zip(&cloth.held).map(inverse));
+        self.inverse.clear(cloth.vertex_count());
+        for (v, (block, _)) in own.iter().zip(&cloth.held).enumerate().filter(|(_, (_, held))| !**held) {
+            self.inverse.set(v, block.inverse());
+        }
     }
 
     /// Ends a relaxation whose last iterations brought less than this share of what all brought.
@@ -93,31 +88,30 @@ impl Relaxation {
         x: &mut Vec<DVec3>,
         iterations: usize,
     ) -> f64 {
-        let mut energy = cloth.gradient(x, contacts, &mut self.gradient);
+        let mut energy = cloth.evaluate(x, contacts, &mut self.gradient, &mut self.scratch);
+        self.down.set_opposite(&self.gradient);
         self.spare.append(&mut self.pairs);
         for (v, before) in self.touched.drain(..) {
-            self.inverse[v as usize] = before;
+            self.inverse.set(v as usize, before);
             self.known[v as usize] = false;
         }
         let mut scale = FIRST_SCALE;
-        let mut energies = vec![energy];
+        self.energies.clear();
+        self.energies.push(energy);
         for _ in 0..iterations {
-            if self.has_ended(&energies) {
+            if self.has_ended() {
                 break;
             }
             self.touch(contacts);
-            self.turn(scale);
-            let slope = dot(&self.gradient, &self.direction);
-            let longest = self.direction.iter().map(|d| d.length_squared()).fold(0.0, f64::max).sqrt();
+            let [slope, longest] = vectors::turn(&self.pairs, &self.inverse, scale, &self.down, &mut self.direction);
             let mut t = (LONGEST_MOVE / longest).min(1.0);
             loop {
-                self.trial.clear();
-                self.trial.extend(x.iter().zip(&self.direction).map(|(x, d)| *x + *d * t));
+                self.direction.added_to(x, t, &mut self.trial);
                 contacts.update(&self.trial);
-                let there = cloth.gradient(&self.trial, contacts, &mut self.trial_gradient);
+                let there = cloth.evaluate(&self.trial, contacts, &mut self.gradient, &mut self.scratch);
                 if there <= energy + ARMIJO * t * slope {
                     energy = there;
-                    energies.push(energy);
+                    self.energies.push(energy);
                     break;
                 }
                 t *= 0.3;
@@ -127,16 +121,18 @@ impl Relaxation {
                     return energy;
                 }
             }
-            scale = self.remember(x, scale);
+            self.trial_down.set_opposite(&self.gradient);
+            scale = self.remember(t, scale);
             std::mem::swap(x, &mut self.trial);
-            std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
+            std::mem::swap(&mut self.down, &mut self.trial_down);
         }
         energy
     }
 
     /// Whether the last [`LATE`] of these energies fell by too little to go on.
-    fn has_ended(&self, energies: &[f64]) -> bool {
-        let [first, .., last] = energies else { return false };
+    fn has_ended(&self) -> bool {
+        let energies = &self.energies;
+        let [first, .., last] = energies[..] else { return false };
         energies.len() > 2 * LATE && energies[energies.len() - 1 - LATE] - last < self.ending * (first - last)
     }
 
@@ -145,70 +141,28 @@ impl Relaxation {
         for t in contacts.touches() {
             let v = t.vertex as usize;
             if !std::mem::replace(&mut self.known[v], true) {
-                let before = self.inverse[v];
+                let before = self.inverse.get(v);
                 let w = before * t.normal;
-                self.inverse[v] -= outer(w, w) * (t.stiffness / (1.0 + t.stiffness * t.normal.dot(w)));
+                let less = outer(w, w) * (t.stiffness / (1.0 + t.stiffness * t.normal.dot(w)));
+                self.inverse.set(v, before - less);
                 self.touched.push((t.vertex, before));
             }
         }
     }
 
-    /// Fills the direction: the two loops of L-BFGS.
-    fn turn(&mut self, scale: f64) {
-        let d = &mut self.direction;
-        d.clear();
-        d.extend(self.gradient.iter().map(|g| -*g));
-        let mut shares = [0.0; MEMORY];
-        for (share, pair) in shares.iter_mut().zip(&self.pairs).rev() {
-            *share = pair.rho * dot(&pair.s, d);
-            add(d, -*share, &pair.y);
-        }
-        for (d, inverse) in d.iter_mut().zip(&self.inverse) {
-            *d = *inverse * *d * scale;
-        }
-        for (share, pair) in shares.iter().zip(&self.pairs) {
-            let back = pair.rho * dot(&pair.y, d);
-            add(d, share - back, &pair.s);
-        }
-    }
-
-    /// Keeps the pair of the iteration from `x` to the trial; returns γ.
-    fn remember(&mut self, x: &[DVec3], scale: f64) -> f64 {
+    /// Keeps the pair of the move by t times the direction; returns γ.
+    fn remember(&mut self, t: f64, scale: f64) -> f64 {
         let mut pair =
             if self.pairs.len() == MEMORY { self.pairs.remove(0) } else { self.spare.pop().unwrap_or_default() };
-        pair.s.clear();
-        pair.s.extend(self.trial.iter().zip(x).map(|(to, from)| *to - *from));
-        pair.y.clear();
-        pair.y.extend(self.trial_gradient.iter().zip(&self.gradient).map(|(to, from)| *to - *from));
-        let curvature = dot(&pair.s, &pair.y);
+        std::mem::swap(&mut pair.s, &mut self.direction);
+        let [curvature, scaled] = vectors::difference(&mut pair, t, &self.down, &self.trial_down, &self.inverse);
         if curvature <= 0.0 {
             self.spare.push(pair);
             return scale;
         }
         pair.rho = 1.0 / curvature;
-        let scale = curvature / pair.y.iter().zip(&self.inverse).map(|(y, m)| y.dot(*m * *y)).sum::<f64>();
         self.pairs.push(pair);
-        scale
-    }
-}
-
-/// a·b, in four sums that do not wait for each other.
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    let mut sums = [DVec3::ZERO; 4];
-    let (fours, others) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() / 4 * 4);
-    for (a, b) in fours {
-        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += *a * *b;
-        }
-    }
-    let rest: f64 = a[others..].iter().zip(&b[others..]).map(|(a, b)| a.dot(*b)).sum();
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])).element_sum() + rest
-}
-
-/// a ← a + t b.
-fn add(a: &mut [DVec3], t: f64, b: &[DVec3]) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a += *b * t;
+        curvature / scaled
     }
 }
 

@@ -1,0 +1,100 @@
+//! E and ∇E of the whole cloth: what a drape spends most of its time on.
+//!
+//! The triangles and the bending pairs go in two halves, one a core, always the same two, so that sums are the same bits on any
+//! number of threads; each half has forces of its own, and the rest is added where the two are joined. Nothing is
+//! allocated once the [`Scratch`] has grown to the garment.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::packs::{self, TrianglePack};
+use super::{Cloth, Contacts};
+use crate::GRAVITY;
+use crate::mechanics::lanes::{Four, Lanes, Pack, Work, run};
+
+/// Memory of an evaluation, kept from one to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    /// Positions, padded.
+    x: Vec<Four>,
+    /// The gradient of each half, padded.
+    halves: [Vec<Four>; 2],
+}
+
+impl Cloth {
+    /// E at `x`, J; `contacts` must have been updated at `x`.
+    #[must_use]
+    pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
+        self.evaluate(x, contacts, &mut Vec::new(), &mut Scratch::default())
+    }
+
+    /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
+    pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
+        self.evaluate(x, contacts, gradient, &mut Scratch::default())
+    }
+
+    /// [`gradient`](Self::gradient) with memory to use again.
+    pub fn evaluate(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>, scratch: &mut Scratch) -> f64 {
+        let Scratch { x: padded, halves: [one, other] } = scratch;
+        padded.clear();
+        padded.extend(x.iter().map(|p| Four([p.x, p.y, p.z, 0.0])));
+        let (first, second) = self.packs.split_at(self.packs.len() / 2);
+        let [above, below] = self.bending.halves();
+        let x_of_all = &*padded;
+        let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
+        let (a, b) = rayon::join(|| run(half(first, above, one)), || run(half(second, below, other)));
+        let weight = run(Join { cloth: self, x: x_of_all, halves: [one, other], gradient });
+        contacts.add_gradient(gradient);
+        contacts.friction.add_gradient(x, gradient);
+        weight + (a + b) + contacts.energy() + contacts.friction.energy(x)
+    }
+}
+
+/// Membrane and bending of half the triangles and half the pairs.
+struct Half<'a> {
+    cloth: &'a Cloth,
+    packs: &'a [TrianglePack],
+    vertices: Range<usize>,
+    x: &'a [Four],
+    gradient: &'a mut Vec<Four>,
+}
+
+impl Work for Half<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        self.gradient.clear();
+        self.gradient.resize(self.x.len(), Four::ZERO);
+        let bending = self.cloth.bending.add_gradient(l, self.vertices, self.x, self.gradient);
+        bending + packs::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
+    }
+}
+
+/// Both halves' gradients and gravity's; held vertices have none. Returns the energy of gravity.
+struct Join<'a> {
+    cloth: &'a Cloth,
+    x: &'a [Four],
+    halves: [&'a Vec<Four>; 2],
+    gradient: &'a mut Vec<DVec3>,
+}
+
+impl Work for Join<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        let Self { cloth, x, halves: [one, other], gradient } = self;
+        gradient.resize(x.len(), DVec3::ZERO);
+        let mut energy = 0.0;
+        let vertices = x.iter().zip(one).zip(other).zip(&cloth.masses).zip(&cloth.held);
+        for (out, ((((x, one), other), &mass), &held)) in gradient.iter_mut().zip(vertices) {
+            let weight = mass * GRAVITY;
+            energy += weight * x.0[2];
+            let Four([gx, gy, gz, _]) = (Pack::load(l, one) + Pack::load(l, other)).store();
+            *out = if held { DVec3::ZERO } else { DVec3::new(gx, gy, gz + weight) };
+        }
+        energy
+    }
+}

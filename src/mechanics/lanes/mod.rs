@@ -1,0 +1,270 @@
+//! Four doubles at a time: the same sums and products on every machine, in AVX2's registers where there are such.
+//!
+//! A plain x86-64 build may use two lanes only, so what is hot is written once over [`Lanes`] and [`run`] picks its
+//! implementation by the processor: [`V3`](pulp::x86::V3) or arrays. Both do the same operations in the same order, each
+//! rounded by IEEE 754 and never fused, hence the same bits.
+//!
+//! Everything that is to run in AVX2 must be inlined into [`run`], so it is `#[inline(always)]` and without closures.
+
+mod arrays;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
+use std::ops::{Add, Mul, Sub};
+
+use arrays::Arrays;
+
+/// Four doubles that one register holds: four of a kind, or a vector of space and a zero.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C, align(32))]
+pub(crate) struct Four(pub(crate) [f64; 4]);
+
+impl Four {
+    pub(crate) const ZERO: Self = Self([0.0; 4]);
+}
+
+/// What a processor does with four doubles.
+pub(crate) trait Lanes: Copy {
+    /// Its register.
+    type Register: Copy;
+
+    fn load(self, four: &Four) -> Self::Register;
+    fn store(self, a: Self::Register) -> Four;
+    fn splat(self, a: f64) -> Self::Register;
+    fn add(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn sub(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn mul(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn div(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn sqrt(self, a: Self::Register) -> Self::Register;
+    /// a where a > b, else b.
+    fn max(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// a where the sign of `test` is set, else b.
+    fn where_negative(self, test: Self::Register, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₀ b₀ a₂ b₂].
+    fn even(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₁ b₁ a₃ b₃].
+    fn odd(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₀ b₁ a₂ b₃].
+    fn mixed(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₁ b₀ a₃ b₂].
+    fn crossed(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₀ a₁ b₀ b₁].
+    fn low(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₂ a₃ b₂ b₃].
+    fn high(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₀ a₁ b₂ b₃].
+    fn low_high(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// [a₂ a₃ b₀ b₁].
+    fn high_low(self, a: Self::Register, b: Self::Register) -> Self::Register;
+}
+
+/// Something to do in lanes.
+pub(crate) trait Work {
+    type Output;
+
+    /// To be `#[inline(always)]`.
+    fn with<L: Lanes>(self, lanes: L) -> Self::Output;
+}
+
+/// Does it in the widest lanes there are.
+pub(crate) fn run<W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = pulp::x86::V3::try_new() {
+        return v3.vectorize(Avx2 { v3, work });
+    }
+    work.with(Arrays)
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Avx2<W> {
+    v3: pulp::x86::V3,
+    work: W,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<W: Work> pulp::NullaryFnOnce for Avx2<W> {
+    type Output = W::Output;
+
+    #[inline(always)]
+    fn call(self) -> W::Output {
+        self.work.with(self.v3)
+    }
+}
+
+/// A register with the lanes it belongs to, so that formulas read as such.
+#[derive(Clone, Copy)]
+pub(crate) struct Pack<L: Lanes> {
+    pub(crate) lanes: L,
+    pub(crate) register: L::Register,
+}
+
+impl<L: Lanes> Pack<L> {
+    #[inline(always)]
+    pub(crate) fn new(lanes: L, register: L::Register) -> Self {
+        Self { lanes, register }
+    }
+
+    #[inline(always)]
+    pub(crate) fn load(lanes: L, four: &Four) -> Self {
+        Self::new(lanes, lanes.load(four))
+    }
+
+    #[inline(always)]
+    pub(crate) fn splat(lanes: L, a: f64) -> Self {
+        Self::new(lanes, lanes.splat(a))
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self) -> Four {
+        self.lanes.store(self.register)
+    }
+
+    #[inline(always)]
+    pub(crate) fn over(self, b: Self) -> Self {
+        Self::new(self.lanes, self.lanes.div(self.register, b.register))
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        Self::new(self.lanes, self.lanes.sqrt(self.register))
+    }
+
+    /// Itself where greater than b, else b.
+    #[inline(always)]
+    pub(crate) fn max(self, b: Self) -> Self {
+        Self::new(self.lanes, self.lanes.max(self.register, b.register))
+    }
+
+    /// a where it is negative, else b.
+    #[inline(always)]
+    pub(crate) fn if_negative(self, a: Self, b: Self) -> Self {
+        Self::new(self.lanes, self.lanes.where_negative(self.register, a.register, b.register))
+    }
+
+    /// Sum of the four.
+    #[inline(always)]
+    pub(crate) fn sum(self) -> f64 {
+        let Four([a, b, c, d]) = self.store();
+        (a + b) + (c + d)
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $function:ident) => {
+        impl<L: Lanes> $trait for Pack<L> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $function(self, b: Self) -> Self {
+                Self::new(self.lanes, self.lanes.$function(self.register, b.register))
+            }
+        }
+    };
+}
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+
+/// Four vectors of space, by coordinate.
+#[derive(Clone, Copy)]
+pub(crate) struct Vectors<L: Lanes> {
+    pub(crate) x: Pack<L>,
+    pub(crate) y: Pack<L>,
+    pub(crate) z: Pack<L>,
+}
+
+impl<L: Lanes> Vectors<L> {
+    /// From one vector and a fourth number in each register.
+    #[inline(always)]
+    pub(crate) fn from_rows(l: L, [a, b, c, d]: [L::Register; 4]) -> Self {
+        let (ab, cd) = (l.even(a, b), l.even(c, d));
+        let (x, z) = (l.low(ab, cd), l.high(ab, cd));
+        let y = l.low(l.odd(a, b), l.odd(c, d));
+        Self { x: Pack::new(l, x), y: Pack::new(l, y), z: Pack::new(l, z) }
+    }
+
+    /// One vector and a zero in each register.
+    #[inline(always)]
+    pub(crate) fn rows(self, l: L) -> [L::Register; 4] {
+        let (x, y, z) = (self.x.register, self.y.register, self.z.register);
+        let zero = l.splat(0.0);
+        let (xy, xy_odd) = (l.even(x, y), l.odd(x, y));
+        let (z, z_odd) = (l.even(z, zero), l.odd(z, zero));
+        [l.low(xy, z), l.low(xy_odd, z_odd), l.high(xy, z), l.high(xy_odd, z_odd)]
+    }
+
+    /// From coordinates one after the other: x y z x | y z x y | z x y z.
+    #[inline(always)]
+    pub(crate) fn from_flat(l: L, [a, b, c]: &[Four; 3]) -> Self {
+        let (a, b, c) = (l.load(a), l.load(b), l.load(c));
+        let (xy, zx, yz) = (l.low_high(a, b), l.high_low(a, c), l.low_high(b, c));
+        let (x, y, z) = (l.mixed(xy, zx), l.crossed(xy, yz), l.mixed(zx, yz));
+        Self { x: Pack::new(l, x), y: Pack::new(l, y), z: Pack::new(l, z) }
+    }
+
+    /// Coordinates one after the other.
+    #[inline(always)]
+    pub(crate) fn flat(self, l: L) -> [Four; 3] {
+        let (x, y, z) = (self.x.register, self.y.register, self.z.register);
+        let (xy, zx, yz) = (l.even(x, y), l.mixed(z, x), l.odd(y, z));
+        [l.store(l.low(xy, zx)), l.store(l.low_high(yz, xy)), l.store(l.high(zx, yz))]
+    }
+
+    #[inline(always)]
+    pub(crate) fn dot(self, b: Self) -> Pack<L> {
+        self.x * b.x + self.y * b.y + self.z * b.z
+    }
+}
+
+impl<L: Lanes> Add for Vectors<L> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Self { x: self.x + b.x, y: self.y + b.y, z: self.z + b.z }
+    }
+}
+
+impl<L: Lanes> Mul<Pack<L>> for Vectors<L> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, b: Pack<L>) -> Self {
+        Self { x: self.x * b, y: self.y * b, z: self.z * b }
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use super::*;
+
+    struct Everything;
+
+    impl Work for Everything {
+        type Output = Vec<Four>;
+
+        fn with<L: Lanes>(self, l: L) -> Vec<Four> {
+            let a = l.load(&Four([1.3, -0.2, 4.7, 1.0 / 3.0]));
+            let b = l.load(&Four([-7.1, 0.3, 5.9, 1e-3]));
+            let c = l.load(&Four([0.7, 12.5, -0.0, 2.0]));
+            let mut all = vec![l.add(a, b), l.sub(a, b), l.mul(a, b), l.div(a, b), l.max(a, b), l.sqrt(l.mul(a, a))];
+            all.extend([l.where_negative(c, a, b), l.splat(0.1), l.even(a, b), l.odd(a, b), l.mixed(a, b)]);
+            all.extend([l.crossed(a, b), l.low(a, b), l.high(a, b), l.low_high(a, b), l.high_low(a, b)]);
+            let flat = [a, b, c].map(|v| l.store(v));
+            let vectors = Vectors::from_flat(l, &flat);
+            assert_eq!(vectors.flat(l), flat);
+            let rows = vectors.rows(l).map(|row| l.store(row));
+            assert_eq!(rows[1].0, [flat[0].0[3], flat[1].0[0], flat[1].0[1], 0.0]);
+            assert_eq!(Vectors::from_rows(l, rows.map(|row| l.load(&row))).flat(l), flat);
+            all.into_iter().map(|v| l.store(v)).collect()
+        }
+    }
+
+    #[test]
+    fn arrays_and_registers_agree_to_the_bit() {
+        let by_arrays = Everything.with(Arrays);
+        for (i, (a, b)) in by_arrays.iter().zip(&run(Everything)).enumerate() {
+            assert_eq!(a.0.map(f64::to_bits), b.0.map(f64::to_bits), "operation {i}: {a:?} and {b:?}");
+        }
+    }
+}
