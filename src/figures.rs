@@ -120,8 +120,14 @@ pub struct Figures {
     /// ‖∇E‖ over the weight of the drape as a state without a history, where friction holds as much as it can: see
     /// [`accuracy::state`].
     pub residual_at_rest_over_weight: Option<f64>,
+    /// The same of the own continuation: what an error against it is fairly judged by.
+    pub own_affine_rms_mm: Option<f64>,
     /// Spearman's rank correlation of the paper's wrinkle measure with the mean curvature, over the seams.
     pub wrinkle_rank_correlation: Option<f64>,
+    /// Excess length that no PART shows after stage two, 95th percentile over the vertices, percent.
+    pub folds_p95_percent: Option<f64>,
+    /// Its rank correlation with the mean curvature of where the cloth settles, over the vertices.
+    pub fold_rank_correlation: Option<f64>,
 }
 
 impl Figures {
@@ -137,6 +143,7 @@ impl Figures {
             level_part_count: drape.level_part_count,
             singletons: parts.singletons,
             contact_parts: drape.outcomes.iter().filter(|o| o.contact).count(),
+            folds_p95_percent: drape.folds.as_ref().map(|f| accuracy::quantile::percentile(&f.excess_percent, 0.95)),
             hole_vertices: parts.hole_vertices,
             unassigned_vertices: parts.unassigned,
             displacement_rms_mm: accuracy::rms_mm(&drape.positions, &scene.garment.positions),
@@ -166,6 +173,8 @@ impl Figures {
             canonical_spread_mm,
             residual_at_rest_over_weight: Some(state.residual_over_weight),
             wrinkle_rank_correlation: assessment.wrinkles.rank_correlation,
+            fold_rank_correlation: assessment.fold_rank_correlation,
+            own_affine_rms_mm: assessment.accuracy.representable.map(|r| r.blended_affine_rms_mm),
             ..self
         }
     }
@@ -212,6 +221,10 @@ impl Figures {
         });
         let single = |mm| format!("its PARTs could hold it to {mm:.1} mm by one displacement each");
         add("representable", best.or(self.representable_rms_mm.map(single)));
+        add("folds", self.folds_p95_percent.map(|p95| match self.fold_rank_correlation {
+            Some(r) => format!("{p95:.1} % of length no PART shows (P95), rank correlation {r:.2} with the mean curvature at rest"),
+            None => format!("{p95:.1} % of length no PART shows after stage two (P95)"),
+        }));
         let rank = |r| format!("rank correlation {r:.2} of PART jumps with the mean curvature");
         add("wrinkles", self.wrinkle_rank_correlation.map(rank));
         found

@@ -8,7 +8,7 @@ use glam::DVec3;
 use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::{Against, Measured};
-use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::record::{FoldView, Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
 use partwise::scene::Loaded;
 
 use super::inputs::InputArgs;
@@ -73,6 +73,15 @@ struct Solved {
     summary: Summary,
 }
 
+impl Solved {
+    /// What the tab *Fit* shows side by side.
+    fn fit(&self) -> Vec<String> {
+        let of_cloth = if self.drape.state.is_some() { &["strain", "pressure"][..] } else { &[] };
+        let folds = self.drape.folds.is_some().then_some("folds");
+        of_cloth.iter().copied().chain(folds).map(str::to_owned).collect()
+    }
+}
+
 /// The cloth at one of the solver's steps; the mesh every so often.
 struct Snapshot {
     iteration: usize,
@@ -132,7 +141,7 @@ impl RunArgs {
                 iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.measured.assessment.is_some(),
                 wrinkles: solved.measured.assessment.is_some(),
-                fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
+                fit: solved.fit(),
                 ..Layout::default()
             },
             replaceable: self.watch,
@@ -191,6 +200,9 @@ impl RunArgs {
             overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
             overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
+        if let Some(folds) = &solved.drape.folds {
+            overlays.push(Overlay { name: "folds", unit: "%", values: &folds.excess_percent });
+        }
         if solved.measured.assessment.is_some() {
             overlays.push(Overlay { name: "error", unit: "mm", values: &solved.measured.error_mm });
         }
@@ -206,6 +218,11 @@ impl RunArgs {
             scalars: &scalars,
             overlays: &overlays,
         })?;
+        if let Some(folds) = &solved.drape.folds {
+            let draped = &solved.drape.positions;
+            let (excess_percent, across) = (&folds.excess_percent, &folds.across);
+            recorder.folds(&FoldView { index, draped, excess_percent, across })?;
+        }
         if let Some(assessment) = &solved.measured.assessment {
             let joining = scene.topology.edges.as_slice();
             let seams = solved.drape.parts.seams.iter().zip(&assessment.wrinkles.seams);
