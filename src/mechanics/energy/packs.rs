@@ -72,7 +72,8 @@ pub(super) fn add_gradient<L: Lanes>(
     let (weft, warp, shear) = (Pack::splat(l, c.weft), Pack::splat(l, c.warp), Pack::splat(l, c.shear));
     let mut energy = zero;
     for pack in packs {
-        let [t0, t1, t2, t3] = &pack.vertices;
+        // By value: a reference would be read, and checked, again after every store.
+        let [t0, t1, t2, t3] = pack.vertices;
         let ((a0, b0), (a1, b1)) = (edges(l, x, t0), edges(l, x, t1));
         let ((a2, b2), (a3, b3)) = (edges(l, x, t2), edges(l, x, t3));
         let (a, b) = (Vectors::from_rows(l, [a0, a1, a2, a3]), Vectors::from_rows(l, [b0, b1, b2, b3]));
@@ -102,14 +103,14 @@ pub(super) fn add_gradient<L: Lanes>(
 
 /// From a triangle's first corner to the others.
 #[inline(always)]
-fn edges<L: Lanes>(l: L, x: &[Four], &[a, b, c]: &[u32; 3]) -> (L::Register, L::Register) {
+fn edges<L: Lanes>(l: L, x: &[Four], [a, b, c]: [u32; 3]) -> (L::Register, L::Register) {
     let a = l.load(&x[a as usize]);
     (l.sub(l.load(&x[b as usize]), a), l.sub(l.load(&x[c as usize]), a))
 }
 
 /// Adds a triangle's gradient at its second and third corners, and what balances them at the first.
 #[inline(always)]
-fn scatter<L: Lanes>(l: L, gradient: &mut [Four], &[a, b, c]: &[u32; 3], second: L::Register, third: L::Register) {
+fn scatter<L: Lanes>(l: L, gradient: &mut [Four], [a, b, c]: [u32; 3], second: L::Register, third: L::Register) {
     let (a, b, c) = (a as usize, b as usize, c as usize);
     gradient[a] = l.store(l.sub(l.load(&gradient[a]), l.add(second, third)));
     gradient[b] = l.store(l.add(l.load(&gradient[b]), second));

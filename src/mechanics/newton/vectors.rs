@@ -18,26 +18,48 @@ impl Flat {
     /// Minus these vectors.
     pub(super) fn set_opposite(&mut self, vectors: &[DVec3]) {
         self.0.resize(vectors.len().div_ceil(16) * GROUP, Four::ZERO);
-        for (to, from) in self.0.chunks_exact_mut(3).zip(vectors.chunks(4)) {
-            let at = |i: usize| from.get(i).map_or(DVec3::ZERO, |v| -*v);
-            let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
-            to[0] = Four([a.x, a.y, a.z, b.x]);
-            to[1] = Four([b.y, b.z, c.x, c.y]);
-            to[2] = Four([c.z, d.x, d.y, d.z]);
+        let (fours, rest) = vectors.as_chunks::<4>();
+        let (groups, _) = self.0.as_chunks_mut::<3>();
+        for (group, four) in groups.iter_mut().zip(fours) {
+            *group = opposite(four);
+        }
+        if !rest.is_empty() {
+            let at = |i: usize| rest.get(i).copied().unwrap_or_default();
+            groups[fours.len()] = opposite(&[at(0), at(1), at(2), at(3)]);
         }
     }
 
     /// x + t times these, for as many vertices as x has.
     pub(super) fn added_to(&self, x: &[DVec3], t: f64, out: &mut Vec<DVec3>) {
         out.resize(x.len(), DVec3::ZERO);
-        for ((to, from), f) in out.chunks_mut(4).zip(x.chunks(4)).zip(self.0.chunks_exact(3)) {
-            let (Four(a), Four(b), Four(c)) = (f[0], f[1], f[2]);
-            let d = [[a[0], a[1], a[2]], [a[3], b[0], b[1]], [b[2], b[3], c[0]], [c[1], c[2], c[3]]];
-            for ((to, from), d) in to.iter_mut().zip(from).zip(d) {
-                *to = *from + DVec3::from_array(d) * t;
-            }
+        let (groups, _) = self.0.as_chunks::<3>();
+        let ((fours, rest), (x_fours, x_rest)) = (out.as_chunks_mut::<4>(), x.as_chunks::<4>());
+        for ((to, from), group) in fours.iter_mut().zip(x_fours).zip(groups) {
+            *to = moved(from, t, group);
+        }
+        if !rest.is_empty() {
+            let at = |i: usize| x_rest.get(i).copied().unwrap_or_default();
+            let last = moved(&[at(0), at(1), at(2), at(3)], t, &groups[x_fours.len()]);
+            rest.copy_from_slice(&last[..x_rest.len()]);
         }
     }
+}
+
+/// Minus these.
+#[inline]
+fn opposite([a, b, c, d]: &[DVec3; 4]) -> [Four; 3] {
+    [Four([-a.x, -a.y, -a.z, -b.x]), Four([-b.y, -b.z, -c.x, -c.y]), Four([-c.z, -d.x, -d.y, -d.z])]
+}
+
+/// x + t d.
+#[inline]
+fn moved([p, q, r, s]: &[DVec3; 4], t: f64, [Four(a), Four(b), Four(c)]: &[Four; 3]) -> [DVec3; 4] {
+    [
+        *p + DVec3::new(a[0], a[1], a[2]) * t,
+        *q + DVec3::new(a[3], b[0], b[1]) * t,
+        *r + DVec3::new(b[2], b[3], c[0]) * t,
+        *s + DVec3::new(c[1], c[2], c[3]) * t,
+    ]
 }
 
 /// A symmetric 3×3 matrix for each vertex, by fours of vertices: xx, yy, zz, xy, xz, yz.
