@@ -87,9 +87,9 @@ pub(super) fn add_gradient<L: Lanes>(
         let field_u = sigma_v.if_negative(weft * su.max(zero), sigma_u.max(zero));
         let field_v = sigma_u.if_negative(warp * sv.max(zero), sigma_v.max(zero));
         let (tu, tv) = (field_u + r * (sigma_u - field_u), field_v + r * (sigma_v - field_v));
-        let tau = shear * gamma;
-        energy = energy + area * (tu * su + tv * sv + tau * gamma);
-        let (tu, tv, tau) = (area * tu.over(shortest.max(lu)), area * tv.over(shortest.max(lv)), area * tau);
+        let (tu, tv, tau) = (area * tu, area * tv, area * (shear * gamma));
+        energy = energy + (tu * su + tv * sv + tau * gamma);
+        let (tu, tv) = (tu.over(shortest.max(lu)), tv.over(shortest.max(lv)));
         let (gu, gv) = (fu * tu + fv * tau, fv * tv + fu * tau);
         let second = (gu * pu + gv * pv).rows(l);
         let third = (gu * qu + gv * qv).rows(l);

@@ -21,8 +21,14 @@ use crate::mechanics::lanes::{Four, Lanes, Pack};
 pub(super) struct Plate {
     /// First two of each i.
     starts: Vec<u32>,
-    others: Vec<[u32; 2]>,
-    scalars: Vec<[f64; 2]>,
+    twos: Vec<Two>,
+}
+
+/// Two pairs of one i.
+#[derive(Debug, Clone, Copy)]
+struct Two {
+    others: [u32; 2],
+    scalars: [f64; 2],
 }
 
 impl Plate {
@@ -39,14 +45,14 @@ impl Plate {
             while let Some(same) = sums.next_if(|same| same[0].0 == i) {
                 row.push((same[0].1, same.iter().map(|e| e.2).sum()));
             }
-            if row.len() % 2 == 1 {
-                row.push((i, 0.0));
+            // Filled up by what it has already, and not by i, whose sum the product keeps to itself.
+            if let (1, Some(&(j, _))) = (row.len() % 2, row.first()) {
+                row.push((j, 0.0));
             }
             for two in row.as_chunks::<2>().0 {
-                plate.others.push(two.map(|e| e.0));
-                plate.scalars.push(two.map(|e| e.1));
+                plate.twos.push(Two { others: two.map(|e| e.0), scalars: two.map(|e| e.1) });
             }
-            plate.starts.push(plate.others.len() as u32);
+            plate.starts.push(plate.twos.len() as u32);
         }
         plate
     }
@@ -54,7 +60,7 @@ impl Plate {
     /// Two ranges of vertices with about as many pairs each.
     pub(super) fn halves(&self) -> [Range<usize>; 2] {
         let vertices = self.starts.len().saturating_sub(1);
-        let middle = self.starts.partition_point(|&s| 2 * (s as usize) < self.others.len()).min(vertices);
+        let middle = self.starts.partition_point(|&s| 2 * (s as usize) < self.twos.len()).min(vertices);
         [0..middle, middle..vertices]
     }
 
@@ -71,18 +77,18 @@ impl Plate {
         let gradient = &mut gradient[..x.len()];
         for i in vertices {
             let here = l.load(&x[i]);
-            let mut sum = l.splat(0.0);
-            let row = self.starts[i] as usize..self.starts[i + 1] as usize;
-            for (&[j, k], &[of_j, of_k]) in self.others[row.clone()].iter().zip(&self.scalars[row]) {
-                let (j, k) = (j as usize, k as usize);
-                let pull = l.mul(l.sub(l.load(&x[j]), here), l.splat(of_j));
-                sum = l.add(sum, pull);
-                gradient[j] = l.store(l.sub(l.load(&gradient[j]), pull));
-                let pull = l.mul(l.sub(l.load(&x[k]), here), l.splat(of_k));
-                sum = l.add(sum, pull);
-                gradient[k] = l.store(l.sub(l.load(&gradient[k]), pull));
+            let mut sum = l.load(&gradient[i]);
+            for two in &self.twos[self.starts[i] as usize..self.starts[i + 1] as usize] {
+                let [j, k] = [two.others[0] as usize, two.others[1] as usize];
+                // What the other gets; in this order a load is an operand and no instruction of its own.
+                let push = l.mul(l.sub(here, l.load(&x[j])), l.splat(two.scalars[0]));
+                sum = l.sub(sum, push);
+                gradient[j] = l.store(l.add(push, l.load(&gradient[j])));
+                let push = l.mul(l.sub(here, l.load(&x[k])), l.splat(two.scalars[1]));
+                sum = l.sub(sum, push);
+                gradient[k] = l.store(l.add(push, l.load(&gradient[k])));
             }
-            gradient[i] = l.store(l.add(l.load(&gradient[i]), sum));
+            gradient[i] = l.store(sum);
         }
         let mut energy = Pack::splat(l, 0.0);
         for (x, g) in x.iter().zip(&*gradient) {
