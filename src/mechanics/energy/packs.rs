@@ -13,8 +13,8 @@
 //! | σ_u, σ_v | stresses without wrinkles | N/m |
 //! | r | share of the stiffness left under compression | – |
 //!
-//! Positions and forces are padded to four lanes, so that a vertex is one load. Same bits as on any machine, not the same as
-//! the triangles' one by one: those sum in another order.
+//! Positions and forces are padded to four lanes, so that a vertex is one load. The bits are the same on any machine, but not
+//! those of the triangles one by one, whose sums have another order.
 
 use super::membrane::{SHORTEST, Stiffness, Triangle};
 use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors};
