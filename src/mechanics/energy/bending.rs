@@ -183,21 +183,6 @@ impl Bending {
         self.hessian().map(|(pair, _)| pair)
     }
 
-    /// Which vertices share a block of the cloth's Hessian with each: by an edge or by bending.
-    pub(super) fn neighbours(&self, topology: &Topology) -> Vec<Vec<u32>> {
-        let vertices = 0..self.plate.vertices() as u32;
-        let mut neighbours: Vec<Vec<u32>> = vertices.map(|v| topology.neighbours(v).to_vec()).collect();
-        for [a, b] in self.pairs() {
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
-        }
-        for list in &mut neighbours {
-            list.sort_unstable();
-            list.dedup();
-        }
-        neighbours
-    }
-
     /// The Hessian's scalars, N/m: each pair of an element once, the diagonal included.
     pub fn hessian(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
         self.elements.iter().flat_map(|e| {

@@ -16,7 +16,6 @@ use super::membrane::{Stiffness, Triangle};
 use super::ordering::nested_dissection;
 use super::packs::TrianglePack;
 use super::pattern::{HELD, Pattern, Slot};
-use super::sag;
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::fabric::Fabric;
@@ -25,6 +24,12 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 /// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with
 /// (compression stockings reach 2 to 5 kPa), so a looser one stays well off the skin.
 const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
+
+/// The tightest body the vertices alone keep off the triangles between them, m: a shoulder's ridge, a bust's apex.
+const TIGHTEST_RADIUS: f64 = 0.03;
+
+/// No mesh is so coarse that its cloth floats farther than this from the body, m: the gap cloth simulators commonly keep.
+const LARGEST_SAG: f64 = 3e-3;
 
 /// What can be wrong with a garment's data.
 #[derive(Debug, thiserror::Error)]
@@ -134,7 +139,7 @@ impl Cloth {
         if free.is_empty() {
             return Err(EnergyError::NothingFree { count: n });
         }
-        let order = nested_dissection(free, &mesh.positions, &bending.neighbours(topology));
+        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &bending));
         let mut unknown = vec![HELD; n];
         for (i, &v) in order.iter().enumerate() {
             unknown[v as usize] = i as u32;
@@ -145,7 +150,7 @@ impl Cloth {
             masses,
             areas,
             held: is_held,
-            offset: fabric.thickness_m + sag::sag(mesh),
+            offset: fabric.thickness_m + sag(mesh),
             friction: fabric.friction,
             order,
             unknown,
@@ -282,4 +287,29 @@ impl Cloth {
     pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
         self.pattern.multiply(blocks, d, out);
     }
+}
+
+/// Which vertices share a block with each.
+fn block_neighbours(n: usize, topology: &Topology, bending: &Bending) -> Vec<Vec<u32>> {
+    let mut neighbours: Vec<Vec<u32>> = (0..n as u32).map(|v| topology.neighbours(v).to_vec()).collect();
+    for [a, b] in bending.pairs() {
+        neighbours[a as usize].push(b);
+        neighbours[b as usize].push(a);
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
+}
+/// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
+/// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
+fn sag(mesh: &TriMesh) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for t in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(t);
+        sum += a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        count += 3.0;
+    }
+    (sum / f64::max(count, 1.0) / (6.0 * TIGHTEST_RADIUS)).min(LARGEST_SAG)
 }

@@ -26,7 +26,6 @@ pub mod ordering;
 mod packs;
 pub mod pattern;
 mod plate;
-mod sag;
 
 pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;

@@ -57,13 +57,9 @@ impl Plate {
         plate
     }
 
-    pub(super) fn vertices(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-
     /// Two ranges of vertices with about as many pairs each.
     pub(super) fn halves(&self) -> [Range<usize>; 2] {
-        let vertices = self.vertices();
+        let vertices = self.starts.len().saturating_sub(1);
         let middle = self.starts.partition_point(|&s| 2 * (s as usize) < self.twos.len()).min(vertices);
         [0..middle, middle..vertices]
     }

@@ -185,8 +185,8 @@ mod tests {
         inverse.clear(21);
         (0..21).for_each(|i| inverse.set(i, block(i)));
         let (mut pairs, mut plain) = (Vec::new(), Vec::new());
-        for k in 0..3 {
-            let (s, before, t) = (noise(k as f64), noise(5.0 + k as f64), 0.3 + k as f64);
+        for k in [0.0, 1.0, 2.0] {
+            let (s, before, t) = (noise(k), noise(5.0 + k), 0.3 + k);
             let after: Vec<DVec3> = before.iter().zip(&s).map(|(b, s)| *b - *s * (2.0 + t) - DVec3::X).collect();
             let mut pair = Pair { s: flat(&s), ..Pair::default() };
             let [curvature, scaled] = difference(&mut pair, t, &flat(&before), &flat(&after), &inverse);
