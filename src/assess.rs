@@ -64,6 +64,9 @@ pub struct Assessment {
     pub canonical: Reference,
     /// Both measures of the folds.
     pub wrinkles: Wrinkles,
+    /// Spearman's rank correlation, over the vertices, of the excess length in the preview with the mean curvature of where it settles;
+    /// `None` where the model has no excess.
+    pub fold_rank_correlation: Option<f64>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -102,10 +105,15 @@ pub fn assess(
     measured.canonical_rms_mm = Some(accuracy::rms_mm(&drape.positions, &canonical.positions));
     measured.canonical_spread_mm =
         (!spread.is_empty()).then(|| (spread.iter().map(|s| s * s).sum::<f64>() / spread.len() as f64).sqrt());
+    let settled = scene.garment.with_positions(own.positions.clone());
+    let fold_rank_correlation = drape.folds.as_ref().and_then(|folds| {
+        wrinkles::rank_correlation(&folds.excess_percent, &wrinkles::mean_curvature(&settled, &scene.topology))
+    });
     let moved: Vec<DVec3> = drape.outcomes.iter().map(|o| o.displacement).collect();
     Ok(Assessment {
         error_mm: accuracy::vertex_errors(&drape.positions, &own.positions).iter().map(|e| 1e3 * e).collect(),
         wrinkles: wrinkles::measure(&scene.garment, &scene.topology, &drape.parts, &moved, &drape.positions),
+        fold_rank_correlation,
         accuracy: measured,
         canonical,
         warnings,
@@ -171,7 +179,7 @@ impl References<'_> {
             garment: &self.scene.garment,
             rest: &self.scene.rest,
             fabric: self.fabric,
-            body: &self.scene.body_mesh,
+            body: self.scene.body.mesh(),
             held: &self.scene.held,
             start,
             options: &format!("{solver:?}"),

@@ -62,6 +62,7 @@ pub struct SurfacePoint {
 /// A body ready to be asked for distances.
 #[derive(Clone)]
 pub struct Body {
+    mesh: TriMesh,
     shape: ParryMesh,
     closed: bool,
 }
@@ -102,7 +103,13 @@ impl Body {
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
         let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { shape, closed })
+        Ok(Self { mesh: mesh.clone(), shape, closed })
+    }
+
+    /// The surface, m.
+    #[must_use]
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
     }
 
     /// Whether the surface was checked to be closed.

@@ -11,6 +11,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::files::{Unreadable, names_a_file, read_text};
+
 /// The constants of one fabric.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -78,6 +80,9 @@ pub enum FabricError {
         /// What there is.
         known: String,
     },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
     /// Not a fabric file.
     #[error("{file}: {reason}; see assets/fabrics/ for examples")]
     Syntax {
@@ -100,12 +105,26 @@ pub enum FabricError {
     },
 }
 
+/// The fabric unless asked otherwise.
+pub const DEFAULT_FABRIC: &str = BUILT_IN[0];
+
+impl Default for Fabric {
+    /// The first of the built-in ones, a knit.
+    fn default() -> Self {
+        // The text is part of the program and a test reads it, so it always parses.
+        Self::parse(FILES[0].1, DEFAULT_FABRIC).unwrap_or_else(|e| unreachable!("{e}"))
+    }
+}
+
 impl Fabric {
-    /// A built-in fabric.
+    /// A built-in fabric, or one from a TOML file.
     ///
     /// # Errors
-    /// [`FabricError::Unknown`] lists those there are.
+    /// [`FabricError::Unknown`] lists those there are; for a file as [`parse`](Self::parse), and where it cannot be read.
     pub fn by_name(name: &str) -> Result<Self, FabricError> {
+        if names_a_file(name) {
+            return Self::parse(&read_text(name.as_ref())?, name);
+        }
         match FILES.iter().find(|(known, _)| *known == name) {
             Some((known, text)) => Self::parse(text, known),
             None => Err(FabricError::Unknown { found: name.to_owned(), known: BUILT_IN.join(", ") }),

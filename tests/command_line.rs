@@ -128,6 +128,16 @@ fn one_json_object_with_the_promised_keys() {
 }
 
 #[test]
+fn vertices_in_no_level_are_warned_of_and_recorded() {
+    let bench = Bench::new();
+    bench.write("near.toml", "name = \"near\"\nunit = \"cm\"\nlevels = [[0.0, 3.0]]\n");
+    let report = json(&bench.drape(&["--table", "near.toml", "--model", "paper", "--format", "json"]));
+    assert!(report["unassigned_vertices"].as_u64().unwrap() > 0, "{report}");
+    assert!(report["warnings"].to_string().contains("no level"), "{report}");
+    assert!(bench.folder.path().join("recordings/garment.rrd").exists());
+}
+
+#[test]
 fn the_same_bits_with_one_thread_and_with_two() {
     let bench = Bench::new();
     let mut exports = Vec::new();
@@ -227,6 +237,55 @@ fn a_held_edge_stays_and_an_unknown_one_is_refused() {
         &["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--hold", "cuff"],
         &["cuff", "front", "top"],
     );
+}
+
+#[test]
+fn the_table_alone_makes_the_parts_and_they_move_as_asked() {
+    let bench = Bench::new();
+    let preview =
+        |more: &[&str]| json(&bench.drape(&[&["--refine", "0", "--no-save", "--format", "json"], more].concat()));
+    let plain = preview(&[]);
+    assert_eq!((&plain["part_count"], &plain["motion"]), (&plain["level_part_count"], &"affine".into()));
+    let same = preview(&["--max-extent", "0", "--motion", "affine"]);
+    assert_eq!(same["displacement_rms_mm"], plain["displacement_rms_mm"]);
+    let shifted = preview(&["--motion", "translation"]);
+    assert_eq!((&shifted["part_count"], &shifted["motion"]), (&plain["part_count"], &"translation".into()));
+    assert_ne!(shifted["displacement_rms_mm"], plain["displacement_rms_mm"]);
+    let cut = preview(&["--max-extent", "20,10"]);
+    assert!(cut["part_count"].as_u64() > plain["part_count"].as_u64(), "{cut}");
+    bench.refuses(&["--max-extent", "6,12"], &["--max-extent 6,12", "12,6"]);
+    bench.refuses(&["--max-extent=-1"], &["--max-extent", "centimetres"]);
+    bench.refuses(&["--motion", "rigid"], &["--motion", "translation"]);
+}
+
+#[test]
+fn what_parts_could_hold_is_said_in_words_and_figures() {
+    let bench = Bench::new();
+    let cache = bench.path("cache");
+    let measured = ["--refine", "0", "--accuracy", "--cache", &cache, "--no-save"];
+    let figures = json(&bench.drape(&[&measured[..], &["--format", "json"]].concat()));
+    let [affine, one] =
+        ["representable_affine_rms_mm", "representable_rms_mm"].map(|key| figures[key].as_f64().unwrap());
+    assert!(affine < one, "{affine} {one}");
+    let said = String::from_utf8(bench.drape(&measured).stdout).unwrap();
+    let words =
+        format!("its PARTs could hold it to {affine:.1} mm by affine maps, {one:.1} mm by one displacement each");
+    assert!(said.contains(&words), "{words}: {said}");
+}
+
+#[test]
+fn the_drape_test_takes_a_fabric_from_a_file() {
+    let bench = Bench::new();
+    bench.write("my, silk.toml", include_str!("../assets/fabrics/silk.toml"));
+    let test = |fabric: &str, csv: &str| {
+        let output = bench.run(&["cusick", fabric, "--rows", "4", "--csv", csv]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let mut reader = csv::Reader::from_path(bench.path(csv)).unwrap();
+        reader.records().next().unwrap().unwrap()
+    };
+    let (file, built_in) = (test("my, silk.toml", "file.csv"), test("silk", "built-in.csv"));
+    assert_eq!((&file[0], &file[1], &file[4]), ("my, silk.toml", &built_in[1], "no published band"));
+    bench.refuses(&["cusick", "nowhere.toml"], &["nowhere.toml", "cannot be read"]);
 }
 
 #[test]

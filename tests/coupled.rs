@@ -1,13 +1,15 @@
-//! The coupled PART solve: what a coarse cloth must do whatever its figures.
+//! The coupled PART solve: what PARTs must do whatever the table.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
+use partwise::GRAVITY;
 use partwise::distance::Body;
 use partwise::fabric::Fabric;
 use partwise::mechanics::coupled::{
-    CoarseMesh, CoupledError, CoupledOptions, Garment, blend, coarse_rest, push_out, smooth_translations, solve,
+    CoupledError, CoupledOptions, CoupledResult, Garment, Motion, Motions, Weights, push_out, solve,
 };
+use partwise::mechanics::energy::Cloth;
 use partwise::mesh::{RestShape, Topology, TriMesh};
 use partwise::parts::{Parts, segment};
 use partwise::range_table::RangeTable;
@@ -57,127 +59,164 @@ fn fabric(stiffness: f64) -> Fabric {
     }
 }
 
+/// PARTs by bounds of some distance (m), as stage one makes them.
+fn levels(topology: &Topology, distance: &[f64], bounds_cm: &[f64]) -> Parts {
+    segment(topology, distance, &RangeTable::from_bounds("levels", bounds_cm).unwrap())
+}
+
 /// One level cut to `extent` metres.
 fn pieces(mesh: &TriMesh, topology: &Topology, extent: f64) -> Parts {
-    let table = RangeTable::from_bounds("one", &[0.0, f64::INFINITY]).unwrap();
-    segment(topology, &vec![0.1; mesh.vertex_count()], &table).cut_to_extent(mesh, topology, extent)
+    levels(topology, &vec![0.1; mesh.vertex_count()], &[0.0, f64::INFINITY]).cut_to_extent(mesh, topology, extent)
 }
 
-fn single(extent: f64) -> CoupledOptions {
-    CoupledOptions { extents_m: vec![extent], tolerance: 1e-6, least_move_m: 0.0, max_steps: 200, ..Default::default() }
+/// The PARTs' own motions to the end, nothing relaxed.
+fn unrelaxed() -> CoupledOptions {
+    CoupledOptions { relaxing: 0, relaxing_trial: 0, least_move_m: 1e-5, max_steps: 200, ..Default::default() }
 }
 
-#[test]
-fn the_coarse_cloth_of_a_sheet_is_a_sheet() {
-    let mesh = sheet(30, 20, 0.01);
-    let topology = Topology::new(&mesh);
-    let parts = pieces(&mesh, &topology, 0.06);
-    let coarse = CoarseMesh::new(&mesh, &topology, &parts, &vec![false; mesh.vertex_count()]);
-    let nodes = TriMesh::new(coarse.nodes_of(&mesh.positions), coarse.triangles.clone());
-    let coarse_topology = Topology::new(&nodes);
-    assert!(coarse.loose.is_empty());
-    assert!(coarse_topology.edge_valence.iter().all(|&v| v <= 2));
-    assert_eq!(coarse_topology.boundary_loops().len(), 1);
-    // A disk: V − E + F = 1.
-    let euler = nodes.vertex_count() as i64 - coarse_topology.edges.len() as i64 + nodes.triangles.len() as i64;
-    assert_eq!(euler, 1);
-    // Every PART that reaches the edge has its node there, so the coarse cloth is as wide as the sheet.
-    let on_edge = topology.boundary_vertices();
-    for (part, &node) in parts.parts.iter().zip(&coarse.node_vertex) {
-        assert!(part.vertices.contains(&node));
-        assert_eq!(part.vertices.iter().any(|&v| on_edge[v as usize]), on_edge[node as usize]);
-    }
+/// Solves from the mesh's own positions, which are its rest shape too.
+fn settle(
+    mesh: &TriMesh,
+    body: &Body,
+    fabric: &Fabric,
+    held: &[u32],
+    parts: impl Fn(&Topology) -> Parts,
+    options: &CoupledOptions,
+) -> Result<CoupledResult, CoupledError> {
+    let topology = Topology::new(mesh);
+    let rest = RestShape::from_edges(mesh).unwrap();
+    let cloth = Cloth::new(mesh, &topology, &rest, fabric, held).unwrap();
+    let garment = Garment { mesh, topology: &topology, cloth: &cloth, fabric };
+    solve(&garment, body, &parts(&topology), &mesh.positions, options)
 }
 
 #[test]
-fn coarse_rest_lengths_are_those_of_the_pattern() {
-    let mesh = sheet(30, 20, 0.01);
-    let topology = Topology::new(&mesh);
-    let parts = pieces(&mesh, &topology, 0.06);
-    let coarse = CoarseMesh::new(&mesh, &topology, &parts, &vec![false; mesh.vertex_count()]);
-    let own = RestShape::from_edges(&mesh).unwrap();
-    // A pattern 30 % wider and 10 % longer than placed, as a gathered hem is.
-    let stretched =
-        RestShape { corners: own.corners.iter().map(|c| c.map(|p| DVec2::new(1.3 * p.x, 1.1 * p.y))).collect() };
-    let rest = coarse_rest(&mesh, &topology, &stretched, &parts, &coarse);
-    for (&triangle, flat) in coarse.triangles.iter().zip(&rest.corners) {
-        let placed = triangle.map(|p| mesh.positions[coarse.node_vertex[p as usize] as usize]);
-        let height = (placed[1] - placed[0]).cross(placed[2] - placed[0]).length();
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let d = placed[j] - placed[i];
-            let expected = (1.3 * d.x).hypot(1.1 * d.z);
-            let found = flat[j] - flat[i];
-            // Slivers are fattened by design; the rest is exact, grain included.
-            if height > 0.2 * d.length_squared() {
-                assert!((found.length() - expected).abs() < 1e-9, "{} against {expected}", found.length());
-            }
-        }
-    }
-}
-
-#[test]
-fn a_hanging_sheet_stretches_as_its_closed_form_says() {
+fn a_hanging_strip_of_one_two_and_five_parts_stretches_as_its_closed_form_says() {
     let (length, k) = (0.6, 60.0);
-    let mesh = sheet(20, 60, 0.01);
-    let topology = Topology::new(&mesh);
-    let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(k), far_away());
-    let held: Vec<u32> = (0..=20).collect();
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &held };
-    let parts = pieces(&mesh, &topology, 10.0);
-    let result = solve(&garment, &body, &parts, &mesh.positions, &single(0.05)).unwrap();
-    assert!(result.residual_over_weight() < 1e-6, "{:?}", result.warnings);
-    let hem: Vec<f64> = (0..=20).map(|i| result.positions[60 * 21 + i].z).collect();
-    let lower = -hem.iter().sum::<f64>() / hem.len() as f64 - length;
-    // ρ g L² / 2k: 5.88 mm. Nodes at the edge lump half a PART too much there: 10 %.
-    let expected = cloth.density_kg_per_m2 * partwise::GRAVITY * length * length / (2.0 * k);
-    assert!((lower / expected - 1.0).abs() < 0.1, "{lower} against {expected}");
-    for &v in &held {
-        assert_eq!(result.positions[v as usize], mesh.positions[v as usize]);
+    let mesh = sheet(10, 60, 0.01);
+    let held: Vec<u32> = (0..=10).collect();
+    let fabric = fabric(k);
+    // ρ g L² / 2k: 5.9 mm.
+    let expected = fabric.density_kg_per_m2 * GRAVITY * length * length / (2.0 * k);
+    for (count, tolerance) in [(1, 0.02), (2, 0.05), (5, 0.05)] {
+        let depth: Vec<f64> = mesh.positions.iter().map(|x| -x.z).collect();
+        let mut bounds: Vec<f64> = (0..count).map(|i| 100.0 * length * f64::from(i) / f64::from(count)).collect();
+        bounds.push(f64::INFINITY);
+        let parts = |topology: &Topology| levels(topology, &depth, &bounds);
+        let result = settle(&mesh, &far_away(), &fabric, &held, parts, &unrelaxed()).unwrap();
+        assert_eq!(result.parts.len(), count as usize);
+        let hem: f64 = result.positions[60 * 11..].iter().map(|x| -x.z).sum::<f64>() / 11.0 - length;
+        assert!((hem / expected - 1.0).abs() < tolerance, "{count} PARTs: {hem} against {expected} m");
+        assert!(held.iter().all(|&v| result.positions[v as usize] == mesh.positions[v as usize]));
     }
 }
 
 #[test]
-fn a_strap_one_part_wide_holds() {
-    // Four centimetres wide, cut to twelve: a chain of PARTs of which no three meet.
-    let (length, k) = (0.4, 60.0);
-    let mesh = sheet(4, 40, 0.01);
-    let topology = Topology::new(&mesh);
-    let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(k), far_away());
-    let held: Vec<u32> = (0..=4).collect();
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &held };
-    let parts = pieces(&mesh, &topology, 10.0);
-    let chain = parts.cut_to_extent(&mesh, &topology, 0.12);
-    let coarse = CoarseMesh::new(&mesh, &topology, &chain, &vec![false; mesh.vertex_count()]);
-    assert!(coarse.triangles.is_empty() && chain.len() > 2, "{} PARTs are no chain", chain.len());
-    let result = solve(&garment, &body, &parts, &mesh.positions, &single(0.12)).unwrap();
-    assert!(result.warnings.is_empty(), "{:?}", result.warnings);
-    let lower = -result.positions.last().unwrap().z - length;
-    // ρ g L² / 2k: 2.6 mm, and no more than the lumping of some PARTs of 3 cm off.
-    let expected = cloth.density_kg_per_m2 * partwise::GRAVITY * length * length / (2.0 * k);
-    assert!((lower / expected - 1.0).abs() < 0.2, "{lower} against {expected}");
+fn rings_shrink_to_the_radius_that_hangs_straight_down() {
+    // A cone from 20 to 32 cm, 36 cm along its side, its top held: it hangs as a cylinder of 20 cm, folds and all.
+    let (around, rows, top, hem, side) = (96, 36, 0.20, 0.32, 0.36);
+    let slope = f64::sqrt(side * side - (hem - top) * (hem - top)) / side;
+    let at = |row: u32, i: u32| {
+        let (s, angle) =
+            (side * f64::from(row) / f64::from(rows), std::f64::consts::TAU * f64::from(i) / f64::from(around));
+        let radius = top + (hem - top) * s / side;
+        DVec3::new(radius * angle.cos(), radius * angle.sin(), -slope * s)
+    };
+    let positions: Vec<DVec3> = (0..=rows).flat_map(|row| (0..around).map(move |i| at(row, i))).collect();
+    let vertex = |row: u32, i: u32| row * around + i % around;
+    let triangles = (0..rows).flat_map(|row| {
+        (0..around).flat_map(move |i| {
+            let [a, b, c, d] = [vertex(row, i), vertex(row, i + 1), vertex(row + 1, i), vertex(row + 1, i + 1)];
+            if (row + i) % 2 == 0 { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] }
+        })
+    });
+    let mesh = TriMesh::new(positions, triangles.collect());
+    let radius = |x: &DVec3| x.x.hypot(x.y);
+    let out: Vec<f64> = mesh.positions.iter().map(|x| radius(x) - top).collect();
+    let held: Vec<u32> = (0..around).collect();
+    let parts = |topology: &Topology| levels(topology, &out, &[0.0, 2.0, 4.0, 6.0, 8.0, 10.0, f64::INFINITY]);
+    let result = settle(&mesh, &far_away(), &fabric(60.0), &held, parts, &CoupledOptions::default()).unwrap();
+    assert_eq!(result.parts.len(), 6);
+    let last = &result.positions[(rows * around) as usize..];
+    let mean = |of: &dyn Fn(&DVec3) -> f64| last.iter().map(of).sum::<f64>() / last.len() as f64;
+    assert!((mean(&radius) / top - 1.0).abs() < 0.1, "the hem hangs at {} m", mean(&radius));
+    let drop = -mean(&|x| x.z);
+    assert!((drop / side - 1.0).abs() < 0.02, "the hem hangs {drop} m down");
 }
 
 #[test]
-fn forces_balance_at_every_free_node() {
+fn blended_maps_hold_every_rigid_and_affine_motion() {
+    let mesh = sheet(24, 24, 0.01);
+    let topology = Topology::new(&mesh);
+    let parts = pieces(&mesh, &topology, 0.08);
+    let weights = Weights::new(&topology, &mesh.positions, &parts);
+    for v in 0..mesh.vertex_count() {
+        let sum: f64 = weights.of(v).iter().map(|w| w.1).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "the weights of vertex {v} sum to {sum}");
+    }
+    let shear = |x: &DVec3| DVec3::new(0.1 * x.x - 0.2 * x.z, 0.1 * x.x + 0.3, 0.2 * x.x);
+    let motion: Vec<DVec3> = mesh.positions.iter().map(shear).collect();
+    let left = |how| {
+        let fit =
+            Motions::new(&parts, weights.clone(), &mesh.positions, how).nearest(&mesh.positions, &motion).unwrap();
+        fit.iter().zip(&motion).map(|(f, u)| f.distance(*u)).fold(0.0, f64::max)
+    };
+    assert!(left(Motion::Affine) < 1e-5, "{}", left(Motion::Affine));
+    // One displacement a PART tears what only turns.
+    assert!(left(Motion::Translation) > 1e-3, "{}", left(Motion::Translation));
+}
+
+#[test]
+fn a_falling_sheet_turns_freely() {
+    // Held by two corners of its upper edge, pushed out of the vertical by its start: it swings down as a whole.
+    let upright = sheet(12, 12, 0.01);
+    let tilted = upright.positions.iter().map(|p| DVec3::new(p.x, -0.8 * p.z, 0.6 * p.z)).collect();
+    let mesh = upright.with_positions(tilted);
+    let one = |topology: &Topology| pieces(&mesh, topology, 10.0);
+    let held: Vec<u32> = (0..=12).collect();
+    let result = settle(&mesh, &far_away(), &fabric(4000.0), &held, one, &unrelaxed()).unwrap();
+    let hem = result.positions[12 * 13 + 6];
+    assert!(hem.y.abs() < 2e-3 && (hem.z + 0.12).abs() < 1e-3, "the hem hangs at {hem}");
+}
+
+#[test]
+fn a_plate_of_parts_bends_nearly_as_its_closed_form_says() {
+    // Clamped at one end by two rows, stiff enough to droop a little: q L⁴ / 8 B.
+    let (rows, h) = (24, 0.01);
+    let upright = sheet(8, rows, h);
+    let level = upright.positions.iter().map(|p| DVec3::new(p.x, -p.z, 0.0)).collect();
+    let mesh = upright.with_positions(level);
+    let mut stiff = fabric(2000.0);
+    stiff.bending_nm = [2e-2; 3];
+    let held: Vec<u32> = (0..18).collect();
+    let length = f64::from(rows - 1) * h;
+    let expected = stiff.density_kg_per_m2 * GRAVITY * length.powi(4) / (8.0 * 2e-2);
+    let droop = |options: &CoupledOptions| {
+        let parts = |topology: &Topology| pieces(&mesh, topology, 0.05);
+        let result = settle(&mesh, &far_away(), &stiff, &held, parts, options).unwrap();
+        -result.positions.last().unwrap().z / expected
+    };
+    let own = droop(&unrelaxed());
+    assert!((0.7..1.05).contains(&own), "the PARTs alone droop {own} times as far");
+}
+
+#[test]
+fn forces_balance_on_every_part() {
     let mesh = sheet(20, 30, 0.01);
-    let topology = Topology::new(&mesh);
-    let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(60.0), far_away());
     let held: Vec<u32> = (0..=20).collect();
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &held };
-    let result = solve(&garment, &body, &pieces(&mesh, &topology, 10.0), &mesh.positions, &single(0.05)).unwrap();
-    let weight = 0.2 * 0.3 * 0.2 * partwise::GRAVITY;
-    let total: DVec3 = result.part_results.iter().map(|p| p.gravity).sum();
+    let options = CoupledOptions { least_move_m: 1e-5, max_steps: 200, ..Default::default() };
+    let result =
+        settle(&mesh, &far_away(), &fabric(60.0), &held, |t: &Topology| pieces(&mesh, t, 0.05), &options).unwrap();
+    let weight = 0.2 * 0.3 * 0.2 * GRAVITY;
+    let total: DVec3 = result.parts.iter().map(|p| p.gravity).sum();
     assert!((total + DVec3::Z * weight).length() < 1e-9 * weight);
-    for part in &result.part_results {
+    for part in result.parts.iter().filter(|p| !p.held) {
         assert!(!part.in_contact && part.resultant == 0.0);
-        if !part.held {
-            assert!((part.gravity + part.reaction + part.pull).length() < 1e-5 * weight);
-        }
+        let left = (part.gravity + part.reaction + part.pull).length();
+        assert!(left < 0.02 * weight, "{left} of {weight} N are left");
     }
-    assert!(result.part_results.iter().any(|p| p.held));
+    assert!(result.residual_over_weight < 1e-3, "{}", result.residual_over_weight);
+    assert!(result.parts.iter().any(|p| p.held));
 }
 
 #[test]
@@ -186,20 +225,12 @@ fn a_sheet_that_falls_on_a_block_rests_on_it() {
     let upright = sheet(24, 24, 0.01);
     let flat = upright.positions.iter().map(|p| DVec3::new(p.x - 0.12, -p.z - 0.12, 0.03)).collect();
     let mesh = upright.with_positions(flat);
-    let topology = Topology::new(&mesh);
-    let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(60.0), cube(DVec3::new(0.0, 0.0, -0.1), 0.1));
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &[] };
-    let parts = pieces(&mesh, &topology, 10.0);
-    // Nearer to rest than a preview, so that the reaction is the weight.
-    let extents_m = vec![0.06, 0.03];
-    let options = CoupledOptions { extents_m, tolerance: 1e-2, least_move_m: 1e-3, ..Default::default() };
-    let result = solve(&garment, &body, &parts, &mesh.positions, &options).unwrap();
-    assert_eq!(result.stages.len(), 2);
-    assert!(result.stages[1].part_count > result.stages[0].part_count);
+    let body = cube(DVec3::new(0.0, 0.0, -0.1), 0.1);
+    let options = CoupledOptions { least_move_m: 3e-4, ..Default::default() };
+    let result = settle(&mesh, &body, &fabric(60.0), &[], |t: &Topology| pieces(&mesh, t, 0.06), &options).unwrap();
     assert!(body.nearest_all(&result.positions).iter().all(|p| p.signed_distance > 0.0));
-    let weight = 0.24 * 0.24 * 0.2 * partwise::GRAVITY;
-    let carried: f64 = result.part_results.iter().map(|p| p.reaction.z).sum();
+    let weight = 0.24 * 0.24 * 0.2 * GRAVITY;
+    let carried: f64 = result.parts.iter().map(|p| p.reaction.z).sum();
     assert!((carried / weight - 1.0).abs() < 0.02, "{carried} of {weight} N");
     // The middle lies on the block, the corners hang over its edge.
     assert!(result.positions[12 * 25 + 12].z < 0.004);
@@ -207,37 +238,28 @@ fn a_sheet_that_falls_on_a_block_rests_on_it() {
 }
 
 #[test]
-fn the_same_bits_twice_and_on_one_thread() {
-    let mesh = sheet(20, 20, 0.01);
-    let topology = Topology::new(&mesh);
-    let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(60.0), cube(DVec3::new(0.1, 0.12, -0.1), 0.1));
-    let held: Vec<u32> = vec![0, 20];
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &held };
-    let parts = pieces(&mesh, &topology, 10.0);
-    let options = CoupledOptions { extents_m: vec![0.05], ..Default::default() };
-    let run = || solve(&garment, &body, &parts, &mesh.positions, &options).unwrap().positions;
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run);
-    let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap().install(run);
-    assert!(one == two && one == run());
+fn vertices_in_no_level_go_with_the_nearest_part() {
+    let mesh = sheet(10, 30, 0.01);
+    let depth: Vec<f64> = mesh.positions.iter().map(|x| -x.z).collect();
+    let held: Vec<u32> = (0..=10).collect();
+    // The lowest third is in no level.
+    let parts = |topology: &Topology| levels(topology, &depth, &[0.0, 10.0, 20.0]);
+    assert!(parts(&Topology::new(&mesh)).unassigned > 100);
+    let result = settle(&mesh, &far_away(), &fabric(60.0), &held, parts, &CoupledOptions::default()).unwrap();
+    let expected = 0.2 * GRAVITY * 0.3 * 0.3 / 120.0;
+    let lower = -result.positions.last().unwrap().z - 0.3;
+    assert!((lower / expected - 1.0).abs() < 0.1, "{lower} against {expected} m");
 }
 
 #[test]
-fn the_blend_keeps_a_rotation_where_translations_tear_it() {
-    let mesh = sheet(24, 24, 0.01);
-    let topology = Topology::new(&mesh);
-    let parts = pieces(&mesh, &topology, 0.08);
-    let coarse = CoarseMesh::new(&mesh, &topology, &parts, &vec![false; mesh.vertex_count()]);
-    let turn = |x: DVec3| DVec3::new(x.x - 0.2 * x.z, 0.1 * x.x, x.z + 0.2 * x.x) - x;
-    let at_nodes: Vec<DVec3> = coarse.nodes_of(&mesh.positions).into_iter().map(turn).collect();
-    let worst = |u: Vec<DVec3>| u.iter().zip(&mesh.positions).map(|(u, &x)| u.distance(turn(x))).fold(0.0, f64::max);
-    let affine = worst(blend(&topology, &parts, &coarse, &mesh.positions, &at_nodes, 4));
-    let translations = worst(smooth_translations(&topology, &parts, &at_nodes));
-    // The Tikhonov term costs two per cent of the linear part.
-    assert!(affine < 5e-4 && translations > 5.0 * affine, "{affine} against {translations}");
-    let shift = vec![DVec3::new(0.1, -0.2, 0.3); parts.len()];
-    let moved = blend(&topology, &parts, &coarse, &mesh.positions, &shift, 5);
-    assert!(moved.iter().all(|u| u.distance(shift[0]) < 1e-14));
+fn the_same_bits_twice_and_on_one_thread() {
+    let mesh = sheet(20, 20, 0.01);
+    let body = cube(DVec3::new(0.1, 0.12, -0.1), 0.1);
+    let parts = |topology: &Topology| pieces(&mesh, topology, 0.05);
+    let run = || settle(&mesh, &body, &fabric(60.0), &[0, 20], parts, &CoupledOptions::default()).unwrap().positions;
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run);
+    let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap().install(run);
+    assert!(one == two && one == run());
 }
 
 #[test]
@@ -255,15 +277,13 @@ fn what_cannot_be_solved_says_why() {
     let mesh = sheet(8, 8, 0.01);
     let topology = Topology::new(&mesh);
     let rest = RestShape::from_edges(&mesh).unwrap();
-    let (cloth, body) = (fabric(60.0), far_away());
-    let garment = Garment { mesh: &mesh, topology: &topology, rest: &rest, fabric: &cloth, held: &[0] };
-    let parts = pieces(&mesh, &topology, 10.0);
-    let run = |extents: &[f64], start: &[DVec3]| {
-        let options = CoupledOptions { extents_m: extents.to_vec(), ..Default::default() };
-        solve(&garment, &body, &parts, start, &options).unwrap_err()
-    };
-    assert!(matches!(run(&[-0.1], &mesh.positions), CoupledError::Extent(e) if e == -0.1));
-    assert!(matches!(run(&[0.05], &mesh.positions[1..]), CoupledError::Count { found: 80, expected: 81, .. }));
-    // A whole sheet as one PART is no cloth.
-    assert!(matches!(run(&[], &mesh.positions), CoupledError::NoCloth { parts: 1 }));
+    let fabric = fabric(60.0);
+    let cloth = Cloth::new(&mesh, &topology, &rest, &fabric, &[0]).unwrap();
+    let garment = Garment { mesh: &mesh, topology: &topology, cloth: &cloth, fabric: &fabric };
+    let options = CoupledOptions::default();
+    let short = solve(&garment, &far_away(), &pieces(&mesh, &topology, 1.0), &mesh.positions[1..], &options);
+    assert!(matches!(short.unwrap_err(), CoupledError::Count { found: 80, expected: 81, .. }));
+    let nowhere = levels(&topology, &[0.5; 81], &[0.0, 10.0]);
+    let none = solve(&garment, &far_away(), &nowhere, &mesh.positions, &options);
+    assert!(matches!(none.unwrap_err(), CoupledError::NoParts));
 }

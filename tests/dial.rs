@@ -151,14 +151,13 @@ fn a_killed_sweep_goes_on_where_it_was() {
 #[test]
 fn a_point_that_fails_is_a_row_and_the_rest_are_done() {
     let bench = Bench::new();
-    let one = "name = \"one level\"\nunit = \"cm\"\nlevels = [[0.0, inf]]\n";
-    bench.write("one.toml", one);
-    bench.write("fails.toml", &format!("{SWEEP}\n[[points]]\ntable = \"one.toml\"\nextent_cm = \"none\"\n"));
+    bench.write("far.toml", "name = \"far\"\nunit = \"cm\"\nlevels = [[500.0, 600.0]]\n");
+    bench.write("fails.toml", &format!("{SWEEP}\n[[points]]\ntable = \"far.toml\"\nextent_cm = \"none\"\n"));
     let output = bench.run(&["sweep", "fails.toml", "--out", "a", "--accuracy", "none", "--format", "json"]);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
     let report = json(&output);
     assert_eq!((&report["failed"], report["rows"].as_array().unwrap().len()), (&1.into(), 6));
-    assert!(report["rows"][5]["error"].as_str().unwrap().contains("no three"), "{}", report["rows"][5]);
+    assert!(report["rows"][5]["error"].as_str().unwrap().contains("none of the garment"), "{}", report["rows"][5]);
     assert_eq!(bench.recording("a").entities["/drape/garment"].rows, 5);
     bench.write("odd.toml", "name = \"odd\"\n[base]\noptions = { speed = 3 }\n[grid]\n");
     bench.refuses(&["sweep", "odd.toml"], "speed");

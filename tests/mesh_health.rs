@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use partwise::distance::Body;
-use partwise::mesh::fit::{Fit, check_near, facing_body};
+use partwise::mesh::fit::{Placement, check_near, facing_body};
 use partwise::mesh::health::health;
 use partwise::mesh::push_out::push_out;
 use partwise::mesh::{MeshError, TriMesh};
@@ -86,7 +86,7 @@ fn a_tube_has_two_loops_and_faces_away_from_what_it_holds() {
     let mut reversed = garment.clone();
     reversed.triangles.iter_mut().for_each(|t| t.reverse());
     assert!(facing_body(&reversed, &body).iter().all(|&facing| facing));
-    let fit = Fit::new(&garment, &body_mesh, &body);
+    let fit = Placement::new(&garment, &body);
     assert_eq!((fit.penetrating_vertices, fit.crossing_pairs), (0, 0));
     assert!((fit.clearance_m.min - 0.1).abs() < 2e-3, "{fit}");
     assert!(check_near(&garment, &body).is_ok());
@@ -106,7 +106,7 @@ fn dents_are_pushed_out_without_turning_a_triangle_over() {
             let dent = (-((turn - PI) / width).powi(2) - (z / (0.5 * width)).powi(2)).exp();
             0.52 - (0.02 + depth) * dent
         });
-        let before = Fit::new(&garment, &body_mesh, &body);
+        let before = Placement::new(&garment, &body);
         let thickness = 0.0005;
         let (pushed, report) = push_out(&garment, &body, thickness);
         assert!(report.found_inside > 0 && report.found_inside == before.penetrating_vertices);
@@ -138,7 +138,7 @@ fn the_same_bits_come_out_on_one_thread_and_on_three() {
             let garment = tube(31, 120, 0.3, |turn, z| 0.5 + 0.02 * (5.0 * turn).sin() + 0.1 * z);
             let (pushed, report) = push_out(&garment, &body, 0.0);
             assert_eq!(report.left_inside, 0, "{report}");
-            (Fit::new(&garment, &body_mesh, &body), pushed, report)
+            (Placement::new(&garment, &body), pushed, report)
         })
     };
     let one = run(1);

@@ -47,11 +47,11 @@ pub enum AccuracyError {
         expected: usize,
     },
     /// A coordinate that is not finite.
-    #[error("vertex {vertex} (from 0) of {what} is not finite: the solve that made it has failed")]
+    #[error("vertex number {} of {what} is not finite: the solve that made it has failed", .vertex + 1)]
     NotFinite {
         /// Which list.
         what: &'static str,
-        /// The vertex.
+        /// The vertex, from 0.
         vertex: usize,
     },
     /// No surface to measure to.

@@ -4,25 +4,23 @@
 //! garment's positions and triangles, the rest shape, the fabric, the body, the held vertices, the start and the solver's
 //! options. Numbers enter by their bits, lists with their lengths, so two inputs never share a key by running together.
 //!
-//! A file holds: 8 bytes of magic, the key, then little-endian u64 steps and vertex count, f64 energy (J), residual over weight
-//! and seconds, 3 f64 a vertex (m), and the BLAKE3 hash of all before it. It is written beside its final name and renamed,
-//! so a reader never sees half of one. A file that does not match its hash, its key or its garment is no error: the reference
-//! is computed again, and the caller gets a warning to show.
+//! A file is the key and the reference, [sealed](crate::sealed). It is written whole or not at all, so a reader never sees
+//! half of one. A file that does not match its hash, its key or its garment is no error: the reference is computed again,
+//! and the caller gets a warning to show.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, TriMesh};
+use crate::sealed::{self, Kind};
+use crate::whole_file::WholeFile;
 
 /// First bytes of a file, and part of every key; the digit goes up with the format and with the mechanics, so that a drape
 /// of an older solver is never taken for the reference of a newer one.
-const MAGIC: &[u8; 8] = b"PWREF\x003\n";
-
-/// Length of a BLAKE3 hash.
-const HASH: usize = blake3::OUT_LEN;
+const KIND: &Kind = b"PWREF\x004\n";
 
 /// What a reference depends on.
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +50,7 @@ impl ReferenceKey {
     #[must_use]
     pub fn new(input: &ReferenceInput<'_>) -> Self {
         let mut hash = Hasher(blake3::Hasher::new());
-        hash.bytes(MAGIC);
+        hash.bytes(KIND);
         hash.bytes(env!("CARGO_PKG_VERSION").as_bytes());
         for mesh in [input.garment, input.body] {
             hash.points(&mesh.positions);
@@ -105,9 +103,10 @@ impl Hasher {
 }
 
 /// A converged drape.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reference {
     /// Vertex positions, m.
+    #[serde(with = "sealed::points")]
     pub positions: Vec<DVec3>,
     /// Energy, J.
     pub energy_j: f64,
@@ -143,12 +142,12 @@ impl ReferenceCache {
         Self { directory: directory.into() }
     }
 
-    /// The user's cache: `$XDG_CACHE_HOME/partwise/references`, or under `~/.cache`; `None` where neither variable is set.
+    /// The user's cache (`$XDG_CACHE_HOME/partwise/references`, or under `~/.cache`, on Linux; where the system keeps
+    /// caches elsewhere); `None` where the user has no home.
     #[must_use]
     pub fn in_user_cache() -> Option<Self> {
-        let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|p| p.is_absolute());
-        let base = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
-        Some(Self::new(base.join("partwise").join("references")))
+        let folders = directories::ProjectDirs::from("", "", "partwise")?;
+        Some(Self::new(folders.cache_dir().join("references")))
     }
 
     /// Where the references are.
@@ -170,9 +169,11 @@ impl ReferenceCache {
         let path = self.directory.join(key.file_name());
         let mut warnings = Vec::new();
         match std::fs::read(&path) {
-            Ok(bytes) => match decode(&bytes, key, vertices) {
-                Some(reference) => return Ok(Found { reference, cached: true, warnings }),
-                None => {
+            Ok(bytes) => match sealed::open::<([u8; blake3::OUT_LEN], Reference)>(KIND, &bytes) {
+                Some((of, reference)) if of == *key.0.as_bytes() && reference.positions.len() == vertices => {
+                    return Ok(Found { reference, cached: true, warnings });
+                }
+                _ => {
                     warnings.push(format!("a cached reference is damaged and was computed again: {}", path.display()));
                 }
             },
@@ -180,63 +181,14 @@ impl ReferenceCache {
             Err(e) => warnings.push(format!("a cached reference cannot be read ({e}): {}", path.display())),
         }
         let reference = compute()?;
-        if let Err(e) = self.write(&path, &encode(&reference, key)) {
+        if let Err(e) = self.write(&path, key, &reference) {
             warnings.push(format!("the reference cannot be kept for the next run ({e}): {}", path.display()));
         }
         Ok(Found { reference, cached: false, warnings })
     }
 
-    fn write(&self, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    fn write(&self, path: &Path, key: &ReferenceKey, reference: &Reference) -> std::io::Result<()> {
         std::fs::create_dir_all(&self.directory)?;
-        // The process's own name, so that two runs never write into one file.
-        let temporary = path.with_extension(format!("{}.part", std::process::id()));
-        let written = std::fs::File::create(&temporary).and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        });
-        let renamed = written.and_then(|()| std::fs::rename(&temporary, path));
-        if renamed.is_err() {
-            // Nothing to add if this fails too: the first error is the one to tell.
-            let _ = std::fs::remove_file(&temporary);
-        }
-        renamed
+        WholeFile::write(path, sealed::seal(KIND, &(key.0.as_bytes(), reference))?)
     }
-}
-
-fn encode(reference: &Reference, key: &ReferenceKey) -> Vec<u8> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(key.0.as_bytes());
-    bytes.extend(reference.steps.to_le_bytes());
-    bytes.extend((reference.positions.len() as u64).to_le_bytes());
-    let numbers = [reference.energy_j, reference.residual_over_weight, reference.seconds];
-    let all = numbers.into_iter().chain(reference.positions.iter().flat_map(DVec3::to_array));
-    bytes.extend(all.flat_map(f64::to_le_bytes));
-    let sum = blake3::hash(&bytes);
-    bytes.extend(sum.as_bytes());
-    bytes
-}
-
-fn decode(bytes: &[u8], key: &ReferenceKey, vertices: usize) -> Option<Reference> {
-    let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(HASH)?)?;
-    if blake3::hash(body).as_bytes() != sum {
-        return None;
-    }
-    let rest = body.strip_prefix(MAGIC)?.strip_prefix(key.0.as_bytes())?;
-    let words: Vec<u64> = rest.chunks_exact(8).filter_map(|c| c.try_into().ok()).map(u64::from_le_bytes).collect();
-    let (head, positions) = words.split_at_checked(5)?;
-    if head[1] != vertices as u64 || positions.len() != 3 * vertices {
-        return None;
-    }
-    let number = |i: usize| f64::from_bits(head[i]);
-    let positions: Vec<DVec3> = positions
-        .chunks_exact(3)
-        .map(|c| DVec3::new(f64::from_bits(c[0]), f64::from_bits(c[1]), f64::from_bits(c[2])))
-        .collect();
-    Some(Reference {
-        positions,
-        energy_j: number(2),
-        residual_over_weight: number(3),
-        steps: head[0],
-        seconds: number(4),
-    })
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 use partwise::fabric;
-use partwise::mesh::WholeFile;
 use partwise::mesh::export::write_mesh;
 use partwise::range_table::RangeTable;
 use partwise::shapes::body::DressForm;
 use partwise::shapes::garment::{BUILT_IN, GarmentSpec, garment_on};
+use partwise::whole_file::WholeFile;
 use rayon::prelude::*;
 
 use super::console;
@@ -64,6 +64,6 @@ impl AssetsArgs {
 
     fn text(&self, name: &str, text: &str) -> anyhow::Result<()> {
         let path = self.path(name);
-        WholeFile::write(&path, text.as_bytes()).with_context(|| format!("{}: cannot be written", path.display()))
+        WholeFile::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))
     }
 }

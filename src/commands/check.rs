@@ -2,7 +2,8 @@
 
 use clap::Args;
 use comfy_table::{Table, presets};
-use partwise::mesh::fit::Fit;
+use partwise::SceneSpec;
+use partwise::mesh::fit::Placement;
 use partwise::mesh::health::{Health, health};
 use serde::Serialize;
 
@@ -30,7 +31,7 @@ pub(crate) struct CheckArgs {
 struct Report {
     body: Health,
     garment: Health,
-    fit: Fit,
+    fit: Placement,
     notes: Vec<String>,
 }
 
@@ -38,14 +39,16 @@ impl CheckArgs {
     /// Prints the report.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         // As they came: what push-out would mend is a finding here.
-        let input = self.input.unmended(self.body_file.as_deref(), self.garment_file.as_deref());
-        let loaded = input.load()?;
+        let mut spec = SceneSpec { push_out: false, ..self.input.spec()? };
+        spec.body = self.body_file.clone().unwrap_or(spec.body);
+        spec.garment = self.garment_file.clone().unwrap_or(spec.garment);
+        let loaded = self.input.load(&spec)?;
         let scene = &loaded.scene;
         let report = Report {
-            body: health(&scene.body_mesh),
+            body: health(scene.body.mesh()),
             garment: health(&scene.garment),
-            fit: Fit::new(&scene.garment, &scene.body_mesh, &scene.body),
-            notes: loaded.notes,
+            fit: Placement::new(&scene.garment, &scene.body),
+            notes: loaded.notes(),
         };
         if self.format == Format::Json {
             console::result(&serde_json::to_string(&report)?);

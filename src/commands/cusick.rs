@@ -2,24 +2,27 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 use comfy_table::{Table, presets};
-use partwise::fabric::BUILT_IN;
+use partwise::fabric::{BUILT_IN, Fabric};
 use partwise::mechanics::cusick::results_csv;
-use partwise::mesh::WholeFile;
+use partwise::whole_file::WholeFile;
 
-use super::console;
+use super::failure::UserError;
+use super::{console, interrupt};
+
+/// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
+const MOST_ROWS: u64 = 100;
 
 /// Arguments of `cusick`.
 #[derive(Debug, Args)]
 pub(crate) struct CusickArgs {
-    /// Built-in fabrics to test [default: all of them]
-    #[arg(value_name = "FABRIC")]
+    /// Fabrics to test: built-in names or TOML files [default: all that are built in]
+    #[arg(value_name = "NAME|FILE")]
     fabrics: Vec<String>,
-    /// Rows of the mesh from the plates' edge to the rim: 12 is half a centimetre
-    #[arg(long, value_name = "N", default_value_t = 12)]
-    rows: usize,
+    /// Rows of the mesh from the plates' edge to the rim, 4 to 100: 12 is half a centimetre
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(4..=MOST_ROWS))]
+    rows: u64,
     /// Write the results to this file as well, as CSV
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
@@ -32,10 +35,14 @@ impl CusickArgs {
             [] => BUILT_IN.to_vec(),
             some => some.iter().map(String::as_str).collect(),
         };
+        // Before any of them is draped.
+        names.iter().try_for_each(|name| Fabric::by_name(name).map(|_| ()))?;
+        // Seconds a fabric, and nothing is written before the last.
+        interrupt::listen_at_once();
         let bar = console::progress(Some(names.len() as u64), "drape test");
         let mut csv = String::new();
         for name in names {
-            let one = results_csv(&[name], self.rows)?;
+            let one = results_csv(&[name], usize::try_from(self.rows)?)?;
             let (header, row) = one.split_once('\n').unwrap_or((&one, ""));
             if csv.is_empty() {
                 csv = format!("{header}\n");
@@ -45,7 +52,9 @@ impl CusickArgs {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.csv {
-            WholeFile::write(path, csv.as_bytes()).with_context(|| format!("{}: cannot be written", path.display()))?;
+            WholeFile::write(path, &csv).map_err(|e| {
+                UserError::new(format!("{}: cannot be written: {e}; choose another file with --csv", path.display()))
+            })?;
         }
         let mut table = Table::new();
         table.load_preset(presets::UTF8_FULL_CONDENSED);

@@ -3,13 +3,13 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use partwise::distance::DistanceError;
 use partwise::fabric::FabricError;
+use partwise::files::Unreadable;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
-use partwise::mesh::rest::RestError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
+use partwise::scene::SceneError;
 use partwise::shapes::ShapeError;
 use partwise::sweep::{MergeError, PlanError, StoreError};
 use partwise::table_search::SearchError;
@@ -33,22 +33,22 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
 }
 
 fn users_own(cause: &(dyn Error + 'static)) -> bool {
-    let recording = cause.downcast_ref::<RecordError>().is_some_and(|e| {
-        !matches!(e, RecordError::Incomplete { .. } | RecordError::Mismatch { .. } | RecordError::Rerun(_))
-    });
-    recording
+    let store = |error: &StoreError| !matches!(error, StoreError::Write { .. } | StoreError::Io { .. });
+    cause.downcast_ref::<RecordError>().is_some_and(RecordError::is_users)
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
-        || cause.is::<RestError>()
-        || cause.is::<DistanceError>()
+        || cause.is::<SceneError>()
+        || cause.is::<Unreadable>()
         || cause.is::<TableError>()
         || cause.is::<FabricError>()
         || cause.is::<ShapeError>()
         || cause.is::<PaperError>()
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
-        || cause
-            .downcast_ref::<StoreError>()
-            .is_some_and(|e| !matches!(e, StoreError::Write { .. } | StoreError::Io { .. }))
-        || cause.downcast_ref::<MergeError>().is_some_and(|e| !matches!(e, MergeError::Store(_)))
+        || cause.downcast_ref::<StoreError>().is_some_and(store)
+        || cause.downcast_ref::<MergeError>().is_some_and(|error| match error {
+            // Said in the store's own words, so it is no cause of its own.
+            MergeError::Store(error) => store(error),
+            _ => true,
+        })
 }

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
+use partwise::files::read_text;
 use partwise::shapes::BodySpec;
-
-use super::inputs::read_text;
 
 /// Measurements of the built-in dress form, in centimetres. What is left out is European size 38.
 #[derive(Debug, Clone, Args)]
@@ -45,6 +44,12 @@ impl MeasurementArgs {
     /// The file, for `--watch`.
     pub(crate) fn file(&self) -> Option<&Path> {
         self.measurements.as_deref()
+    }
+
+    /// Where measurements that make no body were given, for the messages.
+    pub(crate) fn place(&self) -> String {
+        let flags = "--bust, --waist, --measure and the like";
+        self.file().map_or_else(|| flags.to_owned(), |file| format!("{}, or {flags}", file.display()))
     }
 
     /// File and flags together.

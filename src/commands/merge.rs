@@ -10,9 +10,9 @@ use partwise::sweep::{Status, merge, store};
 
 use super::console;
 use super::sinks::SinkArgs;
-use super::sweep::kept::Shelf;
 use super::sweep::record_all;
 use super::sweep::report::{Format, Report};
+use super::sweep::store::PointStore;
 
 /// Arguments of `merge`.
 #[derive(Debug, Clone, Args)]
@@ -36,17 +36,17 @@ impl MergeArgs {
         let started = Instant::now();
         let rows = merge(&self.shards, &self.out)?;
         let (manifest, _) = store::read(&self.out)?;
-        let shelf = Shelf::in_folder(&self.out);
-        let sources: Vec<Shelf> = self.shards.iter().map(|folder| Shelf::in_folder(folder)).collect();
+        let points = PointStore::in_folder(&self.out);
+        let sources: Vec<PointStore> = self.shards.iter().map(|folder| PointStore::in_folder(folder)).collect();
         for row in rows.iter().filter(|row| row.status == Status::Ok) {
             for source in &sources {
-                let taken = shelf.adopt(source, &row.point);
+                let taken = points.adopt(source, &row.point);
                 if taken.with_context(|| format!("{}: cannot keep a point", self.out.display()))? {
                     break;
                 }
             }
         }
-        let recordings = record_all(&rows, &shelf, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
+        let recordings = record_all(&rows, &points, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &manifest.name,
             folder: self.out.display().to_string(),

@@ -19,6 +19,7 @@ mod sweep;
 mod tune;
 mod view;
 mod watch;
+mod work;
 
 use std::process::ExitCode;
 
@@ -103,6 +104,7 @@ pub(crate) fn main() -> ExitCode {
     };
     match outcome {
         Ok(()) if interrupt::requested() => ExitCode::from(130),
+        Ok(()) if !console::all_printed() => ExitCode::FAILURE,
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             console::error(&error);

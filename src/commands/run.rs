@@ -1,22 +1,22 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use partwise::accuracy::reference::ReferenceCache;
-use partwise::assess::{AssessOptions, Assessment, assess};
-use partwise::drape::{Drape, Settings, drape};
-use partwise::mechanics::refine::Observer;
-use partwise::record::{Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::Job;
+use partwise::drape::Drape;
+use partwise::job::{Against, Measured};
+use partwise::record::{FoldView, Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::scene::Loaded;
 
-use super::inputs::{InputArgs, Inputs};
+use super::inputs::InputArgs;
 use super::sinks::SinkArgs;
 use super::stages::StageArgs;
 use super::summary::{Summary, ms};
 use super::watch::FileWatch;
+use super::work::{cache, refining, use_threads};
 use super::{console, failure::UserError, interrupt};
 
 /// What stdout is for.
@@ -65,12 +65,21 @@ pub(crate) struct RunArgs {
 
 /// A garment through every stage.
 struct Solved {
-    inputs: Inputs,
-    settings: Settings,
+    job: Job,
+    loaded: Loaded,
     drape: Drape,
-    assessment: Option<Assessment>,
+    measured: Measured,
     snapshots: Vec<Snapshot>,
     summary: Summary,
+}
+
+impl Solved {
+    /// What the tab *Fit* shows side by side.
+    fn fit(&self) -> Vec<String> {
+        let of_cloth = if self.drape.state.is_some() { &["strain", "pressure"][..] } else { &[] };
+        let folds = self.drape.folds.is_some().then_some("folds");
+        of_cloth.iter().copied().chain(folds).map(str::to_owned).collect()
+    }
 }
 
 /// The cloth at one of the solver's steps; the mesh every so often.
@@ -88,12 +97,14 @@ impl RunArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        interrupt::listen();
-        let mut solved = self.solve(None)?;
+        self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
+        interrupt::listen_at_once();
+        let start = Instant::now();
+        let mut solved = self.solve(self.job()?, start, None)?;
         let mut recorder = Recorder::open(self.record_options(&solved))?;
         self.record(&mut recorder, &mut solved, 0)?;
         if let Some(path) = &self.export {
-            solved.inputs.export(path, &solved.drape.positions)?;
+            solved.loaded.write(path, &solved.drape.positions)?;
             solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
         }
         if self.watch || self.sinks.serve {
@@ -122,15 +133,15 @@ impl RunArgs {
 
     fn record_options(&self, solved: &Solved) -> RecordOptions {
         RecordOptions {
-            sinks: self.sinks.sinks(&solved.inputs.garment_name),
-            name: solved.inputs.garment_name.clone(),
+            sinks: self.sinks.sinks(&solved.loaded.garment_name),
+            name: solved.loaded.garment_name.clone(),
             layout: Layout {
                 several_tables: self.watch,
                 follow: self.watch,
                 iterations: self.records_iterations() && solved.snapshots.len() > 1,
-                error: solved.assessment.is_some(),
-                wrinkles: solved.assessment.is_some(),
-                fit: if solved.drape.state.is_some() { vec!["strain".into(), "pressure".into()] } else { Vec::new() },
+                error: solved.measured.assessment.is_some(),
+                wrinkles: solved.measured.assessment.is_some(),
+                fit: solved.fit(),
                 ..Layout::default()
             },
             replaceable: self.watch,
@@ -138,16 +149,21 @@ impl RunArgs {
         }
     }
 
-    /// Reads what is to be read, the quick files first, and runs every stage; `kept` saves reading body and garment again.
-    fn solve(&self, kept: Option<Inputs>) -> anyhow::Result<Solved> {
-        let start = Instant::now();
+    /// The job that the flags ask for, its small files read.
+    fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
-        let inputs = kept.map_or_else(|| self.input.load(), Ok)?;
+        let accuracy = if self.accuracy { Against::Own } else { Against::None };
+        Ok(Job { scene: self.input.spec()?, settings, seed: 0, accuracy, spread_starts: self.spread })
+    }
+
+    /// Runs every stage of a job; `kept` saves reading body and garment again.
+    fn solve(&self, mut job: Job, start: Instant, kept: Option<Loaded>) -> anyhow::Result<Solved> {
+        let loaded = kept.map_or_else(|| self.input.load(&job.scene), Ok)?;
         let load = start.elapsed();
-        let name = &inputs.garment_name;
+        let name = &loaded.garment_name;
         let mut snapshots = Vec::new();
         let drape = refining(name, |progress| {
-            drape(&inputs.scene, &settings, &mut |step| {
+            job.drape(&loaded.scene, &mut |step| {
                 let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
                 snapshots.push(Snapshot {
                     iteration: step.iteration,
@@ -158,34 +174,25 @@ impl RunArgs {
                 progress(step)
             })
         })?;
-        let options = AssessOptions { cache: self.cache(), spread_starts: self.spread };
-        let assessment = if self.accuracy && !interrupt::requested() {
-            let what = format!("{name}: references");
-            Some(refining(&what, |progress| assess(&inputs.scene, &settings, &drape, &options, progress))?)
-        } else {
-            None
-        };
-        let mut summary = Summary::new([&inputs.body_name, &inputs.garment_name], &inputs.scene, &settings, &drape);
-        summary.timings_ms.insert("load", ms(load));
-        summary.warnings.splice(0..0, inputs.warnings.iter().cloned());
-        if let Some(assessment) = &assessment {
-            summary.assessed(assessment);
+        let cache = cache(self.cache.as_ref());
+        if interrupt::requested() {
+            job.accuracy = Against::None;
         }
-        Ok(Solved { inputs, settings, drape, assessment, snapshots, summary })
+        let what = format!("{name}: references");
+        let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
+        let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
+        summary.timings_ms.insert("load", ms(load));
+        Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 
     fn records_iterations(&self) -> bool {
         !self.watch && !self.no_iterations
     }
 
-    fn cache(&self) -> Option<ReferenceCache> {
-        self.cache.clone().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
-    }
-
     fn record(&self, recorder: &mut Recorder, solved: &mut Solved, index: i64) -> anyhow::Result<()> {
         let start = Instant::now();
-        let scene = &solved.inputs.scene;
-        recorder.body(index, &scene.body_mesh)?;
+        let scene = &solved.loaded.scene;
+        recorder.body(index, scene.body.mesh())?;
         recorder.garment(index, &scene.garment)?;
         let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
         let mut overlays = Vec::new();
@@ -193,22 +200,30 @@ impl RunArgs {
             overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
             overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
         }
-        let mut scalars = Vec::new();
-        if let Some(assessment) = &solved.assessment {
-            overlays.push(Overlay { name: "error", unit: "mm", values: &assessment.error_mm });
-            scalars.push(("error/rms_mm", assessment.accuracy.vertices.rms_mm));
+        if let Some(folds) = &solved.drape.folds {
+            overlays.push(Overlay { name: "folds", unit: "%", values: &folds.excess_percent });
         }
+        if solved.measured.assessment.is_some() {
+            overlays.push(Overlay { name: "error", unit: "mm", values: &solved.measured.error_mm });
+        }
+        let mut scalars = solved.summary.figures.scalars();
+        scalars.retain(|(name, _)| name.starts_with("error/"));
         recorder.step(&StepView {
             index,
             distance_m: &solved.drape.distance,
             part_of_vertex: &solved.drape.parts.part_of_vertex,
             part_force_n: &forces,
             draped: &solved.drape.positions,
-            panel: &solved.summary.panel(&solved.settings.fabric),
+            panel: &solved.summary.panel(&solved.job.settings.fabric),
             scalars: &scalars,
             overlays: &overlays,
         })?;
-        if let Some(assessment) = &solved.assessment {
+        if let Some(folds) = &solved.drape.folds {
+            let draped = &solved.drape.positions;
+            let (excess_percent, across) = (&folds.excess_percent, &folds.across);
+            recorder.folds(&FoldView { index, draped, excess_percent, across })?;
+        }
+        if let Some(assessment) = &solved.measured.assessment {
             let joining = scene.topology.edges.as_slice();
             let seams = solved.drape.parts.seams.iter().zip(&assessment.wrinkles.seams);
             let jumps_mm: Vec<([u32; 2], f64)> = seams
@@ -237,8 +252,8 @@ impl RunArgs {
         for warning in &solved.summary.warnings {
             console::warning(warning);
         }
-        for note in &solved.inputs.notes {
-            console::note(note);
+        for note in solved.loaded.notes() {
+            console::note(&note);
         }
         match self.format {
             Format::Text => console::result(&solved.summary.text()),
@@ -249,8 +264,10 @@ impl RunArgs {
 
     /// Streams a new step after each edit; an edit that does not read leaves the last good state on the page.
     fn keep_watching(&self, recorder: &mut Recorder, solved: Solved) -> anyhow::Result<()> {
+        let of_meshes: Vec<PathBuf> =
+            solved.job.scene.files().into_iter().chain(self.input.measurements()).map(Path::to_path_buf).collect();
         let files: Vec<PathBuf> =
-            self.input.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
+            of_meshes.iter().cloned().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         if files.is_empty() {
             return Err(UserError::new(
                 "--watch has no file to watch: everything is built in. Give --table, --fabric, --body or --garment a file",
@@ -260,14 +277,15 @@ impl RunArgs {
         let mut watch = FileWatch::new(files)?;
         console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
         let mut index = 0;
-        let mut last = Some(solved.inputs);
+        let mut last = Some(solved.loaded);
         while let Some(changed) = watch.changed() {
             // Body and garment take a second to make; a new table need not wait for them.
-            let meshes_stand = changed.iter().all(|file| !self.input.files().contains(&file.as_path()));
+            let meshes_stand = changed.iter().all(|file| !of_meshes.contains(file));
             let kept = last.take_if(|_| meshes_stand);
             // A file that does not read is found before what is kept is used up.
-            let solved = match self.stages.settings() {
-                Ok(_) => self.solve(kept),
+            let start = Instant::now();
+            let solved = match self.job() {
+                Ok(job) => self.solve(job, start, kept),
                 Err(error) => {
                     last = kept;
                     Err(error)
@@ -278,7 +296,7 @@ impl RunArgs {
                     index += 1;
                     self.record(recorder, &mut solved, index)?;
                     self.print(&solved)?;
-                    last = Some(solved.inputs);
+                    last = Some(solved.loaded);
                 }
                 Err(error) => {
                     console::error(&error);
@@ -288,24 +306,4 @@ impl RunArgs {
         }
         Ok(())
     }
-}
-
-/// Sets the size of the thread pool.
-pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
-    match threads {
-        None => Ok(()),
-        Some(0) => Err(UserError::new("--threads 0: found 0, expected at least 1; leave it out for one per core")),
-        Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?),
-    }
-}
-
-/// Runs `work` with the solver's progress shown and Ctrl-C heard.
-pub(crate) fn refining<T>(what: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
-    let bar = console::progress(None, what);
-    let out = work(&mut |step| {
-        bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
-        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    bar.finish_and_clear();
-    out
 }

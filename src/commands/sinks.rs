@@ -1,10 +1,13 @@
 //! Where the recording goes: arguments shared by every command that records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use partwise::record::Sink;
+use partwise::whole_file::same_place;
+
+use super::failure::UserError;
 
 /// Where the views of a recording look from when it opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -59,11 +62,31 @@ pub(crate) struct SinkArgs {
 }
 
 impl SinkArgs {
+    /// Refuses an output that would be written over the recording, or over another output.
+    pub(crate) fn refuse_twice(&self, outputs: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
+        let all = std::iter::once(("--save", self.save.as_deref())).chain(outputs.iter().copied());
+        let given: Vec<(&str, &Path)> = all.filter_map(|(flag, path)| Some((flag, path?))).collect();
+        for (i, (flag, path)) in given.iter().enumerate() {
+            if let Some((other, _)) = given[..i].iter().find(|(_, before)| same_place(before, path)) {
+                let path = path.display();
+                return Err(UserError::new(format!(
+                    "{path}: found both {other} and {flag} writing here, expected two files; give one of them another name"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// The sinks asked for; `name` names the file where the user did not.
     pub(crate) fn sinks(&self, name: &str) -> Vec<Sink> {
+        self.sinks_in(Path::new("recordings"), name)
+    }
+
+    /// The same with the file in another folder.
+    pub(crate) fn sinks_in(&self, folder: &Path, name: &str) -> Vec<Sink> {
         let mut sinks = Vec::new();
         if !self.no_save {
-            let default = || PathBuf::from("recordings").join(format!("{name}.rrd"));
+            let default = || folder.join(format!("{name}.rrd"));
             sinks.push(Sink::File(self.save.clone().unwrap_or_else(default)));
         }
         if self.spawn {

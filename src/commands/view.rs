@@ -1,10 +1,12 @@
 //! `partwise view`: any recording in the bundled web viewer.
 
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 use clap::Args;
 use partwise::record::web;
 
+use super::failure::UserError;
 use super::{console, interrupt};
 
 /// Arguments of `view`.
@@ -19,16 +21,45 @@ pub(crate) struct ViewArgs {
     /// Port the page reads the recording from [default: any free one]
     #[arg(long, value_name = "PORT")]
     grpc_port: Option<u16>,
+    /// Read the recording and end: what `view` itself runs first
+    #[arg(long, hide = true)]
+    check: bool,
 }
 
 impl ViewArgs {
     /// Serves until Ctrl-C.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        if self.check {
+            return Ok(web::check_file(&self.file)?);
+        }
         interrupt::listen();
-        let served = web::serve_file(&self.file, self.web_port, self.grpc_port)?;
+        self.try_to_read()?;
+        // The decoder's panics come back as errors; what they print on the way is for nobody.
+        let loud = std::panic::take_hook();
+        std::panic::set_hook(Box::new(|_| {}));
+        let served = web::serve_file(&self.file, self.web_port, self.grpc_port);
+        std::panic::set_hook(loud);
+        let served = served?;
         console::result(served.url());
         console::note("open this address in a browser; Ctrl-C ends");
         interrupt::wait();
         Ok(())
+    }
+
+    /// Reads the file in a process of its own. Rerun's decoder believes the sizes it finds, and a recording that came from
+    /// somewhere and is damaged can end the process that reads it in ways that no error handling hears of.
+    fn try_to_read(&self) -> anyhow::Result<()> {
+        let mut reader = Command::new(std::env::current_exe()?);
+        reader.arg("view").arg("--check").arg(&self.file);
+        let ended = reader.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status()?;
+        // What it could say well we are about to say ourselves.
+        if matches!(ended.code(), Some(0 | 2)) || interrupt::requested() {
+            return Ok(());
+        }
+        Err(UserError::new(format!(
+            "{}: found a damaged recording (its decoder broke off: {ended}), expected an .rrd file as `partwise run --save \
+             FILE.rrd` writes; make it again, or copy it again",
+            self.file.display()
+        )))
     }
 }

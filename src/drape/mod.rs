@@ -3,6 +3,7 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
+mod error;
 mod settings;
 
 use std::ops::ControlFlow;
@@ -11,14 +12,18 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::distance::{Body, SurfacePoint};
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
+use crate::mechanics::coupled::{self, CoupledOptions, Garment};
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{Fit, fit};
-use crate::mechanics::paper::{self, PaperError, PartForces};
-use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, SolveError, Stop};
+use crate::mechanics::folds::{Folds, folds};
+use crate::mechanics::paper::{self, PartForces};
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::{Parts, segment};
-pub use settings::{Model, Refine, Scene, Settings};
+use crate::range_table::RangeTable;
+pub use crate::scene::Scene;
+pub use error::DrapeError;
+pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
 /// How long each stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -32,6 +37,8 @@ pub struct StageTimes {
     /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked
     /// for, though the preview's energy and residual are still measured.
     pub refine: Duration,
+    /// All of it, start to end; more than the sum by what lies between.
+    pub total: Duration,
 }
 
 /// The outcome of stage two for one PART.
@@ -69,6 +76,8 @@ pub struct Drape {
     pub surface: Vec<SurfacePoint>,
     /// Unsigned distances to the body, m.
     pub distance: Vec<f64>,
+    /// The range table of stage one, with the rows that its rule made for this garment.
+    pub table: RangeTable,
     /// The PARTs of stage one; cut to an extent where the model does so.
     pub parts: Parts,
     /// How many PARTs the range table alone made.
@@ -77,6 +86,8 @@ pub struct Drape {
     pub outcomes: Vec<PartOutcome>,
     /// The garment after stage two, before any step at full resolution, m.
     pub preview: Vec<DVec3>,
+    /// Cloth that the preview has no room for, and folds of PARTs do not show; the coupled model's alone.
+    pub folds: Option<Folds>,
     /// The displaced garment, m.
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
@@ -93,23 +104,6 @@ pub struct Drape {
     pub warnings: Vec<String>,
 }
 
-/// Why nothing came out.
-#[derive(Debug, thiserror::Error)]
-pub enum DrapeError {
-    /// The equations refused their input.
-    #[error(transparent)]
-    Paper(#[from] PaperError),
-    /// The PARTs could not be solved together.
-    #[error(transparent)]
-    Coupled(#[from] CoupledError),
-    /// The cloth cannot be set up at full resolution.
-    #[error(transparent)]
-    Energy(#[from] EnergyError),
-    /// The cloth cannot be solved at full resolution.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-}
-
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is told of each and may end
 /// them.
 ///
@@ -120,17 +114,24 @@ pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Resu
     rayon::scope(|_| stages(scene, settings, observer))
 }
 
+/// An observer for who does not look.
+pub fn unobserved(_: &refine::Step<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
 fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    let began = Instant::now();
     let mut times = StageTimes::default();
     let needs_cloth = matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0);
     let StageTimes { distance: distance_time, segment: segment_time, .. } = &mut times;
-    let ((surface, distance, parts), cloth) = rayon::join(
-        || {
+    let (first, cloth) = rayon::join(
+        || -> Result<_, DrapeError> {
             let surface = timed(distance_time, || scene.body.nearest_all(&scene.garment.positions));
             // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
             let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
-            let parts = timed(segment_time, || stage_one(scene, settings, &distance));
-            (surface, distance, parts)
+            let table = settings.table.resolve(&distance)?;
+            let parts = timed(segment_time, || stage_one(scene, settings.min_part, &table, &distance));
+            Ok((surface, distance, table, parts))
         },
         || {
             let began = Instant::now();
@@ -138,6 +139,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
             cloth.map(|cloth| (cloth, began.elapsed()))
         },
     );
+    let (surface, distance, table, parts) = first?;
     let (cloth, cloth_time) = cloth?;
     let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();
@@ -145,6 +147,10 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     times.mechanics += cloth_time;
     let stage = stage?;
     warnings.extend(stage.warnings);
+    let preview_folds = match settings.model {
+        Model::Coupled(_) => cloth.as_ref().map(|cloth| folds(cloth, &stage.positions)),
+        Model::Paper(_) => None,
+    };
     let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.positions, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
@@ -158,7 +164,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-    if let (Some((low, _)), true) = (scene.body_mesh.bounds(), state.is_some())
+    if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
         && positions.iter().all(|x| x.z < low.z)
     {
         warnings.push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
@@ -166,15 +172,19 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let inside =
         scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
     let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
+    let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
+    times.total = began.elapsed();
     Ok(Drape {
         surface,
         distance,
+        table,
         parts: stage.parts,
         level_part_count,
         outcomes: stage.outcomes,
         preview: stage.positions,
+        folds: preview_folds,
         state,
-        self_intersecting_pairs: self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len(),
+        self_intersecting_pairs,
         positions,
         penetrating_vertices,
         penetration,
@@ -191,14 +201,10 @@ struct StageTwo {
 }
 
 /// Stage one: the PARTs that the range table makes.
-fn stage_one(scene: &Scene, settings: &Settings, distance: &[f64]) -> Parts {
-    let parts = segment(&scene.topology, distance, &settings.table);
-    let joined = if settings.min_part > 1 {
-        parts.join_small(&scene.topology, &scene.garment, settings.min_part)
-    } else {
-        parts
-    };
-    joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &settings.table)
+fn stage_one(scene: &Scene, min_part: usize, table: &RangeTable, distance: &[f64]) -> Parts {
+    let parts = segment(&scene.topology, distance, table);
+    let joined = if min_part > 1 { parts.join_small(&scene.topology, &scene.garment, min_part) } else { parts };
+    joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
 }
 
 fn stage_two(
@@ -213,7 +219,7 @@ fn stage_two(
     match &settings.model {
         Model::Coupled(options) => {
             let made = if cloth.is_none() { Some(full_cloth(scene, settings)?) } else { None };
-            let Some(cloth) = cloth.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
+            let Some(cloth) = cloth.or(made.as_ref()) else { return Err(coupled::CoupledError::NoParts.into()) };
             let garment = Garment { mesh, topology, cloth, fabric };
             couple(&garment, body, parts, options)
         }
@@ -275,7 +281,7 @@ fn refine_further(
         Refine::Converged => None,
     };
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    let floor = scene.body_mesh.bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
+    let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
     let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {
         // What has fallen past the feet meets nothing any more, and would fall for ever.
         if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }

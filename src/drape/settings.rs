@@ -1,36 +1,29 @@
-//! What a run is given: the scene, the model and its dials.
+//! What a drape is given besides its scene: the dials. Plain data, the same defaults wherever they are filled in.
 
-use crate::distance::Body;
+use serde::{Deserialize, Serialize};
+
 use crate::fabric::Fabric;
-use crate::mechanics::coupled::CoupledOptions;
+use crate::mechanics::coupled::{CoupledOptions, Motion};
 use crate::mechanics::paper::PaperOptions;
-use crate::mesh::{RestShape, Topology, TriMesh};
-use crate::range_table::RangeTable;
+use crate::range_table::{METRES_PER_CM, RangeTable, TableError, TableRule};
 
-/// What is draped over what; stays the same while tables and fabrics vary.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// The body's surface, m.
-    pub body_mesh: TriMesh,
-    /// The same, ready for distance queries.
-    pub body: Body,
-    /// The garment as placed, undraped, m.
-    pub garment: TriMesh,
-    /// Its connectivity.
-    pub topology: Topology,
-    /// Its rest shape.
-    pub rest: RestShape,
-    /// Vertices that stay where they are worn (a waistband's edge).
-    pub held: Vec<u32>,
-}
+/// Extents PARTs are cut to unless asked otherwise, cm: none, so that the table alone makes them.
+pub const DEFAULT_EXTENTS_CM: &[f64] = &[];
 
 /// The two models of stage two.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Model {
     /// Equations (2) to (9) as read in [`paper`](crate::mechanics::paper): every PART for itself.
     Paper(PaperOptions),
-    /// All PARTs at once, as the nodes of a coarse cloth: see [`coupled`](crate::mechanics::coupled).
+    /// All PARTs at once: see [`coupled`](crate::mechanics::coupled).
     Coupled(CoupledOptions),
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self::Coupled(CoupledOptions::default()).with_extents_cm(DEFAULT_EXTENTS_CM)
+    }
 }
 
 impl Model {
@@ -42,10 +35,69 @@ impl Model {
             Self::Coupled(_) => "coupled",
         }
     }
+
+    /// The model of this name with its defaults.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        match name {
+            "paper" => Some(Self::Paper(PaperOptions::default())),
+            "coupled" => Some(Self::default()),
+            _ => None,
+        }
+    }
+
+    /// Cut to these extents along the cloth, coarse to fine; the paper's model has none.
+    #[must_use]
+    pub fn with_extents_cm(mut self, extents_cm: &[f64]) -> Self {
+        if let Self::Coupled(options) = &mut self {
+            options.extents_m = extents_cm.iter().map(|cm| cm / 100.0).collect();
+        }
+        self
+    }
+
+    /// The extents, cm.
+    #[must_use]
+    pub fn extents_cm(&self) -> Vec<f64> {
+        match self {
+            Self::Paper(_) => Vec::new(),
+            // A hundred times what was centimetres is off by an ulp.
+            Self::Coupled(options) => {
+                options.extents_m.iter().map(|m| (m / METRES_PER_CM * 1e6).round() / 1e6).collect()
+            }
+        }
+    }
+
+    /// With PARTs that move like this; those of the paper's model have one displacement whatever is asked.
+    #[must_use]
+    pub fn with_motion(mut self, motion: Motion) -> Self {
+        if let Self::Coupled(options) = &mut self {
+            options.motion = motion;
+        }
+        self
+    }
+
+    /// How its PARTs move.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        match self {
+            Self::Paper(_) => Motion::Translation,
+            Self::Coupled(options) => options.motion,
+        }
+    }
+
+    /// How far `run` goes after stage two unless asked otherwise: the paper stops there.
+    #[must_use]
+    pub fn default_refine(&self) -> Refine {
+        match self {
+            Self::Paper(_) => Refine::Steps(0),
+            Self::Coupled(_) => Refine::Converged,
+        }
+    }
 }
 
 /// How far to go at full resolution after stage two.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Refine {
     /// At most this many Newton steps; 0 is the two-stage scheme alone.
     Steps(usize),
@@ -77,11 +129,12 @@ impl std::str::FromStr for Refine {
     }
 }
 
-/// The dials of one run.
-#[derive(Debug, Clone)]
+/// The dials of one drape. The default is the paper's table, the coupled model and a knit, refined until it rests.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// The range table of stage one.
-    pub table: RangeTable,
+    pub table: TableRule,
     /// PARTs with fewer vertices join a neighbour; 1 keeps the paper's definition.
     pub min_part: usize,
     /// The model of stage two.
@@ -90,4 +143,26 @@ pub struct Settings {
     pub refine: Refine,
     /// The cloth.
     pub fabric: Fabric,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            table: RangeTable::table_3().into(),
+            min_part: 1,
+            model: Model::default(),
+            refine: Refine::default(),
+            fabric: Fabric::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// The same with the table that its rule makes at these distances (m), rows that no longer depend on them.
+    ///
+    /// # Errors
+    /// [`TableError`] where the distances make no table.
+    pub fn resolved(&self, distances_m: &[f64]) -> Result<Self, TableError> {
+        Ok(Self { table: self.table.resolve(distances_m)?.into(), ..self.clone() })
+    }
 }

@@ -48,14 +48,6 @@ pub enum MeshError {
         /// Faces with at least three corners.
         faces: usize,
     },
-    /// The reader refused what passed our own checks.
-    #[error("{file}: cannot be read as OBJ: {reason}; try to export the mesh again", file = file.display())]
-    Refused {
-        /// The file.
-        file: PathBuf,
-        /// What the reader said.
-        reason: String,
-    },
     /// No group of that name.
     #[error("{file}: no group \"{asked}\"; {there_are}", file = file.display(), there_are = list(available))]
     UnknownGroup {
@@ -161,7 +153,7 @@ pub enum MeshError {
 }
 
 /// What can be wrong with one line of an OBJ file.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LineProblem {
     /// Not a number.
     #[error("found \"{found}\", expected a number{}", .of.of())]
@@ -178,6 +170,17 @@ pub enum LineProblem {
     NotFinite {
         /// The word.
         found: String,
+    },
+    /// A number that no mesh of ours has.
+    #[error(
+        "found the coordinate {found}, expected at most {limit:e} either way: no body or garment is that large in any \
+         unit; the export that wrote it went wrong, make it again"
+    )]
+    TooLarge {
+        /// The word.
+        found: String,
+        /// The largest there may be.
+        limit: f64,
     },
     /// Too few numbers.
     #[error("found {found} numbers, expected {expected}{}", .of.of())]

@@ -12,7 +12,7 @@ use super::TriMesh;
 use super::error::MeshError;
 use super::import::Imported;
 use super::topology::NONE;
-use super::whole_file::WholeFile;
+use crate::whole_file::WholeFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
 ///
@@ -32,7 +32,7 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
 
 fn write(path: &Path, text: &str) -> Result<(), MeshError> {
     let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-    WholeFile::write(path, text.as_bytes()).map_err(unwritable)
+    WholeFile::write(path, text).map_err(unwritable)
 }
 
 fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, MeshError> {

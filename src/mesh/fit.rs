@@ -15,7 +15,7 @@ pub const FARTHEST: f64 = 1.0;
 
 /// Body and garment together, in figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fit {
+pub struct Placement {
     /// Garment vertices inside the body.
     pub penetrating_vertices: usize,
     /// The deepest of them, m below the surface.
@@ -26,15 +26,15 @@ pub struct Fit {
     pub clearance_m: Percentiles,
 }
 
-impl Fit {
-    /// Measures; `body_mesh` is the mesh that `body` was made of.
+impl Placement {
+    /// Measures a garment about its body.
     #[must_use]
-    pub fn new(garment: &TriMesh, body_mesh: &TriMesh, body: &Body) -> Self {
+    pub fn new(garment: &TriMesh, body: &Body) -> Self {
         let distance: Vec<f64> = body.nearest_all(&garment.positions).iter().map(|near| near.signed_distance).collect();
         Self {
             penetrating_vertices: distance.iter().filter(|&&q| q < 0.0).count(),
             deepest_m: distance.iter().fold(0.0, |deepest, &q| f64::max(deepest, -q)),
-            crossing_pairs: crossing_pairs(garment, body_mesh).len(),
+            crossing_pairs: crossing_pairs(garment, body.mesh()).len(),
             clearance_m: Percentiles::of(distance),
         }
     }
@@ -54,7 +54,7 @@ impl Fit {
     }
 }
 
-impl fmt::Display for Fit {
+impl fmt::Display for Placement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.rows().iter().try_for_each(|(name, value)| writeln!(f, "{name:<26} {value}"))
     }

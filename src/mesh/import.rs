@@ -3,6 +3,7 @@
 //! Vertices are those of the file, in its order, so far as a face uses them: corners that differ in texture coordinate
 //! alone are one vertex. Nothing is joined by position unless asked, as that can make a clean mesh non-manifold.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
@@ -169,12 +170,13 @@ fn chosen_faces(raw: &RawObj, options: &ImportOptions) -> Result<Vec<Face>, Mesh
     let faces = match &options.group {
         None => scan.faces.clone(),
         Some(asked) => {
-            let wanted = scan.names.iter().position(|name| name == asked).map(|i| i as u32);
+            let wanted = scan.number_of(asked);
             let chosen = scan.faces.iter().filter(|face| wanted.is_some_and(|w| face.group == w || face.object == w));
             let chosen: Vec<Face> = chosen.copied().collect();
             if chosen.is_empty() {
-                let used = |i: u32| scan.faces.iter().any(|face| face.group == i || face.object == i);
-                let available = (0u32..).zip(&scan.names).filter(|&(i, _)| used(i)).map(|(_, name)| name.clone());
+                let used: BTreeSet<u32> = scan.faces.iter().flat_map(|face| [face.group, face.object]).collect();
+                let available =
+                    (0u32..).zip(&scan.names).filter(|(i, _)| used.contains(i)).map(|(_, name)| name.clone());
                 let (file, asked) = (raw.file.clone(), asked.clone());
                 return Err(MeshError::UnknownGroup { file, asked, available: available.collect() });
             }
@@ -183,24 +185,24 @@ fn chosen_faces(raw: &RawObj, options: &ImportOptions) -> Result<Vec<Face>, Mesh
     };
     if faces.is_empty() {
         let file = raw.file.clone();
-        return Err(MeshError::Empty { file, vertices: scan.vertices, faces: 0 });
+        return Err(MeshError::Empty { file, vertices: scan.positions.len(), faces: 0 });
     }
     Ok(faces)
 }
 
 fn used_positions(raw: &RawObj, faces: &[Face]) -> Vec<DVec3> {
-    let mut used = vec![false; raw.positions.len()];
+    let mut used = vec![false; raw.scan.positions.len()];
     for face in faces {
         for corner in &raw.scan.corners[face.first as usize..(face.first + face.count) as usize] {
             used[corner.vertex as usize] = true;
         }
     }
-    raw.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
+    raw.scan.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
 }
 
 fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -> Result<Imported, MeshError> {
-    let RawObj { file, scan, positions, textures } = raw;
-    let placed: Vec<DVec3> = positions.iter().map(|&p| frame.to_metres(p)).collect();
+    let RawObj { file, scan } = raw;
+    let placed: Vec<DVec3> = scan.positions.iter().map(|&p| frame.to_metres(p)).collect();
     let mut repairs = Vec::new();
     let mut remarks = Vec::new();
     if let Some(name) = &options.group {
@@ -208,14 +210,14 @@ fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -
     }
     let draft = Draft::new(&placed, &scan.corners, &faces, options.weld, &mut repairs);
     if draft.triangles.is_empty() {
-        let empty = MeshError::Empty { file, vertices: scan.vertices, faces: faces.len() };
+        let empty = MeshError::Empty { file, vertices: scan.positions.len(), faces: faces.len() };
         return Err(empty);
     }
     let group: Vec<u32> = draft.face.iter().map(|&f| scan.group_of(&faces[f as usize])).collect();
     let (groups, triangle_group) = named_groups(&group, &scan.names);
     let texture = draft.corner.iter().map(|corners| {
         let known = corners.map(|c| scan.corners[c as usize].texture);
-        known.iter().all(|&t| t != NONE).then(|| known.map(|t| textures[t as usize]))
+        known.iter().all(|&t| t != NONE).then(|| known.map(|t| scan.textures[t as usize]))
     });
     let texture: Vec<_> = texture.collect();
     let mesh = TriMesh { positions: draft.positions, triangles: draft.triangles, groups, triangle_group };
@@ -245,8 +247,8 @@ fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -
         faces,
         names: scan.names,
         statements: scan.statements,
-        positions,
-        textures,
+        positions: scan.positions,
+        textures: scan.textures,
         mesh_vertex: draft.mesh_vertex,
     };
     let mut imported = Imported { mesh, report, source, texture };

@@ -22,7 +22,6 @@ pub mod self_intersection;
 mod source;
 pub mod topology;
 pub mod triangle_crossing;
-pub mod whole_file;
 pub mod winding;
 
 use glam::DVec3;
@@ -33,7 +32,6 @@ pub use rest::RestShape;
 pub use scan::{Corner, Face};
 pub use source::ObjSource;
 pub use topology::Topology;
-pub use whole_file::WholeFile;
 
 /// An indexed triangle mesh with optional named groups of triangles.
 #[derive(Debug, Clone, Default, PartialEq)]

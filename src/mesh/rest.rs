@@ -29,13 +29,14 @@ const METRIC_AREA_RATIO: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 pub enum RestError {
     /// A triangle without shape.
     #[error(
-        "{count} triangles of the rest shape have no area, the first is number {first} (from 0): expected triangles \
-         with an area; repair the mesh, or take another rest shape"
+        "{count} triangles of the rest shape have no area, the first is number {}: expected triangles \
+         with an area; repair the mesh, or take another rest shape",
+        first + 1
     )]
     NoArea {
         /// How many.
         count: usize,
-        /// The first.
+        /// The first, from 0.
         first: usize,
     },
     /// The second mesh has other vertices.
@@ -48,11 +49,12 @@ pub enum RestError {
     },
     /// The second mesh has other triangles.
     #[error(
-        "the rest mesh has other triangles than the garment, from number {first} (from 0) on; expected the same faces \
-         in the same order; give the garment in another shape"
+        "the rest mesh has other triangles than the garment, from number {} on; expected the same faces in the same \
+         order; give the garment in another shape",
+        first + 1
     )]
     Triangles {
-        /// The first that differs.
+        /// The first that differs, from 0.
         first: usize,
     },
     /// Corners without texture coordinates.

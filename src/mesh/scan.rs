@@ -1,18 +1,22 @@
-//! The lines of an OBJ text, checked and set straight for the reader.
+//! An OBJ text read in one pass, every mistake with its line.
 //!
-//! The numbers and polygons are tobj's to read. What it does not keep, or passes over in silence, is seen to here: the line
-//! of every mistake, NaN, indices out of range, negative ones, corners with and without texture coordinates in one
-//! file, comments behind a face, continued lines, junk, groups that cut a surface apart (it numbers vertices anew in each),
-//! and the statements an export has to give back. The text handed on holds `v`, `vt` and `f` alone, counted from 1.
+//! Other readers pass over in silence what matters here: the line of a mistake, NaN, indices out of range, junk; or lose
+//! what an export has to give back: polygons, groups over one set of vertices, materials, texture coordinates of their own
+//! number. Understood besides: negative indices, indices that point ahead, comments behind a face, continued lines.
 
-use std::fmt::Write as _;
+use std::collections::BTreeMap;
 use std::path::Path;
+
+use glam::{DVec2, DVec3};
 
 use super::error::{Keyword, LineProblem, MeshError};
 use super::topology::NONE;
 
 /// Some editors begin a text with it.
 const BYTE_ORDER_MARK: char = '\u{feff}';
+/// Coordinates beyond are no body's and no garment's in any unit (10 km in millimetres), and squares of much larger ones
+/// overflow.
+const LARGEST: f64 = 1e7;
 
 /// One corner of a face: a vertex and a texture coordinate of the file, from 0; [`NONE`] where there is no coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,9 +45,9 @@ pub struct Face {
 /// What the lines hold.
 #[derive(Debug, Default)]
 pub(super) struct Scan {
-    pub(super) plain: String,
-    pub(super) vertices: usize,
-    pub(super) textures: usize,
+    /// In the file's frame.
+    pub(super) positions: Vec<DVec3>,
+    pub(super) textures: Vec<DVec2>,
     pub(super) corners: Vec<Corner>,
     pub(super) faces: Vec<Face>,
     pub(super) names: Vec<String>,
@@ -55,6 +59,7 @@ pub(super) struct Scan {
     /// Points and lines given as faces.
     pub(super) small_faces: usize,
     has_groups: bool,
+    number_of_name: BTreeMap<String, u32>,
 }
 
 /// A corner as written, until the whole file is known.
@@ -68,7 +73,7 @@ struct Pending {
 impl Scan {
     /// Reads the lines of `text`; `file` is for the messages.
     pub(super) fn new(file: &Path, text: &str) -> Result<Self, MeshError> {
-        let mut scan = Self { plain: String::with_capacity(text.len()), ..Self::default() };
+        let mut scan = Self::default();
         let (mut group, mut object) = (NONE, NONE);
         // Indices may point ahead, so ranges are checked at the end; the first offence in the file is told.
         let mut ahead: Vec<Pending> = Vec::new();
@@ -78,8 +83,14 @@ impl Scan {
             let mut words = line.split_whitespace().take_while(|word| !word.starts_with('#'));
             match words.next() {
                 None => {}
-                Some("v") => scan.numbers(words, "v", 3, 3, Keyword::Vertex).map_err(at)?,
-                Some("vt") => scan.numbers(words, "vt", 1, 2, Keyword::Texture).map_err(at)?,
+                Some("v") => {
+                    let place = numbers(words, 3, Keyword::Vertex).map_err(at)?;
+                    scan.positions.push(DVec3::from_array(place));
+                }
+                Some("vt") => {
+                    let place = numbers(words, 1, Keyword::Texture).map_err(at)?;
+                    scan.textures.push(DVec2::from_array(place));
+                }
                 Some("f" | "fo") => scan.face(words, number, (group, object), &mut ahead).map_err(at)?,
                 Some(keyword @ ("g" | "o" | "usemtl" | "mtllib" | "s")) => {
                     let name = words.collect::<Vec<_>>().join(" ");
@@ -103,13 +114,12 @@ impl Scan {
             }
         }
         for Pending { line, index, so_far, of } in ahead {
-            let there_are = if of == Keyword::Vertex { scan.vertices } else { scan.textures };
+            let there_are = scan.count(of);
             if index < 1 || index > there_are as i64 {
                 let problem = LineProblem::OutOfRange { found: index, there_are, so_far, of };
                 return Err(MeshError::Line { file: file.to_owned(), line, problem });
             }
         }
-        scan.write_faces();
         Ok(scan)
     }
 
@@ -118,41 +128,23 @@ impl Scan {
         if self.has_groups { face.group } else { face.object }
     }
 
-    fn name(&mut self, name: &str) -> u32 {
-        let found = self.names.iter().position(|known| known == name);
-        found.unwrap_or_else(|| {
-            self.names.push(name.to_owned());
-            self.names.len() - 1
-        }) as u32
+    /// Number of a group's or object's name, if there is one.
+    pub(super) fn number_of(&self, name: &str) -> Option<u32> {
+        self.number_of_name.get(name).copied()
     }
 
-    /// A `v` or `vt` line: `least` to `most` numbers are passed on, the rest (weight, colour) is not needed.
-    fn numbers<'a>(
-        &mut self,
-        words: impl Iterator<Item = &'a str>,
-        keyword: &str,
-        least: usize,
-        most: usize,
-        of: Keyword,
-    ) -> Result<(), LineProblem> {
-        self.plain.push_str(keyword);
-        let mut count = 0;
-        for word in words.take(most) {
-            let number = word.parse::<f64>().map_err(|_| LineProblem::NotANumber { found: word.to_owned(), of })?;
-            if !number.is_finite() {
-                return Err(LineProblem::NotFinite { found: word.to_owned() });
-            }
-            self.plain.push(' ');
-            self.plain.push_str(word);
-            count += 1;
+    fn count(&self, of: Keyword) -> usize {
+        if of == Keyword::Vertex { self.positions.len() } else { self.textures.len() }
+    }
+
+    fn name(&mut self, name: &str) -> u32 {
+        if let Some(&number) = self.number_of_name.get(name) {
+            return number;
         }
-        if count < least {
-            return Err(LineProblem::TooFew { found: count, expected: least, of });
-        }
-        (count..most).for_each(|_| self.plain.push_str(" 0"));
-        self.plain.push('\n');
-        *(if of == Keyword::Vertex { &mut self.vertices } else { &mut self.textures }) += 1;
-        Ok(())
+        let number = self.names.len() as u32;
+        self.names.push(name.to_owned());
+        self.number_of_name.insert(name.to_owned(), number);
+        number
     }
 
     fn face<'a>(
@@ -164,7 +156,7 @@ impl Scan {
     ) -> Result<(), LineProblem> {
         let first = self.corners.len();
         for word in words {
-            let bad = || LineProblem::BadCorner { found: word.to_owned() };
+            let bad = || LineProblem::BadCorner { found: excerpt(word) };
             let mut parts = word.split('/');
             let vertex = parts.next().unwrap_or_default().parse::<i64>().map_err(|_| bad())?;
             let vertex = self.resolve(vertex, line, Keyword::Vertex, ahead)?;
@@ -198,7 +190,7 @@ impl Scan {
     }
 
     fn resolve(&self, index: i64, line: usize, of: Keyword, ahead: &mut Vec<Pending>) -> Result<u32, LineProblem> {
-        let so_far = if of == Keyword::Vertex { self.vertices } else { self.textures };
+        let so_far = self.count(of);
         let found = if index < 0 { index.saturating_add(so_far as i64 + 1) } else { index };
         if index < 0 && found < 1 {
             return Err(LineProblem::OutOfRange { found: index, there_are: so_far, so_far, of });
@@ -208,19 +200,40 @@ impl Scan {
         }
         Ok(u32::try_from(found - 1).unwrap_or(NONE))
     }
+}
 
-    fn write_faces(&mut self) {
-        for face in &self.faces {
-            self.plain.push('f');
-            for corner in &self.corners[face.first as usize..(face.first + face.count) as usize] {
-                // Writing into a String cannot fail.
-                let _ = match corner.texture {
-                    NONE => write!(self.plain, " {}", corner.vertex + 1),
-                    texture => write!(self.plain, " {}/{}", corner.vertex + 1, texture + 1),
-                };
-            }
-            self.plain.push('\n');
+/// The numbers of a `v` or `vt` line, at least so many and 0 for those that are not given; what comes behind (weight,
+/// colour) is not needed.
+fn numbers<'a, const N: usize>(
+    words: impl Iterator<Item = &'a str>,
+    least: usize,
+    of: Keyword,
+) -> Result<[f64; N], LineProblem> {
+    let mut numbers = [0.0; N];
+    let mut count = 0;
+    for (slot, word) in numbers.iter_mut().zip(words) {
+        let number = word.parse::<f64>().map_err(|_| LineProblem::NotANumber { found: excerpt(word), of })?;
+        if !number.is_finite() {
+            return Err(LineProblem::NotFinite { found: excerpt(word) });
         }
+        if number.abs() > LARGEST {
+            return Err(LineProblem::TooLarge { found: excerpt(word), limit: LARGEST });
+        }
+        *slot = number;
+        count += 1;
+    }
+    if count < least {
+        return Err(LineProblem::TooFew { found: count, expected: least, of });
+    }
+    Ok(numbers)
+}
+
+/// A word of the file as a message quotes it: the beginning of a long one.
+fn excerpt(word: &str) -> String {
+    const SHOWN: usize = 40;
+    match word.char_indices().nth(SHOWN) {
+        None => word.to_owned(),
+        Some((end, _)) => format!("{} ... ({} bytes)", &word[..end], word.len()),
     }
 }
 

@@ -24,7 +24,7 @@ pub struct ObjSource {
     pub names: Vec<String>,
     /// Grouping and material lines, each with the number of the face it stands before.
     pub statements: Vec<(u32, String)>,
-    /// Positions by file vertex, in the file's frame; zero where no face uses one.
+    /// Positions by file vertex, in the file's frame.
     pub positions: Vec<DVec3>,
     /// Texture coordinates of the file.
     pub textures: Vec<DVec2>,
@@ -57,9 +57,6 @@ impl ObjSource {
 pub(super) struct RawObj {
     pub(super) file: PathBuf,
     pub(super) scan: Scan,
-    /// Positions by file vertex, in the file's frame; those no face uses are zero.
-    pub(super) positions: Vec<DVec3>,
-    pub(super) textures: Vec<DVec2>,
 }
 
 impl RawObj {
@@ -79,30 +76,7 @@ impl RawObj {
 
     /// Reads a text; `file` is for the messages.
     pub(super) fn parse(file: &Path, text: &str) -> Result<Self, MeshError> {
-        let mut scan = Scan::new(file, text)?;
-        let refused = |reason: String| MeshError::Refused { file: file.to_owned(), reason };
-        let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..tobj::LoadOptions::default() };
-        let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, |_| Ok(Default::default()))
-            .map_err(|e| refused(e.to_string()))?;
-        scan.plain = String::new();
-        let indices: Vec<&u32> = models.iter().flat_map(|model| &model.mesh.indices).collect();
-        if models.len() > 1 || indices.len() != scan.corners.len() {
-            return Err(refused(format!("{} face corners of {} were understood", indices.len(), scan.corners.len())));
-        }
-        let mut positions = vec![DVec3::ZERO; scan.vertices];
-        let mut textures = vec![DVec2::ZERO; scan.textures];
-        for mesh in models.iter().map(|model| &model.mesh) {
-            // tobj numbers vertices by first use; the corners of both readings come in one order.
-            for (k, (corner, &i)) in scan.corners.iter().zip(&mesh.indices).enumerate() {
-                let i = 3 * i as usize;
-                positions[corner.vertex as usize] = DVec3::from_slice(&mesh.positions[i..i + 3]);
-                if corner.texture != NONE {
-                    let i = 2 * mesh.texcoord_indices[k] as usize;
-                    textures[corner.texture as usize] = DVec2::from_slice(&mesh.texcoords[i..i + 2]);
-                }
-            }
-        }
-        Ok(Self { file: file.to_owned(), scan, positions, textures })
+        Ok(Self { file: file.to_owned(), scan: Scan::new(file, text)? })
     }
 }
 

@@ -1,10 +1,20 @@
 //! What can be wrong with a range table, row by row.
 
 use super::{GapRule, Level};
+use crate::files::Unreadable;
 
 /// A range table that cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableError {
+    /// No such name.
+    #[error("no range table is called `{found}`; expected `table-3` or a file ending in .toml")]
+    Unknown {
+        /// What was asked for.
+        found: String,
+    },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
     /// Not TOML, or a key that is missing, unknown or of another type.
     #[error(
         "{place}: {message}; a range table has name = \"...\", unit = \"cm\", gap = \"extend-lower\" | \"extend-upper\" | \

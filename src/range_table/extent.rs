@@ -7,7 +7,8 @@
 use super::METRES_PER_CM;
 
 /// The widest and tallest a PART may be along the cloth, cm; infinite for a direction that is never cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Extent {
     /// Along the weft, around the body or the arm, cm.
     pub width_cm: f64,
@@ -61,6 +62,12 @@ impl Extent {
     pub fn numbers_cm(&self) -> Vec<f64> {
         if self.width_cm == self.height_cm { vec![self.width_cm] } else { vec![self.width_cm, self.height_cm] }
     }
+
+    /// The same in a column: `12`, `6x24`, `inf`.
+    #[must_use]
+    pub fn in_a_column(&self) -> String {
+        self.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
+    }
 }
 
 /// For people: `12`, `6 × 24`, `not cut`.
@@ -73,5 +80,25 @@ impl std::fmt::Display for Extent {
             (true, true) => f.write_str(&short(self.width_cm)),
             (true, false) => write!(f, "{} × {}", short(self.width_cm), short(self.height_cm)),
         }
+    }
+}
+
+impl From<Extent> for String {
+    fn from(extent: Extent) -> Self {
+        extent.in_a_column()
+    }
+}
+
+impl TryFrom<String> for Extent {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let numbers: Result<Vec<f64>, _> = text.split('x').map(str::parse).collect();
+        let extent = match numbers.as_deref() {
+            Ok([cm]) => Self::even(*cm),
+            Ok([width_cm, height_cm]) => Self { width_cm: *width_cm, height_cm: *height_cm },
+            _ => return Err(format!("found \"{text}\", expected an extent in centimetres such as 12, 6x24 or inf")),
+        };
+        Ok(extent)
     }
 }

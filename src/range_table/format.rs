@@ -5,6 +5,7 @@ use toml::Spanned;
 
 use super::error::first_problem;
 use super::{Extent, GapRule, Level, RangeTable, TableError};
+use crate::files::{names_a_file, read_text};
 
 /// Table 3 as printed, inside the binary.
 const TABLE_3: &str = include_str!("../../assets/tables/table-3.toml");
@@ -28,6 +29,18 @@ impl RangeTable {
         Self::parse(TABLE_3, "table-3.toml").unwrap_or_default()
     }
 
+    /// The table of this name: `table-3`, or a file.
+    ///
+    /// # Errors
+    /// [`TableError::Unknown`], [`TableError::Unreadable`]; for a file as [`parse`](Self::parse).
+    pub fn by_name(name: &str) -> Result<Self, TableError> {
+        match name {
+            super::TABLE_3 => Ok(Self::table_3()),
+            file if names_a_file(file) => Self::parse(&read_text(file.as_ref())?, file),
+            other => Err(TableError::Unknown { found: other.to_owned() }),
+        }
+    }
+
     /// Reads a table; `source_name` (a path) only serves the messages.
     ///
     /// # Errors
@@ -44,8 +57,7 @@ impl RangeTable {
         let gap = match &file.gap {
             None => GapRule::default(),
             Some(word) => {
-                let rules = [GapRule::ExtendLower, GapRule::ExtendUpper, GapRule::OwnLevel, GapRule::Error];
-                let known = rules.into_iter().find(|r| r.as_str() == word.get_ref());
+                let known = GapRule::ALL.into_iter().find(|r| r.as_str() == word.get_ref());
                 let found = || TableError::Gap { place: at(word.span().start), found: word.get_ref().clone() };
                 known.ok_or_else(found)?
             }
@@ -56,16 +68,10 @@ impl RangeTable {
         }
         let mut levels = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let (lower_cm, upper_cm, extent) = match *row.get_ref().as_slice() {
-                [lower, upper] => (lower, upper, None),
-                [lower, upper, extent] => (lower, upper, Some(Extent::even(extent))),
-                [lower, upper, width_cm, height_cm] => (lower, upper, Some(Extent { width_cm, height_cm })),
-                ref other => {
-                    let (place, row, found) = (at(row.span().start), i + 1, other.len());
-                    return Err(TableError::RowLength { place, row, found });
-                }
-            };
-            levels.push(Level { lower_cm, upper_cm, extent });
+            levels.push(Level::from_numbers(row.get_ref()).ok_or_else(|| {
+                let (place, row, found) = (at(row.span().start), i + 1, row.get_ref().len());
+                TableError::RowLength { place, row, found }
+            })?);
         }
         if let Some((row, problem)) = first_problem(&levels, gap) {
             return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });

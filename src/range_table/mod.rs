@@ -17,9 +17,11 @@ mod error;
 mod extent;
 pub mod families;
 mod format;
+mod rule;
 
 pub use error::{BoundProblem, TableError};
 pub use extent::Extent;
+pub use rule::TableRule;
 
 /// Metres in a centimetre: tables are written in centimetres, everything else is metres.
 pub const METRES_PER_CM: f64 = 0.01;
@@ -42,7 +44,21 @@ impl Level {
     pub fn new(lower_cm: f64, upper_cm: f64) -> Self {
         Self { lower_cm, upper_cm, extent: None }
     }
+
+    /// A row as written: lower and upper value, and an extent, or its width and height, where there is one.
+    fn from_numbers(row: &[f64]) -> Option<Self> {
+        let (lower_cm, upper_cm, extent) = match *row {
+            [lower, upper] => (lower, upper, None),
+            [lower, upper, extent] => (lower, upper, Some(Extent::even(extent))),
+            [lower, upper, width_cm, height_cm] => (lower, upper, Some(Extent { width_cm, height_cm })),
+            _ => return None,
+        };
+        Some(Self { lower_cm, upper_cm, extent })
+    }
 }
+
+/// The name of the paper's table.
+pub const TABLE_3: &str = "table-3";
 
 /// Who takes the distances between two rows that do not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -60,6 +76,9 @@ pub enum GapRule {
 }
 
 impl GapRule {
+    /// Every rule there is.
+    pub const ALL: [Self; 4] = [Self::ExtendLower, Self::ExtendUpper, Self::OwnLevel, Self::Error];
+
     /// As written in a table file.
     #[must_use]
     pub fn as_str(self) -> &'static str {
@@ -73,7 +92,8 @@ impl GapRule {
 }
 
 /// A named, ordered list of distance levels.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(into = "rule::Plain", try_from = "rule::Plain")]
 pub struct RangeTable {
     /// What it is called in reports.
     pub name: String,

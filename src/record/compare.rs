@@ -9,7 +9,8 @@ use super::legend::caption;
 use super::meshes;
 use super::open::Open;
 use super::paths;
-use super::step::Overlay;
+use super::step::{Overlay, covering};
+use crate::parts::UNASSIGNED;
 
 /// One of two to six results shown side by side, each in a view of its own with the same eye.
 #[derive(Debug, Clone, Copy)]
@@ -46,10 +47,12 @@ pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError
         open.log(&path, &meshes::shape(&draped).with_vertex_colors(meshes::rerun_colours(shades)))?;
     } else {
         let cells = meshes::CellMesh::new(&draped);
-        let parts = chosen.part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
+        let known = chosen.part_of_vertex.iter().filter(|p| **p != UNASSIGNED);
+        let part_of_vertex = covering(chosen.part_of_vertex, known.max().map_or(0, |&p| p as usize + 1));
+        let parts = part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
         let palette = colours::palette();
-        let of_part = colours::colour_parts(chosen.part_of_vertex, parts, &open.garment.triangles, &open.vertex_colour);
-        let shade = |v: u32| palette[of_part[chosen.part_of_vertex[v as usize] as usize] as usize];
+        let of_part = colours::colour_parts(&part_of_vertex, parts, &open.garment.triangles, &open.vertex_colour);
+        let shade = |v: u32| palette[of_part[part_of_vertex[v as usize] as usize] as usize];
         let shades = meshes::rerun_colours(cells.owner.iter().map(|&v| shade(v)));
         open.log(&path, &cells.shape().with_vertex_colors(shades))?;
     }

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use rerun::{ChunkStore, ChunkStoreConfig};
@@ -58,25 +57,4 @@ pub fn read(path: &Path) -> Result<Contents, RecordError> {
         }
     }
     Ok(contents)
-}
-
-/// Whether a file just written ends as a complete recording does: Rerun's writer thread ends silently on a full disk.
-pub(crate) fn check_complete(path: &Path) -> Result<(), RecordError> {
-    /// The last bytes of a complete file: the footer's own marker (`re_log_encoding::StreamFooter`).
-    const FOOTER_MARK: &[u8] = b"RRF2";
-    let tail = File::open(path).and_then(|mut file| {
-        let length = file.metadata()?.len();
-        file.seek(SeekFrom::Start(length.saturating_sub(64)))?;
-        let mut tail = Vec::new();
-        file.read_to_end(&mut tail)?;
-        Ok(tail)
-    });
-    let tail = tail.map_err(|source| RecordError::Unreadable { path: path.to_owned(), source })?;
-    if tail.windows(FOOTER_MARK.len()).any(|w| w == FOOTER_MARK) {
-        Ok(())
-    } else {
-        Err(RecordError::Incomplete {
-            reason: format!("{} ends without its footer; is the disk full?", path.display()),
-        })
-    }
 }

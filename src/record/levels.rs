@@ -4,9 +4,9 @@ use rerun::{BarChart, Clear, Color};
 
 use super::colour_map::{ColourMap, Range};
 use super::error::RecordError;
-use super::panel::LevelRow;
 use super::step::StepView;
 use super::{Open, paths};
+use crate::figures::LevelCount;
 
 /// Bars of the distance histogram, about.
 const BINS: usize = 80;
@@ -17,15 +17,15 @@ const STRIP: f64 = 0.08;
 
 /// Bars of one level: how many vertices lie in each, and its left edge, where the viewer begins it, and width, m. A level's bars tile its own range, so
 /// that no bar holds vertices of two.
-fn bars(row: &LevelRow, distance_m: &[f64], widest: f64, end: f64) -> Vec<(f64, f64, f64)> {
-    let upper = row.upper_m.min(end.max(row.lower_m + widest));
-    let count = ((upper - row.lower_m) / widest).ceil().max(1.0);
-    let width = (upper - row.lower_m) / count;
+fn bars(row: &LevelCount, distance_m: &[f64], widest: f64, end: f64) -> Vec<(f64, f64, f64)> {
+    let upper = row.upper_m().min(end.max(row.lower_m() + widest));
+    let count = ((upper - row.lower_m()) / widest).ceil().max(1.0);
+    let width = (upper - row.lower_m()) / count;
     let mut bars: Vec<(f64, f64, f64)> =
-        (0..count as usize).map(|i| (0.0, row.lower_m + i as f64 * width, width)).collect();
+        (0..count as usize).map(|i| (0.0, row.lower_m() + i as f64 * width, width)).collect();
     let last = bars.len() - 1;
-    for &d in distance_m.iter().filter(|d| (row.lower_m..row.upper_m).contains(*d)) {
-        bars[(((d - row.lower_m) / width) as usize).min(last)].0 += 1.0;
+    for &d in distance_m.iter().filter(|d| (row.lower_m()..row.upper_m()).contains(*d)) {
+        bars[(((d - row.lower_m()) / width) as usize).min(last)].0 += 1.0;
     }
     bars.retain(|bar| bar.0 > 0.0);
     bars
@@ -45,9 +45,9 @@ pub(super) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordErro
     let all: Vec<Vec<(f64, f64, f64)>> = rows.iter().map(|row| bars(row, step.distance_m, widest, end)).collect();
     let highest = all.iter().flatten().map(|bar| bar.0).fold(0.0, f64::max);
     for (level, (row, mut bars)) in rows.iter().zip(all).enumerate() {
-        let upper = row.upper_m.min(end);
-        if upper > row.lower_m {
-            bars.push((-STRIP * highest, row.lower_m, upper - row.lower_m));
+        let upper = row.upper_m().min(end);
+        if upper > row.lower_m() {
+            bars.push((-STRIP * highest, row.lower_m(), upper - row.lower_m()));
         }
         let chart = BarChart::new(bars.iter().map(|b| b.0).collect::<Vec<f64>>())
             .with_abscissa(bars.iter().map(|b| 100.0 * b.1).collect::<Vec<f64>>())
@@ -73,7 +73,14 @@ mod tests {
 
     #[test]
     fn bars_tile_their_level_and_count_every_vertex_once() {
-        let row = |lower_m, upper_m| LevelRow { lower_m, upper_m, vertices: 0, parts: 0, extent: None };
+        let row = |lower_m: f64, upper_m: f64| LevelCount {
+            level: 0,
+            lower_cm: 100.0 * lower_m,
+            upper_cm: 100.0 * upper_m,
+            vertices: 0,
+            parts: 0,
+            extent: None,
+        };
         let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
         // A narrow level has one bar of its own width.
         assert_eq!(bars(&row(0.0, 0.01), &distances, 0.02, 0.1), [(3.0, 0.0, 0.01)]);

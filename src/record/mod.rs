@@ -9,6 +9,7 @@ pub mod colours;
 pub mod compare;
 pub mod error;
 pub mod eye;
+mod folds;
 pub mod inspect;
 mod labels;
 mod legend;
@@ -16,13 +17,16 @@ mod levels;
 mod meshes;
 mod native;
 mod open;
+mod page;
 pub mod panel;
 pub mod paths;
+mod remote;
 pub mod scatter;
 pub mod sinks;
 pub mod step;
 pub mod web;
 pub mod wrinkles;
+mod writer;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -33,7 +37,8 @@ use rerun::{Scalars, TextDocument};
 pub use blueprint::layout::{Layout, Tab};
 pub use compare::Chosen;
 pub use error::RecordError;
-pub use panel::{LevelRow, Panel};
+pub use folds::FoldView;
+pub use panel::Panel;
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
@@ -193,6 +198,14 @@ impl Recorder {
     /// A slice that does not fit the garment; what Rerun refuses.
     pub fn wrinkles(&mut self, view: &WrinkleView<'_>) -> Result<(), RecordError> {
         self.timed(|open| wrinkles::log(open, view))
+    }
+
+    /// Lines along the folds that no PART shows.
+    ///
+    /// # Errors
+    /// A slice that does not fit the garment; what Rerun refuses.
+    pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| folds::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.

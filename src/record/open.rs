@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
+use std::io::Stdout;
 use std::time::{Duration, Instant};
 
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
@@ -12,7 +13,8 @@ use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::sinks::{OpenSinks, Target};
 use super::web::WebViewer;
-use super::{RecordOptions, RecordSummary, blueprint, colours, inspect, paths};
+use super::writer::RrdWriter;
+use super::{RecordOptions, RecordSummary, blueprint, colours, paths};
 use crate::mesh::TriMesh;
 
 /// Bytes of an application's name.
@@ -24,6 +26,7 @@ const LAST_FLUSH: Duration = Duration::from_secs(10);
 pub(crate) struct Open {
     pub(super) stream: RecordingStream,
     targets: Vec<Target>,
+    stdout: Option<RrdWriter<Stdout>>,
     pub(super) web: Option<WebViewer>,
     pub(super) options: RecordOptions,
     body: TriMesh,
@@ -49,7 +52,7 @@ impl Open {
     /// Opens every sink, or none.
     pub(super) fn new(options: RecordOptions) -> Result<Self, RecordError> {
         let started = Instant::now();
-        let OpenSinks { sinks, targets, web } = OpenSinks::open(&options.sinks)?;
+        let OpenSinks { sinks, targets, stdout, web } = OpenSinks::open(&options.sinks)?;
         let stream = RecordingStreamBuilder::new(application(&options.name))
             .recording_name(options.name.as_str())
             .set_sinks(sinks)?;
@@ -59,6 +62,7 @@ impl Open {
         Ok(Self {
             stream,
             targets,
+            stdout,
             web,
             options,
             body: TriMesh::default(),
@@ -178,14 +182,17 @@ impl Open {
         self.log_mesh(path, &triangles)
     }
 
-    /// Sends the step on where someone watches.
+    /// Sends the step on where someone watches. A viewer that was closed does not end a recording that goes to a file
+    /// too: it is told at the end.
     pub(super) fn flush_live(&self) -> Result<(), RecordError> {
         if !self.options.layout.follow {
             return Ok(());
         }
-        self.stream
-            .flush_with_timeout(LAST_FLUSH)
-            .map_err(|e| RecordError::Incomplete { reason: format!("a viewer does not take the data: {e}") })
+        let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
+        self.targets
+            .iter()
+            .try_for_each(|target| target.writer.check().map_err(|reason| target.incomplete(&reason)))?;
+        if self.targets.is_empty() { flushed.map_err(not_taken) } else { Ok(()) }
     }
 
     /// The mesh comes every so often; the last iteration shows the result.
@@ -204,19 +211,17 @@ impl Open {
             return Err(error);
         }
         let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
-        // Dropping the sinks ends the file with its footer.
         self.stream.disconnect();
         let mut summary = RecordSummary::default();
-        for Target { part, path } in std::mem::take(&mut self.targets) {
-            let unwritable = |source| RecordError::Unwritable { path: path.clone(), source };
-            inspect::check_complete(&part).inspect_err(|_| {
-                let _ = std::fs::remove_file(&part);
-            })?;
-            std::fs::rename(&part, &path).map_err(unwritable)?;
-            summary.bytes = std::fs::metadata(&path).map_err(unwritable)?.len();
-            summary.path = Some(path);
+        for target in std::mem::take(&mut self.targets) {
+            let file = target.writer.end().map_err(|reason| target.incomplete(&reason))?;
+            summary.bytes = file.finish().map_err(|error| target.incomplete(&error.to_string()))?;
+            summary.path = Some(target.path);
         }
-        flushed.map_err(|e| RecordError::Incomplete { reason: e.to_string() })?;
+        if let Some(stdout) = self.stdout.take() {
+            stdout.end().map_err(|e| RecordError::Incomplete { reason: format!("standard output: {e}") })?;
+        }
+        flushed.map_err(not_taken)?;
         summary.raw_bytes = self.raw_bytes.get();
         summary.log_ms = (self.spent + started.elapsed()).as_secs_f64() * 1e3;
         Ok(summary)
@@ -225,10 +230,19 @@ impl Open {
     /// Takes back what was begun.
     pub(super) fn discard(self: Box<Self>) {
         self.stream.disconnect();
-        for target in &self.targets {
-            let _ = std::fs::remove_file(&target.part);
-        }
+        self.targets.iter().for_each(|target| target.writer.discard());
     }
+}
+
+impl Target {
+    fn incomplete(&self, reason: &str) -> RecordError {
+        let path = self.path.display();
+        RecordError::Incomplete { reason: format!("{path}: {reason}; make room, or choose another place with --save") }
+    }
+}
+
+fn not_taken(error: impl std::fmt::Display) -> RecordError {
+    RecordError::Incomplete { reason: format!("a viewer does not take the data: {error}") }
 }
 
 /// The viewer keeps one layout for each application: under one name, a recording opened later would rearrange the views of

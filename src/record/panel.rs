@@ -3,24 +3,10 @@
 use std::fmt::Write as _;
 
 use super::legend::number;
+use crate::figures::LevelCount;
 
 /// Version of the viewer the recording is made for.
 pub const RERUN_VERSION: &str = "0.36.3";
-
-/// One row of the range table as solved.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LevelRow {
-    /// Lower value, m.
-    pub lower_m: f64,
-    /// Upper value, m; infinite for the last level.
-    pub upper_m: f64,
-    /// Vertices in it.
-    pub vertices: usize,
-    /// PARTs in it.
-    pub parts: usize,
-    /// The extent its PARTs are cut to by the table, cm, as people read it.
-    pub extent: Option<String>,
-}
 
 /// Everything the text panel shows. Empty pieces are left out.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,7 +16,7 @@ pub struct Panel {
     /// Name of the range table.
     pub table: String,
     /// Its levels, nearest first.
-    pub levels: Vec<LevelRow>,
+    pub levels: Vec<LevelCount>,
     /// Facts in two columns: vertices, PARTs, singletons, model, error, ...
     pub facts: Vec<(String, String)>,
     /// The fabric: constant and value with unit.
@@ -68,8 +54,9 @@ impl Panel {
             line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
             // An empty level says nothing; the others keep their numbers.
             for (i, row) in self.levels.iter().enumerate().filter(|(_, row)| row.vertices > 0) {
-                let (level, range) = (i + 1, range_cm(row.lower_m, row.upper_m));
-                let extent = if own { format!(" {} |", row.extent.as_deref().unwrap_or("")) } else { String::new() };
+                let (level, range) = (i + 1, range_cm(row.lower_cm, row.upper_cm));
+                let extent = row.extent.map_or_else(String::new, |e| e.to_string());
+                let extent = if own { format!(" {extent} |") } else { String::new() };
                 line(&mut text, format_args!("| {level} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
@@ -86,10 +73,14 @@ impl Panel {
 
 /// A range in centimetres as the paper prints it.
 #[must_use]
-pub fn range_cm(lower_m: f64, upper_m: f64) -> String {
-    // 100 × a centimetre bound read from a table is off by an ulp; a micrometre is far below any bound.
-    let cm = |m: f64| number((m * 1e6).round() / 1e4);
-    if upper_m.is_finite() { format!("{} – {}", cm(lower_m), cm(upper_m)) } else { format!("{} –", cm(lower_m)) }
+pub fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
+    // A scaled bound has a long tail; a micrometre is far below any bound.
+    let cm = |cm: f64| number((cm * 1e4).round() / 1e4);
+    if upper_cm.is_finite() {
+        format!("{} – {}", cm(lower_cm), cm(upper_cm))
+    } else {
+        format!("{} –", cm(lower_cm))
+    }
 }
 
 /// Whether a fact fits beside others in the panel's width. A table's columns do not wrap: what is longer is text.
@@ -117,6 +108,7 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::range_table::Extent;
 
     #[test]
     fn the_panel_holds_what_it_is_given_and_no_empty_tables() {
@@ -124,9 +116,9 @@ mod tests {
             title: "skirt on body".into(),
             table: "Table 3".into(),
             levels: vec![
-                LevelRow { lower_m: 0.0, upper_m: 0.0006, vertices: 4, parts: 2, extent: None },
-                LevelRow { lower_m: 0.0006, upper_m: 0.0006, vertices: 0, parts: 0, extent: None },
-                LevelRow { lower_m: 0.0006, upper_m: f64::INFINITY, vertices: 9, parts: 1, extent: None },
+                LevelCount { level: 0, lower_cm: 0.0, upper_cm: 0.06, vertices: 4, parts: 2, extent: None },
+                LevelCount { level: 1, lower_cm: 0.06, upper_cm: 0.06, vertices: 0, parts: 0, extent: None },
+                LevelCount { level: 2, lower_cm: 0.06, upper_cm: f64::INFINITY, vertices: 9, parts: 1, extent: None },
             ],
             facts: vec![
                 ("model".into(), "coupled".into()),
@@ -149,7 +141,8 @@ mod tests {
         }
         assert!(!text.contains("Fabric"));
         let mut cut = panel.clone();
-        (cut.levels[0].extent, cut.levels[2].extent) = (Some("6 × 12".into()), Some("not cut".into()));
+        (cut.levels[0].extent, cut.levels[2].extent) =
+            (Some(Extent { width_cm: 6.0, height_cm: 12.0 }), Some(Extent::UNCUT));
         let text = cut.markdown();
         for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 6 × 12 |", "| 9 | 1 | not cut |"] {
             assert!(text.contains(piece), "{piece} in {text}");

@@ -14,6 +14,7 @@
 //! | `/force/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar | `table` |
 //! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
 //! | `/fit/<name>/garment`, `.../legend/...` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
+//! | `/fit/folds/lines` | LineStrips3D | directions of the folds that no PART shows | `table` |
 //! | `/wrinkles/seams/garment`, `.../lines`, `.../legend/...` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
 //! | `/wrinkles/curvature/garment`, `.../legend/...` | Mesh3D | mean curvature of the drape | `table` |
 //! | `/error/garment`, `/error/legend/...` | Mesh3D | distance to the reference drape | `table` |

@@ -1,22 +1,26 @@
 //! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser, standard output; several at once.
 //!
 //! Rerun's own sinks report most failures late or only to the log, so each is tried before the first result is sent: a
-//! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is written as
-//! `FILE.part` and gets its name when it is complete.
+//! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is there whole or not
+//! at all.
 
+use std::io::{ErrorKind, Read as _, Stdout, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rerun::external::re_uri::ProxyUri;
+use rerun::external::re_uri::{ProxyUri, Scheme};
 use rerun::grpc_server::GrpcServerSink;
-use rerun::sink::{FileSink, FileSinkError, GrpcSink, LogSink};
+use rerun::sink::LogSink;
 use rerun::{MemoryLimit, ServerOptions};
 
 use super::error::RecordError;
 use super::native;
 use super::panel::RERUN_VERSION;
+use super::remote::Remote;
 use super::web::WebViewer;
+use super::writer::RrdWriter;
+use crate::whole_file::WholeFile;
 
 /// How long a viewer has to answer.
 const ANSWER: Duration = Duration::from_secs(3);
@@ -46,12 +50,11 @@ pub enum Sink {
 }
 
 /// A file in the making.
-#[derive(Debug)]
 pub(crate) struct Target {
-    /// Where it is written.
-    pub(crate) part: PathBuf,
+    /// What is written to it.
+    pub(super) writer: RrdWriter<WholeFile>,
     /// Where it goes when complete.
-    pub(crate) path: PathBuf,
+    pub(super) path: PathBuf,
 }
 
 /// All sinks of a recording, open.
@@ -59,31 +62,23 @@ pub(crate) struct Target {
 pub(crate) struct OpenSinks {
     pub(crate) sinks: Vec<Box<dyn LogSink>>,
     pub(crate) targets: Vec<Target>,
+    pub(super) stdout: Option<RrdWriter<Stdout>>,
     pub(crate) web: Option<WebViewer>,
 }
 
 impl OpenSinks {
-    /// Opens every sink, or none: on an error what was begun is taken back.
+    /// Opens every sink, or none: on an error what was begun goes as it is dropped.
     pub(crate) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut open = Self::default();
-        for sink in sinks {
-            if let Err(error) = open.add(sink) {
-                open.sinks.clear();
-                for target in &open.targets {
-                    // Nothing was promised yet; a leftover that cannot be removed is no further error.
-                    let _ = std::fs::remove_file(&target.part);
-                }
-                return Err(error);
-            }
-        }
+        sinks.iter().try_for_each(|sink| open.add(sink))?;
         Ok(open)
     }
 
     fn add(&mut self, sink: &Sink) -> Result<(), RecordError> {
         match sink {
             Sink::File(path) => {
-                let (sink, target) = file(path)?;
-                self.sinks.push(Box::new(sink));
+                let target = file(path)?;
+                self.sinks.push(Box::new(target.writer.clone()));
                 self.targets.push(target);
             }
             Sink::Spawn => self.sinks.push(Box::new(spawn()?)),
@@ -96,40 +91,33 @@ impl OpenSinks {
                 self.web = Some(WebViewer::start(web_port, grpc_port)?);
             }
             Sink::Stdout => {
-                let sink = FileSink::stdout()
+                let writer = RrdWriter::new(std::io::stdout())
                     .map_err(|e| RecordError::Incomplete { reason: format!("standard output: {e}") })?;
-                self.sinks.push(Box::new(sink));
+                self.sinks.push(Box::new(writer.clone()));
+                self.stdout = Some(writer);
             }
         }
         Ok(())
     }
 }
 
-fn file(path: &Path) -> Result<(FileSink, Target), RecordError> {
+fn file(path: &Path) -> Result<Target, RecordError> {
     let unwritable = |source: std::io::Error| RecordError::Unwritable { path: path.to_owned(), source };
-    if path.is_dir() {
-        return Err(unwritable(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
-    }
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(unwritable)?;
     }
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let sink = FileSink::new(&part).map_err(|error| match error {
-        FileSinkError::CreateFile { source, .. } | FileSinkError::SpawnThread(source) => unwritable(source),
-        FileSinkError::LogMsgEncode(error) => unwritable(std::io::Error::other(error)),
-    })?;
-    Ok((sink, Target { part, path: path.to_owned() }))
+    let file = WholeFile::create(path).map_err(unwritable)?;
+    let writer = RrdWriter::new(file).map_err(|reason| unwritable(std::io::Error::other(reason)))?;
+    Ok(Target { writer, path: path.to_owned() })
 }
 
-fn spawn() -> Result<GrpcSink, RecordError> {
+fn spawn() -> Result<Remote, RecordError> {
     native::start(VIEWER_PORT)?;
     connect(&format!("rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"))
         .map_err(|error| RecordError::NoViewer { reason: error.to_string(), version: RERUN_VERSION })
 }
 
-fn connect(url: &str) -> Result<GrpcSink, RecordError> {
+fn connect(url: &str) -> Result<Remote, RecordError> {
     let bad = |reason: String| RecordError::BadUrl { url: url.to_owned(), reason };
     let uri: ProxyUri = url.parse().map_err(|e: rerun::external::re_uri::Error| bad(e.to_string()))?;
     let unreachable = |reason: String| RecordError::Unreachable { url: url.to_owned(), reason };
@@ -139,14 +127,35 @@ fn connect(url: &str) -> Result<GrpcSink, RecordError> {
         .map_err(|e| unreachable(format!("the name {host} cannot be resolved ({e})")))?
         .collect();
     // Rerun's client connects in the background and says nothing when nobody is there.
-    let dialled = addresses.iter().map(|a| TcpStream::connect_timeout(a, ANSWER)).find(Result::is_ok);
-    if dialled.is_none() {
+    let Some(dialled) = addresses.iter().find_map(|a| TcpStream::connect_timeout(a, ANSWER).ok()) else {
         let tried: Vec<String> = addresses.iter().map(ToString::to_string).collect();
         return Err(unreachable(format!("nothing listens at {}", tried.join(", "))));
+    };
+    let silent = |why: String| unreachable(format!("something listens, but does not answer as a viewer does ({why})"));
+    if uri.origin.scheme == Scheme::RerunHttp {
+        greet(dialled).map_err(|e| silent(e.to_string()))?;
     }
-    let sink = GrpcSink::new(uri);
-    sink.flush_blocking(ANSWER).map_err(|e| unreachable(format!("something listens, but is no Rerun viewer ({e})")))?;
+    let sink = Remote::new(uri);
+    sink.flush_blocking(ANSWER).map_err(|e| silent(e.to_string()))?;
     Ok(sink)
+}
+
+/// Exchanges HTTP/2's first words (RFC 9113, section 3.4): whoever speaks it answers them with settings of his own.
+/// Rerun's client takes anybody who accepts a connection for a viewer, and then waits for ever.
+fn greet(mut stream: TcpStream) -> std::io::Result<()> {
+    const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+    const NO_SETTINGS: [u8; 9] = [0, 0, 0, SETTINGS, 0, 0, 0, 0, 0];
+    const SETTINGS: u8 = 4;
+    stream.set_read_timeout(Some(ANSWER))?;
+    stream.set_write_timeout(Some(ANSWER))?;
+    stream.write_all(PREFACE)?;
+    stream.write_all(&NO_SETTINGS)?;
+    let mut answer = [0; NO_SETTINGS.len()];
+    stream.read_exact(&mut answer).map_err(|e| match e.kind() {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut => std::io::Error::other(format!("silent for {ANSWER:?}")),
+        _ => e,
+    })?;
+    if answer[3] == SETTINGS { Ok(()) } else { Err(std::io::Error::other("it speaks something else")) }
 }
 
 /// Starts the server that viewers fetch the recording from.

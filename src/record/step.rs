@@ -1,5 +1,7 @@
 //! One step of the timeline `table`: the PARTs of a range table, their forces, the drape, and what was measured.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use rerun::components::{Scalar, Text};
 use rerun::{AnyValues, Arrows3D, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument};
@@ -12,6 +14,7 @@ use super::meshes::{self, single};
 use super::panel::Panel;
 use super::{Open, levels, paths};
 use crate::mesh::TriMesh;
+use crate::parts::UNASSIGNED;
 
 /// Share of the garment's height that the longest arrow takes.
 const LONGEST_ARROW: f64 = 0.16;
@@ -40,7 +43,7 @@ pub struct StepView<'a> {
     pub index: i64,
     /// Distance to the body, m.
     pub distance_m: &'a [f64],
-    /// PART of each vertex.
+    /// PART of each vertex, or [`UNASSIGNED`].
     pub part_of_vertex: &'a [u32],
     /// Resultant force of each PART, N; as many as there are PARTs.
     pub part_force_n: &'a [DVec3],
@@ -52,6 +55,14 @@ pub struct StepView<'a> {
     pub scalars: &'a [(&'a str, f64)],
     /// Error, strain, pressure.
     pub overlays: &'a [Overlay<'a>],
+}
+
+/// PARTs with one more for the vertices outside every level, if there are any; `parts` are there without it.
+pub(super) fn covering(part_of_vertex: &[u32], parts: usize) -> Cow<'_, [u32]> {
+    if !part_of_vertex.contains(&UNASSIGNED) {
+        return part_of_vertex.into();
+    }
+    part_of_vertex.iter().map(|&p| if p == UNASSIGNED { parts as u32 } else { p }).collect()
 }
 
 impl StepView<'_> {
@@ -72,7 +83,8 @@ impl StepView<'_> {
                 });
             }
         }
-        let expected = self.part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
+        let known = self.part_of_vertex.iter().filter(|p| **p != UNASSIGNED);
+        let expected = known.max().map_or(0, |&p| p as usize + 1);
         if self.part_force_n.len() < expected {
             return Err(RecordError::Mismatch {
                 what: "forces".to_owned(),
@@ -87,6 +99,12 @@ impl StepView<'_> {
 
 /// Logs the whole step.
 pub(crate) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
+    let part_of_vertex = covering(step.part_of_vertex, step.part_force_n.len());
+    // Nothing pulls at what is in no PART.
+    let with_rest = [step.part_force_n, &[DVec3::ZERO]].concat();
+    let part_force_n =
+        if part_of_vertex.contains(&(step.part_force_n.len() as u32)) { &with_rest } else { step.part_force_n };
+    let step = &StepView { part_of_vertex: &part_of_vertex, part_force_n, ..*step };
     distance(open, step)?;
     parts(open, step)?;
     force(open, step)?;

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use rerun::grpc_server::GrpcServerSink;
@@ -9,12 +10,12 @@ use rerun::log::LogMsg;
 use rerun::sink::LogSink as _;
 
 use super::error::RecordError;
+use super::page::Page;
 use super::sinks::{free_port, serve};
 
 /// A page that shows a recording; it is served for as long as this lives.
 pub struct WebViewer {
-    /// The server; Rerun does not export its type.
-    _page: Box<dyn std::any::Any + Send + Sync>,
+    _page: Page,
     url: String,
 }
 
@@ -22,17 +23,11 @@ impl WebViewer {
     /// Serves the page on `web_port`, pointed at the data on `grpc_port`.
     pub(crate) fn start(web_port: u16, grpc_port: u16) -> Result<Self, RecordError> {
         let failed = |reason: String| RecordError::Server { what: "the web viewer", port: web_port, reason };
-        let config = rerun::web_viewer::WebViewerConfig {
-            bind_ip: "127.0.0.1".to_owned(),
-            web_port: web_port.into(),
-            open_browser: false,
-            ..rerun::web_viewer::WebViewerConfig::default()
-        };
-        let page = config.host_web_viewer().map_err(|e| failed(e.to_string()))?;
+        let page = Page::serve(web_port, &format!("rerun+http://127.0.0.1:{grpc_port}/proxy")).map_err(failed)?;
+        // The page knows its recording; the parameter makes an address that can be kept differ from run to run.
         // %2B and the rest: the address of the data is a parameter of the page's.
         let data = format!("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc_port}%2Fproxy");
-        let url = format!("{}/?url={data}", page.server_url());
-        Ok(Self { _page: Box::new(page), url })
+        Ok(Self { _page: page, url: format!("http://127.0.0.1:{web_port}/?url={data}") })
     }
 
     /// The address to open in a browser.
@@ -63,6 +58,14 @@ impl Served {
     }
 }
 
+/// Reads a recording and forgets it: whether it can be served.
+///
+/// # Errors
+/// An unreadable file, or one that is no recording.
+pub fn check_file(path: &Path) -> Result<(), RecordError> {
+    read(path).map(|_| ())
+}
+
 /// Serves any `.rrd` file in the bundled web viewer on 127.0.0.1; `None` takes a free port. The file is read once.
 ///
 /// # Errors
@@ -77,11 +80,16 @@ pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) ->
     Ok(Served { viewer, _data: data, messages: count })
 }
 
+/// The messages of a recording; damage of some kinds ends in an allocation that ends the program.
 fn read(path: &Path) -> Result<Vec<LogMsg>, RecordError> {
     let file = File::open(path).map_err(|source| RecordError::Unreadable { path: path.to_owned(), source })?;
-    let none = |reason: String| RecordError::NotARecording { path: path.to_owned(), reason };
-    let decoder = rerun::external::re_log_encoding::Decoder::<LogMsg>::decode_eager(BufReader::new(file))
-        .map_err(|e| none(e.to_string()))?;
-    let messages = decoder.collect::<Result<Vec<LogMsg>, _>>().map_err(|e| none(e.to_string()))?;
+    let none = |reason| RecordError::NotARecording { path: path.to_owned(), reason };
+    let decode = || -> Result<Vec<LogMsg>, String> {
+        let decoder = rerun::external::re_log_encoding::Decoder::decode_eager(BufReader::new(file));
+        decoder.map_err(|e| e.to_string())?.map(|message| message.map_err(|e| e.to_string())).collect()
+    };
+    // The decoder trusts what it reads, and panics where it should not have.
+    let decoded = catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| Err("it is damaged".to_owned()));
+    let messages = decoded.map_err(none)?;
     if messages.is_empty() { Err(none("it is empty".to_owned())) } else { Ok(messages) }
 }

@@ -1,169 +1,159 @@
 //! The values of every axis of a sweep, read from its file, and their full grid.
+//!
+//! A value of an axis is an edit of a [`Point`]: what the file does not say stays as the job the sweep starts from has
+//! it.
 
-use std::collections::BTreeMap;
+use toml::Value;
 
-use toml::{Spanned, Value};
-
-use super::bodies::{body, dress_form};
-use super::choice::{BodyChoice, FabricChoice, Input, ModelChoice, Refine, TableChoice};
+use super::bodies::body;
 use super::error::PlanError;
 use super::file::{At, Grid, Single, Source, number};
 use super::garments::garments;
 use super::inputs::Inputs;
 use super::point::Point;
-use super::tables::{default_table, tables};
+use super::tables::tables;
+use crate::drape::{Model, Refine};
 use crate::fabric::Fabric;
+use crate::files::names_a_file;
+use crate::job::Job;
+use crate::mechanics::coupled::Motion;
 
-/// The fabric where a sweep names none.
-pub const DEFAULT_FABRIC: &str = "interlock";
-/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and its
-/// points take 200 MB of memory).
+/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and
+/// its points take 200 MB of memory).
 const LIMIT: usize = 100_000;
 
-/// The values of every axis.
-pub(super) struct Axes {
-    bodies: Vec<BodyChoice>,
-    garments: Vec<Input>,
-    fabrics: Vec<FabricChoice>,
-    models: Vec<ModelChoice>,
-    pub(super) tables: Vec<TableChoice>,
-    extents_cm: Vec<Vec<f64>>,
-    min_parts: Vec<usize>,
-    refine: Vec<Refine>,
-    seeds: Vec<u64>,
-    options: Vec<BTreeMap<String, String>>,
-}
+/// What a value of an axis does to a point.
+pub(super) type Edit = Box<dyn Fn(&mut Point)>;
+
+/// The values of every axis, in the order in which a grid is nested.
+pub(super) struct Axes(Vec<Vec<Edit>>);
 
 impl Axes {
-    /// Reads the axes of a grid; an axis it lacks has the one value of `base`, or the default.
+    /// Reads the axes of a grid; an axis it lacks has the one value of `base`, or none.
     pub(super) fn read(source: Source<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Self, PlanError> {
-        let axis = Axis { source };
-        let models = axis.of(&base.model, &grid.models, "models", |v| match v.get_ref().as_str() {
-            Some("paper") => Ok(ModelChoice::Paper),
-            Some("coupled") => Ok(ModelChoice::Coupled),
-            _ => Err(source.wrong(v, "model", "\"paper\" or \"coupled\"")),
-        })?;
-        let extents_cm = axis.of(&base.extent_cm, &grid.extents_cm, "extents_cm", |v| extent(source, v))?;
-        let min_parts = axis.of(&base.min_part, &grid.min_parts, "min_parts", |v| {
-            source.count(v, "min_part", 1, "a number of vertices, 1 for PARTs as the paper defines them")
-        })?;
-        let refine = axis.of(&base.refine, &grid.refine, "refine", |v| match v.get_ref().as_str() {
-            Some("converged") => Ok(Refine::Converged),
-            _ => source.count(v, "refine", 0, "a number of steps, or \"converged\"").map(Refine::Steps),
-        })?;
-        let seeds = axis.of(&base.seed, &grid.seeds, "seeds", |v| {
-            source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")
-        })?;
-        let options = axis.of(&base.options, &grid.options, "options", |v| options(source, v))?;
-        let fabrics = axis.of(&base.fabric, &grid.fabrics, "fabrics", |v| {
-            let label = source.text(v, "fabric", "a built-in name or a file")?;
-            let place = source.place(v);
-            let fabric = match Inputs::names_a_file(&label) {
-                true => Fabric::parse(&inputs.text(&label, &place)?, &label),
-                false => Fabric::by_name(&label),
-            };
-            fabric.map(|fabric| FabricChoice { label, fabric }).map_err(|source| PlanError::Fabric { place, source })
-        })?;
-        let bodies = axis.of(&base.body, &grid.bodies, "bodies", |v| body(source, v, inputs))?;
-        let tables = axis.of(&base.table, &grid.tables, "tables", |v| tables(source, v, inputs))?;
-        Ok(Self {
-            bodies: bodies.unwrap_or_else(|| vec![dress_form()]),
-            garments: garments(axis, base, grid, inputs)?,
-            fabrics: fabrics.map_or_else(default_fabric, Ok)?,
-            models: models.unwrap_or_else(|| vec![ModelChoice::Coupled]),
-            tables: tables.map_or_else(|| vec![default_table()], |t| t.into_iter().flatten().collect()),
-            extents_cm: extents_cm.unwrap_or_else(|| vec![Vec::new()]),
-            min_parts: min_parts.unwrap_or_else(|| vec![1]),
-            refine: refine.unwrap_or_else(|| vec![Refine::Steps(0)]),
-            seeds: seeds.unwrap_or_else(|| vec![0]),
-            options: options.unwrap_or_else(|| vec![BTreeMap::new()]),
-        })
+        let axis = Axis { source, base, grid };
+        Ok(Self(vec![
+            axis.edits(["body", "bodies"], |v| body(source, v, inputs))?,
+            garments(axis, inputs)?,
+            axis.edits(["fabric", "fabrics"], |v| fabric(source, v, inputs))?,
+            axis.edits(["model", "models"], |v| {
+                let model = v.get_ref().as_str().and_then(Model::by_name);
+                let model = model.ok_or_else(|| source.wrong(v, "model", "\"paper\" or \"coupled\""))?;
+                Ok(one(move |point| point.job.settings.model = model.clone()))
+            })?,
+            axis.edits(["table", "tables"], |v| tables(source, v, inputs))?,
+            axis.edits(["extent_cm", "extents_cm"], |v| {
+                let extents = extents(source, v)?;
+                Ok(one(move |point| {
+                    let model = std::mem::take(&mut point.job.settings.model);
+                    point.job.settings.model = model.with_extents_cm(&extents);
+                }))
+            })?,
+            axis.edits(["motion", "motions"], |v| {
+                let expected = "\"affine\" or \"translation\"";
+                let motion: Option<Motion> = v.get_ref().as_str().and_then(|text| text.parse().ok());
+                let motion = motion.ok_or_else(|| source.wrong(v, "motion", expected))?;
+                Ok(one(move |point| {
+                    let model = std::mem::take(&mut point.job.settings.model);
+                    point.job.settings.model = model.with_motion(motion);
+                }))
+            })?,
+            axis.edits(["min_part", "min_parts"], |v| {
+                let expected = "a number of vertices, 1 for PARTs as the paper defines them";
+                let least: usize = source.count(v, "min_part", 1, expected)?;
+                Ok(one(move |point| point.job.settings.min_part = least))
+            })?,
+            axis.edits(["refine", "refine"], |v| {
+                let refine = match v.get_ref().as_str() {
+                    Some("converged") => Refine::Converged,
+                    _ => Refine::Steps(source.count(v, "refine", 0, "a number of steps, or \"converged\"")?),
+                };
+                Ok(one(move |point| point.job.settings.refine = refine))
+            })?,
+            axis.edits(["seed", "seeds"], |v| {
+                let seed = source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")?;
+                Ok(one(move |point| point.job.seed = seed))
+            })?,
+            axis.edits(["options", "options"], |v| options(source, v))?,
+        ]))
+    }
+
+    /// How many points the grid has.
+    pub(super) fn count(&self) -> usize {
+        self.0.iter().fold(1, |n: usize, axis| n.saturating_mul(axis.len()))
     }
 
     /// Appends every combination, the last axis fastest.
-    pub(super) fn expand(&self, points: &mut Vec<Point>, name: &str) -> Result<(), PlanError> {
-        let lengths = [
-            self.bodies.len(),
-            self.garments.len(),
-            self.fabrics.len(),
-            self.models.len(),
-            self.tables.len(),
-            self.extents_cm.len(),
-            self.min_parts.len(),
-            self.refine.len(),
-            self.seeds.len(),
-            self.options.len(),
-        ];
-        let count = lengths.iter().fold(1_usize, |n, &length| n.saturating_mul(length));
+    pub(super) fn expand(&self, points: &mut Vec<Point>, start: &Job, name: &str) -> Result<(), PlanError> {
+        let count = self.count();
         let found = count.saturating_add(points.len());
         if found > LIMIT {
             return Err(PlanError::TooMany { name: name.to_owned(), found, limit: LIMIT });
         }
         for number in 0..count {
+            let mut point = Point::of(start.clone());
             // The number's digits, one base an axis.
-            let mut rest = number;
-            let mut at = [0; 10];
-            for (digit, &length) in at.iter_mut().zip(&lengths).rev() {
-                *digit = rest % length;
-                rest /= length;
+            let mut block = count;
+            for axis in &self.0 {
+                block /= axis.len();
+                axis[number / block % axis.len()](&mut point);
             }
-            let point = Point {
-                id: String::new(),
-                index: 0,
-                body: self.bodies[at[0]].clone(),
-                garment: self.garments[at[1]].clone(),
-                fabric: self.fabrics[at[2]].clone(),
-                model: self.models[at[3]],
-                table: self.tables[at[4]].clone(),
-                extents_cm: self.extents_cm[at[5]].clone(),
-                min_part: self.min_parts[at[6]],
-                refine: self.refine[at[7]],
-                seed: self.seeds[at[8]],
-                options: self.options[at[9]].clone(),
-            };
             points.push(point.named());
         }
         Ok(())
     }
 }
 
+/// An axis value that is one edit.
+pub(super) fn one(edit: impl Fn(&mut Point) + 'static) -> Vec<Edit> {
+    vec![Box::new(edit)]
+}
+
 /// Reads one axis after the other.
 #[derive(Clone, Copy)]
 pub(super) struct Axis<'a> {
     pub(super) source: Source<'a>,
+    pub(super) base: &'a Single,
+    pub(super) grid: &'a Grid,
 }
 
 impl Axis<'_> {
-    /// The values of an axis: of the grid's list, or the base's one; `None` where neither has it.
-    pub(super) fn of<T>(
+    /// The edits of an axis, by its key in `[base]` and in `[grid]`; where neither has it, one that changes nothing.
+    fn edits(
         self,
-        base: &Option<At>,
-        grid: &Option<Spanned<Vec<At>>>,
-        key: &'static str,
-        mut read: impl FnMut(&At) -> Result<T, PlanError>,
-    ) -> Result<Option<Vec<T>>, PlanError> {
-        let Some(list) = grid else {
-            return base.as_ref().map(|v| read(v).map(|value| vec![value])).transpose();
-        };
+        keys: [&'static str; 2],
+        mut read: impl FnMut(&At) -> Result<Vec<Edit>, PlanError>,
+    ) -> Result<Vec<Edit>, PlanError> {
+        let Some(values) = self.values(keys)? else { return Ok(one(|_| ())) };
+        let edits: Vec<Vec<Edit>> = values.iter().map(|v| read(v)).collect::<Result<_, _>>()?;
+        Ok(edits.into_iter().flatten().collect())
+    }
+
+    /// The values of an axis: of the grid's list, or the base's one.
+    pub(super) fn values(self, [single, plural]: [&'static str; 2]) -> Result<Option<Vec<At>>, PlanError> {
+        let Some(list) = self.grid.get(plural) else { return Ok(self.base.get(single).map(|v| vec![v.clone()])) };
         if list.get_ref().is_empty() {
             let (place, found) = (self.source.line(list.span().start), "an empty list".to_owned());
             let expected = "at least one value; leave the key out for the value of [base]".to_owned();
-            return Err(PlanError::Value { place, key, found, expected });
+            return Err(PlanError::Value { place, key: plural, found, expected });
         }
-        list.get_ref().iter().map(&mut read).collect::<Result<_, _>>().map(Some)
+        Ok(Some(list.get_ref().clone()))
     }
 }
 
-fn default_fabric() -> Result<Vec<FabricChoice>, PlanError> {
-    let label = DEFAULT_FABRIC.to_owned();
-    match Fabric::by_name(&label) {
-        Ok(fabric) => Ok(vec![FabricChoice { label, fabric }]),
-        Err(source) => Err(PlanError::Fabric { place: "the default".to_owned(), source }),
-    }
+fn fabric(source: Source<'_>, value: &At, inputs: &Inputs) -> Result<Vec<Edit>, PlanError> {
+    let label = source.text(value, "fabric", "a built-in name or a file")?;
+    let place = source.place(value);
+    let fabric = match names_a_file(&label) {
+        true => Fabric::parse(&inputs.text(&label, &place)?, &label),
+        false => Fabric::by_name(&label),
+    };
+    let fabric = Fabric { name: label, ..fabric.map_err(|source| PlanError::Fabric { place, source })? };
+    Ok(one(move |point| point.job.settings.fabric = fabric.clone()))
 }
 
 /// No extent, one, or a cascade from coarse to fine.
-fn extent(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
+fn extents(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
     let wrong =
         || source.wrong(value, "extent_cm", "centimetres, 0 or \"none\" for not cut, or a falling list of them");
     let positive = |v: &Value| number(v).filter(|cm| *cm > 0.0 && cm.is_finite());
@@ -181,14 +171,28 @@ fn extent(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
     }
 }
 
-/// Scalars by name, as text.
-fn options(source: Source<'_>, value: &At) -> Result<BTreeMap<String, String>, PlanError> {
-    let wrong = || source.wrong(value, "options", "{ name = value, ... } of strings, numbers and true or false");
-    let text = |v: &Value| match v {
-        Value::String(text) => Some(text.clone()),
-        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(v.to_string()),
-        _ => None,
+/// What a point is measured against, and further keys of its scene that name no file.
+fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
+    let expected = "{ name = value, ... } with accuracy = \"none\", \"canonical\" or \"own\", or a key of the scene such as \
+                    rest = \"texture\", hold, unit, up, weld";
+    let wrong = |what: &str| source.wrong(value, "options", format!("{expected}{what}"));
+    let given = value.get_ref().as_table().ok_or_else(|| wrong(""))?.clone();
+    let set = move |point: &mut Point| -> Result<(), String> {
+        let mut scene = toml::Table::try_from(&point.job.scene).map_err(|e| e.to_string())?;
+        for (key, v) in &given {
+            let text = v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+            match key.as_str() {
+                "accuracy" => point.job.accuracy = text.parse()?,
+                "body" | "garment" => return Err("bodies and garments have axes of their own".to_owned()),
+                "rest" if names_a_file(&text) => return Err("options name no file".to_owned()),
+                _ => drop(scene.insert(key.clone(), v.clone())),
+            }
+            point.options.insert(key.clone(), text);
+        }
+        point.job.scene = scene.try_into().map_err(|e: toml::de::Error| e.message().replace('\n', ", "))?;
+        Ok(())
     };
-    let table = value.get_ref().as_table().ok_or_else(wrong)?;
-    table.iter().map(|(key, v)| text(v).map(|text| (key.clone(), text)).ok_or_else(wrong)).collect()
+    set(&mut Point::of(Job::default())).map_err(|e| wrong(&format!("; {e}")))?;
+    // Tried above: what fits one point fits any.
+    Ok(one(move |point| set(point).unwrap_or_default()))
 }

@@ -2,26 +2,24 @@
 
 use toml::Value;
 
-use super::choice::{BodyChoice, Input};
+use super::axes::{Edit, one};
 use super::error::PlanError;
 use super::file::{At, Source, number};
-use super::inputs::Inputs;
+use super::inputs::{Input, Inputs};
+use crate::files::names_a_file;
+use crate::scene::DRESS_FORM;
 use crate::shapes::BodySpec;
 
-/// The body where a sweep names none.
-pub const DEFAULT_BODY: &str = "form";
-
-/// The form as it comes.
-pub(super) fn dress_form() -> BodyChoice {
-    BodyChoice {
-        label: DEFAULT_BODY.to_owned(),
-        input: Input::built_in(DEFAULT_BODY),
-        measurements: BodySpec::default(),
-    }
+/// A body by name, file, or measurements.
+pub(super) fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<Vec<Edit>, PlanError> {
+    let (input, measurements) = chosen(source, value, inputs)?;
+    Ok(one(move |point| {
+        point.set_body(&input);
+        point.job.scene.measurements = measurements.clone();
+    }))
 }
 
-/// A body by name, file, or measurements.
-pub(super) fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<BodyChoice, PlanError> {
+fn chosen(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<(Input, BodySpec), PlanError> {
     let expected = "\"form\", an OBJ file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
                     optional name = \"...\" and of = (one of these)";
     let place = source.place(value);
@@ -31,17 +29,17 @@ pub(super) fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Resul
         _ => return Err(source.wrong(value, "body", expected)),
     };
     let text = |key| table.get(key).map(|v: &Value| v.as_str().ok_or_else(|| source.wrong(value, "body", expected)));
-    let (name, of) = (text("name").transpose()?, text("of").transpose()?.unwrap_or(DEFAULT_BODY));
-    let mut body = named_body(source, value, of, expected, inputs)?;
+    let (name, of) = (text("name").transpose()?, text("of").transpose()?.unwrap_or(DRESS_FORM));
+    let (mut input, mut measurements) = named_body(source, value, of, expected, inputs)?;
     for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
         let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
-        let changed = body.measurements.with(measure, cm);
-        body.measurements = changed.map_err(|e| PlanError::Shape { place: place.clone(), key: "body", source: e })?;
-        body.label = format!("{} {measure}={cm}", body.label);
+        let changed = measurements.with(measure, cm);
+        measurements = changed.map_err(|e| PlanError::Shape { place: place.clone(), key: "body", source: e })?;
+        input.label = format!("{} {measure}={cm}", input.label);
     }
-    body.label = name.map_or(body.label, str::to_owned);
-    match body.measurements.measures() {
-        Ok(_) => Ok(body),
+    input.label = name.map_or(input.label, str::to_owned);
+    match measurements.measures() {
+        Ok(_) => Ok((input, measurements)),
         Err(source) => Err(PlanError::Shape { place, key: "body", source }),
     }
 }
@@ -53,19 +51,19 @@ fn named_body(
     label: &str,
     expected: &str,
     inputs: &mut Inputs,
-) -> Result<BodyChoice, PlanError> {
+) -> Result<(Input, BodySpec), PlanError> {
     let place = source.place(value);
-    let body = BodyChoice { label: label.to_owned(), ..dress_form() };
-    if label == DEFAULT_BODY {
-        return Ok(body);
+    let form = Input { label: label.to_owned(), ..Input::built_in(DRESS_FORM) };
+    if label == DRESS_FORM {
+        return Ok((form, BodySpec::default()));
     }
-    if !Inputs::names_a_file(label) {
+    if !names_a_file(label) {
         return Err(source.wrong(value, "body", expected));
     }
     if label.ends_with(".toml") {
         let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
         let measurements = spec.map_err(|source| PlanError::Shape { place, key: "body", source })?;
-        return Ok(BodyChoice { measurements, ..body });
+        return Ok((form, measurements));
     }
-    Ok(BodyChoice { input: inputs.input(label, &place)?, ..body })
+    Ok((inputs.input(label, &place)?, BodySpec::default()))
 }

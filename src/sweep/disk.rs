@@ -5,6 +5,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::error::StoreError;
+use crate::whole_file::WholeFile;
 
 /// Where lines are appended: a file, or what a test puts in its place.
 pub trait Append: Send {
@@ -44,36 +45,15 @@ pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
 pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(source) => Err(StoreError::Io { path: path.to_owned(), doing: "cannot be read", source }),
     }
 }
 
-/// Writes a file beside its place and renames it: whoever looks, and whatever breaks, sees the old or the new one.
+/// Replaces a file: whoever looks, and whatever breaks, sees the old or the new one.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".new");
-    let beside = Path::new(&beside);
-    let write = || {
-        let mut file = File::create(beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(beside, path)
-    };
-    write().map_err(|source| {
-        // Best effort: on a full disk the half-written file is in the way of everything else.
-        let _ = fs::remove_file(beside);
-        StoreError::Io { path: path.to_owned(), doing: "cannot be written", source }
-    })?;
-    sync_folder(path);
-    Ok(())
-}
-
-/// Makes a rename last through a power cut where the system can (a folder cannot be opened everywhere).
-fn sync_folder(path: &Path) {
-    if let Some(Ok(folder)) = path.parent().map(File::open) {
-        let _ = folder.sync_all();
-    }
+    let cannot = |source| StoreError::Io { path: path.to_owned(), doing: "cannot be written", source };
+    WholeFile::write(path, bytes).map_err(cannot)
 }
 
 /// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for

@@ -1,5 +1,5 @@
-//! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of these:
-//! it is a row.
+//! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of
+//! these: it is a row.
 
 use std::io;
 use std::path::PathBuf;
@@ -23,8 +23,8 @@ pub enum PlanError {
     },
     /// Not TOML, or a key that is missing, unknown or of another type.
     #[error(
-        "{place}: {message}; a sweep file has name = \"...\", and [grid] with lists or [[points]] one by one, or both; \
-         [base] holds what all share"
+        "{place}: {message}; a sweep file has name = \"...\", and [grid] with lists (tables = [...]) or [[points]] one by \
+         one (table = ...), or both; [base] holds what all share"
     )]
     Syntax {
         /// File and line.
@@ -157,6 +157,16 @@ pub enum StoreError {
         line: usize,
         /// What the parser said.
         message: String,
+    },
+    /// An id that is no hash: it must not become a file name.
+    #[error(
+        "{path}: found the point id {found:?}, expected 32 hexadecimal digits; it is not what `partwise sweep` wrote"
+    )]
+    BadId {
+        /// The manifest.
+        path: PathBuf,
+        /// The id.
+        found: String,
     },
     /// Rows nobody can tell the sweep of.
     #[error("{path}: found rows but no plan.json beside them, expected both; put it back, or choose another folder")]

@@ -26,10 +26,13 @@
 //! | `model` | `models` | `paper`, `coupled` | `coupled` |
 //! | `table` | `tables` | see [`tables`](super::tables) | `table-3` |
 //! | `extent_cm` | `extents_cm` | cm; 0 or `none` for not cut; a list for a cascade, coarse to fine | `none` |
-//! | `min_part` | `min_parts` | vertices; `coupled` joins PARTs smaller than its finest extent in any case | 1 |
+//! | `motion` | `motions` | of a PART in `coupled`: `affine`, `translation` | `affine` |
+//! | `min_part` | `min_parts` | vertices; PARTs of fewer are joined before any is cut | 1 |
 //! | `refine` | `refine` | steps or `converged` | 0 |
 //! | `seed` | `seeds` | 0 is the undisturbed start | 0 |
-//! | `options` | `options` | `{ name = value, ... }`: whatever else the solver understands | none |
+//! | `options` | `options` | `{ name = value, ... }`: `accuracy`, and the keys of a [`SceneSpec`](crate::SceneSpec) such as `rest` | none |
+
+use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use toml::{Spanned, Value};
@@ -38,6 +41,28 @@ use super::error::PlanError;
 
 /// A value and where it stands.
 pub(super) type At = Spanned<Value>;
+
+/// `[base]` and `[[points]]`: one value a key.
+pub(super) type Single = BTreeMap<String, At>;
+
+/// `[grid]`: a list a key.
+pub(super) type Grid = BTreeMap<String, Spanned<Vec<At>>>;
+
+/// The keys of `[base]` and `[[points]]`, and those of `[grid]`, in the order in which a grid is nested.
+const KEYS: [[&str; 2]; 12] = [
+    ["body", "bodies"],
+    ["garment", "garments"],
+    ["size", "sizes"],
+    ["fabric", "fabrics"],
+    ["model", "models"],
+    ["table", "tables"],
+    ["extent_cm", "extents_cm"],
+    ["motion", "motions"],
+    ["min_part", "min_parts"],
+    ["refine", "refine"],
+    ["seed", "seeds"],
+    ["options", "options"],
+];
 
 /// The file.
 #[derive(Debug, Deserialize)]
@@ -56,60 +81,6 @@ pub(super) struct SweepFile {
     pub(super) points: Vec<Single>,
 }
 
-/// `[base]` and `[[points]]`.
-#[derive(Debug, Default, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Single {
-    pub(super) body: Option<At>,
-    pub(super) garment: Option<At>,
-    pub(super) size: Option<At>,
-    pub(super) fabric: Option<At>,
-    pub(super) model: Option<At>,
-    pub(super) table: Option<At>,
-    pub(super) extent_cm: Option<At>,
-    pub(super) min_part: Option<At>,
-    pub(super) refine: Option<At>,
-    pub(super) seed: Option<At>,
-    pub(super) options: Option<At>,
-}
-
-impl Single {
-    /// What is not given here is taken from `base`.
-    pub(super) fn or(self, base: &Self) -> Self {
-        let or = |own: Option<At>, base: &Option<At>| own.or_else(|| base.clone());
-        Self {
-            body: or(self.body, &base.body),
-            garment: or(self.garment, &base.garment),
-            size: or(self.size, &base.size),
-            fabric: or(self.fabric, &base.fabric),
-            model: or(self.model, &base.model),
-            table: or(self.table, &base.table),
-            extent_cm: or(self.extent_cm, &base.extent_cm),
-            min_part: or(self.min_part, &base.min_part),
-            refine: or(self.refine, &base.refine),
-            seed: or(self.seed, &base.seed),
-            options: or(self.options, &base.options),
-        }
-    }
-}
-
-/// `[grid]`.
-#[derive(Debug, Default, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Grid {
-    pub(super) bodies: Option<Spanned<Vec<At>>>,
-    pub(super) garments: Option<Spanned<Vec<At>>>,
-    pub(super) sizes: Option<Spanned<Vec<At>>>,
-    pub(super) fabrics: Option<Spanned<Vec<At>>>,
-    pub(super) models: Option<Spanned<Vec<At>>>,
-    pub(super) tables: Option<Spanned<Vec<At>>>,
-    pub(super) extents_cm: Option<Spanned<Vec<At>>>,
-    pub(super) min_parts: Option<Spanned<Vec<At>>>,
-    pub(super) refine: Option<Spanned<Vec<At>>>,
-    pub(super) seeds: Option<Spanned<Vec<At>>>,
-    pub(super) options: Option<Spanned<Vec<At>>>,
-}
-
 /// The text of a sweep file and its name, for the messages.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Source<'a> {
@@ -120,10 +91,28 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// Reads the keys.
     pub(super) fn parse(self) -> Result<SweepFile, PlanError> {
-        toml::from_str(self.text).map_err(|e| PlanError::Syntax {
+        let file: SweepFile = toml::from_str(self.text).map_err(|e| PlanError::Syntax {
             place: e.span().map_or_else(|| self.name.to_owned(), |span| self.line(span.start)),
             message: e.message().replace('\n', ", "),
-        })
+        })?;
+        for single in file.points.iter().chain([&file.base]) {
+            self.check_keys(0, single.iter().map(|(key, value)| (key, value.span().start)))?;
+        }
+        if let Some(grid) = &file.grid {
+            self.check_keys(1, grid.iter().map(|(key, list)| (key, list.span().start)))?;
+        }
+        Ok(file)
+    }
+
+    fn check_keys<'k>(self, which: usize, keys: impl Iterator<Item = (&'k String, usize)>) -> Result<(), PlanError> {
+        for (key, offset) in keys {
+            if !KEYS.iter().any(|names| names[which] == key) {
+                let known = KEYS.map(|names| names[which]).join(", ");
+                let message = format!("unknown key `{key}`, expected one of {known}");
+                return Err(PlanError::Syntax { place: self.line(offset), message });
+            }
+        }
+        Ok(())
     }
 
     /// `file:line` of a value.

@@ -1,35 +1,35 @@
 //! The garments of a sweep, at their sizes.
 
-use super::axes::Axis;
-use super::choice::Input;
+use super::axes::{Axis, Edit, one};
 use super::error::PlanError;
-use super::file::{Grid, Single};
-use super::inputs::Inputs;
+use super::file::At;
+use super::inputs::{Input, Inputs};
+use crate::files::names_a_file;
+use crate::scene::SceneSpec;
 use crate::shapes::garment::TABLE_4_SIZES;
 use crate::shapes::{BUILT_IN, GarmentRequest, GarmentSpec};
 
-/// The garment where a sweep names none.
-pub const DEFAULT_GARMENT: &str = "low-cut-dress";
-
 /// Garments, each at every size.
-pub(super) fn garments(
-    axis: Axis<'_>,
-    base: &Single,
-    grid: &Grid,
-    inputs: &mut Inputs,
-) -> Result<Vec<Input>, PlanError> {
+pub(super) fn garments(axis: Axis<'_>, inputs: &mut Inputs) -> Result<Vec<Edit>, PlanError> {
     let source = axis.source;
-    let garments = axis.of(&base.garment, &grid.garments, "garments", |v| {
-        let label = source.text(v, "garment", "a name, name@vertices or a file")?;
-        if !Inputs::names_a_file(&label) {
-            let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
-            known.map_err(|e| PlanError::Shape { place: source.place(v), key: "garment", source: e })?;
+    let sizes = axis.values(["size", "sizes"])?;
+    let garments = match axis.values(["garment", "garments"])? {
+        None if sizes.is_none() => return Ok(one(|_| ())),
+        None => vec![Input::built_in(SceneSpec::default().garment)],
+        Some(values) => {
+            let garment = |v| {
+                let label = source.text(v, "garment", "a name, name@vertices or a file")?;
+                if !names_a_file(&label) {
+                    let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
+                    known.map_err(|e| PlanError::Shape { place: source.place(v), key: "garment", source: e })?;
+                }
+                inputs.input(&label, &source.place(v))
+            };
+            values.iter().map(garment).collect::<Result<Vec<_>, _>>()?
         }
-        inputs.input(&label, &source.place(v))
-    })?;
-    let garments = garments.unwrap_or_else(|| vec![Input::built_in(DEFAULT_GARMENT)]);
-    let sized = garments.iter().find(|g| g.file.is_some() || g.label.contains('@'));
-    let sizes = axis.of(&base.size, &grid.sizes, "sizes", |v| match (sized, v.get_ref().as_str()) {
+    };
+    let sized = garments.iter().find(|g| g.is_a_file() || g.label.contains('@'));
+    let size = |v: &At| match (sized, v.get_ref().as_str()) {
         (Some(garment), _) => {
             let expected = "no sizes where a garment has its own, as {}; write name@vertices for each instead";
             Err(source.wrong(v, "size", expected.replace("{}", &garment.label)))
@@ -40,10 +40,17 @@ pub(super) fn garments(
             let expected = "a number of vertices, at least 4, or \"larger\" or \"smaller\" of the paper's two";
             source.count(v, "size", 4, expected).map(Size::Vertices)
         }
-    })?;
-    let Some(sizes) = sizes else { return Ok(garments) };
-    let at_sizes = |g: &Input| sizes.iter().map(|size| g.at(size.of(&g.label))).collect::<Vec<_>>();
-    Ok(garments.iter().flat_map(at_sizes).collect())
+    };
+    let sizes: Option<Vec<Size>> = sizes.as_ref().map(|values| values.iter().map(size).collect()).transpose()?;
+    let at = |garment: &Input, size: &Size| match size.of(&garment.label) {
+        Some(vertices) => Input::built_in(format!("{}@{vertices}", garment.label)),
+        None => garment.clone(),
+    };
+    let all: Vec<Input> = match &sizes {
+        None => garments,
+        Some(sizes) => garments.iter().flat_map(|g| sizes.iter().map(move |size| at(g, size))).collect(),
+    };
+    Ok(all.into_iter().map(|garment| -> Edit { Box::new(move |point| point.set_garment(&garment)) }).collect())
 }
 
 /// How many vertices a garment shall have.

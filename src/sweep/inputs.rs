@@ -4,8 +4,31 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::choice::Input;
 use super::error::PlanError;
+use crate::files::names_a_file;
+
+/// A body or garment, built in by name or a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Input {
+    /// As written in the sweep file: a built-in name (a garment's with `@vertices`) or a path.
+    pub(super) label: String,
+    /// The name, or the file's path from where the program runs.
+    pub(super) name: String,
+    /// What determines a result: the name, or the hash of the file's contents.
+    pub(super) key: String,
+}
+
+impl Input {
+    /// Something built in.
+    pub(super) fn built_in(label: impl Into<String>) -> Self {
+        let label = label.into();
+        Self { name: label.clone(), key: label.clone(), label }
+    }
+
+    pub(super) fn is_a_file(&self) -> bool {
+        self.key != self.name
+    }
+}
 
 /// Reader of the files a sweep names; paths count from the folder of the sweep file.
 #[derive(Debug)]
@@ -19,14 +42,9 @@ impl Inputs {
         Self { folder: folder.to_owned(), digests: BTreeMap::new() }
     }
 
-    /// Whether an argument names a file rather than something built in.
-    pub(super) fn names_a_file(argument: &str) -> bool {
-        argument.contains(['/', '\\', '.'])
-    }
-
-    /// A body, garment or fabric as written.
+    /// A body or garment as written.
     pub(super) fn input(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
-        if !Self::names_a_file(label) {
+        if !names_a_file(label) {
             return Ok(Input::built_in(label));
         }
         let path = self.folder.join(label);
@@ -39,7 +57,7 @@ impl Inputs {
                 digest
             }
         };
-        Ok(Input { label: label.to_owned(), file: Some(path), digest: Some(digest) })
+        Ok(Input { label: label.to_owned(), name: path.display().to_string(), key: format!("blake3 {digest}") })
     }
 
     /// A text file as written.

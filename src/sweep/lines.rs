@@ -5,16 +5,11 @@ use std::path::Path;
 use super::disk;
 use super::error::StoreError;
 use super::manifest::Manifest;
-use super::row::{Row, csv_header, csv_line, json_line};
+use super::row::{Row, Status, json_line};
 
 /// The rows as JSON lines.
 pub(super) fn json_text(rows: &[Row]) -> Vec<u8> {
     rows.iter().flat_map(json_line).collect()
-}
-
-/// The rows as CSV.
-pub(super) fn csv_text(rows: &[Row]) -> Vec<u8> {
-    csv_header().into_bytes().into_iter().chain(rows.iter().flat_map(csv_line)).collect()
 }
 
 /// The rows of a sweep. A bad last line was torn and is left out; the id counts, not the number, so that rows find their place.
@@ -31,7 +26,10 @@ pub(super) fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, St
         }
         let parsed = match line.strip_suffix(b"\n") {
             None => Err("the line has no end".to_owned()),
-            Some(line) => serde_json::from_slice::<Row>(line).map_err(|e| e.to_string()),
+            Some(line) => serde_json::from_slice(line).map_err(|e| e.to_string()).and_then(|row: Row| {
+                let whole = (row.figures.is_some() && row.timing.is_some()) == (row.status == Status::Ok);
+                if whole { Ok(row) } else { Err("its status and its figures do not agree".to_owned()) }
+            }),
         };
         match parsed {
             Err(message) => bad = Some((i + 1, message)),

@@ -99,6 +99,12 @@ pub struct Manifest {
     pub points: Vec<Listed>,
 }
 
+/// Whether a text is a content hash as points and scenes have them: hexadecimal, hence good for a file name.
+#[must_use]
+pub fn is_id(text: &str) -> bool {
+    text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+}
+
 impl Manifest {
     /// Of a plan, or of a share of it.
     #[must_use]
@@ -132,7 +138,7 @@ impl Manifest {
         format!(
             "sweep \"{name}\" of partwise {partwise}, {} points, plan {}{shard}",
             points.len(),
-            &plan[..plan.len().min(8)]
+            plan.chars().take(8).collect::<String>()
         )
     }
 
@@ -140,10 +146,15 @@ impl Manifest {
     pub(super) fn read(folder: &Path) -> Result<Option<Self>, StoreError> {
         let path = folder.join(MANIFEST);
         let Some(bytes) = disk::read_if_there(&path)? else { return Ok(None) };
-        match serde_json::from_slice(&bytes) {
-            Ok(manifest) => Ok(Some(manifest)),
-            Err(e) => Err(StoreError::Damaged { path, line: e.line(), message: e.to_string() }),
+        let manifest: Self = match serde_json::from_slice(&bytes) {
+            Ok(manifest) => manifest,
+            Err(e) => return Err(StoreError::Damaged { path, line: e.line(), message: e.to_string() }),
+        };
+        // Ids become file names, and the manifest may be somebody else's.
+        if let Some(wrong) = manifest.points.iter().find(|point| !is_id(&point.id)) {
+            return Err(StoreError::BadId { path, found: wrong.id.clone() });
         }
+        Ok(Some(manifest))
     }
 
     /// Writes it, whole or not at all.

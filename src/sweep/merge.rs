@@ -75,6 +75,6 @@ fn agree(mine: &Row, from: &Path, other: &Row, folder: &Path, manifest: &Manifes
         label: manifest.points[mine.index].label.clone(),
         first: from.to_owned(),
         second: folder.to_owned(),
-        columns: columns.into_iter().map(str::to_owned).collect(),
+        columns,
     })
 }

@@ -1,15 +1,16 @@
 //! Sweeps: a file of range tables and other parameters run point by point, a row on disk after each.
 //!
-//! [`Plan::read`] turns a sweep file into points; [`sweep`] runs those that have no row yet through any [`Solve`] and keeps
-//! the rows in a [`Store`]; [`merge`] joins the stores of shards. Equal plans give equal rows, whatever was interrupted,
-//! however many jobs and shards there were, timings aside.
+//! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row
+//! yet, with whatever makes rows of points (a [`Bench`], as a rule), and keeps the rows in a [`Store`]; [`merge`] joins
+//! the stores of shards. Equal plans give equal rows, whatever was interrupted, however many jobs and shards there
+//! were, timings aside.
 //!
-//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points, [`point`] what their
-//! ids are made of, [`store`] the files.
+//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points,
+//! [`point`] what their ids are made of, [`store`] the files.
 
 mod axes;
+mod bench;
 mod bodies;
-mod choice;
 mod disk;
 mod error;
 pub mod file;
@@ -23,24 +24,19 @@ pub mod plan;
 pub mod point;
 mod row;
 mod run;
-mod solve;
 pub mod store;
 pub mod tables;
 mod timing;
 
-pub use axes::DEFAULT_FABRIC;
-pub use bodies::DEFAULT_BODY;
-pub use choice::{BodyChoice, FabricChoice, Input, ModelChoice, Refine, TableChoice, TableRule};
+pub use bench::{Bench, Pass, PointError, result_hash, row_of};
 pub use disk::Append;
 pub use error::{MergeError, PlanError, StoreError};
-pub use garments::DEFAULT_GARMENT;
 pub use journal::Medium;
-pub use manifest::{Listed, Manifest, Shard};
+pub use manifest::{Listed, Manifest, Shard, is_id};
 pub use merge::{join, merge};
 pub use plan::Plan;
 pub use point::{Point, VERSION};
-pub use row::{COLUMNS, Measures, Row, Status};
-pub use run::{Outcome, Progress, Run, run_missing, sweep};
-pub use solve::{PointError, Solve, Solved, result_hash, row_of};
+pub use row::{Row, Status, cell, columns, csv_text};
+pub use run::{Maker, Outcome, Run, SweepProgress, run_missing, sweep};
 pub use store::{Existing, Store};
-pub use timing::{Spread, Times, Timing};
+pub use timing::Timing;

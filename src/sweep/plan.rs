@@ -1,9 +1,10 @@
 //! From a sweep file to its points.
 //!
 //! # Order
-//! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, smallest PART, refinement, seed,
-//! options (the last fastest), each axis in the order written; then the single points as written. A point that equals an earlier one in
-//! all that determines its result (Table 3 scaled by 1, say) is left out, and [`Plan::notes`] says so.
+//! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, motion, smallest PART,
+//! refinement, seed, options (the last fastest), each axis in the order written; then the single points as written. A
+//! point that equals an earlier one in all that determines its result (Table 3 scaled by 1, say) is left out, and
+//! [`Plan::notes`] says so.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,6 +15,7 @@ use super::error::PlanError;
 use super::file::{Grid, Source};
 use super::inputs::Inputs;
 use super::point::Point;
+use crate::job::Job;
 
 /// All points of a sweep, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,25 +35,25 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Reads a sweep file; the files it names count from its folder.
+    /// Reads a sweep file; the files it names count from its folder, and what it does not say is as in `start`.
     ///
     /// # Errors
     /// [`PlanError`] with file, line, what was found and what was expected.
-    pub fn read(path: &Path) -> Result<Self, PlanError> {
+    pub fn read(path: &Path, start: &Job) -> Result<Self, PlanError> {
         let name = path.display().to_string();
         let text = fs::read_to_string(path).map_err(|source| PlanError::Read {
             place: name.clone(),
             path: path.to_owned(),
             source,
         })?;
-        Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))
+        Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")), start)
     }
 
     /// The plan of a sweep file's text; `name` only serves the messages, `folder` is where its paths count from.
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub fn parse(text: &str, name: &str, folder: &Path) -> Result<Self, PlanError> {
+    pub fn parse(text: &str, name: &str, folder: &Path, start: &Job) -> Result<Self, PlanError> {
         let source = Source { text, name };
         let file = source.parse()?;
         let repeats = "a whole number of passes, at least 1";
@@ -61,19 +63,20 @@ impl Plan {
         let mut inputs = Inputs::new(folder);
         let mut points = Vec::new();
         if let Some(grid) = &file.grid {
-            Axes::read(source, &file.base, grid, &mut inputs)?.expand(&mut points, name)?;
+            Axes::read(source, &file.base, grid, &mut inputs)?.expand(&mut points, start, name)?;
         }
         for single in &file.points {
-            let single = single.clone().or(&file.base);
-            let axes = Axes::read(source, &single, &Grid::default(), &mut inputs)?;
-            if let (Some(table), true) = (&single.table, axes.tables.len() > 1) {
+            let mut all = file.base.clone();
+            all.extend(single.clone());
+            let axes = Axes::read(source, &all, &Grid::default(), &mut inputs)?;
+            if let (Some(table), true) = (single.get("table"), axes.count() > 1) {
                 return Err(source.wrong(
                     table,
                     "table",
                     "one table for one point; lists belong into [grid] as tables",
                 ));
             }
-            axes.expand(&mut points, name)?;
+            axes.expand(&mut points, start, name)?;
         }
         if points.is_empty() {
             return Err(PlanError::Empty { name: name.to_owned() });
@@ -81,20 +84,21 @@ impl Plan {
         let (points, notes) = distinct(points);
         Ok(Self { name: file.name, about: file.about, repeats, warm_up, points, notes })
     }
-}
 
-impl Plan {
-    /// The same plan with an option set in every point that does not set it itself: part of what determines a result, so
-    /// the ids change with it.
-    #[must_use]
-    pub fn with_option(mut self, name: &str, value: &str) -> Self {
-        let set = |mut point: Point| {
-            point.options.entry(name.to_owned()).or_insert_with(|| value.to_owned());
-            point.named()
+    /// The plan of jobs, one timed pass each; the files they name are hashed here.
+    ///
+    /// # Errors
+    /// [`PlanError::Read`] for a body or garment that cannot be read.
+    pub fn of_jobs(name: &str, jobs: Vec<Job>) -> Result<Self, PlanError> {
+        let mut inputs = Inputs::new(Path::new(""));
+        let mut point = |job: Job| {
+            let mut point = Point::of(job);
+            point.set_body(&inputs.input(&point.body, name)?);
+            point.set_garment(&inputs.input(&point.garment, name)?);
+            Ok(point.named())
         };
-        let (points, notes) = distinct(self.points.into_iter().map(set).collect());
-        self.notes.extend(notes);
-        Self { points, ..self }
+        let (points, notes) = distinct(jobs.into_iter().map(&mut point).collect::<Result<_, PlanError>>()?);
+        Ok(Self { name: name.to_owned(), about: String::new(), repeats: 1, warm_up: 0, points, notes })
     }
 }
 
@@ -102,7 +106,7 @@ impl Plan {
 fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let (mut kept, mut notes): (Vec<Point>, Vec<String>) = (Vec::with_capacity(points.len()), Vec::new());
-    for point in points {
+    for mut point in points {
         if let Some(&first) = seen.get(&point.id) {
             notes.push(format!(
                 "point left out, the same as point {first} ({}): {}",
@@ -112,7 +116,8 @@ fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
             continue;
         }
         seen.insert(point.id.clone(), kept.len());
-        kept.push(Point { index: kept.len(), ..point });
+        point.index = kept.len();
+        kept.push(point);
     }
     (kept, notes)
 }

@@ -8,13 +8,13 @@ use std::thread;
 use super::error::StoreError;
 use super::manifest::{Manifest, Shard};
 use super::plan::Plan;
+use super::point::Point;
 use super::row::{Row, Status};
-use super::solve::{Solve, row_of};
 use super::store::{Existing, Store};
 
 /// How far a sweep is.
 #[derive(Debug, Clone, Copy)]
-pub struct Progress<'a> {
+pub struct SweepProgress<'a> {
     /// Points of this sweep or shard.
     pub total: usize,
     /// Rows on disk, those found there included.
@@ -35,8 +35,12 @@ pub struct Run<'a> {
     /// Set to stop: points in hand are finished, no others begun.
     pub stop: &'a AtomicBool,
     /// Called before the first point, and after every row by the thread that wrote it, one at a time.
-    pub progress: &'a (dyn Fn(Progress<'_>) + Sync),
+    pub progress: &'a (dyn Fn(SweepProgress<'_>) + Sync),
 }
+
+/// Makes the row of a point; `None` where it was interrupted. Called from several threads at once where there are several
+/// jobs; not from rayon's, so that it may hold a lock around work that rayon spreads.
+pub type Maker<'a> = dyn Fn(&Point) -> Option<Row> + Sync + 'a;
 
 /// What became of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,17 +62,17 @@ pub struct Outcome {
 /// # Errors
 /// [`StoreError`] as [`Store::open`] and [`Store::append`]: rows written before stay intact. A failed point is no error
 /// but a row.
-pub fn sweep<S: Solve>(
+pub fn sweep(
     plan: &Plan,
     shard: Option<Shard>,
     folder: &Path,
     existing: Existing,
     run: &Run<'_>,
-    solver: &S,
+    row: &Maker<'_>,
 ) -> Result<Outcome, StoreError> {
     let mut store = Store::open(folder, Manifest::of(plan, shard), existing)?;
     let skipped = store.rows().len();
-    run_missing(plan, &mut store, run, solver)?;
+    run_missing(plan, &mut store, run, row)?;
     let total = store.manifest().share();
     let rows = store.finish()?;
     let failed = count_failed(&rows);
@@ -80,10 +84,10 @@ pub fn sweep<S: Solve>(
 ///
 /// # Errors
 /// [`StoreError::Write`] when a row cannot be written; the points in hand are then lost, the rows before are not.
-pub fn run_missing<S: Solve>(plan: &Plan, store: &mut Store, run: &Run<'_>, solver: &S) -> Result<(), StoreError> {
+pub fn run_missing(plan: &Plan, store: &mut Store, run: &Run<'_>, row: &Maker<'_>) -> Result<(), StoreError> {
     let todo: Vec<_> = plan.points.iter().filter(|p| store.lacks(p.index)).collect();
     let skipped = store.rows().len();
-    let progress = Progress {
+    let progress = SweepProgress {
         total: store.manifest().share(),
         done: skipped,
         skipped,
@@ -97,7 +101,7 @@ pub fn run_missing<S: Solve>(plan: &Plan, store: &mut Store, run: &Run<'_>, solv
     let work = || {
         while !run.stop.load(Ordering::SeqCst) && !broken.load(Ordering::SeqCst) {
             let Some(point) = todo.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
-            let Some(row) = row_of(point, solver, plan.warm_up, plan.repeats) else { break };
+            let Some(row) = row(point) else { break };
             if !desk.lock().unwrap_or_else(PoisonError::into_inner).take(row, run) {
                 broken.store(true, Ordering::SeqCst);
             }
@@ -116,7 +120,7 @@ pub fn run_missing<S: Solve>(plan: &Plan, store: &mut Store, run: &Run<'_>, solv
 /// Where finished points are handed in, one at a time.
 struct Desk<'a> {
     store: &'a mut Store,
-    progress: Progress<'static>,
+    progress: SweepProgress<'static>,
     written: Result<(), StoreError>,
 }
 
@@ -129,7 +133,7 @@ impl Desk<'_> {
             if self.written.is_ok() {
                 self.progress.done += 1;
                 self.progress.failed += failed;
-                (run.progress)(Progress { row: self.store.rows().last(), ..self.progress });
+                (run.progress)(SweepProgress { row: self.store.rows().last(), ..self.progress });
             }
         }
         self.written.is_ok()

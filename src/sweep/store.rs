@@ -4,11 +4,11 @@
 //! |---|---|
 //! | `plan.json` | whose rows these are ([`Manifest`]) |
 //! | `rows.jsonl` | the truth: a line a row, appended and synced after every point |
-//! | `rows.csv` | the same rows and columns, made from the lines; mended from them on resume |
+//! | `rows.csv` | the same as a table, made from the lines on resume and at the end |
 //! | `lock` | held by the process that writes; the system lets go of it when the process dies |
 //!
-//! While a sweep runs, rows stand in the order in which points finished; at the end both files are put into the plan's
-//! order, each by one rename. A torn last line (a killed process, a full disk) is dropped on resume and its point computed
+//! While a sweep runs, lines stand in the order in which points finished; at the end they are put into the plan's order, by
+//! one rename. A torn last line (a killed process, a full disk) is dropped on resume and its point computed
 //! again; a bad line with good ones after it is no accident of ours and is refused. On resume points that failed are tried
 //! again unless asked otherwise: what failed for want of memory or room deserves it.
 
@@ -18,9 +18,9 @@ use std::path::{Path, PathBuf};
 use super::disk::{self, make};
 use super::error::StoreError;
 use super::journal::{Journal, Medium, take_lock};
-use super::lines::{csv_text, json_text, read_rows};
+use super::lines::{json_text, read_rows};
 use super::manifest::{MANIFEST, Manifest};
-use super::row::{Row, Status, csv_line, json_line};
+use super::row::{Row, Status, csv_text, json_line};
 
 /// Name of the JSON lines in a sweep's folder.
 pub const JSON_LINES: &str = "rows.jsonl";
@@ -54,8 +54,7 @@ pub struct Store {
     folder: PathBuf,
     rows: Vec<Row>,
     done: Vec<bool>,
-    json: Journal,
-    csv: Journal,
+    journal: Journal,
     _lock: File,
 }
 
@@ -97,18 +96,17 @@ impl Store {
             None => Vec::new(),
             Some(found) => left_over(folder, &found, &manifest, existing)?,
         };
-        let (json_path, csv_path) = (folder.join(JSON_LINES), folder.join(CSV));
+        let lines = folder.join(JSON_LINES);
         // The rows of another plan go before its manifest does: a crash between the two leaves a plan with fewer rows.
-        make(&json_path, &json_text(&rows))?;
+        make(&lines, &json_text(&rows))?;
         manifest.write(folder)?;
-        make(&csv_path, &csv_text(&rows))?;
+        make(&folder.join(CSV), &csv_text(&rows))?;
         let mut done = vec![false; manifest.points.len()];
         for row in &rows {
             done[row.index] = true;
         }
-        let json = Journal::open(json_path, medium)?;
-        let csv = Journal::open(csv_path, medium)?;
-        Ok(Self { manifest, folder: folder.to_owned(), rows, done, json, csv, _lock: lock })
+        let journal = Journal::open(lines, medium)?;
+        Ok(Self { manifest, folder: folder.to_owned(), rows, done, journal, _lock: lock })
     }
 
     /// Whose rows these are.
@@ -135,40 +133,35 @@ impl Store {
         self.manifest.holds(point) && self.done.get(point) == Some(&false)
     }
 
-    /// Puts a row on disk, in both files; returns when it is there.
+    /// Puts a row on disk; returns when it is there.
     ///
     /// # Errors
     /// [`StoreError::Write`]; all rows before stay intact. A second row for a point is refused as damage.
     pub fn append(&mut self, row: Row) -> Result<(), StoreError> {
         if !self.lacks(row.index) || self.manifest.points[row.index].id != row.point {
-            let (path, line) = (self.json.path.clone(), self.rows.len() + 1);
+            let (path, line) = (self.journal.path.clone(), self.rows.len() + 1);
             return Err(StoreError::Damaged { path, line, message: format!("point {} was not asked for", row.index) });
         }
-        self.json.append(&json_line(&row), self.rows.len())?;
-        // From here on the row counts as written: the CSV is mended from the lines if it fails.
-        let csv = csv_line(&row);
+        self.journal.append(&json_line(&row), self.rows.len())?;
         self.done[row.index] = true;
         self.rows.push(row);
-        self.csv.append(&csv, self.rows.len())
+        Ok(())
     }
 
     /// Puts many rows at once, whole or none: what joining shards needs.
     pub(super) fn extend(&mut self, rows: Vec<Row>) -> Result<(), StoreError> {
         self.rows.extend(rows);
-        disk::replace(&self.json.path, &json_text(&self.rows))?;
-        disk::replace(&self.csv.path, &csv_text(&self.rows))
+        disk::replace(&self.journal.path, &json_text(&self.rows))
     }
 
-    /// Puts both files into the plan's order. Nothing is written where they are in order already.
+    /// Puts the lines into the plan's order and makes the CSV of them. Nothing is written where both are so already.
     ///
     /// # Errors
     /// [`StoreError::Io`]; the rows stay as they were.
     pub fn finish(mut self) -> Result<Vec<Row>, StoreError> {
-        if !self.rows.is_sorted_by_key(|r| r.index) {
-            self.rows.sort_by_key(|r| r.index);
-            disk::replace(&self.json.path, &json_text(&self.rows))?;
-            disk::replace(&self.csv.path, &csv_text(&self.rows))?;
-        }
+        self.rows.sort_by_key(|r| r.index);
+        make(&self.journal.path, &json_text(&self.rows))?;
+        make(&self.folder.join(CSV), &csv_text(&self.rows))?;
         Ok(self.rows)
     }
 }

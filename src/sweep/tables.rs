@@ -15,14 +15,13 @@
 use serde::Deserialize;
 use toml::Value;
 
-use super::choice::{TableChoice, TableRule};
+use super::axes::Edit;
 use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
-use crate::range_table::{RangeTable, TableError};
+use crate::files::names_a_file;
+use crate::range_table::{RangeTable, TABLE_3, TableError, TableRule};
 
-/// The name of the paper's table.
-pub const TABLE_3: &str = "table-3";
 /// Default ends of a geometric table, cm: the smallest bounds of Table 3 are about 0.1, its largest is 11.
 const GEOMETRIC_CM: (f64, f64) = (0.1, 11.0);
 const EXPECTED: &str = "\"table-3\", a file, { scale = ... }, { levels = ... } (both with an optional of = ...), \
@@ -42,9 +41,14 @@ struct Family {
 }
 
 /// The tables of one entry.
-pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableChoice>, PlanError> {
+pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<Edit>, PlanError> {
+    let edit = |rule: TableRule| -> Edit { Box::new(move |point| point.job.settings.table = rule.clone()) };
+    Ok(rules(source, entry, inputs)?.into_iter().map(edit).collect())
+}
+
+fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRule>, PlanError> {
     let table = match entry.get_ref() {
-        Value::String(name) => return Ok(vec![rows(name.clone(), base(source, entry, name, inputs)?)]),
+        Value::String(name) => return Ok(vec![TableRule::from(base(source, entry, name, inputs)?).named(name)]),
         Value::Table(table) => table.clone(),
         _ => return Err(source.wrong(entry, "table", EXPECTED)),
     };
@@ -58,14 +62,12 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
         return Err(source.wrong(entry, "table", EXPECTED));
     }
     let made = |label: String, table: Result<RangeTable, TableError>| match table {
-        Ok(table) => Ok(rows(label, table)),
+        Ok(table) => Ok(TableRule::from(table).named(label)),
         Err(error) => Err(PlanError::Table { place: source.place(entry), source: error }),
     };
     let mut choices = if let Some(value) = &family.quantile {
         let counts = counts(source, entry, value)?.into_iter();
-        counts
-            .map(|levels| TableChoice { label: format!("quantile {levels}"), rule: TableRule::Quantile { levels } })
-            .collect()
+        counts.map(|levels| TableRule::Quantile { name: format!("quantile {levels}"), levels }).collect()
     } else if let Some(value) = &family.geometric {
         let end = |end: &Option<Value>, default| match end.as_ref().map(number) {
             None => Ok(default),
@@ -108,18 +110,14 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
                 "one table where there is a name; leave the name out or split the entry",
             ));
         };
-        choice.label = name;
+        *choice = choice.clone().named(name);
     }
     Ok(choices)
 }
 
-fn rows(label: String, table: RangeTable) -> TableChoice {
-    TableChoice { label, rule: TableRule::Rows(table) }
-}
-
 /// A table by name or file.
 fn base(source: Source<'_>, entry: &At, name: &str, inputs: &Inputs) -> Result<RangeTable, PlanError> {
-    if !Inputs::names_a_file(name) {
+    if !names_a_file(name) {
         return match name {
             TABLE_3 => Ok(RangeTable::table_3()),
             _ => Err(source.wrong(entry, "table", EXPECTED)),
@@ -147,9 +145,4 @@ fn counts(source: Source<'_>, entry: &At, value: &Value) -> Result<Vec<usize>, P
 fn factors(source: Source<'_>, entry: &At, value: &Value) -> Result<Vec<f64>, PlanError> {
     let factors: Option<Vec<f64>> = list(value).iter().map(number).collect();
     factors.filter(|f| !f.is_empty()).ok_or_else(|| source.wrong(entry, "table", "factors, positive numbers"))
-}
-
-/// The default table where a sweep names none.
-pub(super) fn default_table() -> TableChoice {
-    rows(TABLE_3.to_owned(), RangeTable::table_3())
 }

@@ -9,56 +9,63 @@
 
 use std::time::Duration;
 
-/// Stage times of one pass.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Times {
-    /// Closest points on the body.
-    pub distance: Duration,
-    /// Equation (1).
-    pub segment: Duration,
-    /// Stage two.
-    pub mechanics: Duration,
-    /// Full-resolution refinement.
-    pub refine: Duration,
-    /// All of it, start to end; more than the sum by what lies between.
-    pub total: Duration,
-}
+use serde::{Deserialize, Serialize};
 
-/// Median and spread of one stage.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Spread {
-    /// Median, ms.
-    pub median_ms: f64,
-    /// Interquartile range, ms; none for a single repeat.
-    pub spread_ms: Option<f64>,
-}
+use crate::drape::StageTimes;
 
-/// Median and spread of each stage: distance, segment, mechanics, refine, total.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// Median of each stage, and spread where there is more than one repeat: the columns that differ from run to run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)] // Stages as in `StageTimes`.
 pub struct Timing {
-    /// In that order.
-    pub stages: [Spread; 5],
+    pub time_distance_ms: f64,
+    pub time_distance_spread_ms: Option<f64>,
+    pub time_segment_ms: f64,
+    pub time_segment_spread_ms: Option<f64>,
+    pub time_mechanics_ms: f64,
+    pub time_mechanics_spread_ms: Option<f64>,
+    pub time_refine_ms: f64,
+    pub time_refine_spread_ms: Option<f64>,
+    pub time_total_ms: f64,
+    pub time_total_spread_ms: Option<f64>,
 }
 
 impl Timing {
     /// Of the repeats, warm-up passes left out.
     #[must_use]
-    pub fn of(passes: &[Times]) -> Self {
-        let stage = |pick: fn(&Times) -> Duration| {
+    pub fn of(passes: &[StageTimes]) -> Self {
+        let stage = |pick: fn(&StageTimes) -> Duration| {
             let mut ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(t).as_secs_f64()).collect();
             ms.sort_by(f64::total_cmp);
-            let spread_ms = (ms.len() > 1).then(|| quantile(&ms, 0.75) - quantile(&ms, 0.25));
-            Spread { median_ms: quantile(&ms, 0.5), spread_ms }
+            (quantile(&ms, 0.5), (ms.len() > 1).then(|| quantile(&ms, 0.75) - quantile(&ms, 0.25)))
         };
+        let (time_distance_ms, time_distance_spread_ms) = stage(|t| t.distance);
+        let (time_segment_ms, time_segment_spread_ms) = stage(|t| t.segment);
+        let (time_mechanics_ms, time_mechanics_spread_ms) = stage(|t| t.mechanics);
+        let (time_refine_ms, time_refine_spread_ms) = stage(|t| t.refine);
+        let (time_total_ms, time_total_spread_ms) = stage(|t| t.total);
         Self {
-            stages: [
-                stage(|t| t.distance),
-                stage(|t| t.segment),
-                stage(|t| t.mechanics),
-                stage(|t| t.refine),
-                stage(|t| t.total),
-            ],
+            time_distance_ms,
+            time_distance_spread_ms,
+            time_segment_ms,
+            time_segment_spread_ms,
+            time_mechanics_ms,
+            time_mechanics_spread_ms,
+            time_refine_ms,
+            time_refine_spread_ms,
+            time_total_ms,
+            time_total_spread_ms,
         }
+    }
+
+    /// The stages and their medians, ms.
+    #[must_use]
+    pub fn stages(&self) -> [(&'static str, f64); 4] {
+        [
+            ("distance", self.time_distance_ms),
+            ("segment", self.time_segment_ms),
+            ("mechanics", self.time_mechanics_ms),
+            ("refine", self.time_refine_ms),
+        ]
     }
 }
 
@@ -77,12 +84,15 @@ mod tests {
 
     #[test]
     fn median_and_interquartile_range_by_hand() {
-        let pass = |ms| Times { total: Duration::from_millis(ms), ..Times::default() };
-        let total = |passes: &[u64]| Timing::of(&passes.iter().copied().map(pass).collect::<Vec<_>>()).stages[4];
-        assert_eq!(total(&[7]), Spread { median_ms: 7.0, spread_ms: None });
-        assert_eq!(total(&[9, 1, 5]), Spread { median_ms: 5.0, spread_ms: Some(4.0) });
-        let four = total(&[1, 2, 3, 100]);
-        assert!((four.median_ms - 2.5).abs() < 1e-9);
-        assert!((four.spread_ms.unwrap() - (27.25 - 1.75)).abs() < 1e-9);
+        let pass = |ms| StageTimes { total: Duration::from_millis(ms), ..StageTimes::default() };
+        let total = |passes: &[u64]| {
+            let timing = Timing::of(&passes.iter().copied().map(pass).collect::<Vec<_>>());
+            (timing.time_total_ms, timing.time_total_spread_ms)
+        };
+        assert_eq!(total(&[7]), (7.0, None));
+        assert_eq!(total(&[9, 1, 5]), (5.0, Some(4.0)));
+        let (median, spread) = total(&[1, 2, 3, 100]);
+        assert!((median - 2.5).abs() < 1e-9);
+        assert!((spread.unwrap() - (27.25 - 1.75)).abs() < 1e-9);
     }
 }

@@ -127,12 +127,12 @@ fn check_bearing(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64
 }
 
 fn check_blocks(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, blocks: &[glam::DMat3], tolerance: f64) {
-    let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(i + 5000)).collect();
+    let d: Vec<DVec3> = (0..cloth.order().len()).map(|i| jitters(i + 5000)).collect();
     let mut product = Vec::new();
     cloth.multiply(blocks, &d, &mut product);
     let at = |s: f64| {
         let mut y = x.to_vec();
-        for (&v, d) in cloth.order.iter().zip(&d) {
+        for (&v, d) in cloth.order().iter().zip(&d) {
             y[v as usize] += *d * (s * H);
         }
         let mut moved = contacts.clone();
@@ -143,7 +143,7 @@ fn check_blocks(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, blocks: &[glam:
     };
     let (forth, back) = (at(1.0), at(-1.0));
     let (mut error, mut scale) = (0.0, 0.0);
-    for (&v, p) in cloth.order.iter().zip(&product) {
+    for (&v, p) in cloth.order().iter().zip(&product) {
         let measured = (forth[v as usize] - back[v as usize]) / (2.0 * H);
         error += (measured - *p).length_squared();
         scale += p.length_squared();
@@ -193,7 +193,7 @@ fn hessian_is_never_negative() {
         let mut blocks = Vec::new();
         cloth.hessian(&x, &contacts, &mut blocks);
         for k in 0..40 {
-            let d: Vec<DVec3> = (0..cloth.order.len()).map(|i| jitters(100 * k + i)).collect();
+            let d: Vec<DVec3> = (0..cloth.order().len()).map(|i| jitters(100 * k + i)).collect();
             let mut product = Vec::new();
             cloth.multiply(&blocks, &d, &mut product);
             let curvature: f64 = product.iter().zip(&d).map(|(p, d)| p.dot(*d)).sum();

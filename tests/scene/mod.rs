@@ -3,8 +3,9 @@
 
 use glam::DVec3;
 use partwise::distance::Body;
+use partwise::figures::LevelCount;
 use partwise::mesh::{Topology, TriMesh};
-use partwise::record::{LevelRow, Panel};
+use partwise::record::Panel;
 
 /// Height, half width and half depth of the form, m.
 const FORM: [[f64; 3]; 19] = [
@@ -142,9 +143,10 @@ impl Scene {
             let weight = 0.2 * 9.8 * areas[v];
             part_force_n[part as usize] += weight * (DVec3::NEG_Z + 12.0 * self.distance_m[v] * normals[v]);
         }
-        let rows = (0..=bounds_cm.len()).map(|k| LevelRow {
-            lower_m: if k == 0 { 0.0 } else { bounds_cm[k - 1] / 100.0 },
-            upper_m: bounds_cm.get(k).map_or(f64::INFINITY, |b| b / 100.0),
+        let rows = (0..=bounds_cm.len()).map(|k| LevelCount {
+            level: k,
+            lower_cm: if k == 0 { 0.0 } else { bounds_cm[k - 1] },
+            upper_cm: bounds_cm.get(k).copied().unwrap_or(f64::INFINITY),
             vertices: levels.iter().filter(|&&l| l == k).count(),
             parts: part_level.iter().filter(|&&l| l == k).count(),
             extent: None,

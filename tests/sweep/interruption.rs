@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use partwise::sweep::{
-    Append, Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, store, sweep,
+    Append, Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, SweepProgress, store, sweep,
 };
 use proptest::prelude::*;
 
-use super::{Unsynced, files, plan, run_all, run_on, solve, uninterrupted};
+use super::{Unsynced, files, plan, rows_by, run_all, run_on, solve, uninterrupted};
 
 #[test]
 fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
@@ -20,9 +20,9 @@ fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
     let folder = tempfile::tempdir().unwrap();
     for (stop_at, jobs) in [(1, 1), (70, 3), (155, 2)] {
         let stop = AtomicBool::new(false);
-        let progress = |p: partwise::sweep::Progress<'_>| stop.store(p.done >= stop_at, Ordering::SeqCst);
+        let progress = |p: SweepProgress<'_>| stop.store(p.done >= stop_at, Ordering::SeqCst);
         let run = Run { jobs, stop: &stop, progress: &progress };
-        let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &solve).unwrap();
+        let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(solve)).unwrap();
         assert!(outcome.stopped && outcome.rows.len() >= stop_at && outcome.rows.len() < 200);
         assert!(outcome.rows.len() < stop_at + jobs, "points in hand are finished, no others begun");
     }
@@ -40,10 +40,10 @@ fn what_is_done_is_not_computed_again() {
         solve(point)
     };
     let stop = AtomicBool::new(false);
-    let progress = |p: partwise::sweep::Progress<'_>| stop.store(p.done == 20, Ordering::SeqCst);
+    let progress = |p: SweepProgress<'_>| stop.store(p.done == 20, Ordering::SeqCst);
     let run = Run { jobs: 1, stop: &stop, progress: &progress };
     for _ in 0..2 {
-        sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &counting).unwrap();
+        sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(&counting)).unwrap();
     }
     // Two repeats a point; 20 rows, then only the failed one of them again before the flag is seen at 20 rows.
     let mut twice = solved.into_inner().unwrap();
@@ -96,17 +96,13 @@ fn a_crash_at_any_time_would_lose_only_the_points_in_hand() {
         let watching = |point: &Point| {
             let mut begun = begun.lock().unwrap();
             begun.insert(point.index);
-            for name in ["rows.jsonl", "rows.csv"] {
-                let on_disk = fs::read_to_string(folder.path().join(name)).unwrap();
-                // The CSV has a line of titles, the synthetic errors a line break in it.
-                let rows = on_disk.matches(if name == "rows.csv" { "form,low-cut-dress" } else { "\"form\"" }).count();
-                assert!(rows + jobs >= begun.len(), "{name}: {} points begun, {rows} rows on disk", begun.len());
-            }
+            let rows = fs::read_to_string(folder.path().join("rows.jsonl")).unwrap().lines().count();
+            assert!(rows + jobs >= begun.len(), "{} points begun, {rows} rows on disk", begun.len());
             solve(point)
         };
         let stop = AtomicBool::new(false);
         let run = Run { jobs, stop: &stop, progress: &|_| {} };
-        let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &watching).unwrap();
+        let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &rows_by(watching)).unwrap();
         assert_eq!((outcome.failed, outcome.rows.len()), (5, 200), "{}", outcome.rows[199].error);
     }
 }
@@ -120,14 +116,14 @@ fn failed_points_are_rows_and_are_tried_again() {
         assert!(point.index != 11, "point eleven");
         solve(point)
     };
-    let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &panicking).unwrap();
+    let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &rows_by(panicking)).unwrap();
     assert_eq!((outcome.failed, outcome.rows.len(), outcome.stopped), (6, 200, false));
     assert_eq!((outcome.rows[11].status, outcome.rows[11].error.as_str()), (Status::Error, "panicked: point eleven"));
-    assert!(outcome.rows[7].error.starts_with("synthetic failure") && outcome.rows[7].part_count.is_none());
+    assert!(outcome.rows[7].error.starts_with("synthetic failure") && outcome.rows[7].figures.is_none());
 
     let kept = Existing::Resume { retry_failed: false, adopt: false };
-    assert_eq!(sweep(&plan(), None, folder.path(), kept, &run, &solve).unwrap().failed, 6);
-    assert_eq!(sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &solve).unwrap().failed, 5);
+    assert_eq!(sweep(&plan(), None, folder.path(), kept, &run, &rows_by(solve)).unwrap().failed, 6);
+    assert_eq!(sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(solve)).unwrap().failed, 5);
     assert_eq!(files(folder.path()), uninterrupted().1);
 }
 
@@ -140,7 +136,7 @@ fn an_interrupted_point_leaves_no_row_and_an_odd_one_says_so() {
         5 => Err(PointError::Interrupted),
         _ => solve(point),
     };
-    let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &interrupted).unwrap();
+    let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &rows_by(interrupted)).unwrap();
     assert!(outcome.stopped && outcome.rows.len() == 5);
 
     let passes = Mutex::new(0);
@@ -155,7 +151,7 @@ fn an_interrupted_point_leaves_no_row_and_an_odd_one_says_so() {
         }
         Ok(solved)
     };
-    let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &odd).unwrap();
+    let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(odd)).unwrap();
     assert_eq!(outcome.rows[5].error, "not deterministic: repeat 2 gave 2, the first 1");
     assert!(outcome.rows[6].error.starts_with("displacement_rms_mm is NaN"), "{}", outcome.rows[6].error);
 }
@@ -178,7 +174,7 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
 
     // Another plan that has the first four tables of this one, in another order, and two more.
     let text = super::PLAN.replace("\"table-3\", { scale = [0.5, 2] }", "{ scale = [2, 3, 4] }, \"table-3\"");
-    let other = Plan::parse(&text, "other.toml", Path::new("")).unwrap();
+    let other = Plan::parse(&text, "other.toml", Path::new(""), &partwise::Job::preview()).unwrap();
     let error = open(&other, Existing::RESUME).unwrap_err();
     assert!(matches!(error, StoreError::OtherPlan { .. }), "{error}");
     let adopted = open(&other, Existing::Resume { retry_failed: false, adopt: true }).unwrap();

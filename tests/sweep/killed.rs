@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use partwise::sweep::{Existing, Point, Run, store, sweep};
 
-use super::{files, plan, run_all, solve, uninterrupted};
+use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 
 const FOLDER: &str = "PARTWISE_TEST_SWEEP_FOLDER";
 
@@ -20,7 +20,8 @@ fn child() {
         solve(point)
     };
     let stop = false.into();
-    sweep(&plan(), None, &folder, Existing::RESUME, &Run { jobs: 2, stop: &stop, progress: &|_| {} }, &slow).unwrap();
+    let run = Run { jobs: 2, stop: &stop, progress: &|_| {} };
+    sweep(&plan(), None, &folder, Existing::RESUME, &run, &rows_by(slow)).unwrap();
 }
 
 #[test]

@@ -16,9 +16,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use glam::DVec3;
+use partwise::Job;
+use partwise::drape::StageTimes;
+use partwise::figures::Figures;
 use partwise::sweep::{
-    Append, Existing, Manifest, Measures, Medium, Outcome, Plan, Point, PointError, Run, Solved, Store, StoreError,
-    Times, result_hash, run_missing, sweep,
+    Append, Existing, Manifest, Medium, Outcome, Pass, Plan, Point, PointError, Row, Run, Store, StoreError,
+    SweepProgress, result_hash, row_of, run_missing, sweep,
 };
 
 /// 200 points.
@@ -32,36 +35,43 @@ refine = [0, 5, 20, "converged"]
 "#;
 
 fn plan() -> Plan {
-    let plan = Plan::parse(PLAN, "synthetic.toml", Path::new("")).unwrap();
+    let plan = Plan::parse(PLAN, "synthetic.toml", Path::new(""), &Job::preview()).unwrap();
     assert_eq!(plan.points.len(), 200);
     plan
 }
 
 /// A drape made of nothing but the point's id: any point as good as any other, the same on every machine.
-fn solve(point: &Point) -> Result<Solved<Measures>, PointError> {
+fn solve(point: &Point) -> Result<Pass<Figures>, PointError> {
     let byte = |i: usize| u8::from_str_radix(&point.id[2 * i..2 * i + 2], 16).unwrap();
     let x = |i: usize| (f64::from(byte(i)) + 0.1) / f64::from(byte(i + 1)).mul_add(3.0, 7.0);
     if point.index % 41 == 7 {
         return Err(PointError::Failed(format!("synthetic failure, \"quoted\",\nover two lines: ü {}", byte(0))));
     }
     let positions: Vec<DVec3> = (0..4).map(|i| DVec3::new(x(i), x(i + 4), x(i + 8))).collect();
-    let value = Measures {
+    let value = Figures {
         vertices: 4,
         part_count: usize::from(byte(3)),
         displacement_rms_mm: x(0),
         residual_over_weight: Some(x(1) * 1e-9),
         rms_mm: (byte(2) > 100).then(|| x(2) * 1e5),
-        ..Measures::default()
+        ..Figures::default()
     };
-    let times = Times { total: Duration::from_micros(u64::from(byte(5))), ..Times::default() };
-    Ok(Solved { value, times, result_hash: result_hash(&positions) })
+    let times = StageTimes { total: Duration::from_micros(u64::from(byte(5))), ..StageTimes::default() };
+    Ok(Pass { value, times, result_hash: result_hash(&positions) })
+}
+
+/// Rows made by a function in place of a drape, in two passes each as the plan has it.
+fn rows_by(
+    solve: impl Fn(&Point) -> Result<Pass<Figures>, PointError> + Sync,
+) -> impl Fn(&Point) -> Option<Row> + Sync {
+    move |point| row_of(point, (0, 2), || solve(point), Ok)
 }
 
 /// Runs without a stop.
 fn run_all(folder: &Path, jobs: usize) -> Outcome {
     let stop = AtomicBool::new(false);
     let run = Run { jobs, stop: &stop, progress: &|_| {} };
-    sweep(&plan(), None, folder, Existing::RESUME, &run, &solve).unwrap()
+    sweep(&plan(), None, folder, Existing::RESUME, &run, &rows_by(solve)).unwrap()
 }
 
 /// The files of a finished sweep. The synthetic times are made of the id too, so whole files can be compared.
@@ -83,8 +93,8 @@ fn run_on(folder: &Path, jobs: usize, medium: &Medium<'_>) -> Result<(usize, usi
     let plan = plan();
     let (stop, failed) = (AtomicBool::new(false), AtomicUsize::new(0));
     let mut store = Store::open_on(folder, Manifest::of(&plan, None), Existing::RESUME, medium)?;
-    let progress = |p: partwise::sweep::Progress<'_>| failed.store(p.failed, Ordering::SeqCst);
-    run_missing(&plan, &mut store, &Run { jobs, stop: &stop, progress: &progress }, &solve)?;
+    let progress = |p: SweepProgress<'_>| failed.store(p.failed, Ordering::SeqCst);
+    run_missing(&plan, &mut store, &Run { jobs, stop: &stop, progress: &progress }, &rows_by(solve))?;
     Ok((store.finish()?.len(), failed.into_inner()))
 }
 

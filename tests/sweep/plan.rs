@@ -4,14 +4,17 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use partwise::sweep::{Plan, Refine, TableRule};
+use partwise::Job;
+use partwise::drape::Refine;
+use partwise::range_table::TableRule;
+use partwise::sweep::Plan;
 
 fn parse(text: &str) -> Plan {
-    Plan::parse(text, "s.toml", Path::new("")).unwrap()
+    Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap()
 }
 
 fn message(text: &str) -> String {
-    Plan::parse(text, "s.toml", Path::new("")).unwrap_err().to_string()
+    Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap_err().to_string()
 }
 
 #[test]
@@ -29,11 +32,11 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
         [[points]]
         table = { quantile = 7 }
         extent_cm = [12, 6]
-        options = { rest = "texture", contact_cm = 0.5 }
+        options = { rest = "texture", weld = true }
         "#,
     );
     let found: Vec<_> =
-        plan.points.iter().map(|p| (p.garment.label.as_str(), p.table.label.as_str(), p.seed)).collect();
+        plan.points.iter().map(|p| (p.garment.as_str(), p.job.settings.table.name(), p.job.seed)).collect();
     let skirt = |table, seed| ("flared-skirt@900", table, seed);
     assert_eq!(
         found[..5],
@@ -48,14 +51,14 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
     assert_eq!(found[15], ("pullover-1@500", "table-3 x0.5", 1));
     let last = &plan.points[16];
     assert_eq!(
-        (last.options_text().as_str(), last.options["rest"].as_str()),
-        ("contact_cm=0.5 rest=texture", "texture")
+        (last.options_text().as_str(), last.job.scene.rest.as_str(), last.job.scene.weld),
+        ("accuracy=none rest=texture weld=true", "texture", true)
     );
     assert_eq!(
-        (last.refine, last.extent_text().as_str(), &last.table.rule),
-        (Refine::Converged, "12>6", &TableRule::Quantile { levels: 7 })
+        (last.job.settings.refine, last.extent_text().as_str(), &last.job.settings.table),
+        (Refine::Converged, "12>6", &TableRule::Quantile { name: "quantile 7".into(), levels: 7 })
     );
-    assert!(plan.points.iter().enumerate().all(|(i, p)| p.index == i && p.refine == Refine::Converged));
+    assert!(plan.points.iter().enumerate().all(|(i, p)| p.index == i && p.job.settings.refine == Refine::Converged));
     let ids: BTreeSet<_> = plan.points.iter().map(|p| &p.id).collect();
     assert_eq!((ids.len(), plan.repeats, plan.warm_up), (17, 1, 0));
 }
@@ -64,14 +67,14 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
 fn the_papers_sizes_go_by_name() {
     let plan =
         parse("name = \"n\"\n[grid]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nsizes = [\"smaller\", \"larger\"]");
-    let found: Vec<_> = plan.points.iter().map(|p| p.garment.label.as_str()).collect();
+    let found: Vec<_> = plan.points.iter().map(|p| p.garment.as_str()).collect();
     assert_eq!(found, ["flared-skirt@3613", "flared-skirt@3920", "pullover-1@4710", "pullover-1@5103"]);
 }
 
 #[test]
 fn points_of_one_garment_and_body_share_a_scene() {
     let plan = parse(
-        "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { a = 1 }]",
+        "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { weld = true }]",
     );
     let scenes: BTreeSet<_> = plan.points.iter().map(partwise::sweep::Point::scene_id).collect();
     assert_eq!((plan.points.len(), scenes.len()), (24, 8));
@@ -87,6 +90,27 @@ fn equal_points_are_left_out_and_said() {
 }
 
 #[test]
+fn parts_are_the_tables_and_move_by_affine_maps_unless_asked_otherwise() {
+    let plan = parse("name = \"n\"\n[grid]\nmotions = [\"affine\", \"translation\"]\nextents_cm = [\"none\", 8]");
+    let found: Vec<_> = plan.points.iter().map(|p| (p.extent_text(), p.job.settings.model.motion().name())).collect();
+    let [none, eight] = ["none", "8"].map(str::to_owned);
+    let expected = [(none.clone(), "affine"), (none, "translation"), (eight.clone(), "affine"), (eight, "translation")];
+    assert_eq!(found, expected);
+    assert!(
+        plan.points[1].label().contains("extent none, motion translation, min-part 1"),
+        "{}",
+        plan.points[1].label()
+    );
+    let ids: BTreeSet<_> = plan.points.iter().map(|p| &p.id).collect();
+    assert_eq!(ids.len(), 4);
+    // What a file leaves out is the first of these.
+    assert_eq!(parse("name = \"n\"\n[grid]").points[0].id, plan.points[0].id);
+    // The paper's PARTs have one displacement each, whatever is asked.
+    let paper = parse("name = \"n\"\n[base]\nmodel = \"paper\"\n[grid]\nmotions = [\"affine\", \"translation\"]");
+    assert_eq!((paper.points.len(), paper.points[0].job.settings.model.motion().name()), (1, "translation"));
+}
+
+#[test]
 fn ids_are_made_of_contents_not_of_names_or_timings() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -95,7 +119,8 @@ fn ids_are_made_of_contents_not_of_names_or_timings() {
     write("t.toml", "name = \"t\"\nunit = \"cm\"\nlevels = [[0, 1], [1, inf]]");
     write("u.toml", "# the same\nname = \"u\"\nunit = \"cm\"\nlevels = [[0.0, 1.0], [1.0, inf]]");
     let id = |text: &str| {
-        let plan = Plan::parse(&format!("name = \"n\"\n{text}\n[[points]]"), "s.toml", folder.path()).unwrap();
+        let plan = Plan::parse(&format!("name = \"n\"\n{text}\n[[points]]"), "s.toml", folder.path(), &Job::preview())
+            .unwrap();
         plan.points[0].id.clone()
     };
     assert_eq!(id("[base]\ngarment = \"a.obj\""), id("repeats = 9\nwarm_up = 2\n[base]\ngarment = \"b.obj\""));
@@ -112,7 +137,7 @@ fn ids_are_made_of_contents_not_of_names_or_timings() {
         id("[base]\ngarment = \"a.obj\""),
         id(""),
         id("[base]\nseed = 1"),
-        id("[base]\noptions = { a = 1 }"),
+        id("[base]\noptions = { weld = true }"),
         id("[base]\nbody = { bust = 93 }"),
     ];
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), 6);
@@ -128,7 +153,7 @@ fn table_entries_make_the_tables_they_say() {
         "#,
     );
     let distances: Vec<f64> = (0..300).map(|i| 0.0003 * f64::from(i)).collect();
-    let made: Vec<_> = plan.points.iter().map(|p| p.table.resolve(&distances).unwrap()).collect();
+    let made: Vec<_> = plan.points.iter().map(|p| p.job.settings.table.resolve(&distances).unwrap()).collect();
     let names: Vec<_> = made.iter().map(|t| (t.name.as_str(), t.levels.len())).collect();
     assert_eq!(
         names,
@@ -143,7 +168,7 @@ fn table_entries_make_the_tables_they_say() {
         ]
     );
     assert_eq!(made[5].levels.iter().map(|l| l.upper_cm).collect::<Vec<_>>(), [1.0, 2.0, 4.0, f64::INFINITY]);
-    assert!(plan.points[6].table.resolve(&[]).is_err());
+    assert!(plan.points[6].job.settings.table.resolve(&[]).is_err());
 }
 
 #[test]
@@ -183,10 +208,15 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         (format!("{point}model = \"rubber\""), "s.toml:3: model: found \"rubber\"", "coupled"),
         (format!("{point}extent_cm = [3, 6]"), "s.toml:3: extent_cm: found [3, 6]", "falling"),
         (format!("{point}extent_cm = -1"), "s.toml:3: extent_cm: found -1", "none"),
+        (format!("{point}motion = \"rigid\""), "s.toml:3: motion: found \"rigid\"", "translation"),
         (format!("{point}refine = \"fully\""), "s.toml:3: refine: found \"fully\"", "converged"),
         (format!("{point}min_part = 0"), "s.toml:3: min_part: found 0", "1 for"),
         (format!("{point}body = {{ bust = \"wide\" }}"), "s.toml:3: body: found", "centimetres"),
         (format!("{point}options = {{ a = [1] }}"), "s.toml:3: options: found", "name = value"),
+        (format!("{point}options = {{ speed = 3 }}"), "s.toml:3: options: found", "speed"),
+        (format!("{point}options = {{ unit = \"furlong\" }}"), "s.toml:3: options: found", "furlong"),
+        (format!("{point}options = {{ accuracy = \"high\" }}"), "s.toml:3: options: found", "canonical"),
+        (format!("{point}options = {{ rest = \"a.obj\" }}"), "s.toml:3: options: found", "name no file"),
         (format!("{point}body = {{ chest = 92 }}"), "s.toml:3: body: the spec", "chest"),
         (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
         (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),
@@ -204,7 +234,7 @@ fn bad_files_are_told_where_what_and_what_to_do() {
 #[test]
 fn the_sweeps_that_come_along_are_sound() {
     for (file, count) in [("table-3-variations", 50), ("extents-and-refinement", 49), ("tables-by-kind", 52)] {
-        let plan = Plan::read(Path::new(&format!("assets/sweeps/{file}.toml"))).unwrap();
+        let plan = Plan::read(Path::new(&format!("assets/sweeps/{file}.toml")), &Job::preview()).unwrap();
         assert_eq!((plan.points.len(), plan.notes.len()), (count, 0), "{file}: {:?}", plan.notes);
         assert!(plan.about.contains(&format!("= {count} points")), "{file}");
     }

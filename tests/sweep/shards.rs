@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, merge, sweep};
+use partwise::Job;
+use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
 
-use super::{files, plan, run_all, solve, uninterrupted};
+use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 
 fn run_shards(folder: &Path, plan: &Plan, count: usize) -> Vec<PathBuf> {
     let stop = AtomicBool::new(false);
@@ -15,7 +16,7 @@ fn run_shards(folder: &Path, plan: &Plan, count: usize) -> Vec<PathBuf> {
         .map(|i| {
             let part = folder.join(i.to_string());
             let shard: Shard = format!("{i}/{count}").parse().unwrap();
-            let outcome = sweep(plan, Some(shard), &part, Existing::Refuse, &run, &solve).unwrap();
+            let outcome = sweep(plan, Some(shard), &part, Existing::Refuse, &run, &rows_by(solve)).unwrap();
             assert_eq!((outcome.total, outcome.stopped), (outcome.rows.len(), false));
             part
         })
@@ -51,10 +52,36 @@ fn missing_points_are_listed() {
 }
 
 #[test]
+fn a_manifest_made_by_somebody_else_is_taken_for_no_path_and_does_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = run_shards(folder.path(), &plan(), 2);
+    let manifest = parts[0].join("plan.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    let id = text.split("\"id\": \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    let out = folder.path().join("out");
+    for hostile in ["../../../../escaped", "a/b", "..", "", "x".repeat(32).as_str(), "ABCDEF0123456789ABCDEF0123456789"]
+    {
+        fs::write(&manifest, text.replace(&id, hostile)).unwrap();
+        let rows = fs::read_to_string(parts[0].join("rows.jsonl")).unwrap();
+        fs::write(parts[0].join("rows.jsonl"), rows.replace(&id, hostile)).unwrap();
+        let error = merge(&parts, &out).unwrap_err();
+        assert!(matches!(&error, MergeError::Store(StoreError::BadId { .. })), "{error}");
+        assert!(error.to_string().contains("plan.json") && error.to_string().contains("32 hexadecimal"), "{error}");
+        fs::write(parts[0].join("rows.jsonl"), rows).unwrap();
+    }
+    // Eight letters of the plan's hash are shown, and these are of two bytes.
+    let hash = text.split("\"plan\": \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    fs::write(&manifest, text.replace(&hash, "xéééééééééé")).unwrap();
+    let error = merge(&parts, &out).unwrap_err().to_string();
+    assert!(error.contains("plan xééééééé"), "{error}");
+}
+
+#[test]
 fn shards_of_other_plans_and_versions_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let parts = run_shards(folder.path(), &plan(), 2);
-    let other = Plan::parse("name = \"other\"\n[grid]\nseeds = [1, 2]", "other.toml", Path::new("")).unwrap();
+    let other =
+        Plan::parse("name = \"other\"\n[grid]\nseeds = [1, 2]", "other.toml", Path::new(""), &Job::preview()).unwrap();
     let others = run_shards(&folder.path().join("other"), &other, 2);
     let out = folder.path().join("out");
     let error = merge(&[parts[0].clone(), others[1].clone()], &out).unwrap_err();

@@ -3,7 +3,7 @@
 use partwise::parts::Parts;
 
 /// PARTs of one table seen from another's.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct Changes {
     /// PARTs of the first table that have the same vertices in the second.
     pub(crate) kept: usize,

@@ -3,25 +3,31 @@
 mod changes;
 mod table;
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use partwise::drape::{Refine, Settings};
+use partwise::figures::LevelCount;
+use partwise::job::Against;
 use partwise::parts::{Parts, segment};
-use partwise::range_table::{EffectiveLevel, Extent, RangeTable};
+use partwise::range_table::{RangeTable, TableRule};
 use partwise::record::Tab;
-use partwise::sweep::{Plan, Point, Row, Status, row_of};
+use partwise::sweep::{Bench, Plan, Row, Status};
+use partwise::whole_file::WholeFile;
+use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
-use self::table::{Compared, LevelCount};
+use self::table::Compared;
 use super::failure::UserError;
-use super::run::use_threads;
 use super::sinks::SinkArgs;
-use super::stages::ModelName;
+use super::stages::DialArgs;
 use super::sweep::chosen::MOST;
-use super::sweep::kept::Shelf;
-use super::sweep::points::{ACCURACY, Against, Bench};
+use super::sweep::points::KeepingBench;
+use super::sweep::record_all;
 use super::sweep::report::{Format, line};
-use super::sweep::{cache, record_all};
+use super::sweep::store::PointStore;
+use super::work::{cache, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -45,31 +51,22 @@ pub(crate) struct CompareArgs {
     #[arg(required = true, value_name = "NAME|FILE")]
     tables: Vec<String>,
     /// Garment, as in `partwise run`; several are compared one by one
-    #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_value = "low-cut-dress")]
+    #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
     garment: Vec<String>,
     /// Body: `form`, an OBJ file, or a TOML file of measurements
-    #[arg(long, value_name = "form|FILE", default_value = "form")]
+    #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
-    /// Fabric: a built-in name or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "interlock", help_heading = "Stages")]
-    fabric: String,
-    /// Model of stage two
-    #[arg(long, value_enum, default_value_t = ModelName::Coupled, help_heading = "Stages")]
-    model: ModelName,
-    /// Cut PARTs to this extent along the cloth for `coupled`; several make a cascade; 0 cuts nothing
-    #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', default_value = "6", help_heading = "Stages")]
-    max_extent: Vec<f64>,
-    /// Join PARTs of fewer vertices than this to a neighbour; `coupled` joins those smaller than its finest extent in any case
-    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Stages")]
-    min_part: usize,
+    #[command(flatten)]
+    dials: DialArgs,
     /// Newton steps at full resolution, or `converged`
-    #[arg(long, value_name = "N|converged", default_value = "0", help_heading = "Stages")]
-    refine: String,
+    #[arg(long, value_name = "N|converged", default_value_t = Job::preview().settings.refine, help_heading = "Stages")]
+    refine: Refine,
     /// Timed passes of each; the median is reported
-    #[arg(long, value_name = "N", default_value_t = 3, help_heading = "Stages")]
-    repeats: usize,
-    /// What they are measured against
-    #[arg(long, value_enum, default_value_t = Against::Own, help_heading = "Stages")]
+    #[arg(long, value_name = "N", default_value = "3", help_heading = "Stages")]
+    repeats: NonZeroUsize,
+    /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own`
+    /// continuation too
+    #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Stages")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
@@ -97,31 +94,32 @@ impl CompareArgs {
             )));
         }
         use_threads(self.threads)?;
+        self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
         interrupt::listen();
         let plan = self.plan()?;
-        let shelf = Shelf::in_memory();
-        let bench = Bench::new(&shelf, cache(self.cache.as_ref()));
+        let store = PointStore::in_memory();
+        let bench = KeepingBench::new(&store, cache(self.cache.as_ref()));
         let bar = console::progress(Some(plan.points.len() as u64), "compare");
         let mut rows: Vec<Row> = Vec::new();
         for point in &plan.points {
-            bar.set_message(format!("{}, {}", point.garment.label, point.table.label));
-            let Some(row) = row_of(point, &bench, plan.warm_up, plan.repeats) else { break };
+            bar.set_message(format!("{}, {}", point.garment, point.job.settings.table.name()));
+            let Some(row) = bench.row(point, (0, self.repeats.get())) else { break };
             rows.push(row);
             bar.inc(1);
         }
         bar.finish_and_clear();
-        for warning in bench.warnings() {
+        for warning in bench.bench.warnings() {
             console::warning(&warning);
         }
-        let compared = self.compared(&plan, &rows, &bench)?;
+        let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
-            let written = std::fs::write(path, table::csv(&compared)?);
+            let written = WholeFile::write(path, table::csv(&compared)?);
             written.map_err(|e| {
                 UserError::new(format!("{}: cannot be written: {e}; choose another file", path.display()))
             })?;
         }
         let folder = Path::new("recordings").join("compare");
-        let recordings = record_all(&rows, &shelf, "compare", &folder, &self.sinks, Tab::SideBySide)?;
+        let recordings = record_all(&rows, &store, "compare", &folder, &self.sinks, Tab::SideBySide)?;
         let lines: String = recordings.iter().map(line).collect();
         match self.format {
             Format::Text => console::result(&format!("{}{lines}", table::text(&compared))),
@@ -135,74 +133,47 @@ impl CompareArgs {
         Ok(())
     }
 
-    /// The comparison as a sweep of one grid.
+    /// The comparison as a plan: every table on every garment.
     fn plan(&self) -> anyhow::Result<Plan> {
-        let text = |s: &String| toml::Value::String(s.clone());
-        let mut base = toml::Table::new();
-        base.insert("body".into(), text(&self.body));
-        base.insert("fabric".into(), text(&self.fabric));
-        let model = match self.model {
-            ModelName::Coupled => "coupled",
-            ModelName::Paper => "paper",
-        };
-        base.insert("model".into(), model.into());
-        let min_part = i64::try_from(self.min_part)?;
-        base.insert("min_part".into(), min_part.into());
-        let extents: Vec<f64> = self.max_extent.iter().copied().filter(|cm| *cm != 0.0).collect();
-        base.insert("extent_cm".into(), if extents.is_empty() { "none".into() } else { extents.into() });
-        let refine = self.refine.parse::<i64>().map_or_else(|_| text(&self.refine), Into::into);
-        base.insert("refine".into(), refine);
-        let list = |names: &[String]| toml::Value::Array(names.iter().map(text).collect());
-        let mut grid = toml::Table::new();
-        grid.insert("garments".into(), list(&self.garment));
-        grid.insert("tables".into(), list(&self.tables));
-        let mut file = toml::Table::new();
-        file.insert("name".into(), "compare".into());
-        file.insert("repeats".into(), i64::try_from(self.repeats)?.into());
-        file.insert("base".into(), base.into());
-        file.insert("grid".into(), grid.into());
-        let plan = Plan::parse(&toml::to_string(&file)?, "command line", Path::new(""))?;
+        let settings = Settings { refine: self.refine, ..self.dials.over(Job::preview().settings)? };
+        let table = |name: &String| Ok(TableRule::from(RangeTable::by_name(name)?).named(name));
+        let tables: Vec<TableRule> = self.tables.iter().map(table).collect::<anyhow::Result<_>>()?;
+        let mut jobs = Vec::new();
+        for garment in &self.garment {
+            let scene = SceneSpec::new(&self.body, garment);
+            scene.check_names()?;
+            jobs.extend(tables.iter().map(|table| Job {
+                scene: scene.clone(),
+                settings: Settings { table: table.clone(), ..settings.clone() },
+                accuracy: self.accuracy,
+                ..Job::preview()
+            }));
+        }
+        let plan = Plan::of_jobs("compare", jobs)?;
         for note in &plan.notes {
             console::note(note);
         }
-        Ok(plan.with_option(ACCURACY, self.accuracy.name()))
-    }
-
-    fn compared(&self, plan: &Plan, rows: &[Row], bench: &Bench<'_>) -> anyhow::Result<Vec<Compared>> {
-        let mut out: Vec<Compared> = Vec::new();
-        let mut first: Option<(String, Parts)> = None;
-        for row in rows {
-            let point: &Point = &plan.points[row.index];
-            let placed = bench.placed(point)?;
-            let table = point.table.resolve(&placed.distance_m)?;
-            let (mesh, topology) = (&placed.scene.garment, &placed.scene.topology);
-            let parts =
-                segment(topology, &placed.distance_m, &table).cut_to_table(mesh, topology, &placed.scene.rest, &table);
-            let scene = point.scene_id();
-            if first.as_ref().is_none_or(|(of, _)| *of != scene) {
-                first = Some((scene, parts.clone()));
-            }
-            let changes = first.as_ref().map_or(Changes::default(), |(_, from)| Changes::between(from, &parts));
-            out.push(Compared::new(row.clone(), parts.len(), changes, levels(&table, &parts)));
-        }
-        Ok(out)
+        Ok(plan)
     }
 }
 
-fn levels(table: &RangeTable, parts: &Parts) -> Vec<LevelCount> {
-    let mut vertices = vec![0; parts.parts_per_level.len()];
-    for part in &parts.parts {
-        vertices[part.level as usize] += part.vertices.len();
+fn compared(plan: &Plan, rows: &[Row], bench: &Bench<'_>) -> anyhow::Result<Vec<Compared>> {
+    let mut out: Vec<Compared> = Vec::new();
+    let mut first: Option<(String, Parts)> = None;
+    for row in rows {
+        let point = &plan.points[row.index];
+        let loaded = bench.scene(point)?;
+        let (scene, distances_m) = (&loaded.scene, loaded.scene.distances_m());
+        let table = point.job.settings.table.resolve(&distances_m)?;
+        let parts = segment(&scene.topology, &distances_m, &table);
+        let parts = parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &table);
+        let id = point.scene_id();
+        if first.as_ref().is_none_or(|(of, _)| *of != id) {
+            first = Some((id, parts.clone()));
+        }
+        let changes = first.as_ref().map_or(Changes::default(), |(_, from)| Changes::between(from, &parts));
+        let per_level = LevelCount::all(&table, &parts);
+        out.push(Compared { row: row.clone(), changes, per_level });
     }
-    let bounds = table.effective_levels();
-    let counts = bounds.iter().zip(&parts.parts_per_level).zip(vertices);
-    let count = |(level, ((bound, &parts), vertices)): (usize, ((&EffectiveLevel, &usize), usize))| {
-        let upper_cm = bound.upper_cm.is_finite().then_some(bound.upper_cm);
-        let extent_cm = bound
-            .extent
-            .filter(Extent::cuts)
-            .map(|e| e.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x"));
-        LevelCount { level, lower_cm: bound.lower_cm, upper_cm, extent_cm, vertices, parts }
-    };
-    counts.enumerate().map(count).collect()
+    Ok(out)
 }

@@ -8,9 +8,14 @@ pub(crate) const MOST: usize = 6;
 /// And at least, where there are so many rows: two that nothing beats say little about the rest.
 const FEWEST: usize = 4;
 
-/// The error a row is judged by, mm: against its own continuation, else against the canonical drape.
+/// The error a row is judged by, mm.
 pub(crate) fn error_mm(row: &Row) -> Option<f64> {
-    row.rms_mm.or(row.canonical_rms_mm)
+    row.figures.as_ref()?.error_mm()
+}
+
+/// The time a row took, ms.
+pub(crate) fn total_ms(row: &Row) -> Option<f64> {
+    Some(row.timing.as_ref()?.time_total_ms)
 }
 
 /// The table's name, and whatever else differs within the rows.
@@ -21,31 +26,32 @@ pub(crate) fn labels(rows: &[&Row]) -> Vec<String> {
             row.model.clone(),
             row.fabric.clone(),
             if row.extent_cm == "none" { "not cut".to_owned() } else { format!("{} cm", row.extent_cm) },
+            row.motion.clone(),
             format!("min {}", row.min_part),
             if row.refine == "converged" { row.refine.clone() } else { format!("{} steps", row.refine) },
             format!("seed {}", row.seed),
             row.options.clone(),
         ]
     };
-    let all: Vec<[String; 8]> = rows.iter().map(|row| fields(row)).collect();
-    let varies: Vec<bool> = (0..8).map(|i| all.windows(2).any(|pair| pair[0][i] != pair[1][i])).collect();
+    let all: Vec<[String; 9]> = rows.iter().map(|row| fields(row)).collect();
+    let varies: Vec<bool> = (0..9).map(|i| all.windows(2).any(|pair| pair[0][i] != pair[1][i])).collect();
     let some = varies.contains(&true);
-    let label = |fields: &[String; 8]| {
+    let label = |fields: &[String; 9]| {
         let kept = fields.iter().zip(&varies).enumerate().filter(|(i, (_, v))| **v || (*i == 0 && !some));
         kept.map(|(_, (field, _))| field.as_str()).collect::<Vec<_>>().join(", ")
     };
     all.iter().map(label).collect()
 }
 
-/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with), and an even choice from those that no
-/// other row beats in both PART count and error; if those are few, those whose PART counts lie farthest from the chosen. All are deterministic
-/// figures, so that shards choose alike.
+/// Up to [`MOST`] rows, ascending: all where they are so few, else the first (the table everything is compared with),
+/// and an even choice from those that no other row beats in both PART count and error; if those are few, those whose
+/// PART counts lie farthest from the chosen. All are deterministic figures, so that shards choose alike.
 pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     if rows.len() <= MOST {
         return (0..rows.len()).collect();
     }
     let figures: Vec<Option<(usize, f64)>> =
-        rows.iter().map(|row| Some((row.part_count?, error_mm(row).unwrap_or(0.0)))).collect();
+        rows.iter().map(|row| Some((row.figures.as_ref()?.part_count, error_mm(row).unwrap_or(0.0)))).collect();
     let beaten = |mine: (usize, f64)| {
         figures
             .iter()
@@ -83,12 +89,12 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use partwise::figures::Figures;
 
     fn row(table: &str, parts: usize, error: f64) -> Row {
         Row {
             table: table.to_owned(),
-            part_count: Some(parts),
-            canonical_rms_mm: Some(error),
+            figures: Some(Figures { part_count: parts, canonical_rms_mm: Some(error), ..Figures::default() }),
             extent_cm: "8".to_owned(),
             ..Row::default()
         }

@@ -1,12 +1,11 @@
 //! `partwise sweep`: every point of a sweep file, a row on disk after each, and a recording of them all.
 
 pub(crate) mod chosen;
-pub(crate) mod kept;
-mod packed;
 pub(crate) mod points;
 pub(crate) mod recording;
 pub(crate) mod report;
-pub(crate) mod scenes;
+mod single;
+pub(crate) mod store;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -14,22 +13,23 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use clap::Args;
-use partwise::accuracy::reference::ReferenceCache;
-use partwise::record::{RecordSummary, Sink, Tab};
-use partwise::sweep::{Existing, Plan, Point, Progress, Row, Run, Shard, Status, sweep};
+use partwise::Job;
+use partwise::job::Against;
+use partwise::record::{RecordSummary, Tab};
+use partwise::sweep::{Existing, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
 
-use self::kept::Shelf;
-use self::points::{ACCURACY, Against, Bench};
+use self::points::KeepingBench;
 use self::report::{Format, Report};
+use self::store::PointStore;
 use super::failure::UserError;
-use super::run::use_threads;
 use super::sinks::SinkArgs;
+use super::work::{MOST_THREADS, cache, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
 Runs every point of a sweep file: range tables, and any other setting, over garments, sizes and fabrics.
 
-A row is on disk after every point (rows.csv and rows.jsonl, the same columns), so that Ctrl-C, a crash or a full disk lose at \
+A row is on disk after every point (rows.jsonl; rows.csv is made of it at the end), so that Ctrl-C, a crash or a full disk lose at \
 most the point in hand; --resume goes on from there. A point that fails is a row with its error, and the sweep goes on. At the end \
 one recording per garment shows each table as a step, the few best side by side, and speed against error.";
 
@@ -69,8 +69,9 @@ pub(crate) struct SweepArgs {
     /// Points at a time; more than one makes the timings of all of them worse
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
     jobs: usize,
-    /// What the points are measured against
-    #[arg(long, value_enum, default_value_t = Against::Own, help_heading = "Rows")]
+    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and
+    /// fabric), or `own` continuation too, a converged drape for every point, seconds each
+    #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Rows")]
     accuracy: Against,
     /// Where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Rows")]
@@ -89,21 +90,27 @@ impl SweepArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
+        if !(1..=MOST_THREADS).contains(&self.jobs) {
+            let found = self.jobs;
+            return Err(UserError::new(format!(
+                "--jobs {found}: found {found}, expected 1 to {MOST_THREADS} points at a time"
+            )));
+        }
         interrupt::listen();
         let plan = self.plan()?;
         let folder = self.folder();
-        let shelf = Shelf::in_folder(&folder);
+        let store = PointStore::in_folder(&folder);
         // Before hours of points, not after them.
         let scenes: BTreeSet<String> = plan.points.iter().map(Point::scene_id).collect();
         one_recording(scenes.len(), &folder, &self.sinks)?;
-        let bench = Bench::new(&shelf, cache(self.cache.as_ref()));
+        let bench = KeepingBench::new(&store, cache(self.cache.as_ref()));
         let existing = match self.resume {
             true => Existing::Resume { retry_failed: true, adopt: self.adopt },
             false => Existing::Refuse,
         };
         let started = Instant::now();
         let bar = console::progress(Some(0), &plan.name);
-        let progress = |p: Progress<'_>| {
+        let progress = |p: SweepProgress<'_>| {
             bar.set_length(p.total as u64);
             bar.set_position(p.done as u64);
             if p.row.is_none() {
@@ -115,7 +122,8 @@ impl SweepArgs {
             }
         };
         let run = Run { jobs: self.jobs, stop: interrupt::flag(), progress: &progress };
-        let outcome = sweep(&plan, self.shard, &folder, existing, &run, &bench);
+        let row = |point: &Point| bench.row(point, (plan.warm_up, plan.repeats));
+        let outcome = sweep(&plan, self.shard, &folder, existing, &run, &row);
         bar.finish_and_clear();
         if let Some(error) = bench.take_broken() {
             let advice = "the rows before are intact: make room and go on with --resume";
@@ -123,12 +131,12 @@ impl SweepArgs {
                 .with_context(|| format!("{}: cannot keep a point; {advice}", folder.display()));
         }
         let outcome = outcome?;
-        self.mend(&plan, &outcome.rows, &shelf, &bench);
+        self.mend(&plan, &outcome.rows, &store, &bench);
         let seconds = started.elapsed().as_secs_f64();
-        for warning in bench.warnings() {
+        for warning in bench.bench.warnings() {
             console::warning(&warning);
         }
-        let recordings = record_all(&outcome.rows, &shelf, &plan.name, &folder, &self.sinks, Tab::Stages)?;
+        let recordings = record_all(&outcome.rows, &store, &plan.name, &folder, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &plan.name,
             folder: folder.display().to_string(),
@@ -152,20 +160,11 @@ impl SweepArgs {
     }
 
     fn plan(&self) -> anyhow::Result<Plan> {
-        let plan = Plan::read(&self.file)?;
-        for point in &plan.points {
-            for (name, value) in &point.options {
-                let wrong = |what: String| UserError::new(format!("{}: options: {what}", self.file.display()));
-                if name != ACCURACY {
-                    return Err(wrong(format!("found `{name}`, expected none but `{ACCURACY}`")));
-                }
-                value.parse::<Against>().map_err(wrong)?;
-            }
-        }
+        let plan = Plan::read(&self.file, &Job { accuracy: self.accuracy, ..Job::preview() })?;
         for note in &plan.notes {
             console::note(note);
         }
-        Ok(plan.with_option(ACCURACY, self.accuracy.name()))
+        Ok(plan)
     }
 
     fn folder(&self) -> PathBuf {
@@ -176,24 +175,20 @@ impl SweepArgs {
     }
 
     /// Computes again what is kept of points whose file is gone or damaged.
-    fn mend(&self, plan: &Plan, rows: &[Row], shelf: &Shelf, bench: &Bench<'_>) {
+    fn mend(&self, plan: &Plan, rows: &[Row], store: &PointStore, bench: &KeepingBench<'_>) {
         for row in rows.iter().filter(|row| row.status == Status::Ok) {
             if interrupt::requested() {
                 return;
             }
-            if shelf.point(&row.point).is_some_and(|point| shelf.scene(&point.scene).is_some()) {
+            if store.point(&row.point).is_some_and(|point| store.scene(&point.scene).is_some()) {
                 continue;
             }
-            if let Err(error) = bench.keep_again(&plan.points[row.index]) {
-                console::warning(&format!("point {} is missing from the recording: {error}", row.index));
+            let again = bench.row(&plan.points[row.index], (0, 1));
+            if again.is_none_or(|again| again.status == Status::Error) {
+                console::warning(&format!("point {} is missing from the recording", row.index));
             }
         }
     }
-}
-
-/// The folder of references: the one given, else the user's.
-pub(crate) fn cache(given: Option<&PathBuf>) -> Option<ReferenceCache> {
-    given.cloned().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
 }
 
 /// Refuses a sink that takes one recording where there are several.
@@ -211,13 +206,13 @@ fn one_recording(recordings: usize, folder: &Path, sinks: &SinkArgs) -> anyhow::
 /// Makes the recordings of a sweep, in its folder unless a file was given.
 pub(crate) fn record_all(
     rows: &[Row],
-    shelf: &Shelf,
+    store: &PointStore,
     name: &str,
     folder: &Path,
     sinks: &SinkArgs,
     opens_on: Tab,
 ) -> anyhow::Result<Vec<RecordSummary>> {
-    let (groups, missing) = recording::groups(rows, shelf);
+    let (groups, missing) = recording::groups(rows, store);
     if missing > 0 {
         console::warning(&format!(
             "{missing} points have a row but no drape on disk and are missing from the recording"
@@ -226,13 +221,9 @@ pub(crate) fn record_all(
     one_recording(groups.len(), folder, sinks)?;
     let mut done = Vec::new();
     for group in &groups {
-        let mut sinks = sinks.clone();
-        if sinks.save.is_none() && !sinks.no_save {
-            sinks.save = Some(folder.join(format!("{}.rrd", group.name)));
-        }
-        let sinks: Vec<Sink> = sinks.sinks(&group.name);
+        let sinks = sinks.sinks_in(folder, &group.name);
         if !sinks.is_empty() {
-            done.push(recording::record(group, shelf, name, sinks, opens_on)?);
+            done.push(recording::record(group, store, name, sinks, opens_on)?);
         }
     }
     Ok(done)

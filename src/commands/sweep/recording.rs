@@ -1,22 +1,19 @@
 //! The recording of a sweep: one file a garment, each table a step, the few chosen side by side, speed against error.
 //!
-//! It is put together at the end from what is kept on the shelf, in the plan's order, so that a sweep that was interrupted, cut
-//! into shards or run with several jobs gives the recording of an undisturbed one.
+//! It is put together at the end from what is kept in the store, in the plan's order, so that a sweep that was
+//! interrupted, cut into shards or run with several jobs gives the recording of an undisturbed one.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::DVec3;
-use partwise::parts::UNASSIGNED;
-use partwise::range_table::{Extent, METRES_PER_CM};
+use partwise::figures::Figures;
 use partwise::record::{
-    Chosen, Layout, LevelRow, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView,
-    Tab, When,
+    Chosen, Layout, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab, When,
 };
-use partwise::sweep::{Row, Status};
+use partwise::sweep::{Row, Status, Timing};
 
-use super::chosen::{choose, error_mm, labels};
-use super::kept::{KeptPoint, Shelf};
+use super::chosen::{choose, error_mm, labels, total_ms};
+use super::store::{KeptPoint, PointStore};
 
 /// A recording to be made.
 pub(crate) struct Group<'a> {
@@ -27,11 +24,11 @@ pub(crate) struct Group<'a> {
 }
 
 /// The rows with a result and a kept point, by body and garment, in the plan's order; and how many have no kept point.
-pub(crate) fn groups<'a>(rows: &'a [Row], shelf: &Shelf) -> (Vec<Group<'a>>, usize) {
+pub(crate) fn groups<'a>(rows: &'a [Row], store: &PointStore) -> (Vec<Group<'a>>, usize) {
     let mut groups: Vec<Group<'a>> = Vec::new();
     let mut missing = 0;
     for row in rows.iter().filter(|row| row.status == Status::Ok) {
-        let Some(scene) = shelf.scene_of(&row.point) else {
+        let Some(scene) = store.scene_of(&row.point) else {
             missing += 1;
             continue;
         };
@@ -64,12 +61,12 @@ fn file_stem(label: &str) -> String {
 /// Records a group. `sweep` is its name, for the text panel; `opens_on` the tab shown first.
 pub(crate) fn record(
     group: &Group<'_>,
-    shelf: &Shelf,
+    store: &PointStore,
     sweep: &str,
     sinks: Vec<Sink>,
     opens_on: Tab,
 ) -> anyhow::Result<RecordSummary> {
-    let Some(scene) = shelf.scene(&group.scene) else { anyhow::bail!("the scene of {} cannot be read", group.name) };
+    let Some(scene) = store.scene(&group.scene) else { anyhow::bail!("the scene of {} cannot be read", group.name) };
     let rows = &group.rows;
     let label = labels(rows);
     let chosen = choose(rows);
@@ -88,18 +85,17 @@ pub(crate) fn record(
     recorder.body(0, &scene.body)?;
     recorder.garment(0, &scene.garment)?;
     for (index, (row, label)) in (0..).zip(rows.iter().zip(&label)) {
-        let Some(point) = shelf.point(&row.point) else { continue };
-        let (part_of_vertex, force_n) = covering(&point);
+        let Some(point) = store.point(&row.point) else { continue };
         let error = Overlay { name: "error", unit: "mm", values: &point.error_mm };
         let overlays = if point.error_mm.is_empty() { &[][..] } else { std::slice::from_ref(&error) };
         recorder.step(&StepView {
             index,
             distance_m: &scene.distance_m,
-            part_of_vertex: &part_of_vertex,
-            part_force_n: &force_n,
+            part_of_vertex: &point.part_of_vertex,
+            part_force_n: &point.force_n,
             draped: &point.positions,
             panel: &panel(row, label, sweep, &point),
-            scalars: &scalars(row),
+            scalars: &row.figures.as_ref().map(Figures::scalars).unwrap_or_default(),
             overlays,
         })?;
     }
@@ -109,14 +105,13 @@ pub(crate) fn record(
     }
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {
-            let Some(point) = shelf.point(&rows[i].point) else { continue };
-            let (part_of_vertex, _) = covering(&point);
+            let Some(point) = store.point(&rows[i].point) else { continue };
             recorder.compare(&Chosen {
                 index: 0,
                 slot,
                 caption: &caption(rows[i]),
                 draped: &point.positions,
-                part_of_vertex: &part_of_vertex,
+                part_of_vertex: &point.part_of_vertex,
                 overlay: None,
             })?;
         }
@@ -124,20 +119,10 @@ pub(crate) fn record(
     Ok(recorder.finish()?)
 }
 
-/// PARTs and forces with one more PART, without a force, for the vertices outside every level.
-fn covering(point: &KeptPoint) -> (Vec<u32>, Vec<DVec3>) {
-    let rest = point.force_n.len() as u32;
-    let mut force = point.force_n.clone();
-    if point.part_of_vertex.contains(&UNASSIGNED) {
-        force.push(DVec3::ZERO);
-    }
-    (point.part_of_vertex.iter().map(|&p| if p == UNASSIGNED { rest } else { p }).collect(), force)
-}
-
 fn caption(row: &Row) -> String {
     let error = error_mm(row).map_or(String::new(), |mm| format!(" · {mm:.1} mm"));
-    let parts = row.part_count.unwrap_or_default();
-    format!("{parts} PARTs · {:.0} ms{error}", row.time_total_ms.unwrap_or_default())
+    let parts = row.figures.as_ref().map_or(0, |f| f.part_count);
+    format!("{parts} PARTs · {:.0} ms{error}", total_ms(row).unwrap_or_default())
 }
 
 /// As many points as these have their names written beside them; of more only the chosen.
@@ -147,7 +132,7 @@ fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<Sca
     let point = |(i, row): (usize, &&Row)| {
         Some(ScatterPoint {
             label: &labels[i],
-            cost: row.time_total_ms?,
+            cost: total_ms(row)?,
             error_mm: error_mm(row)?,
             group: usize::from(chosen.contains(&i)),
             named: rows.len() <= ALL_NAMED || chosen.contains(&i),
@@ -156,68 +141,24 @@ fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<Sca
     rows.iter().enumerate().filter_map(point).collect()
 }
 
-fn scalars(row: &Row) -> Vec<(&'static str, f64)> {
-    let count = |n: Option<usize>| n.map(|n| n as f64);
-    let all = [
-        ("error/rms_mm", row.rms_mm),
-        ("error/canonical_rms_mm", row.canonical_rms_mm),
-        ("error/representable_rms_mm", row.representable_rms_mm),
-        ("displacement_rms_mm", row.displacement_rms_mm),
-        ("levels", count(row.levels)),
-        ("singletons", count(row.singletons)),
-        ("penetrating_vertices", count(row.penetrating_vertices)),
-    ];
-    all.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
-}
-
 fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
-    let mut levels: Vec<LevelRow> = point
-        .levels_cm
-        .iter()
-        .zip(&point.extents_cm)
-        .map(|(&[lower, upper], &[width_cm, height_cm])| LevelRow {
-            lower_m: lower * METRES_PER_CM,
-            upper_m: upper * METRES_PER_CM,
-            vertices: 0,
-            parts: 0,
-            extent: (width_cm > 0.0).then(|| Extent { width_cm, height_cm }.to_string()),
-        })
-        .collect();
-    for &level in &point.level_of_part {
-        levels[level as usize].parts += 1;
-    }
-    for level in point.part_of_vertex.iter().filter_map(|&p| point.level_of_part.get(p as usize)) {
-        levels[*level as usize].vertices += 1;
-    }
-    let mut facts = vec![
-        ("sweep".to_owned(), sweep.to_owned()),
-        ("point".to_owned(), row.index.to_string()),
-        ("model".to_owned(), row.model.clone()),
-        ("fabric".to_owned(), row.fabric.clone()),
-        ("extent, cm".to_owned(), row.extent_cm.clone()),
-        ("refinement".to_owned(), row.refine.clone()),
+    let facts = [
+        ("sweep", sweep.to_owned()),
+        ("point", row.index.to_string()),
+        ("model", row.model.clone()),
+        ("fabric", row.fabric.clone()),
+        ("extent, cm", row.extent_cm.clone()),
+        ("motion", row.motion.clone()),
+        ("refinement", row.refine.clone()),
     ];
-    let mut fact = |name: &str, value: Option<String>| facts.extend(value.map(|v| (name.to_owned(), v)));
-    let mm = |value: Option<f64>| value.map(|v| format!("{v:.1} mm RMS"));
-    fact("vertices", row.vertices.map(|n| n.to_string()));
-    fact("PARTs", row.part_count.map(|n| format!("{n} ({} single vertices)", row.singletons.unwrap_or_default())));
-    fact("moved", mm(row.displacement_rms_mm));
-    fact("off its own continuation", mm(row.rms_mm));
-    fact("off the canonical drape", mm(row.canonical_rms_mm));
-    fact("representable error", mm(row.representable_rms_mm));
-    fact("inside the body", row.penetrating_vertices.map(|n| format!("{n} vertices")));
-    let times = [
-        ("distance", row.time_distance_ms),
-        ("segment", row.time_segment_ms),
-        ("mechanics", row.time_mechanics_ms),
-        ("refine", row.time_refine_ms),
-    ];
+    let measured = row.figures.iter().flat_map(Figures::facts);
+    let times = row.timing.iter().flat_map(Timing::stages);
     Panel {
         title: format!("{} on {}", row.garment, row.body),
         table: label.to_owned(),
-        levels,
-        facts,
-        timings_ms: times.into_iter().filter_map(|(stage, ms)| Some((stage.to_owned(), ms?))).collect(),
+        levels: point.levels.clone(),
+        facts: facts.into_iter().chain(measured).map(|(name, value)| (name.to_owned(), value)).collect(),
+        timings_ms: times.map(|(stage, ms)| (stage.to_owned(), ms)).collect(),
         ..Panel::default()
     }
 }

@@ -3,10 +3,10 @@
 use clap::ValueEnum;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use partwise::record::RecordSummary;
-use partwise::sweep::{Row, Status};
+use partwise::sweep::{Row, Status, csv_text};
 use serde_json::json;
 
-use super::chosen::labels;
+use super::chosen::{labels, total_ms};
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -45,7 +45,7 @@ impl Report<'_> {
         match format {
             Format::Text => Ok(self.table()),
             Format::Json => Ok(serde_json::to_string(&self.json())?),
-            Format::Csv => csv(self.rows),
+            Format::Csv => Ok(String::from_utf8(csv_text(self.rows))?),
         }
     }
 
@@ -59,10 +59,12 @@ impl Report<'_> {
     }
 
     fn json(&self) -> serde_json::Value {
+        // JSON is Unicode; names of files need not be.
+        let name = |r: &RecordSummary| r.path.as_ref().map(|path| path.display().to_string());
         let recordings: Vec<_> = self
             .recordings
             .iter()
-            .map(|r| json!({ "path": r.path, "bytes": r.bytes, "raw_bytes": r.raw_bytes, "log_ms": r.log_ms }))
+            .map(|r| json!({ "path": name(r), "bytes": r.bytes, "raw_bytes": r.raw_bytes, "log_ms": r.log_ms }))
             .collect();
         json!({
             "sweep": self.name,
@@ -114,7 +116,7 @@ pub(crate) fn line(recording: &RecordSummary) -> String {
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_BORDERS_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "representable mm"]);
+    table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"]);
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
     for (row, label) in rows.iter().zip(labels(&refs)) {
@@ -123,31 +125,23 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             table.add_row([index, garment, format!("{label}: {}", row.error)]);
             continue;
         }
-        let parts = row.part_count.map_or_else(String::new, |n| n.to_string());
+        let Some(figures) = &row.figures else { continue };
         table.add_row([
             index,
             garment,
             label,
-            parts,
-            mm(row.time_total_ms),
-            mm(row.rms_mm),
-            mm(row.canonical_rms_mm),
-            mm(row.representable_rms_mm),
+            figures.part_count.to_string(),
+            mm(total_ms(row)),
+            mm(figures.rms_mm),
+            mm(figures.canonical_rms_mm),
+            mm(figures.representable_affine_rms_mm),
+            mm(figures.representable_rms_mm),
         ]);
     }
-    for column in [0, 3, 4, 5, 6, 7] {
+    for column in [0, 3, 4, 5, 6, 7, 8] {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     table
-}
-
-/// The rows as CSV, with the columns of `rows.csv`.
-pub(crate) fn csv(rows: &[Row]) -> anyhow::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row)?;
-    }
-    Ok(String::from_utf8(writer.into_inner()?)?)
 }

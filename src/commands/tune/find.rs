@@ -3,7 +3,7 @@
 use partwise::range_table::RangeTable;
 use partwise::table_search::{Front, FrontPoint, Progress, Search, SearchError, SearchOptions, search};
 
-use super::wearer::{Holds, Wearer};
+use super::garment::{Garment, Holds};
 use crate::commands::{console, interrupt};
 
 /// One iteration: a round of one search.
@@ -61,13 +61,13 @@ const THINNEST_CM: f64 = 0.5;
 
 /// Searches on all garments together, over so many candidate bounds a round. Where the user stops it, what was found until then.
 pub(crate) fn find(
-    wearers: &[&Wearer],
+    garments: &[&Garment],
     max_parts: usize,
     (extents_cm, shapes): (&[f64], &[f64]),
     candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
-    let samples: Vec<_> = wearers.iter().zip(limits(wearers, max_parts)).map(|(w, limit)| w.sample(limit)).collect();
+    let samples: Vec<_> = garments.iter().zip(limits(garments, max_parts)).map(|(w, limit)| w.sample(limit)).collect();
     let mut found = Found { iterations: Vec::new(), levels: Front::default(), exact: false, all: Front::default() };
     let levels = ("levels alone", SearchOptions::default());
     let both =
@@ -76,7 +76,7 @@ pub(crate) fn find(
         if interrupt::requested() {
             break;
         }
-        if wearers.len() > 1 && !options.widths_cm.is_empty() {
+        if garments.len() > 1 && !options.widths_cm.is_empty() {
             // Meant for garments that are not here: what only fits these ones finely is left out.
             (options.thinnest_cm, options.uncut) = (THINNEST_CM, false);
             (options.candidates, options.rounds) = (80, 4);
@@ -105,16 +105,16 @@ pub(crate) fn find(
 }
 
 /// The most PARTs of each garment: its share of a total, as Table 3 spends them.
-fn limits(wearers: &[&Wearer], max_parts: usize) -> Vec<usize> {
-    let total: usize = wearers.iter().map(|w| w.table_3.parts).sum();
-    wearers.iter().map(|w| w.table_3.parts * max_parts / total.max(1)).collect()
+fn limits(garments: &[&Garment], max_parts: usize) -> Vec<usize> {
+    let total: usize = garments.iter().map(|w| w.table_3.parts).sum();
+    garments.iter().map(|w| w.table_3.parts * max_parts / total.max(1)).collect()
 }
 
 /// The best table with which every garment is within its limit, and what it holds.
-pub(crate) fn take(front: &Front, wearers: &[&Wearer], name: &str) -> anyhow::Result<Option<Taken>> {
+pub(crate) fn take(front: &Front, garments: &[&Garment], name: &str) -> anyhow::Result<Option<Taken>> {
     let taken = |point: &FrontPoint| {
         let table = point.table(name, "")?;
-        let holds = wearers.iter().map(|w| w.holds(&table)).collect();
+        let holds = garments.iter().map(|w| w.holds(&table)).collect();
         Ok(Taken { table, holds })
     };
     front.best.as_ref().map(taken).transpose()

@@ -6,22 +6,22 @@
 use partwise::range_table::{Extent, RangeTable};
 use rayon::prelude::*;
 
-use super::wearer::Wearer;
+use super::garment::Garment;
 
 /// Factors tried, 2 % apart: 1/8 to 8.
 const STEPS: std::ops::RangeInclusive<i32> = -105..=105;
 
 /// The table with its extents scaled, and the factor: as many PARTs as can be, but no more than Table 3 makes of the garment. `None` where no factor makes so few.
-pub(super) fn fitted(table: &RangeTable, wearer: &Wearer) -> anyhow::Result<Option<(f64, RangeTable)>> {
+pub(super) fn fitted(table: &RangeTable, garment: &Garment) -> anyhow::Result<Option<(f64, RangeTable)>> {
     let tried: Vec<(usize, f64, RangeTable)> = STEPS
         .into_par_iter()
         .map(|step| {
             let factor = 1.02f64.powi(step);
             let table = scaled(table, factor)?;
-            Ok((wearer.parts(&table).len(), factor, table))
+            Ok((garment.parts(&table).len(), factor, table))
         })
         .collect::<anyhow::Result<_>>()?;
-    let allowed = tried.into_iter().filter(|(parts, ..)| *parts <= wearer.table_3.parts);
+    let allowed = tried.into_iter().filter(|(parts, ..)| *parts <= garment.table_3.parts);
     Ok(allowed.max_by_key(|(parts, ..)| *parts).map(|(_, factor, table)| (factor, table)))
 }
 

@@ -2,28 +2,29 @@
 
 mod find;
 mod fit;
+mod garment;
 mod recording;
 mod report;
-mod wearer;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use partwise::assess::AssessOptions;
-use partwise::fabric::Fabric;
+use partwise::fabric::{DEFAULT_FABRIC, Fabric};
+use partwise::files::stem;
 use partwise::record::RecordSummary;
+use partwise::scene::DRESS_FORM;
 use partwise::shapes::BUILT_IN;
 use partwise::table_search::Front;
+use partwise::whole_file::WholeFile;
 
 use self::find::{Found, SHAPES, SHAPES_TOGETHER, Taken, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, take};
+use self::garment::Garment;
 use self::report::Verdict;
-use self::wearer::Wearer;
 use super::failure::UserError;
-use super::inputs::{looks_like_a_file, read_text};
-use super::run::use_threads;
 use super::sinks::SinkArgs;
-use super::sweep::cache;
 use super::sweep::report::{Format, line};
+use super::work::{cache, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -59,10 +60,10 @@ pub(crate) struct TuneArgs {
     #[arg(long, value_name = "NAME[@VERTICES]|FILE")]
     hold_out: Vec<String>,
     /// Body: `form`, or an OBJ file with garments placed around it
-    #[arg(long, value_name = "form|FILE.obj", default_value = "form")]
+    #[arg(long, value_name = "form|FILE.obj", default_value = DRESS_FORM)]
     body: String,
     /// Fabric of the reference drape: a built-in name or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "interlock")]
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
     fabric: String,
     /// Most PARTs a table may make, over all garments tuned together, each its share of Table 3's [default: as many as Table 3
     /// makes of each]
@@ -115,19 +116,19 @@ impl TuneArgs {
         use_threads(self.threads)?;
         interrupt::listen();
         let ladder = self.ladder()?;
-        let fabric = self.fabric()?;
+        let fabric = Fabric::by_name(&self.fabric)?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
         let names: Vec<String> = if self.garment.is_empty() {
             BUILT_IN.iter().map(|n| (*n).to_owned()).filter(|n| !self.hold_out.contains(n)).collect()
         } else {
             self.garment.clone()
         };
-        let load = |names: &[String]| -> anyhow::Result<Option<Vec<Wearer>>> {
-            names.iter().map(|name| Wearer::load(name, &self.body, &fabric, &options)).collect()
+        let load = |names: &[String]| -> anyhow::Result<Option<Vec<Garment>>> {
+            names.iter().map(|name| Garment::load(name, &self.body, &fabric, &options)).collect()
         };
-        let (Some(wearers), Some(held_out)) = (load(&names)?, load(&self.hold_out)?) else { return Ok(()) };
-        let sets: Vec<Vec<&Wearer>> =
-            if self.together { vec![wearers.iter().collect()] } else { wearers.iter().map(|w| vec![w]).collect() };
+        let (Some(garments), Some(held_out)) = (load(&names)?, load(&self.hold_out)?) else { return Ok(()) };
+        let sets: Vec<Vec<&Garment>> =
+            if self.together { vec![garments.iter().collect()] } else { garments.iter().map(|w| vec![w]).collect() };
         if sets.len() * sets.first().map_or(0, Vec::len) > 1 && self.sinks.save.is_some() {
             return Err(UserError::new(
                 "--save takes one recording and this makes one a garment; choose a folder with --out",
@@ -143,13 +144,15 @@ impl TuneArgs {
         let front = report::csv(&results.fronts)?;
         self.write(&self.out.join("front.csv"), &front)?;
         self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
+        // JSON is Unicode; names of files need not be.
+        let name = |path: &PathBuf| path.display().to_string();
         match self.format {
             Format::Csv => console::result(&front),
             Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
                 "verdicts": results.verdicts,
-                "tables": results.tables,
-                "front": self.out.join("front.csv"),
-                "recordings": results.recordings.iter().map(|r| &r.path).collect::<Vec<_>>(),
+                "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
+                "front": name(&self.out.join("front.csv")),
+                "recordings": results.recordings.iter().map(|r| r.path.as_ref().map(name)).collect::<Vec<_>>(),
             }))?),
             Format::Text => {
                 let recordings: String = results.recordings.iter().map(line).collect();
@@ -168,8 +171,8 @@ impl TuneArgs {
     /// Searches for one set of garments.
     fn tune(
         &self,
-        set: &[&Wearer],
-        held_out: &[Wearer],
+        set: &[&Garment],
+        held_out: &[Garment],
         (extents_cm, shapes): (&[f64], &[f64]),
         results: &mut Results,
     ) -> anyhow::Result<()> {
@@ -192,7 +195,7 @@ impl TuneArgs {
             let path = self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")));
             self.write(&path, &report::with_provenance(&best, set).to_toml())?;
             results.tables.push(path);
-            let on = |w: &Wearer, held_out: bool| Verdict::new(&name, kind, &best.table, w, held_out);
+            let on = |w: &Garment, held_out: bool| Verdict::new(&name, kind, &best.table, w, held_out);
             results.verdicts.extend(set.iter().map(|w| on(w, false)));
             for w in held_out {
                 results.verdicts.push(on(w, true));
@@ -209,20 +212,16 @@ impl TuneArgs {
 
     fn record(
         &self,
-        set: &[&Wearer],
+        set: &[&Garment],
         found: &Found,
         taken: &[(&'static str, Taken)],
         results: &mut Results,
     ) -> anyhow::Result<()> {
         let taken: Vec<(&'static str, &Taken)> = taken.iter().map(|(kind, t)| (*kind, t)).collect();
-        for wearer in set {
-            let mut sinks = self.sinks.clone();
-            if sinks.save.is_none() && !sinks.no_save {
-                sinks.save = Some(self.out.join(format!("{}.rrd", stem(&wearer.name))));
-            }
-            let sinks = sinks.sinks(&wearer.name);
+        for garment in set {
+            let sinks = self.sinks.sinks_in(&self.out, &stem(&garment.name));
             if !sinks.is_empty() {
-                results.recordings.push(recording::record(wearer, set, found, &taken, sinks)?);
+                results.recordings.push(recording::record(garment, set, found, &taken, sinks)?);
             }
         }
         Ok(())
@@ -248,23 +247,10 @@ impl TuneArgs {
         Ok((or(&self.extents, widths), or(&self.shapes, shapes)))
     }
 
-    fn fabric(&self) -> anyhow::Result<Fabric> {
-        if looks_like_a_file(&self.fabric) {
-            return Ok(Fabric::parse(&read_text(Path::new(&self.fabric))?, &self.fabric)?);
-        }
-        Ok(Fabric::by_name(&self.fabric)?)
-    }
-
     fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let written = std::fs::create_dir_all(&self.out).and_then(|()| std::fs::write(path, text));
+        let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
         written.map_err(|e| {
             UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
         })
     }
-}
-
-/// A garment's name for files: without folder and ending.
-fn stem(name: &str) -> String {
-    let file = Path::new(name).file_name().map_or(name.into(), std::ffi::OsStr::to_string_lossy);
-    file.trim_end_matches(".obj").trim_end_matches(".toml").to_owned()
 }

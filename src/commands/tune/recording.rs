@@ -3,16 +3,16 @@
 
 use glam::DVec3;
 use partwise::accuracy::vertex_errors;
-use partwise::parts::{Parts, UNASSIGNED};
-use partwise::range_table::{METRES_PER_CM, RangeTable};
+use partwise::figures::LevelCount;
+use partwise::parts::Parts;
+use partwise::range_table::RangeTable;
 use partwise::record::{
-    Chosen, Layout, LevelRow, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView,
-    When,
+    Chosen, Layout, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, When,
 };
 use partwise::table_search::Front;
 
 use super::find::{Found, Iteration, Taken, take};
-use super::wearer::Wearer;
+use super::garment::Garment;
 use crate::commands::summary::command_line;
 
 /// One table of the recording.
@@ -24,8 +24,8 @@ struct Shown<'a> {
 
 /// Records what a search found on one of its garments.
 pub(super) fn record(
-    wearer: &Wearer,
-    all: &[&Wearer],
+    garment: &Garment,
+    all: &[&Garment],
     found: &Found,
     taken: &[(&'static str, &Taken)],
     sinks: Vec<Sink>,
@@ -34,24 +34,24 @@ pub(super) fn record(
         std::iter::once("table-3".to_owned()).chain(taken.iter().map(|(kind, _)| (*kind).to_owned())).collect();
     let layout =
         Layout { several_tables: true, held: true, error: true, compare: titles, scatter: true, ..Layout::default() };
-    let name = format!("{}: search", wearer.name);
+    let name = format!("{}: search", garment.name);
     let mut recorder = Recorder::open(RecordOptions { sinks, name, layout, ..RecordOptions::default() })?;
-    recorder.body(0, &wearer.placed.scene.body_mesh)?;
-    recorder.garment(0, &wearer.placed.scene.garment)?;
+    recorder.body(0, garment.scene.body.mesh())?;
+    recorder.garment(0, &garment.scene.garment)?;
     let table_3 = RangeTable::table_3();
     let start = Shown { index: 0, title: "table-3".to_owned(), table: &table_3 };
-    step(&mut recorder, wearer, &start)?;
+    step(&mut recorder, garment, &start)?;
     scatter(&mut recorder, 0, all, &Front::default())?;
-    slot(&mut recorder, wearer, 0, &start)?;
+    slot(&mut recorder, garment, 0, &start)?;
     for (index, iteration) in (1..).zip(&found.iterations) {
         let Some(best) = take(&iteration.front, all, "best so far")? else { continue };
         let shown = Shown { index, title: title(iteration), table: &best.table };
-        step(&mut recorder, wearer, &shown)?;
+        step(&mut recorder, garment, &shown)?;
         scatter(&mut recorder, index, all, &iteration.front)?;
     }
     for (place, (kind, taken)) in (1..).zip(taken) {
         let shown = Shown { index: 0, title: (*kind).to_owned(), table: &taken.table };
-        slot(&mut recorder, wearer, place, &shown)?;
+        slot(&mut recorder, garment, place, &shown)?;
     }
     Ok(recorder.finish()?)
 }
@@ -61,48 +61,30 @@ fn title(iteration: &Iteration) -> String {
 }
 
 /// The garment with each PART moved by its mean.
-fn held(wearer: &Wearer, parts: &Parts) -> Vec<DVec3> {
-    let mut positions = wearer.placed.scene.garment.positions.clone();
+fn held(garment: &Garment, parts: &Parts) -> Vec<DVec3> {
+    let mut positions = garment.scene.garment.positions.clone();
     for part in &parts.parts {
-        let sum: DVec3 = part.vertices.iter().map(|&v| wearer.displacement[v as usize]).sum();
+        let sum: DVec3 = part.vertices.iter().map(|&v| garment.displacement[v as usize]).sum();
         let mean = sum / part.vertices.len() as f64;
         part.vertices.iter().for_each(|&v| positions[v as usize] += mean);
     }
     positions
 }
 
-fn covering(parts: &Parts) -> Vec<u32> {
-    let rest = parts.len() as u32;
-    parts.part_of_vertex.iter().map(|&p| if p == UNASSIGNED { rest } else { p }).collect()
-}
-
-fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::Result<()> {
-    let parts = wearer.parts(shown.table);
-    let positions = held(wearer, &parts);
-    let error_mm: Vec<f64> = vertex_errors(&positions, &wearer.reference).iter().map(|e| 1e3 * e).collect();
-    let holds = wearer.holds(shown.table);
-    let mut vertices = vec![0; parts.parts_per_level.len()];
-    for part in &parts.parts {
-        vertices[part.level as usize] += part.vertices.len();
-    }
-    let bounds = shown.table.effective_levels();
-    let rows = bounds.iter().zip(&parts.parts_per_level).zip(vertices);
-    let levels = rows.map(|((bound, &parts), vertices)| LevelRow {
-        lower_m: bound.lower_cm * METRES_PER_CM,
-        upper_m: bound.upper_cm * METRES_PER_CM,
-        vertices,
-        parts,
-        extent: bound.extent.map(|e| e.to_string()),
-    });
+fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow::Result<()> {
+    let parts = garment.parts(shown.table);
+    let positions = held(garment, &parts);
+    let error_mm: Vec<f64> = vertex_errors(&positions, &garment.reference).iter().map(|e| 1e3 * e).collect();
+    let holds = garment.holds(shown.table);
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let panel = Panel {
-        title: format!("Search: {}", wearer.name),
+        title: format!("Search: {}", garment.name),
         table: shown.title.clone(),
-        levels: levels.collect(),
+        levels: LevelCount::all(shown.table, &parts),
         facts: vec![
             fact("PARTs", holds.parts.to_string()),
             fact("representable error", format!("{:.2} mm RMS", holds.rms_mm)),
-            fact("of Table 3's", format!("{:.2}", holds.rms_mm / wearer.table_3.rms_mm)),
+            fact("of Table 3's", format!("{:.2}", holds.rms_mm / garment.table_3.rms_mm)),
             fact("shown as drape", "each PART moved by the reference's mean".to_owned()),
         ],
         command_line: command_line(),
@@ -110,9 +92,9 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
     };
     recorder.step(&StepView {
         index: shown.index,
-        distance_m: &wearer.placed.distance_m,
-        part_of_vertex: &covering(&parts),
-        part_force_n: &vec![DVec3::ZERO; parts.len() + usize::from(parts.unassigned > 0)],
+        distance_m: &garment.distances_m,
+        part_of_vertex: &parts.part_of_vertex,
+        part_force_n: &vec![DVec3::ZERO; parts.len()],
         draped: &positions,
         panel: &panel,
         scalars: &[("error/representable_rms_mm", holds.rms_mm), ("levels", shown.table.levels.len() as f64)],
@@ -121,22 +103,22 @@ fn step(recorder: &mut Recorder, wearer: &Wearer, shown: &Shown<'_>) -> anyhow::
     Ok(())
 }
 
-fn slot(recorder: &mut Recorder, wearer: &Wearer, slot: usize, shown: &Shown<'_>) -> anyhow::Result<()> {
-    let parts = wearer.parts(shown.table);
-    let holds = wearer.holds(shown.table);
+fn slot(recorder: &mut Recorder, garment: &Garment, slot: usize, shown: &Shown<'_>) -> anyhow::Result<()> {
+    let parts = garment.parts(shown.table);
+    let holds = garment.holds(shown.table);
     recorder.compare(&Chosen {
         index: shown.index,
         slot,
         caption: &format!("{} PARTs · {:.1} mm", holds.parts, holds.rms_mm),
-        draped: &held(wearer, &parts),
-        part_of_vertex: &covering(&parts),
+        draped: &held(garment, &parts),
+        part_of_vertex: &parts.part_of_vertex,
         overlay: None,
     })?;
     Ok(())
 }
 
 /// The front so far beside Table 3, all garments of the search together.
-fn scatter(recorder: &mut Recorder, index: i64, all: &[&Wearer], front: &Front) -> anyhow::Result<()> {
+fn scatter(recorder: &mut Recorder, index: i64, all: &[&Garment], front: &Front) -> anyhow::Result<()> {
     let (parts, error_mm) = super::report::table_3(all);
     let mut points = vec![ScatterPoint { label: "Table 3", cost: parts as f64, error_mm, group: 1, named: true }];
     points.extend(front.points.iter().map(|p| ScatterPoint {

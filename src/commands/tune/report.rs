@@ -8,7 +8,7 @@ use partwise::table_search::Front;
 use serde::Serialize;
 
 use super::find::Taken;
-use super::wearer::{Holds, Wearer};
+use super::garment::{Garment, Holds};
 use crate::commands::summary::command_line;
 
 /// A tuned table beside Table 3 on one garment.
@@ -36,21 +36,27 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn new(tuned_on: &str, kind: &'static str, table: &RangeTable, wearer: &Wearer, held_out: bool) -> Self {
-        let Holds { parts, rms_mm } = wearer.holds(table);
+    pub(super) fn new(
+        tuned_on: &str,
+        kind: &'static str,
+        table: &RangeTable,
+        garment: &Garment,
+        held_out: bool,
+    ) -> Self {
+        let Holds { parts, rms_mm } = garment.holds(table);
         Self {
             tuned_on: tuned_on.to_owned(),
             kind,
-            garment: wearer.name.clone(),
+            garment: garment.name.clone(),
             held_out,
             extent_factor: 1.0,
             levels: table.levels.len(),
             cut_levels: table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
             parts,
             rms_mm,
-            table_3_parts: wearer.table_3.parts,
-            table_3_rms_mm: wearer.table_3.rms_mm,
-            ratio: rms_mm / wearer.table_3.rms_mm,
+            table_3_parts: garment.table_3.parts,
+            table_3_rms_mm: garment.table_3.rms_mm,
+            ratio: rms_mm / garment.table_3.rms_mm,
         }
     }
 
@@ -101,7 +107,7 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
 const SHOWN: usize = 12;
 
 /// A front for the terminal, thinned.
-pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer], exact: bool) -> String {
+pub(super) fn front(title: &str, front: &Front, garments: &[&Garment], exact: bool) -> String {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extents cm"]);
     let last = front.points.len().saturating_sub(1);
@@ -120,7 +126,7 @@ pub(super) fn front(title: &str, front: &Front, wearers: &[&Wearer], exact: bool
     }
     let beats = if exact { "can beat, every bound tried" } else { "found beats" };
     let mut out = format!("{title}: {} tables that no other {beats}\n{table}\n", front.points.len());
-    let (parts, rms) = table_3(wearers);
+    let (parts, rms) = table_3(garments);
     let _ = writeln!(out, "Table 3: {parts} PARTs, {rms:.2} mm\n");
     out
 }
@@ -137,17 +143,12 @@ fn between(extents: &[Extent]) -> String {
     }
 }
 
-/// An extent in the CSV: `12`, `6x24`, `inf`.
-fn written(extent: &Extent) -> String {
-    extent.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
-}
-
 /// Table 3's PARTs and error over a set, weighted as the search weighs them.
-pub(super) fn table_3(wearers: &[&Wearer]) -> (usize, f64) {
-    let parts = wearers.iter().map(|w| w.table_3.parts).sum();
-    let weights = wearers.iter().map(|w| w.weight());
+pub(super) fn table_3(garments: &[&Garment]) -> (usize, f64) {
+    let parts = garments.iter().map(|w| w.table_3.parts).sum();
+    let weights = garments.iter().map(|w| w.weight());
     let total: f64 = weights.clone().sum();
-    let mean = wearers.iter().zip(weights).map(|(w, weight)| weight * w.table_3.rms_mm.powi(2)).sum::<f64>() / total;
+    let mean = garments.iter().zip(weights).map(|(w, weight)| weight * w.table_3.rms_mm.powi(2)).sum::<f64>() / total;
     (parts, mean.sqrt())
 }
 
@@ -187,7 +188,7 @@ pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<St
                 rms_mm: 1e3 * point.rms_m,
                 levels: point.inner_bounds_cm.len() + 1,
                 inner_bounds_cm: words(&point.inner_bounds_cm),
-                extents_cm: point.extents.iter().map(written).collect::<Vec<_>>().join(" "),
+                extents_cm: point.extents.iter().map(Extent::in_a_column).collect::<Vec<_>>().join(" "),
             })?;
         }
     }
@@ -195,8 +196,8 @@ pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<St
 }
 
 /// The table with its provenance: who made it how, from what, and how good it is there.
-pub(super) fn with_provenance(taken: &Taken, wearers: &[&Wearer]) -> RangeTable {
-    let figures: Vec<String> = wearers
+pub(super) fn with_provenance(taken: &Taken, garments: &[&Garment]) -> RangeTable {
+    let figures: Vec<String> = garments
         .iter()
         .zip(&taken.holds)
         .map(|(w, h)| {

@@ -75,20 +75,21 @@ impl Reduced {
 }
 
 impl Tangent for Reduced {
-    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>) -> Result<(), SolveError> {
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError> {
         self.motions.centre_at(here.x);
         self.assemble(here);
         self.motions.restrict(here.x, here.gradient, &mut self.unknowns);
         for q in &mut self.unknowns {
             *q = -*q;
         }
-        self.solver.solve(&self.layout.pattern, &self.blocks, &self.undamped, true, &mut self.unknowns)?;
+        let Self { solver, layout, blocks, undamped, unknowns, .. } = self;
+        let (solved, ()) = rayon::join(
+            || solver.solve(&layout.pattern, blocks, undamped, true, unknowns),
+            || here.cloth.own_blocks(here.x, here.contacts, here.damping, own),
+        );
+        solved?;
         self.motions.prolong(here.x, &self.unknowns, d);
         Ok(())
-    }
-
-    fn diagonal(&self, here: &State<'_>, blocks: &mut Vec<DMat3>) {
-        here.cloth.own_blocks(here.x, here.contacts, here.damping, blocks);
     }
 
     fn pause(&mut self) -> bool {

@@ -96,7 +96,7 @@ pub fn solve(
     let setup = began.elapsed();
 
     let began = Instant::now();
-    let contacts = soft.contacts(body, start).planes(start);
+    let contacts = soft.contacts_by_planes(body, start);
     let mut descent = Descent::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
     let history = settle(&mut descent, &mut tangent, options)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;

@@ -22,6 +22,7 @@ use super::options::Motion;
 use super::weights::Weights;
 use crate::mechanics::energy::pattern::Pattern;
 use crate::mechanics::newton::{SolveError, Solver};
+use crate::mechanics::principal::principal;
 use crate::parts::Parts;
 
 /// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
@@ -207,29 +208,4 @@ impl Motions {
         self.prolong(x, &unknowns, &mut out);
         Ok(out)
     }
-}
-
-/// Eigenvalues and unit eigenvectors of a symmetric matrix, by Jacobi's rotations; three sweeps more than it ever takes.
-fn principal(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
-    let mut m = m.to_cols_array_2d();
-    let mut v = [DVec3::X, DVec3::Y, DVec3::Z];
-    for _ in 0..8 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if m[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = t.hypot(1.0).recip();
-            let s = t * c;
-            for k in 0..3 {
-                (m[k][p], m[k][q]) = (c * m[k][p] - s * m[k][q], s * m[k][p] + c * m[k][q]);
-            }
-            for k in 0..3 {
-                (m[p][k], m[q][k]) = (c * m[p][k] - s * m[q][k], s * m[p][k] + c * m[q][k]);
-            }
-            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
-        }
-    }
-    ([m[0][0], m[1][1], m[2][2]], v)
 }

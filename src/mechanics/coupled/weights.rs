@@ -26,7 +26,7 @@ use crate::mesh::Topology;
 use crate::parts::{Parts, UNASSIGNED};
 
 /// Weights under this share are left out: they cost as much as any and move nothing.
-const LEAST: f64 = 0.01;
+const LEAST: f64 = 0.03;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +121,7 @@ fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32
     flow.run(&seam, reach + half, |v| !inside(v));
     let kernel = |v: u32| {
         let t = (flow.distance[v as usize] - half).max(0.0) / reach;
-        (!inside(v) && t < 1.0).then(|| (v, (1.0 - t) * (1.0 - t)))
+        (!inside(v) && t < 1.0).then_some((v, (1.0 - t) * (1.0 - t)))
     };
     flow.reached.iter().filter_map(|&v| kernel(v)).collect()
 }

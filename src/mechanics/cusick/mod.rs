@@ -135,10 +135,10 @@ pub fn targets() -> Result<Vec<Target>, CusickError> {
     Ok(csv::Reader::from_reader(TARGETS.as_bytes()).deserialize().collect::<Result<_, _>>()?)
 }
 
-/// Drapes the named built-in fabrics and sets the results beside the published bands, as CSV.
+/// Drapes fabrics, built in by name or from files, and sets the results beside the published bands, as CSV.
 ///
 /// # Errors
-/// As [`run`], and [`FabricError`] for an unknown name.
+/// As [`run`], and [`FabricError`] for an unknown name or a file that is none of a fabric.
 pub fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
     let targets = targets()?;
     let mut csv =
@@ -149,8 +149,10 @@ pub fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError>
         let target = targets.iter().find(|t| t.fabric == *name);
         let band = target.map_or_else(|| ",".to_owned(), |t| format!("{},{}", t.low_percent, t.high_percent));
         let verdict = target.map_or_else(|| "no published band".to_owned(), |t| verdict(percent, t));
+        let quoted = || format!("\"{}\"", name.replace('"', "\"\""));
+        let label = if name.contains([',', '"', '\n', '\r']) { quoted() } else { (*name).to_owned() };
         csv += &format!(
-            "{name},{percent:.1},{band},{verdict},{},{:.1e},{}\n",
+            "{label},{percent:.1},{band},{verdict},{},{:.1e},{}\n",
             result.folds, result.residual_over_weight, result.steps
         );
     }

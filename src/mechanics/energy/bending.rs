@@ -161,6 +161,12 @@ impl Bending {
         self.plate.add_gradient(l, vertices, x, gradient)
     }
 
+    /// Q_vv, N/m.
+    #[must_use]
+    pub fn own_scalar(&self, v: usize) -> f64 {
+        self.plate.own(v)
+    }
+
     /// Energy of all elements, J.
     #[must_use]
     pub fn energy(&self, x: &[DVec3]) -> f64 {
@@ -238,10 +244,43 @@ fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
     for (i, row) in normal.iter_mut().enumerate().skip(2) {
         row[i] += RIDGE * trace;
     }
-    let inverse = faer::Mat::from_fn(5, 5, |i, j| normal[i][j]);
-    let factor = faer::linalg::solvers::Llt::new(inverse.as_ref(), faer::Side::Lower).ok()?;
-    let right = faer::Mat::from_fn(5, rows.len(), |i, k| rows[k].1 * rows[k].0[i]);
-    let fit = faer::linalg::solvers::Solve::solve(&factor, &right);
+    let factor = cholesky(normal)?;
     let per_area = 1.0 / (scale * scale);
-    Some((0..rows.len()).map(|k| DVec3::new(fit[(2, k)], fit[(3, k)], fit[(4, k)]) * per_area).collect())
+    let fit = |(row, weight): &([f64; 5], f64)| {
+        let [_, _, uu, uv, vv] = substitute(&factor, row.map(|r| r * weight));
+        DVec3::new(uu, uv, vv) * per_area
+    };
+    Some(rows.iter().map(fit).collect())
+}
+
+/// The lower factor L of a symmetric matrix L Lᵀ; `None` where it is not positive. Five by five is too small for a library's setting up,
+/// and there is one for every vertex.
+fn cholesky(mut m: [[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
+    for j in 0..5 {
+        for i in j..5 {
+            let sum: f64 = (0..j).map(|k| m[i][k] * m[j][k]).sum();
+            let left = m[i][j] - sum;
+            if i > j {
+                m[i][j] = left / m[j][j];
+            } else if left > 0.0 {
+                m[j][j] = left.sqrt();
+            } else {
+                return None;
+            }
+        }
+    }
+    Some(m)
+}
+
+/// Solves L Lᵀ x = b.
+fn substitute(l: &[[f64; 5]; 5], mut b: [f64; 5]) -> [f64; 5] {
+    for i in 0..5 {
+        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
+    }
+    for i in (0..5).rev() {
+        let sum: f64 = (i + 1..5).map(|k| l[k][i] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
+    }
+    b
 }

@@ -7,15 +7,17 @@
 //! | ∇E | gradient, minus the force | N |
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
 
+use std::sync::{Arc, OnceLock};
+
 use glam::{DMat3, DVec3};
 
 use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
+use super::layout::Layout;
 use super::membrane::{Stiffness, Triangle};
-use super::ordering::nested_dissection;
 use super::packs::TrianglePack;
-use super::pattern::{HELD, Pattern, Slot};
+use super::pattern::{HELD, Pattern};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::fabric::Fabric;
@@ -43,15 +45,15 @@ pub enum EnergyError {
         mesh: usize,
     },
     /// A triangle without rest area has no strain.
-    #[error("triangle {triangle} (from 0) has no area in the rest shape: repair the mesh or the pattern first")]
+    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
     Degenerate {
-        /// Its index.
+        /// Its index, from 0.
         triangle: usize,
     },
     /// A held vertex that is not there.
-    #[error("held vertex {vertex} does not exist: the garment has {count} vertices, numbered from 0")]
+    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
     Held {
-        /// Index asked for.
+        /// Index asked for, from 0.
         vertex: u32,
         /// Vertices there are.
         count: usize,
@@ -79,21 +81,15 @@ pub struct Cloth {
     pub offset: f64,
     /// Coulomb friction against the body.
     pub friction: f64,
-    /// Vertex of each unknown, in elimination order.
-    pub order: Vec<u32>,
-    /// Unknown of each vertex, [`HELD`] where it is held.
-    pub unknown: Vec<u32>,
-    /// Where the Hessian's blocks are.
-    pub pattern: Pattern,
     /// The triangles' rest data.
     pub triangles: Vec<Triangle>,
     /// The rings that bend.
-    pub bending: Bending,
+    pub bending: Arc<Bending>,
     pub(crate) stiffness: Stiffness,
     /// The triangles by fours.
     pub(super) packs: Vec<TrianglePack>,
-    triangle_slots: Vec<[Slot; 6]>,
-    bending_blocks: Vec<f64>,
+    placed: Arc<Vec<DVec3>>,
+    layout: Arc<OnceLock<Layout>>,
 }
 
 impl Cloth {
@@ -135,16 +131,10 @@ impl Cloth {
         }
         let masses: Vec<f64> = areas.iter().map(|a| a * fabric.density_kg_per_m2).collect();
         let bending = Bending::new(mesh, topology, rest, fabric);
-        let free: Vec<u32> = (0..n as u32).filter(|&v| !is_held[v as usize]).collect();
-        if free.is_empty() {
+        if !is_held.contains(&false) {
             return Err(EnergyError::NothingFree { count: n });
         }
-        let order = nested_dissection(free, &mesh.positions, &block_neighbours(n, topology, &bending));
-        let mut unknown = vec![HELD; n];
-        for (i, &v) in order.iter().enumerate() {
-            unknown[v as usize] = i as u32;
-        }
-        let mut cloth = Self {
+        Ok(Self {
             packs: TrianglePack::all(&triangles),
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
@@ -152,42 +142,30 @@ impl Cloth {
             held: is_held,
             offset: fabric.thickness_m + sag(mesh),
             friction: fabric.friction,
-            order,
-            unknown,
-            pattern: Pattern::default(),
             triangles,
-            bending,
+            bending: Arc::new(bending),
             stiffness: Stiffness::new(fabric),
-            triangle_slots: Vec::new(),
-            bending_blocks: Vec::new(),
-        };
-        cloth.lay_out(topology);
-        Ok(cloth)
+            placed: Arc::new(mesh.positions.clone()),
+            layout: Arc::new(OnceLock::new()),
+        })
     }
 
-    /// Builds the pattern, the triangles' slots in it and bending's constant blocks.
-    fn lay_out(&mut self, topology: &Topology) {
-        let u = &self.unknown;
-        let edges = topology.edges.iter().copied().chain(self.bending.pairs());
-        let pairs = edges.map(|[a, b]| (u[a as usize], u[b as usize])).filter(|&(i, j)| i != HELD && j != HELD);
-        let pattern = Pattern::new(self.order.len(), pairs);
-        let slot = |a: u32, b: u32| pattern.slot(u[a as usize], u[b as usize]);
-        self.triangle_slots = self
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.vertices;
-                [slot(a, a), slot(b, b), slot(c, c), slot(b, a), slot(c, a), slot(c, b)]
-            })
-            .collect();
-        self.bending_blocks = vec![0.0; pattern.rows.len()];
-        for ([a, b], scalar) in self.bending.hessian() {
-            let s = slot(a, b);
-            if s.block != HELD {
-                self.bending_blocks[s.block as usize] += scalar;
-            }
-        }
-        self.pattern = pattern;
+    /// Unknowns and pattern of the Hessian, made when first asked for.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        self.layout.get_or_init(|| Layout::new(&self.placed, &self.triangles, &self.bending, &self.held))
+    }
+
+    /// The unknown vertices in elimination order.
+    #[must_use]
+    pub fn order(&self) -> &[u32] {
+        &self.layout().order
+    }
+
+    /// Where the Hessian's blocks are.
+    #[must_use]
+    pub fn pattern(&self) -> &Pattern {
+        &self.layout().pattern
     }
 
     /// The same cloth with its membrane no stiffer than what lets a length of `height_m` (m) of it stretch by `strain` where
@@ -218,9 +196,21 @@ impl Cloth {
     /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
     #[must_use]
     pub fn contacts<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+        self.found(self.untouched(body), x)
+    }
+
+    /// The same by tangent planes: see [`Contacts::by_planes`].
+    #[must_use]
+    pub fn contacts_by_planes<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+        self.found(self.untouched(body).by_planes(), x)
+    }
+
+    fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let stiffness = HALF_THICKNESS_PRESSURE / (0.5 * self.offset);
-        let friction = Friction::new(self.friction);
-        let mut contacts = Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, friction);
+        Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, Friction::new(self.friction))
+    }
+
+    fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
         contacts.update(x);
         contacts.friction_refresh(x);
         contacts
@@ -237,24 +227,22 @@ impl Cloth {
         self.assemble(|t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
     }
 
-    /// Each unknown's own block of the positive part of ∇²E + ε M at `x`, N/m, in elimination order.
+    /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
     pub(crate) fn own_blocks(&self, x: &[DVec3], contacts: &Contacts, damping: f64, blocks: &mut Vec<DMat3>) {
-        let starts = &self.pattern.starts;
         blocks.clear();
-        blocks.extend(self.order.iter().zip(starts).map(|(&v, &s)| {
-            DMat3::from_diagonal(DVec3::splat(self.bending_blocks[s as usize] + damping * self.masses[v as usize]))
-        }));
+        blocks.extend(
+            self.masses
+                .iter()
+                .enumerate()
+                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))),
+        );
         for t in &self.triangles {
             for (&v, block) in t.vertices.iter().zip(t.own_blocks(&self.stiffness, x)) {
-                if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
-                    *sum += block;
-                }
+                blocks[v as usize] += block;
             }
         }
         for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
-            if let Some(sum) = blocks.get_mut(self.unknown[v as usize] as usize) {
-                *sum += block;
-            }
+            blocks[v as usize] += block;
         }
     }
 
@@ -265,9 +253,10 @@ impl Cloth {
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
     ) {
+        let layout = self.layout();
         blocks.clear();
-        blocks.extend(self.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
-        for (t, slots) in self.triangles.iter().zip(&self.triangle_slots) {
+        blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
+        for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
             let parts = of_triangle(t);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
@@ -276,32 +265,19 @@ impl Cloth {
             }
         }
         for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
-            let i = self.unknown[v as usize];
+            let i = layout.unknown[v as usize];
             if i != HELD {
-                blocks[self.pattern.starts[i as usize] as usize] += block;
+                blocks[layout.pattern.starts[i as usize] as usize] += block;
             }
         }
     }
 
     /// H d for a Hessian in [`hessian`](Self::hessian)'s blocks, both over the unknowns in elimination order.
     pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
-        self.pattern.multiply(blocks, d, out);
+        self.pattern().multiply(blocks, d, out);
     }
 }
 
-/// Which vertices share a block with each.
-fn block_neighbours(n: usize, topology: &Topology, bending: &Bending) -> Vec<Vec<u32>> {
-    let mut neighbours: Vec<Vec<u32>> = (0..n as u32).map(|v| topology.neighbours(v).to_vec()).collect();
-    for [a, b] in bending.pairs() {
-        neighbours[a as usize].push(b);
-        neighbours[b as usize].push(a);
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    neighbours
-}
 /// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
 /// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
 fn sag(mesh: &TriMesh) -> f64 {

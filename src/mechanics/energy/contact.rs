@@ -116,21 +116,17 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// The same at `x` by tangent planes of the exact distance, asked anew where a vertex has moved by [`PLANE`]: cheap
-    /// for a cloth that moves far and need not be told to a tenth of a millimetre.
+    /// The same by tangent planes of the exact distance, asked anew where a vertex has moved by [`PLANE`]: cheap for a cloth that
+    /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
-    pub fn planes(self, x: &[DVec3]) -> Self {
+    pub fn by_planes(self) -> Self {
         let n = self.areas.len();
         let met = match self.met {
             Met::Nothing => Met::Nothing,
-            Met::Planes(body, _) => Met::Planes(body, vec![DVec3::ZERO; n]),
+            Met::Planes(body, normals) => Met::Planes(body, normals),
             Met::Rounded(field) => Met::Planes(field.body(), vec![DVec3::ZERO; n]),
         };
-        let leave = leave_of_unasked(&self.held);
-        let mut contacts = Self { met, answer: vec![f64::NEG_INFINITY; n], leave, ..self };
-        contacts.update(x);
-        contacts.friction_refresh(x);
-        contacts
+        Self { met, ..self }
     }
 
     /// κ, N/m³.

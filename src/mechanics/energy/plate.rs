@@ -22,6 +22,8 @@ pub(super) struct Plate {
     /// First two of each i.
     starts: Vec<u32>,
     twos: Vec<Two>,
+    /// Q_ii, N/m: what its pairs add up to.
+    own: Vec<f64>,
 }
 
 /// Two pairs of one i.
@@ -38,12 +40,15 @@ impl Plate {
         let mut all: Vec<(u32, u32, f64)> = hessian.map(of_pair).filter(|(i, j, _)| i != j).collect();
         // Stable, so that equal entries are summed in the order of their elements.
         all.sort_by_key(|&(i, j, _)| (i, j));
-        let mut plate = Self { starts: vec![0], ..Self::default() };
+        let mut plate = Self { starts: vec![0], own: vec![0.0; vertices], ..Self::default() };
         let mut sums = all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
         for i in 0..vertices as u32 {
             let mut row: Vec<(u32, f64)> = Vec::new();
             while let Some(same) = sums.next_if(|same| same[0].0 == i) {
-                row.push((same[0].1, same.iter().map(|e| e.2).sum()));
+                let (j, scalar) = (same[0].1, same.iter().map(|e| e.2).sum());
+                row.push((j, scalar));
+                plate.own[i as usize] -= scalar;
+                plate.own[j as usize] -= scalar;
             }
             // Filled up by what it has already, and not by i, whose sum the product keeps to itself.
             if let (1, Some(&(j, _))) = (row.len() % 2, row.first()) {
@@ -55,6 +60,11 @@ impl Plate {
             plate.starts.push(plate.twos.len() as u32);
         }
         plate
+    }
+
+    /// Q_ii, N/m.
+    pub(super) fn own(&self, i: usize) -> f64 {
+        self.own[i]
     }
 
     /// Two ranges of vertices with about as many pairs each.

@@ -55,11 +55,8 @@ pub(crate) struct State<'a> {
 
 /// Coordinates to take Newton steps in, and the Hessian in them.
 pub(crate) trait Tangent {
-    /// The step of every vertex, m, zero where held.
-    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>) -> Result<(), SolveError>;
-
-    /// Each unknown vertex's own block of H + ε M at the last step's start, N/m, in elimination order.
-    fn diagonal(&self, here: &State<'_>, blocks: &mut Vec<DMat3>);
+    /// The step of every vertex, m, zero where held, and every free vertex's own block of a positive H + ε M, N/m.
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError>;
 
     /// After a step that led nowhere: whether there is another Hessian left to try.
     fn pause(&mut self) -> bool;
@@ -217,11 +214,8 @@ impl<'c, 'b> Descent<'c, 'b> {
         for again in 0.. {
             let Self { cloth, x, contacts, gradient, direction, blocks, .. } = self;
             let here = State { cloth, x, contacts, gradient, damping };
-            match tangent.step(&here, direction) {
-                Ok(()) => {
-                    tangent.diagonal(&here, blocks);
-                    break;
-                }
+            match tangent.step(&here, direction, blocks) {
+                Ok(()) => break,
                 Err(SolveError::NotPositive { .. }) if again < DAMPED_AGAIN => damping = 10.0 * damping.max(0.1),
                 Err(error) => return Err(error),
             }

@@ -61,8 +61,8 @@ pub(crate) struct Relaxation {
 }
 
 impl Relaxation {
-    /// Takes D from the `blocks` (N/m) of the unknowns, in elimination order; they must be positive.
-    pub(crate) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, blocks: &[DMat3]) {
+    /// Takes D from each vertex's own block (N/m), which must be positive where it is not held.
+    pub(crate) fn prepare(&mut self, cloth: &Cloth, contacts: &Contacts<'_>, own: &[DMat3]) {
         self.touched.clear();
         self.known.clear();
         self.known.resize(cloth.vertex_count(), false);
@@ -70,8 +70,8 @@ impl Relaxation {
             self.known[t.vertex as usize] = true;
         }
         self.inverse.clear(cloth.vertex_count());
-        for (&v, block) in cloth.order.iter().zip(blocks) {
-            self.inverse.set(v as usize, block.inverse());
+        for (v, (block, _)) in own.iter().zip(&cloth.held).enumerate().filter(|(_, (_, held))| !**held) {
+            self.inverse.set(v, block.inverse());
         }
     }
 
@@ -190,13 +190,8 @@ mod tests {
     fn relaxed(cloth: &Cloth, x: &mut Vec<DVec3>, iterations: usize) -> [f64; 2] {
         let mut contacts = Contacts::none();
         let (mut blocks, mut relaxation) = (Vec::new(), Relaxation::default());
-        cloth.hessian(x, &contacts, &mut blocks);
-        let starts = &cloth.pattern.starts;
-        let damped =
-            cloth.order.iter().zip(starts).map(|(&v, &s)| {
-                blocks[s as usize] + DMat3::from_diagonal(DVec3::splat(100.0 * cloth.masses[v as usize]))
-            });
-        relaxation.prepare(cloth, &contacts, &damped.collect::<Vec<_>>());
+        cloth.own_blocks(x, &contacts, 100.0, &mut blocks);
+        relaxation.prepare(cloth, &contacts, &blocks);
         let before = cloth.energy(x, &contacts);
         let after = relaxation.run(cloth, &mut contacts, x, iterations);
         assert!((after - cloth.energy(x, &contacts)).abs() < 1e-12 * before.abs());

@@ -33,18 +33,18 @@ impl Whole {
         let State { cloth, gradient, damping, .. } = *here;
         let solver = match &mut self.solver {
             Some(solver) => solver,
-            none => none.insert(Solver::new(&cloth.pattern)?),
+            none => none.insert(Solver::new(cloth.pattern())?),
         };
         self.damped.clear();
-        self.damped.extend(cloth.order.iter().map(|&v| cloth.masses[v as usize] * damping));
+        self.damped.extend(cloth.order().iter().map(|&v| cloth.masses[v as usize] * damping));
         self.unknowns.clear();
-        self.unknowns.extend(cloth.order.iter().map(|&v| -gradient[v as usize]));
-        solver.solve(&cloth.pattern, &self.blocks, &self.damped, positive, &mut self.unknowns)
+        self.unknowns.extend(cloth.order().iter().map(|&v| -gradient[v as usize]));
+        solver.solve(cloth.pattern(), &self.blocks, &self.damped, positive, &mut self.unknowns)
     }
 }
 
 impl Tangent for Whole {
-    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>) -> Result<(), SolveError> {
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError> {
         let State { cloth, x, contacts, .. } = *here;
         let mut solved = false;
         if self.waiting == 0 {
@@ -61,17 +61,14 @@ impl Tangent for Whole {
         }
         d.clear();
         d.resize(x.len(), DVec3::ZERO);
-        for (&v, step) in cloth.order.iter().zip(&self.unknowns) {
-            d[v as usize] = *step;
+        own.clear();
+        own.resize(x.len(), DMat3::ZERO);
+        let starts = &cloth.pattern().starts;
+        for (i, &v) in cloth.order().iter().enumerate() {
+            d[v as usize] = self.unknowns[i];
+            own[v as usize] = self.blocks[starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(self.damped[i]));
         }
         Ok(())
-    }
-
-    fn diagonal(&self, here: &State<'_>, blocks: &mut Vec<DMat3>) {
-        let starts = &here.cloth.pattern.starts;
-        let own = self.damped.iter().zip(starts);
-        blocks.clear();
-        blocks.extend(own.map(|(m, &s)| self.blocks[s as usize] + DMat3::from_diagonal(DVec3::splat(*m))));
     }
 
     fn pause(&mut self) -> bool {

@@ -1,11 +1,15 @@
 //! The readings of equations (2) to (9): what the page leaves open or gets wrong, one option each. The defaults work; the
 //! literal ones can be run and seen to fail.
 
+use serde::{Deserialize, Serialize};
+
 /// ΔV in (2) and (7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Volume {
     /// Barycentric vertex area × thickness: the cloth's own volume, in any frame.
     #[default]
+    #[serde(rename = "area")]
     AreaTimesThickness,
     /// Δx Δy Δz to the adjacent point, as printed. A triangle mesh has no next point, so each factor is the mean absolute
     /// difference to the neighbours. Fails: zero wherever the cloth lies along an axis, and another value in another frame.
@@ -13,7 +17,8 @@ pub enum Volume {
 }
 
 /// cos(•_p) in Fᵃ of (2) and (7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Cosine {
     /// |cos|: a stiffness is positive.
     #[default]
@@ -26,7 +31,8 @@ pub enum Cosine {
 }
 
 /// q as a factor of Fᵃ in (2) and (7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Clearance {
     /// max(q, 0) + thickness: the cloth's outer face, at least a thickness away, so that a tight PART keeps a stiffness. The
     /// floor is reached by vertices inside the body, which are counted.
@@ -37,31 +43,37 @@ pub enum Clearance {
 }
 
 /// The sign of D_z in (9).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Contactless {
     /// −F⁰/Fᵃ, which is (6) with F¹ = 0: cloth sinks.
     #[default]
+    #[serde(rename = "as-equation-6")]
     AsEquation6,
     /// F⁰/Fᵃ, as printed. Fails: cloth rises.
     AsPrinted,
 }
 
 /// q_f in (2) and (7), N/m³.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum BodyForce {
     /// One scalar from the vertical balance of the whole garment: Σ q_f cos γ_q ΔV over the contact PARTs = its weight.
     #[default]
+    #[serde(rename = "balance")]
     FromBalance,
     /// This value.
     Given(f64),
 }
 
 /// p_f in (2) and (7), N/m⁵.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum LineForce {
     /// From the fabric's membrane stiffness along the warp, so that a strip hanging from its top sinks as its closed form
     /// says, however it is cut into PARTs.
     #[default]
+    #[serde(rename = "membrane")]
     FromMembrane,
     /// This value, everywhere.
     Given(f64),
@@ -69,7 +81,8 @@ pub enum LineForce {
 
 /// What "directly attached" means for a garment none of whose vertices is within the contact distance, as one that is placed
 /// around the body and not yet draped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Untouched {
     /// The contact distance counts from the garment's nearest vertex, where it will touch first; a warning says so.
     #[default]
@@ -79,7 +92,8 @@ pub enum Untouched {
 }
 
 /// How to read equations (2) to (9).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PaperOptions {
     /// ΔV.
     pub volume: Volume,

@@ -101,7 +101,7 @@ fn settle(
         }
         if std::mem::take(&mut fresh) {
             let analysed = tangent.solver.take();
-            let analyse = || analysed.map_or_else(|| Solver::new(&cloth.pattern), Ok);
+            let analyse = || analysed.map_or_else(|| Solver::new(cloth.pattern()), Ok);
             tangent.solver = Some(descent.relax(RELAXING, analyse)?);
         }
         let advance = descent.advance(&mut tangent, pace)?;
@@ -144,7 +144,8 @@ fn settle(
 
 /// Whether a residual is that of cloth which nothing carries yet.
 fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
-    let squares: f64 = cloth.order.iter().map(|&v| cloth.masses[v as usize].powi(2)).sum();
+    let free = cloth.masses.iter().zip(&cloth.held).filter(|(_, held)| !**held);
+    let squares: f64 = free.map(|(m, _)| m * m).sum();
     residual > FAR_FROM_REST * GRAVITY * squares.sqrt() / cloth.weight
 }
 

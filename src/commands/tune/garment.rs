@@ -7,11 +7,10 @@ use partwise::assess::{AssessError, AssessOptions, canonical};
 use partwise::fabric::Fabric;
 use partwise::parts::{Grain, Parts, representable_rms_m, segment};
 use partwise::range_table::RangeTable;
-use partwise::shapes::BodySpec;
 use partwise::table_search::Sample;
+use partwise::{Scene, SceneSpec};
 
-use crate::commands::run::refining;
-use crate::commands::sweep::scenes::Placed;
+use crate::commands::work::refining;
 use crate::commands::{console, interrupt};
 
 /// PARTs and representable error of a table on a garment.
@@ -24,11 +23,13 @@ pub(crate) struct Holds {
 }
 
 /// A garment with its reference drape.
-pub(crate) struct Wearer {
+pub(crate) struct Garment {
     /// As on the command line.
     pub(crate) name: String,
-    /// Body, garment, distances.
-    pub(crate) placed: Placed,
+    /// The garment on its body.
+    pub(crate) scene: Scene,
+    /// Unsigned distance of each vertex to the body, m.
+    pub(crate) distances_m: Vec<f64>,
     /// The canonical drape, m.
     pub(crate) reference: Vec<DVec3>,
     /// From undraped to the canonical drape, m.
@@ -39,7 +40,7 @@ pub(crate) struct Wearer {
     pub(crate) table_3: Holds,
 }
 
-impl Wearer {
+impl Garment {
     /// Makes or reads a garment and finds or computes its reference; `None` where the user stopped it.
     pub(crate) fn load(
         name: &str,
@@ -47,9 +48,9 @@ impl Wearer {
         fabric: &Fabric,
         options: &AssessOptions,
     ) -> anyhow::Result<Option<Self>> {
-        let placed = Placed::load(body, name, &BodySpec::default())?;
+        let loaded = SceneSpec::new(body, name).load()?;
         let found = refining(&format!("{name}: reference drape"), |observer| {
-            canonical(&placed.scene, fabric, options, &mut |step| {
+            canonical(&loaded.scene, fabric, options, &mut |step| {
                 let _ = observer(step);
                 if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
@@ -59,21 +60,23 @@ impl Wearer {
             Err(AssessError::Interrupted) => return Ok(None),
             Err(other) => return Err(other.into()),
         };
-        for warning in placed.warnings.iter().chain(&warnings) {
+        for warning in loaded.warnings().iter().chain(&warnings) {
             console::warning(&format!("{name}: {warning}"));
         }
-        let start = &placed.scene.garment.positions;
+        let scene = loaded.scene;
+        let start = &scene.garment.positions;
         let displacement = reference.positions.iter().zip(start).map(|(a, b)| *a - *b).collect();
-        let mut wearer = Self {
+        let mut garment = Self {
             name: name.to_owned(),
-            grain: Grain::new(&placed.scene.garment, &placed.scene.topology, &placed.scene.rest),
-            placed,
+            grain: Grain::new(&scene.garment, &scene.topology, &scene.rest),
+            distances_m: scene.distances_m(),
+            scene,
             reference: reference.positions,
             displacement,
             table_3: Holds { parts: 0, rms_mm: 0.0 },
         };
-        wearer.table_3 = wearer.holds(&RangeTable::table_3());
-        Ok(Some(wearer))
+        garment.table_3 = garment.holds(&RangeTable::table_3());
+        Ok(Some(garment))
     }
 
     /// How much its squared error counts: relative to Table 3's, so that a wide skirt does not outweigh a pullover.
@@ -84,10 +87,10 @@ impl Wearer {
     /// As the search sees it, with the most PARTs it may have.
     pub(crate) fn sample(&self, max_parts: usize) -> Sample<'_> {
         Sample {
-            mesh: &self.placed.scene.garment,
-            topology: &self.placed.scene.topology,
+            mesh: &self.scene.garment,
+            topology: &self.scene.topology,
             grain: &self.grain,
-            distances_m: &self.placed.distance_m,
+            distances_m: &self.distances_m,
             displacement: &self.displacement,
             weight: self.weight(),
             max_parts,
@@ -96,8 +99,8 @@ impl Wearer {
 
     /// The PARTs of a table, levels with an extent cut to it.
     pub(crate) fn parts(&self, table: &RangeTable) -> Parts {
-        let scene = &self.placed.scene;
-        let parts = segment(&scene.topology, &self.placed.distance_m, table);
+        let scene = &self.scene;
+        let parts = segment(&scene.topology, &self.distances_m, table);
         parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
     }
 

@@ -1,0 +1,31 @@
+//! Drapes one garment by several range tables and tells what each costs and how far it is from the canonical drape:
+//! `cargo run --release --no-default-features --example sweep_tables`
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example talks")]
+
+use std::error::Error;
+
+use partwise::drape::unobserved;
+use partwise::job::{Against, Job};
+use partwise::range_table::{RangeTable, TableRule};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut job = Job { accuracy: Against::Canonical, ..Job::preview() };
+    job.scene.garment = std::env::args().nth(1).unwrap_or_else(|| "flared-skirt@900".to_owned());
+    let input = job.scene.load()?;
+    let quantile = |levels| TableRule::Quantile { name: format!("{levels} quantile levels"), levels };
+    let tables = [RangeTable::table_3().into(), RangeTable::table_3().scaled(0.5)?.into(), quantile(5), quantile(20)];
+    for table in tables {
+        job.settings.table = table;
+        let draped = job.drape(&input.scene, &mut unobserved)?;
+        let figures = job.measure(&input.scene, &draped, None, &mut unobserved)?.figures;
+        println!(
+            "{:<20} {:>5} PARTs {:>8.1} ms {:>6.1} mm off",
+            draped.table.name,
+            figures.part_count,
+            1e3 * draped.times.total.as_secs_f64(),
+            figures.error_mm().unwrap_or_default()
+        );
+    }
+    Ok(())
+}

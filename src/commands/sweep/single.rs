@@ -1,0 +1,51 @@
+//! Meshes and points in single precision, which is what a recording holds: `#[serde(with = "single::points")]`.
+
+use glam::{DVec3, Vec3};
+use partwise::mesh::TriMesh;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+fn rounded(points: &[DVec3]) -> Vec<[f32; 3]> {
+    points.iter().map(|p| p.as_vec3().to_array()).collect()
+}
+
+fn widened(points: Vec<[f32; 3]>) -> Vec<DVec3> {
+    points.into_iter().map(|p| Vec3::from_array(p).as_dvec3()).collect()
+}
+
+pub(super) mod points {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
+        rounded(points).serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
+        Deserialize::deserialize(from).map(widened)
+    }
+}
+
+pub(super) mod numbers {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(numbers: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(numbers.iter().map(|&x| x as f32))
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        Ok(Vec::<f32>::deserialize(from)?.into_iter().map(f64::from).collect())
+    }
+}
+
+/// Positions and triangles; a recording shows no groups.
+pub(super) mod mesh {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(mesh: &TriMesh, to: S) -> Result<S::Ok, S::Error> {
+        (rounded(&mesh.positions), &mesh.triangles).serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<TriMesh, D::Error> {
+        let (positions, triangles) = Deserialize::deserialize(from)?;
+        Ok(TriMesh::new(widened(positions), triangles))
+    }
+}

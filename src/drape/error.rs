@@ -1,0 +1,27 @@
+//! Why there is no drape.
+
+use crate::mechanics::coupled::CoupledError;
+use crate::mechanics::energy::EnergyError;
+use crate::mechanics::paper::PaperError;
+use crate::mechanics::refine::SolveError;
+use crate::range_table::TableError;
+
+/// Why nothing came out.
+#[derive(Debug, thiserror::Error)]
+pub enum DrapeError {
+    /// The distances make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The equations refused their input.
+    #[error(transparent)]
+    Paper(#[from] PaperError),
+    /// The PARTs could not be solved together.
+    #[error(transparent)]
+    Coupled(#[from] CoupledError),
+    /// The cloth cannot be set up at full resolution.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The cloth cannot be solved at full resolution.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}

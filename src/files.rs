@@ -1,0 +1,33 @@
+//! What a name on the command line or in a file stands for: something built in, or a file.
+
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{path}: cannot be read: {reason}; check the path and its permissions")]
+pub struct Unreadable {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system said.
+    pub reason: String,
+}
+
+/// Whether a name is that of a file rather than of something built in.
+#[must_use]
+pub fn names_a_file(name: &str) -> bool {
+    name.contains(['/', '\\', '.'])
+}
+
+/// A file's name without folder and ending; any other name as it is.
+#[must_use]
+pub fn stem(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Reads a text file.
+///
+/// # Errors
+/// [`Unreadable`] names it.
+pub fn read_text(path: &Path) -> Result<String, Unreadable> {
+    std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
+}

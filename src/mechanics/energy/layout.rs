@@ -1,0 +1,67 @@
+//! The unknowns of a cloth in their order of elimination, and where the Hessian's blocks are.
+//!
+//! Made when first asked for: a preview by PARTs factors nothing of it.
+
+use glam::DVec3;
+
+use super::bending::Bending;
+use super::membrane::Triangle;
+use super::ordering::nested_dissection;
+use super::pattern::{HELD, Pattern, Slot};
+
+/// Order, pattern and slots of one cloth.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// Vertex of each unknown, in elimination order.
+    pub order: Vec<u32>,
+    /// Unknown of each vertex, [`HELD`] where it is held.
+    pub unknown: Vec<u32>,
+    /// Where the Hessian's blocks are.
+    pub pattern: Pattern,
+    /// The blocks of each triangle: its corners' own, then (1,0), (2,0), (2,1).
+    pub(super) triangle_slots: Vec<[Slot; 6]>,
+    /// What bending adds to each block's diagonal, N/m.
+    pub(super) bending_blocks: Vec<f64>,
+}
+
+impl Layout {
+    /// Of the vertices that are not `held`; `placed` is where they are cut apart for the elimination.
+    pub(super) fn new(placed: &[DVec3], triangles: &[Triangle], bending: &Bending, held: &[bool]) -> Self {
+        let n = held.len();
+        let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); n];
+        let sides = triangles.iter().flat_map(|t| {
+            let [a, b, c] = t.vertices;
+            [[a, b], [b, c], [c, a]]
+        });
+        for [a, b] in sides.chain(bending.pairs()).filter(|[a, b]| a != b) {
+            neighbours[a as usize].push(b);
+            neighbours[b as usize].push(a);
+        }
+        for list in &mut neighbours {
+            list.sort_unstable();
+            list.dedup();
+        }
+        let free: Vec<u32> = (0..n as u32).filter(|&v| !held[v as usize]).collect();
+        let order = nested_dissection(free, placed, &neighbours);
+        let mut unknown = vec![HELD; n];
+        for (i, &v) in order.iter().enumerate() {
+            unknown[v as usize] = i as u32;
+        }
+        let pairs = order.iter().flat_map(|&v| neighbours[v as usize].iter().map(move |&w| (v, w)));
+        let pairs = pairs.map(|(v, w)| (unknown[v as usize], unknown[w as usize])).filter(|&(i, j)| j != HELD && i > j);
+        let pattern = Pattern::new(order.len(), pairs);
+        let slot = |a: u32, b: u32| pattern.slot(unknown[a as usize], unknown[b as usize]);
+        let slots = |t: &Triangle| {
+            let [a, b, c] = t.vertices;
+            [slot(a, a), slot(b, b), slot(c, c), slot(b, a), slot(c, a), slot(c, b)]
+        };
+        let triangle_slots = triangles.iter().map(slots).collect();
+        let mut bending_blocks = vec![0.0; pattern.rows.len()];
+        for ([a, b], scalar) in bending.hessian() {
+            if let Some(sum) = bending_blocks.get_mut(slot(a, b).block as usize) {
+                *sum += scalar;
+            }
+        }
+        Self { order, unknown, pattern, triangle_slots, bending_blocks }
+    }
+}

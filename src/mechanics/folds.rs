@@ -1,0 +1,84 @@
+//! Folds that no PART shows: how much more cloth there is than the surface has room for, and in which direction.
+//!
+//! Where a PART is too wide to fold, tension field theory lets the cloth in it be compressed for next to nothing; what is compressed
+//! would lie in folds. With σ₂ the smaller singular value of a triangle's deformation gradient F, its excess length is 1 − σ₂ where
+//! that is positive, along F v₂ / σ₂: the direction across the folds. A vertex takes the sum over its triangles of the excess times
+//! d dᵀ, by rest area; the largest eigenvalue is its excess, the eigenvector its direction.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | F | deformation gradient, columns along weft and warp | – |
+//! | 1 − σ₂ | excess length | % outside, – inside |
+//! | d | direction across the folds, a line, not an arrow | – |
+//!
+//! Source: own, after the wrinkle strain of tension field theory (Roddeman and others: "The wrinkling of membranes", J. Appl. Mech. 54,
+//! 1987). Limits: it says nothing of how deep and how many the folds are; cloth that is held or pressed flat shows none.
+
+use glam::{DMat3, DVec3};
+
+use super::energy::Cloth;
+use super::principal::principal;
+
+/// Excess length per vertex.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Folds {
+    /// Excess length, percent.
+    pub excess_percent: Vec<f64>,
+    /// Unit direction across the folds; zero where there is no excess.
+    pub across: Vec<DVec3>,
+}
+
+/// Reads the folds off `cloth` at `x` (m).
+#[must_use]
+pub fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
+    let mut sum = vec![DMat3::ZERO; x.len()];
+    let mut area = vec![0.0; x.len()];
+    for triangle in &cloth.triangles {
+        let (excess, across) = excess(triangle.deformation(x));
+        let tensor =
+            DMat3::from_cols(across * across.x, across * across.y, across * across.z) * (excess * triangle.area);
+        for v in triangle.vertices.map(|v| v as usize) {
+            sum[v] += tensor;
+            area[v] += triangle.area;
+        }
+    }
+    let of_vertex = |(tensor, area): (&DMat3, &f64)| -> (f64, DVec3) {
+        if *area <= 0.0 || *tensor == DMat3::ZERO {
+            return (0.0, DVec3::ZERO);
+        }
+        let (values, vectors) = principal(*tensor * area.recip());
+        let most = (0..3).fold(0, |best, k| if values[k] > values[best] { k } else { best });
+        (100.0 * values[most].max(0.0), vectors[most])
+    };
+    let (excess_percent, across) = sum.iter().zip(&area).map(of_vertex).unzip();
+    Folds { excess_percent, across }
+}
+
+/// 1 − σ₂, at least zero, and the unit direction in space that is too long.
+fn excess([fu, fv]: [DVec3; 2]) -> (f64, DVec3) {
+    let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
+    let least = (0.5 * (a + b) - (0.5 * (a - b)).hypot(c)).max(0.0);
+    let excess = (1.0 - least.sqrt()).max(0.0);
+    // (C − σ₂²) v₂ = 0 for C = [[a, c], [c, b]]: of the two rows the longer.
+    let (p, q) = if (a - least).hypot(c) >= c.hypot(b - least) { (-c, a - least) } else { (b - least, -c) };
+    let across = (fu * p + fv * q).normalize_or_zero();
+    // Compressed alike in every direction, or to nothing: along the weft.
+    (excess, if across == DVec3::ZERO { fu.normalize_or_zero() } else { across })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excess_is_what_is_too_long_and_lies_across_the_folds() {
+        let (none, _) = excess([DVec3::X * 1.02, DVec3::Y]);
+        assert!(none < 1e-12);
+        let (excess_along, across) = excess([DVec3::X * 1.1, DVec3::Z * 0.7]);
+        assert!((excess_along - 0.3).abs() < 1e-12 && across.dot(DVec3::Z).abs() > 1.0 - 1e-12);
+        // Turned by 45 degrees against the grain: F v = 0.8 v for v = (1, 1)/√2, and (1, −1)/√2 keeps its length.
+        let turned = excess([DVec3::new(0.9, -0.1, 0.0), DVec3::new(-0.1, 0.9, 0.0)]);
+        assert!((turned.0 - 0.2).abs() < 1e-12);
+        assert!(turned.1.dot(DVec3::new(1.0, 1.0, 0.0).normalize()).abs() > 1.0 - 1e-12);
+    }
+}

@@ -1,0 +1,174 @@
+//! The web viewer's page, served on 127.0.0.1 alone. Nothing on it asks anybody else for anything.
+//!
+//! The viewer is Rerun's, as its crate bundles it; the page around it is ours, as Rerun's own asks for fonts, news and
+//! statistics elsewhere. The Content-Security-Policy forbids the browser every other host.
+
+use std::convert::Infallible;
+use std::io::Write as _;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::OnceLock;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use http_body_util::Full;
+use hyper::body::Bytes;
+use hyper::header::{self, HeaderValue};
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use re_web_viewer_server::WebViewerData;
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
+
+const INDEX: &str = include_str!("index.html");
+const START: &str = include_str!("start.js");
+/// How long a browser has to ask once it has connected.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// What a browser may do on the page. WebAssembly is compiled code, which needs leave of its own; the data comes from
+/// another port of this machine; the viewer sets styles and draws pictures it made.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
+    connect-src 'self' http://127.0.0.1:* http://localhost:*; style-src 'self' 'unsafe-inline'; \
+    img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; \
+    frame-ancestors 'none'";
+
+/// A page, served for as long as this lives.
+pub(super) struct Page {
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Page {
+    /// Serves the page on `port` of 127.0.0.1; it opens the recording at `recording` (`rerun+http://...`).
+    pub(super) fn serve(port: u16, recording: &str) -> Result<Self, String> {
+        let files = Files::new(recording)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| e.to_string())?;
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+        let listener = runtime.block_on(TcpListener::bind(address)).map_err(|e| e.to_string())?;
+        let (stop, stopped) = oneshot::channel();
+        let serve = move || {
+            runtime.block_on(async {
+                tokio::select! {
+                    () = accept(listener, files) => {}
+                    _ = stopped => {}
+                }
+            });
+        };
+        let thread = std::thread::Builder::new().name("page".to_owned()).spawn(serve).map_err(|e| e.to_string())?;
+        Ok(Self { stop: Some(stop), thread: Some(thread) })
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        // The thread ends at once; if it has ended before, there is nobody to tell.
+        let _ = self.stop.take().map(|stop| stop.send(()));
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+async fn accept(listener: TcpListener, files: Files) {
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // Out of file handles: those open are closed in a while.
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            continue;
+        };
+        let files = files.clone();
+        let answer = service_fn(move |request: Request<hyper::body::Incoming>| {
+            let response = files.answer(&request);
+            async { Ok::<_, Infallible>(response) }
+        });
+        let mut http = hyper::server::conn::http1::Builder::new();
+        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
+        // A browser that breaks off is no concern of ours.
+        tokio::spawn(async move { http.serve_connection(TokioIo::new(stream), answer).await.ok() });
+    }
+}
+
+/// What there is to be had.
+#[derive(Clone)]
+struct Files {
+    index: Bytes,
+    viewer: &'static WebViewerData,
+}
+
+impl Files {
+    fn new(recording: &str) -> Result<Self, String> {
+        static VIEWER: OnceLock<WebViewerData> = OnceLock::new();
+        let viewer = match VIEWER.get() {
+            Some(viewer) => viewer,
+            None => {
+                let loaded = WebViewerData::load(None).map_err(|e| e.to_string())?;
+                VIEWER.get_or_init(|| loaded)
+            }
+        };
+        // A second of work that a fast connection need not wait for: until it is done the program goes out as it is.
+        std::thread::spawn(|| packed(viewer.viewer_wasm()));
+        Ok(Self { index: INDEX.replace("{recording}", recording).into(), viewer })
+    }
+
+    fn answer<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
+        if request.method() != Method::GET && request.method() != Method::HEAD {
+            return response(StatusCode::METHOD_NOT_ALLOWED, "text/plain", Bytes::from_static(b"expected GET\n"));
+        }
+        let viewer = self.viewer;
+        let (kind, bytes) = match request.uri().path() {
+            "/" | "/index.html" => ("text/html; charset=utf-8", self.index.clone()),
+            "/start.js" => ("text/javascript", Bytes::from_static(START.as_bytes())),
+            "/re_viewer.js" => ("text/javascript", Bytes::from_static(viewer.viewer_js())),
+            "/favicon.ico" => ("image/x-icon", Bytes::from_static(viewer.favicon())),
+            "/re_viewer_bg.wasm" => return self.program(request),
+            _ => return response(StatusCode::NOT_FOUND, "text/plain", Bytes::from_static(b"no such page\n")),
+        };
+        response(StatusCode::OK, kind, bytes)
+    }
+
+    fn program<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
+        let wasm = self.viewer.viewer_wasm();
+        let takes_gzip = request
+            .headers()
+            .get(header::ACCEPT_ENCODING)
+            .and_then(|value| value.to_str().ok())
+            .is_some_and(|value| value.split(',').any(|name| name.trim().starts_with("gzip")));
+        let packed = PACKED.get().filter(|_| takes_gzip);
+        let bytes = packed.cloned().unwrap_or_else(|| Bytes::from_static(wasm));
+        let mut response = response(StatusCode::OK, "application/wasm", bytes);
+        if packed.is_some() {
+            response.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+        }
+        // The page shows how much has come, and sees unpacked bytes only.
+        response.headers_mut().insert("rerun-final-length", wasm.len().into());
+        response
+    }
+}
+
+static PACKED: OnceLock<Bytes> = OnceLock::new();
+
+/// The viewer's program packed, 42 MB to a third; once in the life of this process.
+fn packed(wasm: &[u8]) {
+    PACKED.get_or_init(|| {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        // Writing to memory does not fail.
+        let _ = encoder.write_all(wasm);
+        encoder.finish().unwrap_or_default().into()
+    });
+}
+
+fn response(status: StatusCode, kind: &'static str, bytes: Bytes) -> Response<Full<Bytes>> {
+    let mut response = Response::new(Full::new(bytes));
+    *response.status_mut() = status;
+    for (name, value) in [
+        (header::CONTENT_TYPE, kind),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        // The next run may be of another version on the same port.
+        (header::CACHE_CONTROL, "no-cache"),
+    ] {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}

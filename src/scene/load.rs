@@ -1,0 +1,181 @@
+//! From names and files to a scene, and back to a file.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{Scene, SceneError, SceneSpec};
+use crate::distance::Body;
+use crate::files::{names_a_file, stem};
+use crate::mesh::export::{write_imported, write_mesh};
+use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
+use crate::mesh::push_out::PushOutReport;
+use crate::mesh::report::MeshReport;
+use crate::mesh::{MeshError, RestShape, TriMesh};
+use crate::shapes::body::dress_form;
+use crate::shapes::garment::garment;
+
+/// A scene with its origin.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// What is draped over what.
+    pub scene: Scene,
+    /// What the body is called.
+    pub body_name: String,
+    /// What the garment is called.
+    pub garment_name: String,
+    /// What was guessed, found and repaired in each file, the body's first.
+    pub reports: Vec<MeshReport>,
+    /// What was pushed out of the body.
+    pub pushed_out: PushOutReport,
+    imported: Option<Imported>,
+}
+
+/// A garment before it meets the body.
+struct Unplaced {
+    mesh: TriMesh,
+    rest: RestShape,
+    held: Vec<u32>,
+    imported: Option<Imported>,
+}
+
+impl SceneSpec {
+    /// Reads or makes body and garment.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file, its line or the name, and what to do.
+    pub fn load(&self) -> Result<Loaded, SceneError> {
+        let (body, of_body) = self.load_body()?;
+        let unplaced = self.load_garment(&body, of_body.as_ref())?;
+        let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
+            .map_err(SceneError::about(&self.garment))?;
+        scene.held = match &self.hold {
+            None => unplaced.held,
+            Some(what) => scene.edge(what).map_err(SceneError::about(&self.garment))?,
+        };
+        let reports = of_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
+        Ok(Loaded {
+            scene,
+            body_name: stem(&self.body),
+            garment_name: self.garment_name(),
+            reports,
+            pushed_out,
+            imported: unplaced.imported,
+        })
+    }
+
+    fn load_body(&self) -> Result<(Body, Option<Imported>), SceneError> {
+        self.check_names()?;
+        let new = if self.open_body { Body::new_open } else { Body::new };
+        if !self.body_is_a_mesh() {
+            let of_numbers = !names_a_file(&self.body);
+            let form = dress_form(&self.form()?).map_err(|source| match of_numbers {
+                true => SceneError::Measurements(source),
+                false => SceneError::in_file(&self.body)(source),
+            })?;
+            return Ok((new(&form)?, None));
+        }
+        let imported = import_body(self.body.as_ref(), &self.import_options(self.body_group.as_ref()))?;
+        Ok((new(&imported.mesh)?, Some(imported)))
+    }
+
+    fn load_garment(&self, body: &Body, of_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
+        if Path::new(&self.garment).extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+            let beside = match (of_body, body.mesh().bounds()) {
+                (Some(body), _) => Beside::File(body.frame()),
+                (None, Some((low, high))) => Beside::Bounds(low, high),
+                (None, None) => return Err(crate::distance::DistanceError::Empty.into()),
+            };
+            let options = self.import_options(self.garment_group.as_ref());
+            let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
+            imported.face_away_from(body);
+            let rest = self.imported_rest(&imported)?;
+            return Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) });
+        }
+        if of_body.is_some() {
+            return Err(SceneError::NotCutForIt { body: self.body.clone() });
+        }
+        let (spec, vertices) = self.described()?;
+        let made = garment(&spec, &self.form()?, vertices)?;
+        Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, imported: None })
+    }
+
+    fn imported_rest(&self, imported: &Imported) -> Result<RestShape, SceneError> {
+        let about = SceneError::about;
+        Ok(match self.rest.as_str() {
+            "own" => RestShape::from_edges(&imported.mesh).map_err(about(&self.garment))?,
+            "texture" => {
+                let rest = RestShape::from_texture(&imported.mesh, &imported.texture, 1.0);
+                rest.map_err(about(&self.garment))?
+            }
+            file => {
+                let frame = imported.frame();
+                let options = ImportOptions {
+                    unit: Some(frame.unit),
+                    up: Some(frame.up),
+                    ..self.import_options(self.garment_group.as_ref())
+                };
+                let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
+                let shape = imported.in_the_shape_of(&other)?;
+                RestShape::from_mesh(&imported.mesh, &shape).map_err(about(file))?
+            }
+        })
+    }
+}
+
+impl Loaded {
+    /// What to act upon.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        if self.pushed_out.is_clean() { Vec::new() } else { vec![self.pushed_out.to_string()] }
+    }
+
+    /// What was guessed, found and repaired.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
+        if self.pushed_out.is_clean() && self.pushed_out.found_inside > 0 {
+            notes.push(self.pushed_out.to_string());
+        }
+        notes
+    }
+
+    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
+    /// coordinates.
+    ///
+    /// # Errors
+    /// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.
+    pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
+        match &self.imported {
+            Some(imported) => write_imported(path.as_ref(), imported, positions),
+            None => write_mesh(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec())),
+        }
+    }
+}
+
+impl Scene {
+    /// The vertices of the garment's highest edge (`top`), or of the edges that a group lies on.
+    ///
+    /// # Errors
+    /// [`SceneError::NoEdge`], [`SceneError::UnknownGroup`].
+    pub fn edge(&self, what: &str) -> Result<Vec<u32>, SceneError> {
+        let Self { garment: mesh, topology, .. } = self;
+        let height = |edge: &[u32]| edge.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() / edge.len() as f64;
+        if what == "top" {
+            let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
+            return highest.ok_or(SceneError::NoEdge);
+        }
+        let Some(group) = mesh.groups.iter().position(|g| g == what) else {
+            return Err(SceneError::UnknownGroup { found: what.to_owned(), known: mesh.groups.clone() });
+        };
+        let on_edge = topology.boundary_vertices();
+        let mut held: Vec<u32> = (mesh.triangles.iter().zip(&mesh.triangle_group))
+            .filter(|&(_, &g)| g as usize == group)
+            .flat_map(|(triangle, _)| *triangle)
+            .filter(|&v| on_edge[v as usize])
+            .collect();
+        held.sort_unstable();
+        held.dedup();
+        Ok(held)
+    }
+}

@@ -1,0 +1,66 @@
+//! What is draped over what: a body, a garment placed around it, and the garment's rest shape, ready for the stages.
+//!
+//! [`SceneSpec`] names them, as files or built in, and [`SceneSpec::load`] reads them, in the order that keeps them right:
+//! the garment is turned to face away from the body, its rest shape is taken before anything moves, it must be near the
+//! body, and what starts inside is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
+
+mod error;
+mod load;
+mod spec;
+
+pub use error::SceneError;
+pub use load::Loaded;
+pub use spec::{DRESS_FORM, SceneSpec};
+
+use crate::distance::Body;
+use crate::mesh::fit::{check_near, facing_body};
+use crate::mesh::push_out::{PushOutReport, push_out};
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+/// Pushed-out vertices come to rest this far from the body, m: a thick knit's thickness.
+const PUSHED_CLEARANCE: f64 = 1e-3;
+
+/// What is draped over what; stays the same while tables and fabrics vary.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The body, ready for distance queries; its mesh is [`Body::mesh`].
+    pub body: Body,
+    /// The garment as placed, undraped, m.
+    pub garment: TriMesh,
+    /// Its connectivity.
+    pub topology: Topology,
+    /// Its rest shape.
+    pub rest: RestShape,
+    /// Vertices that stay where they are worn (a waistband's edge).
+    pub held: Vec<u32>,
+}
+
+impl Scene {
+    /// A body and a garment placed around it, both in metres with z up; the garment is at rest as it stands.
+    ///
+    /// # Errors
+    /// [`SceneError`]: a body that is not closed, triangles without area, a garment nowhere near the body.
+    pub fn of_meshes(body: &TriMesh, mut garment: TriMesh) -> Result<Self, SceneError> {
+        let body = Body::new(body)?;
+        let turn = facing_body(&garment, &body);
+        garment.triangles.iter_mut().zip(turn).filter(|(_, turn)| *turn).for_each(|(t, _)| t.swap(1, 2));
+        let rest = RestShape::from_edges(&garment)?;
+        Ok(Self::place(body, garment, rest, true)?.0)
+    }
+
+    /// Puts them together, nothing held; what starts inside the body is pushed out if asked.
+    fn place(body: Body, garment: TriMesh, rest: RestShape, push: bool) -> Result<(Self, PushOutReport), SceneError> {
+        check_near(&garment, &body)?;
+        let (garment, report) =
+            if push { push_out(&garment, &body, PUSHED_CLEARANCE) } else { (garment, PushOutReport::default()) };
+        let topology = Topology::new(&garment);
+        Ok((Self { body, garment, topology, rest, held: Vec::new() }, report))
+    }
+
+    /// Unsigned distance of each garment vertex to the body, m: equation (1) takes it without its sign, as a vertex inside is
+    /// as far from the surface as one outside.
+    #[must_use]
+    pub fn distances_m(&self) -> Vec<f64> {
+        self.body.nearest_all(&self.garment.positions).iter().map(|s| s.signed_distance.abs()).collect()
+    }
+}

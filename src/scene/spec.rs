@@ -1,0 +1,137 @@
+//! Body and garment by name or file, and what is asked of them: plain data that flags, sweep files and scripts fill.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::SceneError;
+use crate::files::{names_a_file, read_text, stem};
+use crate::mesh::import::ImportOptions;
+use crate::mesh::{Axis, Unit};
+use crate::shapes::{BodySpec, GarmentRequest, GarmentSpec};
+
+/// The name of the built-in body.
+pub const DRESS_FORM: &str = "form";
+
+/// What is draped over what. The default is the low-cut dress on the dress form.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SceneSpec {
+    /// `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file.
+    pub body: String,
+    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, or an OBJ file placed around the body.
+    pub garment: String,
+    /// One group or object of the body's file alone.
+    pub body_group: Option<String>,
+    /// One group or object of the garment's file alone.
+    pub garment_group: Option<String>,
+    /// Unit of the files; guessed from the body where it is not given.
+    pub unit: Option<Unit>,
+    /// Up axis of the files; guessed from the body where it is not given.
+    pub up: Option<Axis>,
+    /// Whether a body that is not closed is accepted, inside and outside told by its normals.
+    pub open_body: bool,
+    /// Whether vertices at exactly the same place are joined.
+    pub weld: bool,
+    /// Rest shape of a garment from a file: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces.
+    pub rest: String,
+    /// An edge held where it is: `top` (the highest) or the edges of a group; without it what a built-in garment holds.
+    pub hold: Option<String>,
+    /// Whether garment vertices that start inside the body are pushed out.
+    pub push_out: bool,
+    /// Measurements of the dress form, which built-in garments are made to.
+    pub measurements: BodySpec,
+}
+
+impl Default for SceneSpec {
+    fn default() -> Self {
+        Self {
+            body: DRESS_FORM.to_owned(),
+            garment: "low-cut-dress".to_owned(),
+            body_group: None,
+            garment_group: None,
+            unit: None,
+            up: None,
+            open_body: false,
+            weld: false,
+            rest: "own".to_owned(),
+            hold: None,
+            push_out: true,
+            measurements: BodySpec::default(),
+        }
+    }
+}
+
+impl SceneSpec {
+    /// A body and a garment, each a name or a file; everything else as it comes.
+    #[must_use]
+    pub fn new(body: impl Into<String>, garment: impl Into<String>) -> Self {
+        Self { body: body.into(), garment: garment.into(), ..Self::default() }
+    }
+
+    /// The files it names.
+    #[must_use]
+    pub fn files(&self) -> Vec<&Path> {
+        let named = [&self.body, &self.garment, &self.rest].into_iter().filter(|name| names_a_file(name));
+        named.map(Path::new).collect()
+    }
+
+    /// What the garment is called where one name will do, a recording's for one.
+    #[must_use]
+    pub fn garment_name(&self) -> String {
+        if names_a_file(&self.garment) {
+            return stem(&self.garment);
+        }
+        self.garment.split('@').next().unwrap_or_default().to_owned()
+    }
+
+    /// Finds names that mean nothing before any time is spent.
+    ///
+    /// # Errors
+    /// [`SceneError`] for a body or garment that is neither built in nor a file.
+    pub fn check_names(&self) -> Result<(), SceneError> {
+        if self.body != DRESS_FORM && !names_a_file(&self.body) {
+            return Err(SceneError::UnknownBody { found: self.body.clone() });
+        }
+        if !names_a_file(&self.garment) {
+            self.described()?;
+        }
+        Ok(())
+    }
+
+    /// The built-in or described garment, and how many vertices are asked of it.
+    pub(super) fn described(&self) -> Result<(GarmentSpec, Option<usize>), SceneError> {
+        if names_a_file(&self.garment) {
+            let spec = GarmentSpec::from_toml(&read_text(self.garment.as_ref())?);
+            return Ok((spec.map_err(SceneError::in_file(&self.garment))?, None));
+        }
+        let request: GarmentRequest = self.garment.parse()?;
+        Ok((GarmentSpec::by_name(&request.name)?, request.vertices))
+    }
+
+    /// Whether the body is a mesh from a file.
+    pub(super) fn body_is_a_mesh(&self) -> bool {
+        names_a_file(&self.body) && !self.body.ends_with(".toml")
+    }
+
+    /// The form's measurements, where the body is a file of them from there.
+    ///
+    /// # Errors
+    /// [`SceneError`] for a file that cannot be read or is none of measurements.
+    pub fn form(&self) -> Result<BodySpec, SceneError> {
+        if !self.body.ends_with(".toml") {
+            return Ok(self.measurements.clone());
+        }
+        BodySpec::from_toml(&read_text(self.body.as_ref())?).map_err(SceneError::in_file(&self.body))
+    }
+
+    pub(super) fn import_options(&self, group: Option<&String>) -> ImportOptions {
+        ImportOptions {
+            group: group.cloned(),
+            unit: self.unit,
+            up: self.up,
+            weld: self.weld,
+            open_body: self.open_body,
+        }
+    }
+}

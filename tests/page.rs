@@ -1,0 +1,139 @@
+//! The served page: nothing on it asks anybody else for anything, and nobody can make it fall over.
+#![cfg(feature = "viewer")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use partwise::record::web::{Served, serve_file};
+use partwise::record::{RecordOptions, Recorder, Sink};
+
+fn served(folder: &tempfile::TempDir) -> Served {
+    let path = folder.path().join("x.rrd");
+    let options = RecordOptions { sinks: vec![Sink::File(path.clone())], ..RecordOptions::default() };
+    Recorder::open(options).unwrap().finish().unwrap();
+    serve_file(&path, None, None).unwrap()
+}
+
+/// Host of an address, and whatever query it has.
+fn parts(url: &str) -> (&str, &str) {
+    url.strip_prefix("http://").unwrap().split_once('/').unwrap()
+}
+
+/// Head and body of the answer to a request.
+fn ask(host: &str, request: &str) -> (String, Vec<u8>) {
+    let mut stream = TcpStream::connect(host).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    stream.write_all(request.replace('\n', "\r\n").as_bytes()).unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    let end = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
+    (String::from_utf8(answer[..end].to_vec()).unwrap().to_lowercase(), answer[end + 4..].to_vec())
+}
+
+fn get(host: &str, path: &str) -> (String, Vec<u8>) {
+    ask(host, &format!("GET {path} HTTP/1.1\nHost: {host}\nConnection: close\n\n"))
+}
+
+/// Addresses in a text that are not on this machine.
+fn foreign(text: &str) -> Vec<String> {
+    let addresses =
+        text.split("//").skip(1).map(|rest| rest.split(['"', '\'', ' ', '<', ';']).next().unwrap_or_default());
+    addresses.filter(|a| a.contains('.') && !a.starts_with("127.0.0.1")).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_page_opens_its_recording_without_a_query_and_names_no_foreign_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let served = served(&folder);
+    let (host, query) = parts(served.url());
+    let (head, body) = get(host, "/");
+    assert!(head.starts_with("http/1.1 200"), "{head}");
+    let page = String::from_utf8(body).unwrap();
+    let data = query.strip_prefix("?url=").unwrap().replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
+    assert!(page.contains(&format!("data-recording=\"{data}\"")), "{page}");
+    let script = String::from_utf8(get(host, "/start.js").1).unwrap();
+    assert!(script.contains("dataset.recording") && script.contains("hide_welcome_screen: true"));
+    for text in [&page, &script] {
+        assert_eq!(foreign(text), [""; 0]);
+    }
+    // What the page asks for is there, and nothing else.
+    for path in ["/?url=anything", "/re_viewer.js", "/start.js", "/favicon.ico"] {
+        assert!(get(host, path).0.starts_with("http/1.1 200"), "{path}");
+    }
+    for path in ["/sw.js", "/signed-in", "/../Cargo.toml", "/%2e%2e/Cargo.toml"] {
+        assert!(get(host, path).0.starts_with("http/1.1 404"), "{path}");
+    }
+}
+
+#[test]
+fn the_browser_is_forbidden_every_other_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let served = served(&folder);
+    let (host, _) = parts(served.url());
+    for path in ["/", "/start.js", "/re_viewer.js", "/nowhere"] {
+        let (head, _) = get(host, path);
+        let policy = head.lines().find_map(|line| line.strip_prefix("content-security-policy: ")).unwrap();
+        assert!(policy.starts_with("default-src 'none';"), "{policy}");
+        for directive in policy.split(';').map(str::trim) {
+            for source in directive.split(' ').skip(1) {
+                let near = source.starts_with('\'')
+                    || ["blob:", "data:", "http://127.0.0.1:*", "http://localhost:*"].contains(&source);
+                assert!(near, "{path}: {directive}");
+            }
+        }
+        assert!(!policy.contains("'unsafe-eval'") && !policy.contains("script-src 'self' 'unsafe-inline'"), "{policy}");
+    }
+    // Rerun's own page does ask elsewhere: what is looked for can be found.
+    let theirs = re_web_viewer_server::WebViewerData::load(None).unwrap();
+    assert!(foreign(&String::from_utf8_lossy(theirs.index_html())).iter().any(|a| a.contains("fonts.g")));
+}
+
+#[test]
+fn requests_of_any_size_and_kind_leave_the_server_standing() {
+    let folder = tempfile::tempdir().unwrap();
+    let served = served(&folder);
+    let (host, _) = parts(served.url());
+    for length in ["99999999999", "18446744073709551615", "-1", "x"] {
+        for method in ["GET", "POST"] {
+            let request = format!("{method} / HTTP/1.1\nHost: {host}\nContent-Length: {length}\nConnection: close\n\n");
+            let (head, _) = ask(host, &request);
+            assert!(head.starts_with("http/1.1 "), "{head}");
+        }
+    }
+    assert!(ask(host, "DELETE / HTTP/1.1\nHost: x\nConnection: close\n\n").0.starts_with("http/1.1 405"));
+    assert!(ask(host, "nonsense\n\n").0.starts_with("http/1.1 400"));
+    let long = format!("GET /{} HTTP/1.1\nHost: x\nConnection: close\n\n", "x".repeat(60_000));
+    assert!(ask(host, &long).0.starts_with("http/1.1 4"));
+    let silent: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(host).unwrap()).collect();
+    assert!(get(host, "/").0.starts_with("http/1.1 200"));
+    drop(silent);
+}
+
+#[test]
+fn the_program_comes_packed_once_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let served = served(&folder);
+    let (host, _) = parts(served.url());
+    let (head, plain) = get(host, "/re_viewer_bg.wasm");
+    assert!(head.contains("content-type: application/wasm") && !head.contains("content-encoding"), "{head}");
+    assert!(plain.starts_with(b"\0asm"));
+    let request =
+        format!("GET /re_viewer_bg.wasm HTTP/1.1\nHost: {host}\nAccept-Encoding: br, gzip\nConnection: close\n\n");
+    let patience = Instant::now() + Duration::from_secs(120);
+    let (head, packed) = loop {
+        let (head, bytes) = ask(host, &request);
+        if head.contains("content-encoding: gzip") {
+            break (head, bytes);
+        }
+        assert_eq!(bytes.len(), plain.len());
+        assert!(Instant::now() < patience, "never packed");
+        std::thread::sleep(Duration::from_millis(500));
+    };
+    assert!(head.contains(&format!("rerun-final-length: {}", plain.len())), "{head}");
+    assert!(packed.len() < plain.len() / 2, "{} of {} bytes", packed.len(), plain.len());
+    let mut unpacked = Vec::new();
+    flate2::read::GzDecoder::new(packed.as_slice()).read_to_end(&mut unpacked).unwrap();
+    assert!(unpacked == plain);
+}

@@ -1,0 +1,128 @@
+//! What it is given: numbers beyond measure, mistakes, escape codes, odd names, damaged recordings.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::os::unix::ffi::OsStrExt as _;
+use std::process::Stdio;
+
+use super::{Bench, GARMENT, SCENE};
+
+#[test]
+fn numbers_beyond_all_measure_are_refused_with_their_limit() {
+    let bench = Bench::new();
+    bench.drape(&["--no-save", "--threads", "100000"]).with(2, &["--threads", "1024"]);
+    bench.run(&["sweep", "none.toml", "--jobs", "100000"]).with(2, &["--jobs", "1024"]);
+    for rows in ["3", "100000", "18446744073709551615"] {
+        bench.run(&["cusick", "silk", "--rows", rows]).with(2, &["--rows", "4..=100"]);
+    }
+    bench.write("huge.obj", &GARMENT.replace("1.65", "1e200"));
+    let huge = ["--body", "body.obj", "--garment", "huge.obj", "--no-save"];
+    bench.run(&huge).with(2, &["huge.obj, line 5", "1e200", "1e7"]);
+}
+
+#[test]
+fn what_the_user_can_mend_ends_with_two() {
+    let bench = Bench::new();
+    bench.run(&["merge", "nope", "--out", "x"]).with(2, &["nope", "partwise sweep"]);
+    bench.run(&["merge", "body.obj", "--out", "x"]).with(2, &["body.obj", "partwise sweep"]);
+    bench.run(&["cusick", "nope"]).with(2, &["nope", "silk"]);
+    bench.drape(&["--no-save", "--hold", "cuff"]).with(2, &["garment.obj", "cuff", "no groups"]);
+    bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
+    bench.write("large.toml", "bust_cm = 900\n");
+    bench.run(&["--no-save", "--measurements", "large.toml"]).with(2, &["large.toml", "900"]);
+    bench.write("far.obj", &GARMENT.replace(" 1.6", " 41.6"));
+    let far = ["--body", "body.obj", "--garment", "far.obj", "--unit", "m", "--up", "z", "--no-save"];
+    bench.run(&far).with(2, &["far.obj", "no body near"]);
+    bench.write("flat.obj", &GARMENT.replace("v 0 0 1.65", "v 0 -0.2 1.62"));
+    let flat = ["--body", "body.obj", "--garment", "flat.obj", "--unit", "m", "--up", "z", "--no-save"];
+    bench.run(&flat).with(2, &["flat.obj", "the first is number 1:"]);
+}
+
+#[test]
+fn messages_neither_move_the_cursor_nor_fill_the_screen() {
+    let bench = Bench::new();
+    bench.write("escape.obj", "v 0 0 0\nv \u{1b}]0;title\u{7} 0 0\n");
+    let escape = bench.run(&["--body", "body.obj", "--garment", "escape.obj", "--no-save"]);
+    escape.with(2, &["escape.obj, line 2", "\\u{1b}]0;title"]);
+    assert!(!escape.said.contains(|c: char| c.is_control() && c != '\n'), "{:?}", escape.said);
+    bench.write("long.obj", &format!("v 0 0 0\nv {} 0 0\n", "x".repeat(3_000_000)));
+    let long = bench.run(&["--body", "body.obj", "--garment", "long.obj", "--no-save"]);
+    long.with(2, &["long.obj, line 2", "3000000 bytes"]);
+    assert!(long.said.len() < 1000, "{} bytes", long.said.len());
+    bench.write("table.toml", &format!("levels = \"{}\"\n", "y".repeat(3_000_000)));
+    let table = bench.drape(&["--no-save", "--table", "table.toml"]);
+    table.with(2, &["table.toml"]);
+    assert!(table.said.len() < 5000, "{} bytes", table.said.len());
+}
+
+#[test]
+fn names_of_files_need_not_be_unicode() {
+    let bench = Bench::new();
+    let name = |text: &[u8]| OsStr::from_bytes(text).to_owned();
+    let mut arguments: Vec<_> = SCENE.iter().map(|a| OsStr::new(a).to_owned()).collect();
+    arguments.extend([name(b"--save"), name(b"a\xff.rrd"), name(b"--export"), name(b"a\xff.obj")]);
+    arguments.extend([name(b"--format"), name(b"json")]);
+    bench.run(&arguments).with(0, &[]);
+    assert!(bench.path(name(b"a\xff.rrd")).is_file() && bench.path(name(b"a\xff.obj")).is_file());
+    bench.run(&[name(b"view"), name(b"b\xff.rrd")]).with(2, &["No such file"]);
+    bench.run(&[name(b"--garment"), name(b"c\xff.obj")]).with(2, &["UTF-8"]);
+    let tune = ["tune", "--body", "body.obj", "--garment", "garment.obj", "--levels-only", "--max-parts", "2"];
+    let mut arguments: Vec<_> = tune.iter().map(|a| OsStr::new(a).to_owned()).collect();
+    arguments.extend([name(b"--format"), name(b"json"), name(b"--out"), name(b"d\xff")]);
+    let tuned = bench.run(&arguments);
+    assert!(!tuned.said.contains("panicked"), "{}", tuned.said);
+}
+
+/// SplitMix64, for mutations that are the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % n as u64) as usize
+    }
+}
+
+#[test]
+fn mutated_recordings_are_viewed_or_refused() {
+    let bench = Bench::new();
+    bench.drape(&["--save", "whole.rrd"]).with(0, &[]);
+    let whole = fs::read(bench.path("whole.rrd")).unwrap();
+    let mut random = Random(13);
+    let mut refused = 0;
+    for i in 0..60 {
+        let mut bytes = whole.clone();
+        for _ in 0..=random.below(8) {
+            let at = random.below(bytes.len());
+            match random.below(4) {
+                0 => bytes[at] ^= 1 << random.below(8),
+                1 => bytes.truncate(at.max(1)),
+                2 => bytes.splice(at..at, [0xff; 8]).for_each(drop),
+                // Sizes stand in the first bytes of each message.
+                _ => bytes[12 + random.below(16)] = 0x7f,
+            }
+        }
+        fs::write(bench.path("mutated.rrd"), &bytes).unwrap();
+        let mut child = bench.command();
+        child.args(["view", "mutated.rrd"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = child.spawn().unwrap();
+        let mut address = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        if address.is_empty() {
+            let mut said = String::new();
+            child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+            assert_eq!(child.wait().unwrap().code(), Some(2), "mutation {i}: {said}");
+            assert!(said.contains("mutated.rrd") && !said.contains("panicked"), "mutation {i}: {said}");
+            refused += 1;
+        } else {
+            assert!(address.starts_with("http://127.0.0.1:"), "{address}");
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+    }
+    assert!((10..60).contains(&refused), "{refused} of 60 were refused");
+}

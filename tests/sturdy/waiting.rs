@@ -1,0 +1,75 @@
+//! Whom it waits for: silent peers, viewers that stop reading, nobody who pressed Ctrl-C.
+
+use std::io::Read as _;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::Bench;
+
+#[test]
+fn a_peer_that_accepts_and_stays_silent_is_no_viewer() {
+    let bench = Bench::new();
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("rerun+http://{}/proxy", silent.local_addr().unwrap());
+    let refused = bench.drape(&["--no-save", "--connect", &url]);
+    refused.with(2, &[&url, "silent"]);
+    assert!(refused.took < Duration::from_secs(30), "{:?}", refused.took);
+}
+
+#[test]
+fn a_viewer_that_stops_reading_does_not_keep_the_run() {
+    let bench = Bench::new();
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("rerun+http://{}/proxy", listener.local_addr().unwrap());
+    // Answers as HTTP/2 does, then never again.
+    std::thread::spawn(move || {
+        let mut open = Vec::new();
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            std::io::Write::write_all(&mut stream, &[0, 0, 0, 4, 0, 0, 0, 0, 0]).unwrap();
+            open.push(stream);
+        }
+    });
+    let left = bench.drape(&["--save", "kept.rrd", "--connect", &url]);
+    left.with(1, &["a viewer does not take the data"]);
+    assert!(left.took < Duration::from_secs(90), "{:?}", left.took);
+    assert!(bench.path("kept.rrd").is_file(), "the file is complete all the same");
+}
+
+#[test]
+fn ctrl_c_ends_a_drape_test_even_where_the_shell_ignores_it() {
+    let bench = Bench::new();
+    let program = env!("CARGO_BIN_EXE_partwise");
+    // A script's background jobs inherit an ignored SIGINT; hours of rows, so that it cannot end by itself.
+    let script = format!("trap '' INT; exec {program} cusick --rows 100");
+    let mut child = Command::new("sh").arg("-c").arg(script).current_dir(bench.0.path()).spawn().unwrap();
+    let patience = Instant::now() + Duration::from_secs(60);
+    let code = loop {
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        std::thread::sleep(Duration::from_millis(200));
+        if let Some(status) = child.try_wait().unwrap() {
+            break status.code();
+        }
+        if Instant::now() > patience {
+            child.kill().unwrap();
+            panic!("still running");
+        }
+    };
+    assert_eq!(code, Some(130));
+}
+
+#[test]
+fn ctrl_c_while_a_mesh_is_made_ends_the_run_at_once() {
+    let bench = Bench::new();
+    let mut command = bench.command();
+    command.args(["--no-save", "--garment", "long-sleeved-dress@60000"]).stderr(Stdio::piped()).stdout(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let asked = Instant::now();
+    let status = child.wait().unwrap();
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(status.code(), Some(130), "{said}");
+    assert!(!said.contains("keeping what is done") && asked.elapsed() < Duration::from_secs(5), "{said}");
+}
