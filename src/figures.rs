@@ -221,10 +221,15 @@ impl Figures {
         });
         let single = |mm| format!("its PARTs could hold it to {mm:.1} mm by one displacement each");
         add("representable", best.or(self.representable_rms_mm.map(single)));
-        add("folds", self.folds_p95_percent.map(|p95| match self.fold_rank_correlation {
-            Some(r) => format!("{p95:.1} % of length no PART shows (P95), rank correlation {r:.2} with the mean curvature at rest"),
-            None => format!("{p95:.1} % of length no PART shows after stage two (P95)"),
-        }));
+        add(
+            "folds",
+            self.folds_p95_percent.map(|p95| match self.fold_rank_correlation {
+                Some(r) => format!(
+                    "{p95:.1} % of length no PART shows (P95), rank correlation {r:.2} with the mean curvature at rest"
+                ),
+                None => format!("{p95:.1} % of length no PART shows after stage two (P95)"),
+            }),
+        );
         let rank = |r| format!("rank correlation {r:.2} of PART jumps with the mean curvature");
         add("wrinkles", self.wrinkle_rank_correlation.map(rank));
         found

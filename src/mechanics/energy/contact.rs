@@ -64,9 +64,13 @@ pub struct Contacts<'b> {
     met: Met<'b>,
     offset: f64,
     areas: Vec<f64>,
-    asks: Vec<bool>,
+    held: Vec<bool>,
     asked_at: Vec<DVec3>,
     answer: Vec<f64>,
+    /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
+    leave: Vec<f64>,
+    /// The vertices that may be near, of the last [`update`](Self::update).
+    near: Vec<u32>,
     stiffness: f64,
     touches: Vec<Touch>,
     /// Where the cloth holds on to the body.
@@ -81,9 +85,11 @@ impl<'b> Contacts<'b> {
             met: Met::Nothing,
             offset: 0.0,
             areas: Vec::new(),
-            asks: Vec::new(),
+            held: Vec::new(),
             asked_at: Vec::new(),
             answer: Vec::new(),
+            leave: Vec::new(),
+            near: Vec::new(),
             stiffness: 0.0,
             touches: Vec::new(),
             friction: Friction::none(),
@@ -99,9 +105,11 @@ impl<'b> Contacts<'b> {
             met: Met::Rounded(Field::new(body, n)),
             offset,
             areas: areas.to_vec(),
-            asks: held.iter().map(|h| !h).collect(),
+            held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],
             answer: vec![f64::NEG_INFINITY; n],
+            leave: leave_of_unasked(held),
+            near: Vec::new(),
             stiffness,
             touches: Vec::new(),
             friction,
@@ -143,52 +151,70 @@ impl<'b> Contacts<'b> {
             return;
         }
         self.bound(x);
-        let near: Vec<u32> = (0..x.len())
-            .filter(|&v| self.asks[v] && self.answer[v] - x[v].distance(self.asked_at[v]) < self.offset)
-            .map(|v| v as u32)
-            .collect();
+        self.find_near(x);
+        let near = std::mem::take(&mut self.near);
         let found = match &mut self.met {
             Met::Nothing | Met::Planes(..) => Vec::new(),
             Met::Rounded(field) => field.at(&near, x),
         };
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
-            self.asked_at[v] = x[v];
-            self.answer[v] = distance;
+            self.keep(v, x[v], distance);
             let depth = self.offset - distance;
             if depth > 0.0 {
                 let stiffness = self.stiffness * self.areas[v];
                 self.touches.push(Touch { vertex, depth, normal, stiffness });
             }
         }
+        self.near = near;
+    }
+
+    /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
+    fn find_near(&mut self, x: &[DVec3]) {
+        let Self { near, asked_at, leave, .. } = self;
+        near.clear();
+        for (v, ((x, asked_at), leave)) in x.iter().zip(asked_at).zip(leave).enumerate() {
+            if x.distance_squared(*asked_at) > *leave {
+                near.push(v as u32);
+            }
+        }
+    }
+
+    /// Remembers a vertex's distance and where it was asked.
+    fn keep(&mut self, v: usize, x: DVec3, distance: f64) {
+        let free = distance - self.offset;
+        (self.asked_at[v], self.answer[v], self.leave[v]) = (x, distance, free * free.abs());
     }
 
     /// [`update`](Self::update) by planes.
     fn update_planes(&mut self, x: &[DVec3]) {
-        let Met::Planes(body, normals) = &mut self.met else { return };
-        let stale = |&v: &usize| {
-            let moved = x[v].distance(self.asked_at[v]);
-            // What was never asked has minus infinity for an answer.
-            self.asks[v]
-                && self.answer[v] - moved < self.offset
-                && (moved > PLANE || self.answer[v] == f64::NEG_INFINITY)
+        self.find_near(x);
+        let near = std::mem::take(&mut self.near);
+        let Met::Planes(body, _) = &self.met else { return };
+        let body = *body;
+        // What was never asked has minus infinity for an answer.
+        let stale = |&&v: &&u32| {
+            let v = v as usize;
+            self.answer[v] == f64::NEG_INFINITY || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
         };
-        let stale: Vec<usize> = (0..x.len()).filter(stale).collect();
+        let stale: Vec<usize> = near.iter().filter(stale).map(|&v| v as usize).collect();
         let found: Vec<_> = stale.par_iter().with_min_len(128).map(|&v| body.nearest(x[v])).collect();
-        for (v, near) in stale.into_iter().zip(found) {
-            (self.asked_at[v], self.answer[v], normals[v]) = (x[v], near.signed_distance, near.normal);
-        }
-        for v in 0..x.len() {
-            let step = x[v] - self.asked_at[v];
-            if !self.asks[v] || self.answer[v] - step.length() >= self.offset {
-                continue;
+        for (v, found) in stale.into_iter().zip(found) {
+            self.keep(v, x[v], found.signed_distance);
+            if let Met::Planes(_, normals) = &mut self.met {
+                normals[v] = found.normal;
             }
-            let depth = self.offset - (self.answer[v] + normals[v].dot(step));
+        }
+        let Met::Planes(_, normals) = &self.met else { return };
+        for &vertex in &near {
+            let v = vertex as usize;
+            let depth = self.offset - (self.answer[v] + normals[v].dot(x[v] - self.asked_at[v]));
             if depth > 0.0 {
                 let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex: v as u32, depth, normal: normals[v], stiffness });
+                self.touches.push(Touch { vertex, depth, normal: normals[v], stiffness });
             }
         }
+        self.near = near;
     }
 
     /// Gives every vertex that was never asked a bound by the exact distance: most are far, and a lattice about each would
@@ -196,13 +222,12 @@ impl<'b> Contacts<'b> {
     fn bound(&mut self, x: &[DVec3]) {
         let Met::Rounded(field) = &self.met else { return };
         let body = field.body();
-        let fresh = |&v: &usize| self.asks[v] && self.answer[v] == f64::NEG_INFINITY;
+        let fresh = |&v: &usize| !self.held[v] && self.answer[v] == f64::NEG_INFINITY;
         let new: Vec<usize> = (0..x.len()).filter(fresh).collect();
         let distances: Vec<f64> =
             new.par_iter().with_min_len(128).map(|&v| body.nearest(x[v]).signed_distance).collect();
         for (v, distance) in new.into_iter().zip(distances) {
-            self.asked_at[v] = x[v];
-            self.answer[v] = distance - SIDE;
+            self.keep(v, x[v], distance - SIDE);
         }
     }
 
@@ -248,4 +273,9 @@ impl<'b> Contacts<'b> {
     pub fn hessian(&self) -> impl Iterator<Item = (u32, DMat3)> + '_ {
         self.touches.iter().map(|t| (t.vertex, outer(t.normal, t.normal) * t.stiffness))
     }
+}
+
+/// Of vertices not asked yet: those that are held never will be.
+fn leave_of_unasked(held: &[bool]) -> Vec<f64> {
+    held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect()
 }

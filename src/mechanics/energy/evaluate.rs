@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::packs::{self, TrianglePack};
 use super::{Cloth, Contacts};
 use crate::GRAVITY;
-use crate::mechanics::lanes::{Four, Lanes, Pack, Work, run};
+use crate::mechanics::lanes::{Four, Lanes, Work, run};
 
 /// Memory of an evaluation, kept from one to the next.
 #[derive(Debug, Clone, Default)]
@@ -44,10 +44,23 @@ impl Cloth {
         let x_of_all = &*padded;
         let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
         let (a, b) = rayon::join(|| run(half(first, above, one)), || run(half(second, below, other)));
-        let weight = run(Join { cloth: self, x: x_of_all, halves: [one, other], gradient });
+        let weight = self.join(padded, [one, other], gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
         weight + (a + b) + contacts.energy() + contacts.friction.energy(x)
+    }
+
+    /// Both halves' gradients and gravity's, where a vertex is not held; returns the energy of gravity.
+    fn join(&self, x: &[Four], [one, other]: [&[Four]; 2], gradient: &mut Vec<DVec3>) -> f64 {
+        gradient.resize(x.len(), DVec3::ZERO);
+        let mut energy = 0.0;
+        let vertices = x.iter().zip(one).zip(other).zip(&self.masses).zip(&self.held);
+        for (out, ((((x, Four(a)), Four(b)), &mass), &held)) in gradient.iter_mut().zip(vertices) {
+            let weight = mass * GRAVITY;
+            energy += weight * x.0[2];
+            *out = if held { DVec3::ZERO } else { DVec3::new(a[0] + b[0], a[1] + b[1], a[2] + b[2] + weight) };
+        }
+        energy
     }
 }
 
@@ -69,32 +82,5 @@ impl Work for Half<'_> {
         self.gradient.resize(self.x.len(), Four::ZERO);
         let bending = self.cloth.bending.add_gradient(l, self.vertices, self.x, self.gradient);
         bending + packs::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
-    }
-}
-
-/// Both halves' gradients and gravity's; held vertices have none. Returns the energy of gravity.
-struct Join<'a> {
-    cloth: &'a Cloth,
-    x: &'a [Four],
-    halves: [&'a Vec<Four>; 2],
-    gradient: &'a mut Vec<DVec3>,
-}
-
-impl Work for Join<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn with<L: Lanes>(self, l: L) -> f64 {
-        let Self { cloth, x, halves: [one, other], gradient } = self;
-        gradient.resize(x.len(), DVec3::ZERO);
-        let mut energy = 0.0;
-        let vertices = x.iter().zip(one).zip(other).zip(&cloth.masses).zip(&cloth.held);
-        for (out, ((((x, one), other), &mass), &held)) in gradient.iter_mut().zip(vertices) {
-            let weight = mass * GRAVITY;
-            energy += weight * x.0[2];
-            let Four([gx, gy, gz, _]) = (Pack::load(l, one) + Pack::load(l, other)).store();
-            *out = if held { DVec3::ZERO } else { DVec3::new(gx, gy, gz + weight) };
-        }
-        energy
     }
 }

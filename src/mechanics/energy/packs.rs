@@ -13,8 +13,8 @@
 //! | σ_u, σ_v | stresses without wrinkles | N/m |
 //! | r | share of the stiffness left under compression | – |
 //!
-//! Positions and forces are padded to four lanes, so that a vertex is one load. Same bits as on any machine, not the same as
-//! the triangles' one by one: those sum in another order.
+//! Positions and forces are padded to four lanes, so that a vertex is one load. The bits are the same on any machine, but not
+//! those of the triangles one by one, whose sums have another order.
 
 use super::membrane::{SHORTEST, Stiffness, Triangle};
 use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors};
@@ -72,7 +72,8 @@ pub(super) fn add_gradient<L: Lanes>(
     let (weft, warp, shear) = (Pack::splat(l, c.weft), Pack::splat(l, c.warp), Pack::splat(l, c.shear));
     let mut energy = zero;
     for pack in packs {
-        let [t0, t1, t2, t3] = &pack.vertices;
+        // By value: a reference would be read, and checked, again after every store.
+        let [t0, t1, t2, t3] = pack.vertices;
         let ((a0, b0), (a1, b1)) = (edges(l, x, t0), edges(l, x, t1));
         let ((a2, b2), (a3, b3)) = (edges(l, x, t2), edges(l, x, t3));
         let (a, b) = (Vectors::from_rows(l, [a0, a1, a2, a3]), Vectors::from_rows(l, [b0, b1, b2, b3]));
@@ -86,9 +87,9 @@ pub(super) fn add_gradient<L: Lanes>(
         let field_u = sigma_v.if_negative(weft * su.max(zero), sigma_u.max(zero));
         let field_v = sigma_u.if_negative(warp * sv.max(zero), sigma_v.max(zero));
         let (tu, tv) = (field_u + r * (sigma_u - field_u), field_v + r * (sigma_v - field_v));
-        let tau = shear * gamma;
-        energy = energy + area * (tu * su + tv * sv + tau * gamma);
-        let (tu, tv, tau) = (area * tu.over(shortest.max(lu)), area * tv.over(shortest.max(lv)), area * tau);
+        let (tu, tv, tau) = (area * tu, area * tv, area * (shear * gamma));
+        energy = energy + (tu * su + tv * sv + tau * gamma);
+        let (tu, tv) = (tu.over(shortest.max(lu)), tv.over(shortest.max(lv)));
         let (gu, gv) = (fu * tu + fv * tau, fv * tv + fu * tau);
         let second = (gu * pu + gv * pv).rows(l);
         let third = (gu * qu + gv * qv).rows(l);
@@ -102,14 +103,14 @@ pub(super) fn add_gradient<L: Lanes>(
 
 /// From a triangle's first corner to the others.
 #[inline(always)]
-fn edges<L: Lanes>(l: L, x: &[Four], &[a, b, c]: &[u32; 3]) -> (L::Register, L::Register) {
+fn edges<L: Lanes>(l: L, x: &[Four], [a, b, c]: [u32; 3]) -> (L::Register, L::Register) {
     let a = l.load(&x[a as usize]);
     (l.sub(l.load(&x[b as usize]), a), l.sub(l.load(&x[c as usize]), a))
 }
 
 /// Adds a triangle's gradient at its second and third corners, and what balances them at the first.
 #[inline(always)]
-fn scatter<L: Lanes>(l: L, gradient: &mut [Four], &[a, b, c]: &[u32; 3], second: L::Register, third: L::Register) {
+fn scatter<L: Lanes>(l: L, gradient: &mut [Four], [a, b, c]: [u32; 3], second: L::Register, third: L::Register) {
     let (a, b, c) = (a as usize, b as usize, c as usize);
     gradient[a] = l.store(l.sub(l.load(&gradient[a]), l.add(second, third)));
     gradient[b] = l.store(l.add(l.load(&gradient[b]), second));

@@ -18,6 +18,7 @@
 //! | ε | damping | 1/s² |
 //! | M | lumped masses | kg |
 
+mod flat;
 pub(crate) mod relax;
 mod solver;
 mod vectors;

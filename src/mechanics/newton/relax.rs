@@ -19,7 +19,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::vectors::{self, Blocks, Flat, MEMORY, Pair};
+use super::flat::{Blocks, Flat};
+use super::vectors::{self, MEMORY, Pair};
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};
 

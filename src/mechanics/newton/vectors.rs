@@ -1,81 +1,9 @@
 //! The sums of L-BFGS over all coordinates, in lanes: each passes over memory once, for that is what they wait for.
 //!
-//! A [`Flat`] holds the coordinates of all vertices one after the other and zeros behind, in whole groups of sixteen vertices. Sums
-//! go in four registers that do not wait for each other, in an order that depends on the length alone.
+//! Sums go in four registers that do not wait for each other, in an order that depends on the length alone.
 
-use glam::{DMat3, DVec3};
-
+use super::flat::{Blocks, Flat};
 use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors, Work, run};
-
-/// Fours of a group: sixteen vertices, four registers a vector of four vertices.
-const GROUP: usize = 12;
-
-/// Coordinates of all vertices.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Flat(Vec<Four>);
-
-impl Flat {
-    /// Minus these vectors.
-    pub(super) fn set_opposite(&mut self, vectors: &[DVec3]) {
-        self.0.resize(vectors.len().div_ceil(16) * GROUP, Four::ZERO);
-        for (to, from) in self.0.chunks_exact_mut(3).zip(vectors.chunks(4)) {
-            let at = |i: usize| from.get(i).map_or(DVec3::ZERO, |v| -*v);
-            let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
-            to[0] = Four([a.x, a.y, a.z, b.x]);
-            to[1] = Four([b.y, b.z, c.x, c.y]);
-            to[2] = Four([c.z, d.x, d.y, d.z]);
-        }
-    }
-
-    /// x + t times these, for as many vertices as x has.
-    pub(super) fn added_to(&self, x: &[DVec3], t: f64, out: &mut Vec<DVec3>) {
-        out.resize(x.len(), DVec3::ZERO);
-        for ((to, from), f) in out.chunks_mut(4).zip(x.chunks(4)).zip(self.0.chunks_exact(3)) {
-            let (Four(a), Four(b), Four(c)) = (f[0], f[1], f[2]);
-            let d = [[a[0], a[1], a[2]], [a[3], b[0], b[1]], [b[2], b[3], c[0]], [c[1], c[2], c[3]]];
-            for ((to, from), d) in to.iter_mut().zip(from).zip(d) {
-                *to = *from + DVec3::from_array(d) * t;
-            }
-        }
-    }
-}
-
-/// A symmetric 3×3 matrix for each vertex, by fours of vertices: xx, yy, zz, xy, xz, yz.
-#[derive(Debug, Default)]
-pub(super) struct Blocks(Vec<[Four; 6]>);
-
-impl Blocks {
-    /// Zero for so many vertices.
-    pub(super) fn clear(&mut self, vertices: usize) {
-        self.0.clear();
-        self.0.resize(vertices.div_ceil(16) * 4, [Four::ZERO; 6]);
-    }
-
-    /// That of a vertex.
-    pub(super) fn get(&self, vertex: usize) -> DMat3 {
-        let [xx, yy, zz, xy, xz, yz] = self.0[vertex / 4].map(|four| four.0[vertex % 4]);
-        DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
-    }
-
-    /// Sets that of a vertex, of which the upper half is taken.
-    pub(super) fn set(&mut self, vertex: usize, m: DMat3) {
-        let entries = [m.x_axis.x, m.y_axis.y, m.z_axis.z, m.y_axis.x, m.z_axis.x, m.z_axis.y];
-        for (four, entry) in self.0[vertex / 4].iter_mut().zip(entries) {
-            four.0[vertex % 4] = entry;
-        }
-    }
-
-    #[inline(always)]
-    fn times<L: Lanes>(l: L, block: &[Four; 6], v: Vectors<L>) -> Vectors<L> {
-        let [xx, yy, zz] = [Pack::load(l, &block[0]), Pack::load(l, &block[1]), Pack::load(l, &block[2])];
-        let [xy, xz, yz] = [Pack::load(l, &block[3]), Pack::load(l, &block[4]), Pack::load(l, &block[5])];
-        Vectors {
-            x: xx * v.x + xy * v.y + xz * v.z,
-            y: xy * v.x + yy * v.y + yz * v.z,
-            z: xz * v.x + yz * v.y + zz * v.z,
-        }
-    }
-}
 
 /// A pair of L-BFGS: s and y, and 1 / sᵀy, 1/J.
 #[derive(Debug, Default)]
@@ -221,4 +149,77 @@ fn longest<L: Lanes>(l: L, d: &[Four]) -> f64 {
     }
     let Four([a, b, c, d]) = most.store();
     a.max(b).max(c.max(d)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+
+    /// Vectors of 21 vertices: a group of sixteen, one of four and one left over.
+    fn noise(seed: f64) -> Vec<DVec3> {
+        let at = |i: usize, k: f64| (seed + 1.7 * i as f64 + k).sin();
+        (0..21).map(|i| DVec3::new(at(i, 0.0), at(i, 0.5), at(i, 2.1))).collect()
+    }
+
+    fn flat(vectors: &[DVec3]) -> Flat {
+        let mut flat = Flat::default();
+        flat.set_opposite(&vectors.iter().map(|v| -*v).collect::<Vec<_>>());
+        flat
+    }
+
+    fn product(a: &[DVec3], b: &[DVec3]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+    }
+
+    fn block(i: usize) -> DMat3 {
+        let v = DVec3::new(0.3, 0.1 * i as f64, -0.4);
+        DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0 + i as f64)) + DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+    }
+
+    #[test]
+    fn the_direction_is_that_of_the_two_loops_vertex_by_vertex() {
+        let (gradient, x) = (noise(0.3), noise(9.0));
+        let mut inverse = Blocks::default();
+        inverse.clear(21);
+        (0..21).for_each(|i| inverse.set(i, block(i)));
+        let (mut pairs, mut plain) = (Vec::new(), Vec::new());
+        for k in [0.0, 1.0, 2.0] {
+            let (s, before, t) = (noise(k), noise(5.0 + k), 0.3 + k);
+            let after: Vec<DVec3> = before.iter().zip(&s).map(|(b, s)| *b - *s * (2.0 + t) - DVec3::X).collect();
+            let mut pair = Pair { s: flat(&s), ..Pair::default() };
+            let [curvature, scaled] = difference(&mut pair, t, &flat(&before), &flat(&after), &inverse);
+            let s: Vec<DVec3> = s.iter().map(|s| *s * t).collect();
+            let y: Vec<DVec3> = before.iter().zip(&after).map(|(b, a)| *b - *a).collect();
+            let by_block: Vec<DVec3> = y.iter().enumerate().map(|(i, y)| block(i) * *y).collect();
+            assert!((curvature - product(&s, &y)).abs() < 1e-12 * curvature);
+            assert!((scaled - product(&y, &by_block)).abs() < 1e-12 * scaled);
+            pair.rho = 1.0 / curvature;
+            pairs.push(pair);
+            plain.push((s, y));
+        }
+        let mut direction = Flat::default();
+        let down: Vec<DVec3> = gradient.iter().map(|g| -*g).collect();
+        let [slope, longest] = turn(&pairs, &inverse, 0.7, &flat(&down), &mut direction);
+        let add = |d: &mut [DVec3], t: f64, b: &[DVec3]| d.iter_mut().zip(b).for_each(|(d, b)| *d += *b * t);
+        let (mut d, mut shares) = (down, [0.0; 3]);
+        for (k, (s, y)) in plain.iter().enumerate().rev() {
+            shares[k] = product(s, &d) / product(s, y);
+            add(&mut d, -shares[k], y);
+        }
+        d.iter_mut().enumerate().for_each(|(i, d)| *d = block(i) * *d * 0.7);
+        for ((s, y), share) in plain.iter().zip(shares) {
+            let back = product(y, &d) / product(s, y);
+            add(&mut d, share - back, s);
+        }
+        let most = d.iter().map(|d| d.length()).fold(0.0, f64::max);
+        assert!((slope - product(&gradient, &d)).abs() < 1e-12 * slope.abs(), "{slope}");
+        assert!((longest - most).abs() < 1e-12 * most, "{longest} and {most}");
+        let mut moved = Vec::new();
+        direction.added_to(&x, 0.5, &mut moved);
+        for ((moved, x), d) in moved.iter().zip(&x).zip(&d) {
+            assert!(moved.distance(*x + *d * 0.5) < 1e-12 * most, "{moved}");
+        }
+    }
 }
