@@ -151,7 +151,8 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         Model::Coupled(_) => cloth.as_ref().map(|cloth| folds(cloth, &stage.positions)),
         Model::Paper(_) => None,
     };
-    let refined = timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.positions, observer))?;
+    let refined =
+        timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.parts, &stage.positions, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
@@ -267,11 +268,33 @@ fn full_cloth(scene: &Scene, settings: &Settings) -> Result<Cloth, EnergyError> 
     Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)
 }
 
+/// Extent of the PARTs that a drape goes on with from its table's, before the steps at full resolution, m: about half a fold, so that they
+/// make the folds which rings leave to tension field theory. Without them a skirt takes 21 steps from Table 3 and a dress 12; with
+/// them 12 and 2, each dearer than ten of these.
+const APPROACH_EXTENT: f64 = 0.12;
+
+/// Steps of these PARTs: the later ones bring less than a step at full resolution does.
+const APPROACH_STEPS: usize = 10;
+
+/// The same model once more, by finer PARTs, from where stage two ended; where that fails, nothing is lost.
+fn approach(scene: &Scene, settings: &Settings, cloth: &Cloth, parts: &Parts, start: &[DVec3]) -> Vec<DVec3> {
+    let Model::Coupled(options) = &settings.model else { return start.to_vec() };
+    let Scene { garment: mesh, topology, body, .. } = scene;
+    let finer = parts.cut_to_extent(mesh, topology, APPROACH_EXTENT);
+    if settings.refine != Refine::Converged || finer.len() == parts.len() {
+        return start.to_vec();
+    }
+    let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
+    let garment = Garment { mesh, topology, cloth, fabric: &settings.fabric };
+    coupled::solve(&garment, body, &finer, start, &options).map_or_else(|_| start.to_vec(), |result| result.positions)
+}
+
 /// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
 fn refine_further(
     scene: &Scene,
     settings: &Settings,
     cloth: Option<Cloth>,
+    parts: &Parts,
     start: &[DVec3],
     observer: Observer<'_>,
 ) -> Result<Option<(Cloth, Refined)>, DrapeError> {
@@ -280,9 +303,10 @@ fn refine_further(
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
+    let start = approach(scene, settings, &cloth, parts, start);
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
     let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
-    let refined = refine::refine(&cloth, &scene.body, start.to_vec(), &options, &mut |step| {
+    let refined = refine::refine(&cloth, &scene.body, start, &options, &mut |step| {
         // What has fallen past the feet meets nothing any more, and would fall for ever.
         if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
     })?;
