@@ -15,10 +15,10 @@ STAGES = ["time_distance_ms", "time_segment_ms", "time_mechanics_ms", "time_refi
 COLOURS = {"interlock": "#2a6fbb", "cotton": "#c8502d"}
 KINDS = [
     ("paper's model, Table 3", "X", lambda r: r.model == "paper"),
-    ("Table 3, and scaled", "*", lambda r: r.table.str.startswith("Table 3") & ~r.table.str.contains("cm")),
+    ("Table 3, and scaled", "*", lambda r: r.table.str.startswith("table-3")),
     ("quantile levels, 3 to 40", "o", lambda r: r.table.str.startswith("quantile")),
-    ("Table 3 with extents 24, 12, 6 cm", "^", lambda r: r.table.str.contains("cm")),
-    ("tuned", "D", lambda r: ~r.table.str.startswith(("Table 3", "quantile", "table-3"))),
+    ("Table 3 with extents 24, 12, 6 cm", "^", lambda r: r.table.str.contains("tables/")),
+    ("tuned", "D", lambda r: r.table.str.contains("tuned/")),
 ]
 
 
