@@ -41,8 +41,13 @@ fn ctrl_c_ends_a_drape_test_even_where_the_shell_ignores_it() {
     let bench = Bench::new();
     let program = env!("CARGO_BIN_EXE_partwise");
     // A script's background jobs inherit an ignored SIGINT; hours of rows, so that it cannot end by itself.
-    let script = format!("trap '' INT; exec {program} cusick --rows 100");
-    let mut child = Command::new("sh").arg("-c").arg(script).current_dir(bench.0.path()).spawn().unwrap();
+    let script = format!("trap '' INT; echo ready; exec {program} cusick --rows 100");
+    let mut shell = Command::new("sh");
+    let mut child = shell.arg("-c").arg(script).current_dir(bench.0.path()).stdout(Stdio::piped()).spawn().unwrap();
+    // Before its trap is set the shell itself would be interrupted.
+    let mut said = [0; 6];
+    child.stdout.take().unwrap().read_exact(&mut said).unwrap();
+    assert_eq!(&said, b"ready\n");
     let patience = Instant::now() + Duration::from_secs(60);
     let code = loop {
         let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
