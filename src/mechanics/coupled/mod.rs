@@ -1,9 +1,9 @@
 //! The coupled PART solve: all PARTs of a range table at once, in the energy of the whole cloth.
 //!
-//! Each PART moves by an affine map, blended over the seams ([`motions`]): these maps are the unknowns, and the energy is the very one of
+//! Each PART moves by an affine map, blended over the seams ([`Motions`]): these maps are the unknowns, and the energy is the very one of
 //! [`energy`](super::energy) over all vertices, with its gravity (the paper's F⁰), its contact and friction (F¹) and the pull of the
-//! cloth (F²). What compresses a PART too wide to fold is taken up by folds finer than it ([`slack`]), so a ring of a skirt falls as the
-//! skirt does, without the folds. Newton's method in the unknowns ([`hessian`]) with relaxed steps ([`newton`](super::newton))
+//! cloth (F²). What compresses a PART too wide to fold is taken up by folds finer than it (`slack.rs`), so a ring of a skirt falls as the
+//! skirt does, without the folds. Newton's method in the unknowns (`hessian.rs`) with relaxed steps (`mechanics::newton`)
 //! lowers the energy until the steps are short: then Bᵀ∇E = 0, which says that forces and moments balance on every PART.
 //!
 //! | symbol | meaning | unit |

@@ -116,7 +116,7 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// The same by tangent planes of the exact distance, asked anew where a vertex has moved by [`PLANE`]: cheap for a cloth that
+    /// The same by tangent planes of the exact distance, asked anew where a vertex has moved by 2 mm: cheap for a cloth that
     /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
     pub fn by_planes(self) -> Self {

@@ -1,6 +1,6 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
-//! The steps are those of [`newton`](super::newton) in all vertices. Stops where the residual ‖∇E‖₂ over the free vertices, divided
+//! The steps are those of `mechanics::newton` in all vertices. Stops where the residual ‖∇E‖₂ over the free vertices, divided
 //! by the garment's weight, is under the tolerance and no vertex is inside the body.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
