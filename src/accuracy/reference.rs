@@ -4,7 +4,7 @@
 //! garment's positions and triangles, the rest shape, the fabric, the body, the held vertices, the start and the solver's
 //! options. Numbers enter by their bits, lists with their lengths, so two inputs never share a key by running together.
 //!
-//! A file is the key and the reference, [`sealed`](crate::sealed). It is written whole or not at all, so a reader never sees
+//! A file is the key and the reference, [`sealed`]. It is written whole or not at all, so a reader never sees
 //! half of one. A file that does not match its hash, its key or its garment is no error: the reference is computed again,
 //! and the caller gets a warning to show.
 
