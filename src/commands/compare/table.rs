@@ -63,7 +63,7 @@ pub(super) fn text(all: &[Compared]) -> String {
                 Some(l) => [range(l), l.parts.to_string()],
                 None => [String::new(), String::new()],
             });
-            table.add_row(std::iter::once(level.to_string()).chain(cells));
+            table.add_row(std::iter::once((level + 1).to_string()).chain(cells));
         }
         right(&mut table, 0..1 + 2 * of_garment.len());
         let _ = writeln!(out, "{table}");
