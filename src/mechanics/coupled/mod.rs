@@ -36,7 +36,7 @@ pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResul
 pub use weights::Weights;
 
 use super::energy::{Cloth, Contacts, gravity};
-use super::newton::{Advance, Descent, Pace};
+use super::newton::{Descent, Pace};
 use super::refine::Record;
 use crate::distance::Body;
 use crate::fabric::Fabric;
@@ -136,10 +136,10 @@ fn settle(
 ) -> Result<Vec<Record>, CoupledError> {
     let pace =
         Pace { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
-    let mut history = vec![record(descent, 0, None)];
+    let mut history = vec![descent.record(0, None, true)];
     for iteration in 1..=options.max_steps {
         let advance = descent.advance(tangent, pace)?;
-        history.push(record(descent, iteration, Some(advance)));
+        history.push(descent.record(iteration, Some(advance), true));
         let still = advance.accepted && advance.step_length >= 1.0 && advance.largest_move_m < options.least_move_m;
         if still && descent.damping <= FREE_DAMPING || !advance.accepted && descent.damping >= DAMPING[1] {
             break;
@@ -151,18 +151,6 @@ fn settle(
         }
     }
     Ok(history)
-}
-
-fn record(descent: &Descent<'_, '_>, iteration: usize, advance: Option<Advance>) -> Record {
-    Record {
-        iteration,
-        energy: descent.energy,
-        residual_over_weight: descent.residual,
-        step_length: advance.map_or(0.0, |a| a.step_length),
-        largest_move_m: advance.map_or(0.0, |a| a.largest_move_m),
-        damping: descent.damping,
-        softened: true,
-    }
 }
 
 /// F⁰, F¹ and F² of each PART: sums over its own vertices.

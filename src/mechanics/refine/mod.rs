@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-pub use super::newton::{SolveError, Solver};
+pub use super::newton::{Record, SolveError, Solver};
 pub use settle::{refine, refine_with};
 
 /// When to stop, and how carefully to go.
@@ -54,25 +54,6 @@ pub struct Step<'a> {
     pub contacts: usize,
     /// Positions, m.
     pub positions: &'a [DVec3],
-}
-
-/// One line of the history.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Record {
-    /// Steps done.
-    pub iteration: usize,
-    /// Energy, J.
-    pub energy: f64,
-    /// ‖∇E‖₂ over the weight.
-    pub residual_over_weight: f64,
-    /// Step length t of the line search.
-    pub step_length: f64,
-    /// Largest move of a vertex, m.
-    pub largest_move_m: f64,
-    /// Damping ε, 1/s².
-    pub damping: f64,
-    /// Whether the energy is that of the softened cloth.
-    pub softened: bool,
 }
 
 /// Why a run ended.

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::{Observer, Record, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
+use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
-use crate::mechanics::newton::{Advance, Descent, Pace, SolveError, Solver, Tangent, Whole};
+use crate::mechanics::newton::{Descent, Pace, SolveError, Solver, Tangent, Whole};
 
 /// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
 /// under gravity is a millimetre.
@@ -81,7 +81,7 @@ fn settle(
     // Whether the energy is new to these positions: at the start, and when the cloth gets its true stiffness.
     let mut fresh = true;
     let limit = options.max_steps.unwrap_or(STEP_LIMIT).min(STEP_LIMIT);
-    let mut history = vec![record(&descent, 0, None, soft)];
+    let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
@@ -124,7 +124,7 @@ fn settle(
             descent.damping = (descent.damping * 2.0).min(MOST_DAMPING);
         }
         if advance.accepted {
-            history.push(record(&descent, iteration, Some(advance), soft));
+            history.push(descent.record(iteration, Some(advance), soft));
         }
     };
     if soft {
@@ -156,18 +156,6 @@ fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize) -> Step<'a> {
         residual_over_weight: descent.residual,
         contacts: descent.contacts.touches().len(),
         positions: &descent.x,
-    }
-}
-
-fn record(descent: &Descent<'_, '_>, iteration: usize, advance: Option<Advance>, softened: bool) -> Record {
-    Record {
-        iteration,
-        energy: descent.energy,
-        residual_over_weight: descent.residual,
-        step_length: advance.map_or(0.0, |a| a.step_length),
-        largest_move_m: advance.map_or(0.0, |a| a.largest_move_m),
-        damping: descent.damping,
-        softened,
     }
 }
 
