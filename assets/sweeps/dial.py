@@ -72,7 +72,7 @@ def draw(rows, picture):
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncol=5, fontsize=7, frameon=False)
     figure.tight_layout(rect=(0, 0.11, 1, 1))
-    figure.savefig(picture, dpi=110)
+    figure.savefig(picture, dpi=96)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from PIL import Image, ImageDraw
 GARMENTS = ["pullover-1", "pullover-2", "flared-skirt", "low-cut-dress", "long-sleeved-dress"]
 # Left, top, right, bottom of a 3D view, as shares of the window: the first (undraped) and the fourth (drape).
 VIEWS = {"undraped": (0.0, 0.085, 0.19, 0.735), "drape": (0.572, 0.085, 0.762, 0.735)}
+# Width of a cell, pixels: all seven are as wide as the README shows them.
+WIDTH = 190
 COLUMNS = [
     ("undraped", "undraped", "front", ["--refine", "0"]),
     ("undraped, side", "undraped", "side", ["--refine", "0"]),
@@ -45,7 +47,7 @@ def main():
                 left, top, right, bottom = VIEWS[view]
                 box = [left * image.width, top * image.height, right * image.width, bottom * image.height]
                 cell = image.crop([round(b) for b in box])
-                cells.append(cell.resize((270, 270 * cell.height // cell.width)))
+                cells.append(cell.resize((WIDTH, WIDTH * cell.height // cell.width)))
             rows.append((garment, cells))
     width, height = rows[0][1][0].size
     sheet = Image.new("RGB", (width * len(COLUMNS), (height + 24) * len(rows)), "white")
