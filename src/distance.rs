@@ -15,7 +15,7 @@
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
 use glam::DVec3;
-use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::query::{PointProjection, PointQueryWithLocation};
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
 use rayon::prelude::*;
 
@@ -24,6 +24,12 @@ use crate::mesh::{Topology, TriMesh};
 /// Closer than this to the surface (m), the direction to the closest point is rounding noise and the pseudo-normal is
 /// used: 1e-9 m is a million times the spacing of doubles at body size, and a millionth of a cloth's thickness.
 const ON_SURFACE: f64 = 1e-9;
+
+/// Points that are asked for one after the other: in one task, and each with the one before as a hint.
+const CHUNK: usize = 128;
+
+/// Above 1 by more than a distance is rounded.
+const ROUNDED: f64 = 1.0 + 1e-12;
 
 /// What can be wrong with a body.
 #[derive(Debug, thiserror::Error)]
@@ -121,7 +127,20 @@ impl Body {
     /// The nearest surface point to a finite `x`.
     #[must_use]
     pub fn nearest(&self, x: DVec3) -> SurfacePoint {
-        let (projection, (triangle, location)) = self.shape.project_local_point_and_get_location(x, false);
+        self.found(x, self.shape.project_local_point_and_get_location(x, false))
+    }
+
+    /// The same where it is known to be no farther than `most` (m), which spares most of the search.
+    fn nearest_within(&self, x: DVec3, most: f64) -> SurfacePoint {
+        let found = self.shape.project_local_point_and_get_location_with_max_dist(x, false, most);
+        found.map_or_else(|| self.nearest(x), |found| self.found(x, found))
+    }
+
+    fn found(
+        &self,
+        x: DVec3,
+        (projection, (triangle, location)): (PointProjection, (u32, TrianglePointLocation)),
+    ) -> SurfacePoint {
         let offset = x - projection.point;
         let distance = offset.length();
         let sign = if projection.is_inside { -1.0 } else { 1.0 };
@@ -133,7 +152,18 @@ impl Body {
     /// [`nearest`](Self::nearest) of every point, in parallel; the order, and every bit, is that of the input.
     #[must_use]
     pub fn nearest_all(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
-        points.par_iter().with_min_len(256).map(|&x| self.nearest(x)).collect()
+        points.par_chunks(CHUNK).flat_map_iter(|chunk| self.one_after_the_other(chunk)).collect()
+    }
+
+    /// Points that follow each other mostly lie near each other: no point is farther from the body than the one before it is, and its
+    /// distance from that.
+    fn one_after_the_other(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
+        let mut all: Vec<SurfacePoint> = Vec::with_capacity(points.len());
+        for (i, &x) in points.iter().enumerate() {
+            let most = all.last().map(|before| before.signed_distance.abs() + x.distance(points[i - 1]));
+            all.push(most.map_or_else(|| self.nearest(x), |most| self.nearest_within(x, most * ROUNDED + ON_SURFACE)));
+        }
+        all
     }
 
     fn pseudo_normal(&self, triangle: u32, location: TrianglePointLocation) -> DVec3 {

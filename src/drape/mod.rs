@@ -4,6 +4,7 @@
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
 mod error;
+mod levels;
 mod parts;
 mod settings;
 
@@ -13,7 +14,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::distance::SurfacePoint;
-use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::folds::{Folds, folds};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
@@ -22,6 +23,7 @@ use crate::parts::Parts;
 use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
+use levels::Levels;
 use parts::{approach, stage_one, stage_two};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
@@ -135,7 +137,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         },
         || {
             let began = Instant::now();
-            let cloth = needs_cloth.then(|| full_cloth(scene, settings)).transpose();
+            let cloth = needs_cloth.then(|| Levels::new(scene, &settings.fabric)).transpose();
             cloth.map(|cloth| (cloth, began.elapsed()))
         },
     );
@@ -148,7 +150,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let stage = stage?;
     warnings.extend(stage.warnings);
     let preview_folds = match settings.model {
-        Model::Coupled(_) => cloth.as_ref().map(|cloth| folds(cloth, &stage.positions)),
+        Model::Coupled(_) => cloth.as_ref().map(|levels| folds(&levels.cloth, &stage.positions)),
         Model::Paper(_) => None,
     };
     let refined =
@@ -159,7 +161,8 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let (positions, state) = match refined {
         None => (stage.positions.clone(), None),
         Some((cloth, refined)) => {
-            let fit = fit(&cloth, &scene.body, &refined.positions, refined.contact_stiffness);
+            let contacts = met(&cloth, scene, settings.refine, &refined.positions);
+            let fit = fit(&cloth, contacts, &refined.positions, refined.contact_stiffness);
             let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
             (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
         }
@@ -194,32 +197,34 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     })
 }
 
-fn full_cloth(scene: &Scene, settings: &Settings) -> Result<Cloth, EnergyError> {
-    Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)
-}
-
 /// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
 fn refine_further(
     scene: &Scene,
     settings: &Settings,
-    cloth: Option<Cloth>,
+    levels: Option<Levels>,
     parts: &Parts,
     start: &[DVec3],
     observer: Observer<'_>,
 ) -> Result<Option<(Cloth, Refined)>, DrapeError> {
-    let Some(cloth) = cloth else { return Ok(None) };
+    let Some(levels) = levels else { return Ok(None) };
     let max_steps = match settings.refine {
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
-    let start = approach(scene, settings, &cloth, parts, start);
+    let start = approach(scene, settings, &levels, parts, start);
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
     let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
-    let refined = refine::refine(&cloth, &scene.body, start, &options, &mut |step| {
+    let contacts = met(&levels.cloth, scene, settings.refine, &start);
+    let refined = refine::refine_with(&levels.cloth, contacts, start, &options, &mut |step| {
         // What has fallen past the feet meets nothing any more, and would fall for ever.
         if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
     })?;
-    Ok(Some((cloth, refined)))
+    Ok(Some((levels.cloth, refined)))
+}
+
+/// What the cloth meets at `x`: by planes where no step is taken, which need no more.
+fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, x: &[DVec3]) -> Contacts<'b> {
+    if refine == Refine::Steps(0) { cloth.contacts_by_planes(&scene.body, x) } else { cloth.contacts(&scene.body, x) }
 }
 
 fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {

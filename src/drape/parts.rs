@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
-use super::{DrapeError, Model, PartOutcome, Refine, Settings, full_cloth};
-use crate::distance::{Body, SurfacePoint};
-use crate::mechanics::coupled::{self, CoupledOptions, Garment};
-use crate::mechanics::energy::Cloth;
+use super::levels::{Level, Levels};
+use super::{DrapeError, Model, PartOutcome, Refine, Settings};
+use crate::distance::SurfacePoint;
+use crate::fabric::Fabric;
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Garment};
 use crate::mechanics::paper::{self, PartForces};
 use crate::parts::{Parts, segment};
 use crate::range_table::RangeTable;
@@ -31,16 +32,15 @@ pub(super) fn stage_two(
     settings: &Settings,
     surface: &[SurfacePoint],
     parts: Parts,
-    cloth: Option<&Cloth>,
+    levels: Option<&Levels>,
 ) -> Result<StageTwo, DrapeError> {
     let Scene { garment: mesh, topology, body, .. } = scene;
     let fabric = &settings.fabric;
     match &settings.model {
         Model::Coupled(options) => {
-            let made = if cloth.is_none() { Some(full_cloth(scene, settings)?) } else { None };
-            let Some(cloth) = cloth.or(made.as_ref()) else { return Err(coupled::CoupledError::NoParts.into()) };
-            let garment = Garment { mesh, topology, cloth, fabric };
-            couple(&garment, body, parts, options)
+            let made = if levels.is_none() { Some(Levels::new(scene, fabric)?) } else { None };
+            let Some(levels) = levels.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
+            couple(scene, fabric, levels, parts, options)
         }
         Model::Paper(options) => {
             let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
@@ -57,14 +57,21 @@ pub(super) fn stage_two(
 }
 
 /// Stage two by the coupled model: the PARTs of the table, or those cut to one extent after the other.
-fn couple(garment: &Garment<'_>, body: &Body, parts: Parts, options: &CoupledOptions) -> Result<StageTwo, DrapeError> {
-    let placed = &garment.mesh.positions;
+fn couple(
+    scene: &Scene,
+    fabric: &Fabric,
+    levels: &Levels,
+    parts: Parts,
+    options: &CoupledOptions,
+) -> Result<StageTwo, DrapeError> {
+    let Scene { garment: mesh, topology, .. } = scene;
+    let placed = &mesh.positions;
     let mut stage = StageTwo { parts, outcomes: Vec::new(), positions: placed.clone(), warnings: Vec::new() };
     let table = stage.parts.clone();
     let uncut = [f64::INFINITY];
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
-        stage.parts = table.cut_to_extent(garment.mesh, garment.topology, extent);
-        let result = coupled::solve(garment, body, &stage.parts, &stage.positions, options)?;
+        stage.parts = table.cut_to_extent(mesh, topology, extent);
+        let result = through_levels(scene, fabric, levels, &stage.parts, &stage.positions, options)?;
         let outcome = |p: &coupled::PartResult| PartOutcome {
             force_n: p.reaction,
             displacement: p.displacement,
@@ -82,6 +89,43 @@ fn couple(garment: &Garment<'_>, body: &Body, parts: Parts, options: &CoupledOpt
     Ok(stage)
 }
 
+/// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
+const ENOUGH: usize = 8;
+
+/// Steps at full resolution after coarser ones: they take off what the prolongation strained, and tell the forces.
+const STEPS_AFTER_COARSE: usize = 2;
+
+/// The coupled model on the coarsest cloth whose vertices still tell these PARTs apart, then on the finer ones.
+fn through_levels(
+    scene: &Scene,
+    fabric: &Fabric,
+    levels: &Levels,
+    parts: &Parts,
+    start: &[DVec3],
+    options: &CoupledOptions,
+) -> Result<CoupledResult, CoupledError> {
+    let enough = |level: &&Level| level.mesh().vertex_count() >= ENOUGH * parts.len();
+    let coarsest = levels.coarser.iter().take_while(enough).count();
+    let mut x = start.to_vec();
+    for number in (1..=coarsest).rev() {
+        let level = &levels.coarser[number - 1];
+        let parts = levels.parts(number, parts);
+        let solved =
+            coupled::solve(&level.garment(fabric), &scene.body, &parts, &levels.restrict(number, &x), options)?;
+        x = levels.prolong(number, &x, solved.positions);
+    }
+    let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth, fabric };
+    if coarsest == 0 {
+        return coupled::solve(&garment, &scene.body, parts, &x, options);
+    }
+    let max_steps = options.max_steps.min(STEPS_AFTER_COARSE);
+    let mut solved =
+        coupled::solve(&garment, &scene.body, parts, &x, &CoupledOptions { max_steps, ..options.clone() })?;
+    // That they go on moving after so few steps is meant.
+    solved.warnings.clear();
+    Ok(solved)
+}
+
 /// Extent of the PARTs that a drape goes on with from its table's, before the steps at full resolution, m: about half a fold, so that they
 /// make the folds which rings leave to tension field theory. Without them a skirt takes 21 steps from Table 3 and a dress 12; with
 /// them 12 and 2, each dearer than ten of these.
@@ -94,7 +138,7 @@ const APPROACH_STEPS: usize = 10;
 pub(super) fn approach(
     scene: &Scene,
     settings: &Settings,
-    cloth: &Cloth,
+    levels: &Levels,
     parts: &Parts,
     start: &[DVec3],
 ) -> Vec<DVec3> {
@@ -105,6 +149,6 @@ pub(super) fn approach(
         return start.to_vec();
     }
     let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
-    let garment = Garment { mesh, topology, cloth, fabric: &settings.fabric };
+    let garment = Garment { mesh, topology, cloth: &levels.cloth, fabric: &settings.fabric };
     coupled::solve(&garment, body, &finer, start, &options).map_or_else(|_| start.to_vec(), |result| result.positions)
 }

@@ -15,8 +15,7 @@
 
 use glam::DVec3;
 
-use super::energy::Cloth;
-use crate::distance::Body;
+use super::energy::{Cloth, Contacts};
 
 /// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,9 +32,9 @@ pub struct Fit {
     pub pressure_max_kpa: f64,
 }
 
-/// Measures `cloth` on `body` at `x` (m), where it settled against a contact of stiffness κ (N/m³).
+/// Measures `cloth` at `x` (m), where it settled against contacts of stiffness κ (N/m³).
 #[must_use]
-pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3], contact_stiffness: f64) -> Fit {
+pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiffness: f64) -> Fit {
     let mut sum = vec![0.0; x.len()];
     let mut area = vec![0.0; x.len()];
     let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
@@ -49,7 +48,6 @@ pub fn fit(cloth: &Cloth, body: &Body, x: &[DVec3], contact_stiffness: f64) -> F
     }
     let strain_percent = sum.iter().zip(&area).map(|(s, a)| if *a > 0.0 { s / a } else { 0.0 }).collect();
     let mut pressure_kpa = vec![0.0; x.len()];
-    let mut contacts = cloth.contacts(body, x);
     contacts.stiffen(contact_stiffness / contacts.stiffness());
     contacts.update(x);
     for touch in contacts.touches() {
@@ -102,7 +100,7 @@ mod tests {
         let (depth, stretch) = (0.2e-3, 1.03);
         let x = flat(stretch, cloth.offset - depth);
         let stiffness = cloth.contacts(&body, &x).stiffness();
-        let fit = fit(&cloth, &body, &x, stiffness);
+        let fit = fit(&cloth, cloth.contacts(&body, &x), &x, stiffness);
         assert!((fit.strain_p95_percent - 3.0).abs() < 1e-9, "{}", fit.strain_p95_percent);
         assert!(fit.strain_percent.iter().all(|s| (s - 3.0).abs() < 1e-9));
         let expected = 1e-3 * cloth.contacts(&body, &x).stiffness() * depth;

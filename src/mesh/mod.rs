@@ -4,13 +4,17 @@
 //! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
 //! triangles (barycentric area).
 
+pub mod coarse;
+mod decimate;
 mod draft;
 pub mod error;
 pub mod export;
 mod facing;
 pub mod fit;
+pub(crate) mod flip;
 pub mod frame;
 pub mod frame_guess;
+pub(crate) mod half_edge;
 pub mod health;
 pub mod import;
 pub mod polygon;

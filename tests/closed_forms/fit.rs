@@ -23,7 +23,7 @@ fn a_cloth_at_rest_presses_with_its_weight() {
     let options = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
     let end = refine(&cloth, &body, mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(end.stop, Stop::Converged);
-    let fit_at_rest = fit(&cloth, &body, &end.positions, end.contact_stiffness);
+    let fit_at_rest = fit(&cloth, cloth.contacts(&body, &end.positions), &end.positions, end.contact_stiffness);
     let expected_kpa = 1e-3 * 0.5 * GRAVITY;
     for p in &fit_at_rest.pressure_kpa {
         assert!((p / expected_kpa - 1.0).abs() < 1e-3, "{p} kPa for {expected_kpa}");

@@ -1,7 +1,8 @@
 //! Which PARTs move each triangle, each bending ring and each vertex, and where their blocks of the reduced Hessian are.
 //!
-//! An element couples every pair of PARTs that have weight at one of its vertices. The pattern is built PART by PART: the
-//! column of a PART's unknown holds what is left of its own block, then its neighbours that come later in the order of elimination.
+//! An element couples every pair of PARTs that have weight at one of its vertices: such pairs are numbered, and what elements add is summed
+//! pair by pair. The pattern is built PART by PART: the column of a PART's unknown holds what is left of its own block, then its
+//! neighbours that come later in the order of elimination.
 
 use crate::mechanics::energy::ordering::nested_dissection;
 use crate::mechanics::energy::pattern::Pattern;
@@ -27,11 +28,20 @@ pub(super) struct Elements {
     pub(super) sampled: Vec<(u32, f64)>,
 }
 
-/// The blocks of two PARTs of an element, by their places in its list: rows of the later, columns of the earlier.
+/// Two PARTs of an element, by their places in its list: rows of the later, columns of the earlier.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair {
     pub(super) row: u8,
     pub(super) column: u8,
+    /// Its number in [`Layout::places`].
+    pub(super) number: u32,
+}
+
+/// Where the blocks of a pair of PARTs are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub(super) row: u32,
+    pub(super) column: u32,
     /// Blocks between the column's own and the row's.
     pub(super) skip: u32,
 }
@@ -108,8 +118,9 @@ impl Elements {
                         if motions.first[p as usize] >= motions.first[q as usize] { (k, l) } else { (l, k) };
                     let later = motions.first[list[row] as usize];
                     let of = &columns[list[column] as usize];
-                    let skip = of.binary_search_by_key(&later, |e| e.0).map_or(0, |at| of[at].1);
-                    self.pairs.push(Pair { row: row as u8, column: column as u8, skip });
+                    // PARTs that do not move have no pair: they add to one that nobody reads.
+                    let number = of.binary_search_by_key(&later, |e| e.0).map_or(0, |at| of[at].1);
+                    self.pairs.push(Pair { row: row as u8, column: column as u8, number });
                 }
             }
             self.pair_starts.push(self.pairs.len() as u32);
@@ -122,6 +133,8 @@ impl Elements {
 pub(super) struct Layout {
     /// The reduced Hessian's pattern.
     pub(super) pattern: Pattern,
+    /// The pairs of PARTs that share an element, by number; nothing is at 0.
+    pub(super) places: Vec<Place>,
     pub(super) triangles: Elements,
     pub(super) rings: Elements,
     pub(super) vertices: Elements,
@@ -144,8 +157,9 @@ impl Layout {
         let free: Vec<u32> = (0..parts as u32).filter(|&p| motions.count[p as usize] > 0).collect();
         let order = nested_dissection(free, motions.centres(), &neighbours);
         motions.number(order.iter().copied());
-        // Of each PART its later neighbours by first unknown, with the unknowns in between.
+        // Of each PART itself and its later neighbours, by first unknown, with the pair's number.
         let mut columns: Vec<Vec<(u32, u32)>> = vec![Vec::new(); parts];
+        let mut places = vec![Place { row: u32::MAX, column: u32::MAX, skip: 0 }];
         let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
         for &q in &order {
             let own = motions.first[q as usize];
@@ -154,9 +168,10 @@ impl Layout {
             let mut later: Vec<u32> = later.filter(|&p| count(p) > 0).collect();
             later.sort_unstable_by_key(|&p| motions.first[p as usize]);
             let mut skip = 0;
-            for &p in &later {
-                columns[q as usize].push((motions.first[p as usize], skip));
-                skip += count(p);
+            for &p in std::iter::once(&q).chain(&later) {
+                columns[q as usize].push((motions.first[p as usize], places.len() as u32));
+                places.push(Place { row: p, column: q, skip });
+                skip += if p == q { 0 } else { count(p) };
             }
             for b in 0..count(q) {
                 pattern.rows.extend(own + b..own + count(q));
@@ -169,7 +184,7 @@ impl Layout {
         for elements in [&mut triangles, &mut rings, &mut vertices] {
             elements.lay_out(motions, &columns);
         }
-        Self { pattern, triangles, rings, vertices }
+        Self { pattern, places, triangles, rings, vertices }
     }
 }
 

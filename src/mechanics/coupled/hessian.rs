@@ -4,12 +4,13 @@
 //! cloth. With a = ∇φ the gradient of a PART's function over a triangle, its membrane brings A (a_u H_uu b_u + a_u H_uv b_v + …) to each
 //! pair of functions; bending and masses bring a scalar, contact and friction a block for each vertex that touches. Membrane and bending
 //! are sampled ([`elements`](super::elements)): a step need not be Newton's to the last digit, since the energy that judges it
-//! is whole.
+//! is whole. They are summed up in [`sums`](super::sums).
 
 use glam::{DMat3, DVec3};
 
-use super::elements::{Elements, Layout};
-use super::motions::{Motions, RIDGE, Values};
+use super::elements::Layout;
+use super::motions::{Motions, RIDGE};
+use super::sums::{Element, Sums};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::newton::{SolveError, Solver, State, Tangent};
 
@@ -20,7 +21,7 @@ pub(super) struct Reduced {
     layout: Layout,
     solver: Solver,
     blocks: Vec<DMat3>,
-    other: Vec<DMat3>,
+    sums: [Sums; 2],
     unknowns: Vec<DVec3>,
     undamped: Vec<f64>,
 }
@@ -30,8 +31,8 @@ impl Reduced {
         let layout = Layout::new(cloth, &mut motions);
         let solver = Solver::new(&layout.pattern)?;
         let undamped = vec![0.0; motions.unknowns()];
-        let (blocks, other, unknowns) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { motions, layout, solver, blocks, other, unknowns, undamped })
+        let sums = [Sums::default(), Sums::default()];
+        Ok(Self { motions, layout, solver, blocks: Vec::new(), sums, unknowns: Vec::new(), undamped })
     }
 
     /// Unknown vectors.
@@ -48,23 +49,36 @@ impl Reduced {
 
     /// Fills the blocks: membrane on one core, the rest on the other, always so, for the same bits.
     fn assemble(&mut self, here: &State<'_>) {
-        let Self { motions, layout, blocks, other, .. } = self;
-        let sum = Sum { motions, starts: &layout.pattern.starts };
-        for list in [&mut *blocks, &mut *other] {
-            list.clear();
-            list.resize(layout.pattern.rows.len(), DMat3::ZERO);
+        let Self { motions, layout, blocks, sums, .. } = self;
+        let functions = motions.functions();
+        for sums in &mut *sums {
+            sums.clear(layout.places.len());
         }
+        let [first, second] = &mut *sums;
         let (sampled, half) = (&layout.triangles.sampled, layout.triangles.sampled.len() / 2);
         rayon::join(
-            || sum.membrane(here, &layout.triangles, &sampled[..half], blocks),
+            || first.add(&functions, here, &layout.triangles, Element::Triangles(&sampled[..half])),
             || {
-                sum.membrane(here, &layout.triangles, &sampled[half..], other);
-                sum.bending(here, &layout.rings, other);
-                sum.vertices(here, &layout.vertices, other);
+                second.add(&functions, here, &layout.triangles, Element::Triangles(&sampled[half..]));
+                second.add(&functions, here, &layout.rings, Element::Rings);
+                second.add(&functions, here, &layout.vertices, Element::Vertices);
             },
         );
-        for (block, other) in blocks.iter_mut().zip(&*other) {
-            *block += *other;
+        first.join(second);
+        blocks.clear();
+        blocks.resize(layout.pattern.rows.len(), DMat3::ZERO);
+        for (number, place) in layout.places.iter().enumerate().skip(1) {
+            let [rows, columns] = [place.row, place.column].map(|p| usize::from(motions.count[p as usize]));
+            let column = motions.first[place.column as usize] as usize;
+            for b in 0..columns {
+                let start = layout.pattern.starts[column + b] as usize;
+                // Of a PART's own block the lower half; beside it, what is left of its own comes before.
+                let own = place.row == place.column;
+                let (from, start) = if own { (b, start) } else { (0, start + columns - b + place.skip as usize) };
+                for a in from..rows {
+                    blocks[start + a - from] = first.block(number, a, b);
+                }
+            }
         }
         for &diagonal in &layout.pattern.starts[..self.undamped.len()] {
             let block = &mut blocks[diagonal as usize];
@@ -95,112 +109,4 @@ impl Tangent for Reduced {
     fn pause(&mut self) -> bool {
         false
     }
-}
-
-/// Adds elements up.
-#[derive(Clone, Copy)]
-struct Sum<'a> {
-    motions: &'a Motions,
-    starts: &'a [u32],
-}
-
-impl Sum<'_> {
-    fn membrane(&self, here: &State<'_>, all: &Elements, sampled: &[(u32, f64)], blocks: &mut [DMat3]) {
-        let State { cloth, x, .. } = *here;
-        let mut gradients: Vec<[[f64; 2]; 4]> = Vec::new();
-        let mut halves: Vec<[[DMat3; 2]; 4]> = Vec::new();
-        for &(i, standing_for) in sampled {
-            let i = i as usize;
-            let (t, parts, weights) = (&cloth.triangles[i], all.parts(i), all.weights(i));
-            let [huu, huv, hvv] = t.by_gradient(&cloth.stiffness, x, false).map(|h| h * (t.area * standing_for));
-            let hvu = huv.transpose();
-            gradients.clear();
-            halves.clear();
-            for (&p, weights) in parts.iter().zip(weights.chunks_exact(3)) {
-                let mut gradient = [[0.0; 2]; 4];
-                for c in 0..3 {
-                    let values = self.motions.values(p, weights[c], x[t.vertices[c] as usize]);
-                    for (g, f) in gradient.iter_mut().zip(values) {
-                        g[0] += f * t.gradients[c].x;
-                        g[1] += f * t.gradients[c].y;
-                    }
-                }
-                gradients.push(gradient);
-                halves.push(gradient.map(|[u, v]| [huu * u + hvu * v, huv * u + hvv * v]));
-            }
-            self.scatter(all, i, blocks, |row, a, column, b| {
-                let [u, v] = gradients[column][b];
-                let [left_u, left_v] = &halves[row][a];
-                *left_u * u + *left_v * v
-            });
-        }
-    }
-
-    fn bending(&self, here: &State<'_>, all: &Elements, blocks: &mut [DMat3]) {
-        let State { cloth, x, .. } = *here;
-        let mut derivatives: Vec<[DVec3; 4]> = Vec::new();
-        let mut sampled = all.sampled.iter().peekable();
-        for (i, (vertices, ring, stiffness)) in cloth.bending.elements().enumerate() {
-            let Some(&(_, standing_for)) = sampled.next_if(|s| s.0 as usize == i) else { continue };
-            let stiffness = stiffness * standing_for;
-            derivatives.clear();
-            for (&p, weights) in all.parts(i).iter().zip(all.weights(i).chunks_exact(vertices.len())) {
-                let mut derivative = [DVec3::ZERO; 4];
-                for ((&v, r), &w) in vertices.iter().zip(ring).zip(weights).filter(|(_, w)| **w > 0.0) {
-                    for (d, f) in derivative.iter_mut().zip(self.motions.values(p, w, x[v as usize])) {
-                        *d += *r * f;
-                    }
-                }
-                derivatives.push(derivative);
-            }
-            self.scatter(all, i, blocks, |row, a, column, b| {
-                scalar((derivatives[row][a] * stiffness).dot(derivatives[column][b]))
-            });
-        }
-    }
-
-    /// Masses times the damping, contact and friction.
-    fn vertices(&self, here: &State<'_>, all: &Elements, blocks: &mut [DMat3]) {
-        let State { cloth, x, contacts, damping, .. } = *here;
-        let functions = |v: usize| -> Vec<Values> {
-            let of = |(&p, &w): (&u32, &f64)| self.motions.values(p, w, x[v]);
-            all.parts(v).iter().zip(all.weights(v)).map(of).collect()
-        };
-        for v in 0..x.len() {
-            let (values, mass) = (functions(v), cloth.masses[v] * damping);
-            self.scatter(all, v, blocks, |row, a, column, b| scalar(mass * values[row][a] * values[column][b]));
-        }
-        for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
-            let values = functions(v as usize);
-            self.scatter(all, v as usize, blocks, |row, a, column, b| block * (values[row][a] * values[column][b]));
-        }
-    }
-
-    /// Adds an element's block for every pair of its PARTs' functions.
-    #[inline]
-    fn scatter(
-        &self,
-        all: &Elements,
-        element: usize,
-        blocks: &mut [DMat3],
-        block: impl Fn(usize, usize, usize, usize) -> DMat3,
-    ) {
-        let parts = all.parts(element);
-        for pair in all.pairs(element) {
-            let (row, column) = (pair.row as usize, pair.column as usize);
-            let (p, q) = (parts[row] as usize, parts[column] as usize);
-            let (rows, columns) = (self.motions.count[p] as usize, self.motions.count[q] as usize);
-            for b in 0..columns {
-                let start = self.starts[self.motions.first[q] as usize + b] as usize;
-                let (from, start) = if p == q { (b, start) } else { (0, start + columns - b + pair.skip as usize) };
-                for a in from..rows {
-                    blocks[start + a - from] += block(row, a, column, b);
-                }
-            }
-        }
-    }
-}
-
-fn scalar(s: f64) -> DMat3 {
-    DMat3::from_diagonal(DVec3::splat(s))
 }

@@ -24,6 +24,7 @@ mod hessian;
 mod motions;
 mod options;
 mod slack;
+mod sums;
 mod weights;
 
 use std::time::Instant;

@@ -21,12 +21,32 @@ use glam::{DMat3, DVec3};
 use super::options::Motion;
 use super::weights::Weights;
 use crate::mechanics::energy::pattern::Pattern;
+use crate::mechanics::lanes::{Four, Lanes, Pack};
 use crate::mechanics::newton::{SolveError, Solver};
 use crate::mechanics::principal::principal;
 use crate::parts::Parts;
 
 /// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
 pub(super) type Values = [f64; 4];
+
+/// The functions of a PART in one register: its weight, and that times its coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Functions {
+    centre: DVec3,
+    /// x, y and z of the axes, after a zero.
+    axes: [Four; 3],
+}
+
+impl Functions {
+    /// Their values at x, where the PART's weight is w.
+    #[inline(always)]
+    pub(super) fn at<L: Lanes>(&self, l: L, w: f64, x: DVec3) -> Pack<L> {
+        let y = x - self.centre;
+        let [ax, ay, az] = [Pack::load(l, &self.axes[0]), Pack::load(l, &self.axes[1]), Pack::load(l, &self.axes[2])];
+        let one = Pack::load(l, &Four([1.0, 0.0, 0.0, 0.0]));
+        (one + ax * Pack::splat(l, y.x) + ay * Pack::splat(l, y.y) + az * Pack::splat(l, y.z)) * Pack::splat(l, w)
+    }
+}
 
 /// Vertices of a PART that has its displacement alone.
 const SMALL: usize = 3;
@@ -136,6 +156,15 @@ impl Motions {
         let y = (x - self.centre[p as usize]) * w;
         let [a, b, c] = &self.axes[p as usize];
         [w, y.dot(*a), y.dot(*b), y.dot(*c)]
+    }
+
+    /// The functions of all PARTs, by fours.
+    pub(super) fn functions(&self) -> Vec<Functions> {
+        let of = |(centre, [a, b, c]): (&DVec3, &[DVec3; 3])| Functions {
+            centre: *centre,
+            axes: [Four([0.0, a.x, b.x, c.x]), Four([0.0, a.y, b.y, c.y]), Four([0.0, a.z, b.z, c.z])],
+        };
+        self.centre.iter().zip(&self.axes).map(of).collect()
     }
 
     /// From a force (or any covector) at each vertex to that of each unknown.

@@ -18,7 +18,6 @@
 //! Limits: vertices are tested, not edges or triangles; a sharp body corner can poke through a triangle.
 
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
 use super::field::{Field, SIDE};
 use super::friction::Friction;
@@ -198,7 +197,7 @@ impl<'b> Contacts<'b> {
             self.answer[v] == f64::NEG_INFINITY || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
         };
         let stale: Vec<usize> = near.iter().filter(stale).map(|&v| v as usize).collect();
-        let found: Vec<_> = stale.par_iter().with_min_len(128).map(|&v| body.nearest(x[v])).collect();
+        let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());
         for (v, found) in stale.into_iter().zip(found) {
             self.keep(v, x[v], found.signed_distance);
             if let Met::Planes(_, normals) = &mut self.met {
@@ -224,10 +223,9 @@ impl<'b> Contacts<'b> {
         let body = field.body();
         let fresh = |&v: &usize| !self.held[v] && self.answer[v] == f64::NEG_INFINITY;
         let new: Vec<usize> = (0..x.len()).filter(fresh).collect();
-        let distances: Vec<f64> =
-            new.par_iter().with_min_len(128).map(|&v| body.nearest(x[v]).signed_distance).collect();
-        for (v, distance) in new.into_iter().zip(distances) {
-            self.keep(v, x[v], distance - SIDE);
+        let found = body.nearest_all(&new.iter().map(|&v| x[v]).collect::<Vec<_>>());
+        for (v, found) in new.into_iter().zip(found) {
+            self.keep(v, x[v], found.signed_distance - SIDE);
         }
     }
 

@@ -13,14 +13,14 @@
 //!
 //! Boundary vertices slide along their cut and stay on it. Limits: features sharper than ℓ are lost.
 
-pub(crate) mod half_edge;
 mod passes;
 mod relax;
 
 use glam::DVec3;
 
 use crate::mesh::TriMesh;
-use half_edge::HalfEdgeMesh;
+use crate::mesh::flip::{Rule, flip};
+use crate::mesh::half_edge::HalfEdgeMesh;
 
 /// The surface that is meshed.
 pub(crate) trait Surface: Sync {
@@ -80,22 +80,22 @@ pub(crate) fn remesh(
         }
         for _ in 0..2 {
             passes::trim(&mut work, surface, count);
-            passes::flip(&mut work, passes::Rule::Valence);
+            flip(&mut work, Rule::Valence);
             relax::relax(&mut work, surface);
         }
         passes::trim(&mut work, surface, count);
     }
     for _ in 0..POLISH {
-        passes::flip(&mut work, passes::Rule::Delaunay);
+        flip(&mut work, Rule::Delaunay);
         relax::relax(&mut work, surface);
     }
-    passes::flip(&mut work, passes::Rule::Delaunay);
+    flip(&mut work, Rule::Delaunay);
     Some(work.compact())
 }
 
 fn round(work: &mut HalfEdgeMesh, surface: &dyn Surface, edge: f64) {
     passes::split(work, surface, edge * 4.0 / 3.0);
     passes::collapse(work, surface, edge * 4.0 / 5.0, edge * 4.0 / 3.0);
-    passes::flip(work, passes::Rule::Valence);
+    flip(work, Rule::Valence);
     relax::relax(work, surface);
 }

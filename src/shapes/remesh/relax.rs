@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Surface;
-use super::half_edge::{HalfEdgeMesh, NONE, previous};
+use crate::mesh::half_edge::{HalfEdgeMesh, NONE, previous};
 
 /// Moves every vertex once.
 pub(super) fn relax(mesh: &mut HalfEdgeMesh, surface: &dyn Surface) {

@@ -1,0 +1,95 @@
+//! The garment at several resolutions: a drape goes from coarse to fine, so that full resolution is left to polish.
+//!
+//! Each level has a quarter of the vertices of the one before ([`Coarse`]). PARTs are those of the full garment, as far as they have
+//! vertices there. Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985).
+
+use glam::DVec3;
+
+use crate::fabric::Fabric;
+use crate::mechanics::coupled::Garment;
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mesh::TriMesh;
+use crate::mesh::coarse::Coarse;
+use crate::parts::{Parts, UNASSIGNED};
+use crate::scene::Scene;
+
+/// Vertices of a level over those of the next coarser.
+const RATIO: usize = 4;
+
+/// No level is made with fewer vertices than this: there is nothing left to save.
+const LEAST_VERTICES: usize = 400;
+
+/// A coarser garment.
+#[derive(Debug)]
+pub(super) struct Level {
+    coarse: Coarse,
+    cloth: Cloth,
+}
+
+/// The full garment's cloth and the coarser ones, fine to coarse.
+#[derive(Debug)]
+pub(super) struct Levels {
+    pub(super) cloth: Cloth,
+    pub(super) coarser: Vec<Level>,
+}
+
+impl Levels {
+    /// The cloth of `scene`, and as many coarser ones as there are.
+    pub(super) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
+        let Scene { garment, topology, rest, held, .. } = scene;
+        let (cloth, coarser) = rayon::join(
+            || Cloth::new(garment, topology, rest, fabric, held),
+            || {
+                let mut coarser: Vec<Level> = Vec::new();
+                while let Some(next) = Level::below(scene, coarser.last(), fabric) {
+                    coarser.push(next);
+                }
+                coarser
+            },
+        );
+        Ok(Self { cloth: cloth?, coarser })
+    }
+
+    /// Positions of the level of this number (1: the first coarser one) from those of the full garment.
+    pub(super) fn restrict(&self, level: usize, full: &[DVec3]) -> Vec<DVec3> {
+        self.coarser[..level].iter().fold(full.to_vec(), |x, l| l.coarse.restrict(&x))
+    }
+
+    /// Where the full garment goes from `from` when the level of this number goes to `to`.
+    pub(super) fn prolong(&self, level: usize, from: &[DVec3], to: Vec<DVec3>) -> Vec<DVec3> {
+        (1..=level).rev().fold(to, |to, l| self.coarser[l - 1].coarse.prolong(&self.restrict(l - 1, from), &to))
+    }
+
+    /// PARTs of the full garment on a level.
+    pub(super) fn parts(&self, level: usize, parts: &Parts) -> Parts {
+        let label = self.coarser[..level].iter().fold(parts.part_of_vertex.clone(), |p, l| l.coarse.restrict(&p));
+        let level_of = |label: u32| if label == UNASSIGNED { 0 } else { parts.parts[label as usize].level };
+        Parts::from_labels(&self.coarser[level - 1].coarse.topology, &label, level_of, parts.own_extent.clone(), 0)
+    }
+}
+
+impl Level {
+    fn below(scene: &Scene, above: Option<&Self>, fabric: &Fabric) -> Option<Self> {
+        let (mesh, rest) = above.map_or((&scene.garment, &scene.rest), |a| (&a.coarse.mesh, &a.coarse.rest));
+        let count = mesh.vertex_count() / RATIO;
+        if count < LEAST_VERTICES {
+            return None;
+        }
+        let coarse = Coarse::new(mesh, rest, count)?;
+        let held = match above {
+            None => coarse.kept(&scene.held),
+            Some(above) => (0u32..).zip(coarse.restrict(&above.cloth.held)).filter(|h| h.1).map(|h| h.0).collect(),
+        };
+        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabric, &held).ok()?;
+        Some(Self { coarse, cloth })
+    }
+
+    pub(super) fn mesh(&self) -> &TriMesh {
+        &self.coarse.mesh
+    }
+
+    /// What is draped at this level.
+    pub(super) fn garment<'a>(&'a self, fabric: &'a Fabric) -> Garment<'a> {
+        Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth, fabric }
+    }
+}
