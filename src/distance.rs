@@ -27,20 +27,14 @@ const ON_SURFACE: f64 = 1e-9;
 
 /// What can be wrong with a body.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum DistanceError {
     /// No triangle to be near to.
     #[error("the body has no triangles")]
     Empty,
     /// A boundary edge: the surface does not separate inside from outside.
     #[error("the body is not closed: {count} boundary edges, the first between vertices {a} and {b}")]
-    Open {
-        /// Number of edges with one triangle.
-        count: usize,
-        /// First vertex of the first such edge, from 0.
-        a: u32,
-        /// Its second vertex.
-        b: u32,
-    },
+    Open { count: usize, a: u32, b: u32 },
     /// The query structure refused the mesh.
     #[error("the body cannot be searched: {0}")]
     Refused(String),

@@ -71,38 +71,20 @@ pub const BUILT_IN: [&str; 11] = [
 
 /// What can be wrong with a fabric.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum FabricError {
     /// No such name.
     #[error("no fabric is called `{found}`; expected one of {known}, or a TOML file")]
-    Unknown {
-        /// What was asked for.
-        found: String,
-        /// What there is.
-        known: String,
-    },
+    Unknown { found: String, known: String },
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
     /// Not a fabric file.
     #[error("{file}: {reason}; see assets/fabrics/ for examples")]
-    Syntax {
-        /// The file.
-        file: String,
-        /// What the reader said, with line and column.
-        reason: String,
-    },
+    Syntax { file: String, reason: String },
     /// A constant no cloth can have.
     #[error("{file}: {key} is {found}; expected {expected}")]
-    Constant {
-        /// The file.
-        file: String,
-        /// Which constant.
-        key: &'static str,
-        /// Its value.
-        found: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    Constant { file: String, key: &'static str, found: f64, expected: &'static str },
 }
 
 /// The fabric unless asked otherwise.

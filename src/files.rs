@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{path}: cannot be read: {reason}; check the path and its permissions")]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub struct Unreadable {
-    /// The file.
     pub path: PathBuf,
-    /// What the system said.
     pub reason: String,
 }
 

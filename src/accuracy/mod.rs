@@ -35,25 +35,14 @@ pub const CONTACT_ZONE: f64 = 0.005;
 
 /// Why two drapes cannot be compared.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum AccuracyError {
     /// Lists of different meshes.
     #[error("{what} has {found} vertices and the garment {expected}: both drapes must be of one mesh")]
-    Count {
-        /// Which list.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The garment's vertices.
-        expected: usize,
-    },
+    Count { what: &'static str, found: usize, expected: usize },
     /// A coordinate that is not finite.
     #[error("vertex number {} of {what} is not finite: the solve that made it has failed", .vertex + 1)]
-    NotFinite {
-        /// Which list.
-        what: &'static str,
-        /// The vertex, from 0.
-        vertex: usize,
-    },
+    NotFinite { what: &'static str, vertex: usize },
     /// No surface to measure to.
     #[error("the drapes cannot be searched: {0}")]
     Distance(#[from] DistanceError),

@@ -8,6 +8,7 @@ use crate::shapes::ShapeError;
 
 /// A body or garment that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum SceneError {
     /// A mesh file, or a garment nowhere near the body.
     #[error(transparent)]
@@ -23,12 +24,7 @@ pub enum SceneError {
     Shape(#[from] ShapeError),
     /// The same, in a file.
     #[error("{file} cannot be used: {source}")]
-    ShapeFile {
-        /// The file.
-        file: String,
-        /// What is wrong in it.
-        source: ShapeError,
-    },
+    ShapeFile { file: String, source: ShapeError },
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
@@ -36,19 +32,13 @@ pub enum SceneError {
     #[error(
         "no body is called `{found}`; expected `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file"
     )]
-    UnknownBody {
-        /// What was asked for.
-        found: String,
-    },
+    UnknownBody { found: String },
     /// A built-in garment on somebody's body.
     #[error(
         "the built-in garments are cut for the dress form, not for {body}; give --garment an OBJ file placed around that \
          body, or leave --body out and give its measurements (--bust, --waist, ...)"
     )]
-    NotCutForIt {
-        /// The body.
-        body: String,
-    },
+    NotCutForIt { body: String },
     /// Measurements, given as numbers, that make no body.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
@@ -57,20 +47,10 @@ pub enum SceneError {
     NoEdge,
     /// A group to hold that is not there.
     #[error("--hold: found no group \"{found}\" in the garment, expected `top`{}", or_one_of(known))]
-    UnknownGroup {
-        /// What was asked for.
-        found: String,
-        /// What there is.
-        known: Vec<String>,
-    },
+    UnknownGroup { found: String, known: Vec<String> },
     /// Any of these, where it does not say itself which body, garment or file it is about.
     #[error("{name}: {source}")]
-    In {
-        /// The name or file.
-        name: String,
-        /// What is wrong with it.
-        source: Box<SceneError>,
-    },
+    In { name: String, source: Box<SceneError> },
 }
 
 impl SceneError {
