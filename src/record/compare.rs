@@ -30,13 +30,8 @@ pub struct Chosen<'a> {
 }
 
 pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError> {
-    let expected = open.garment.positions.len();
-    for (what, found) in [("positions", chosen.draped.len()), ("PART numbers", chosen.part_of_vertex.len())] {
-        if found != expected {
-            let (what, of) = (format!("{what} of slot {}", chosen.slot), "vertices of the garment");
-            return Err(RecordError::Mismatch { what, found, expected, of });
-        }
-    }
+    let lists = [("positions", chosen.draped.len()), ("PART numbers", chosen.part_of_vertex.len())];
+    RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let branch = format!("{}/{}", paths::COMPARE, chosen.slot);
     let path = format!("{branch}/garment");
     let draped = open.garment.with_positions(chosen.draped.to_vec());

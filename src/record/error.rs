@@ -53,6 +53,16 @@ impl From<rerun::RecordingStreamError> for RecordError {
 }
 
 impl RecordError {
+    /// Refuses lists that have not one value for each vertex of the garment.
+    pub(super) fn unless_per_vertex(vertices: usize, lists: &[(&str, usize)]) -> Result<(), Self> {
+        match lists.iter().find(|(_, found)| *found != vertices) {
+            None => Ok(()),
+            Some(&(what, found)) => {
+                Err(Self::Mismatch { what: what.to_owned(), found, expected: vertices, of: "vertices of the garment" })
+            }
+        }
+    }
+
     /// Whether the user can set it right by asking for something else (exit code 2) or not (1).
     #[must_use]
     pub fn is_users(&self) -> bool {

@@ -34,13 +34,8 @@ pub struct WrinkleView<'a> {
 }
 
 pub(super) fn log(open: &Open, view: &WrinkleView<'_>) -> Result<(), RecordError> {
-    let expected = open.garment.positions.len();
-    for (what, found) in [("displaced positions", view.draped.len()), ("curvatures", view.curvature_per_m.len())] {
-        if found != expected {
-            let (what, of) = (what.to_owned(), "vertices of the garment");
-            return Err(RecordError::Mismatch { what, found, expected, of });
-        }
-    }
+    let lists = [("displaced positions", view.draped.len()), ("curvatures", view.curvature_per_m.len())];
+    RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let draped = open.garment.with_positions(view.draped.to_vec());
     open.at(view.index, 6);
     let pixel_m = open.layout().wrinkle_pixel_m(&open.eye);

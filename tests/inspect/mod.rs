@@ -1,4 +1,6 @@
-//! What a recording holds: read back to test it, and to see that it was written to the end.
+//! What a recording holds, read back.
+
+#![allow(dead_code, reason = "each test reads what it needs")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -6,10 +8,8 @@ use std::path::Path;
 
 use rerun::{ChunkStore, ChunkStoreConfig};
 
-use super::error::RecordError;
-
 /// What lies at one entity path.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Default)]
 pub struct Entity {
     /// Names of its components (`Mesh3D:vertex_positions`).
     pub components: BTreeSet<String>,
@@ -22,7 +22,7 @@ pub struct Entity {
 }
 
 /// The contents of an `.rrd` file.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Default)]
 pub struct Contents {
     /// What lies at each path of the recording.
     pub entities: BTreeMap<String, Entity>,
@@ -33,13 +33,9 @@ pub struct Contents {
 }
 
 /// Reads a recording.
-///
-/// # Errors
-/// An unreadable file, or one that is no recording.
-pub fn read(path: &Path) -> Result<Contents, RecordError> {
-    let mut file = File::open(path).map_err(|source| RecordError::Unreadable { path: path.to_owned(), source })?;
-    let stores = ChunkStore::from_rrd_reader(&ChunkStoreConfig::ALL_DISABLED, &mut file)
-        .map_err(|e| RecordError::NotARecording { path: path.to_owned(), reason: format!("{e:#}") })?;
+pub fn read(path: &Path) -> Contents {
+    let mut file = File::open(path).unwrap();
+    let stores = ChunkStore::from_rrd_reader(&ChunkStoreConfig::ALL_DISABLED, &mut file).unwrap();
     let mut contents = Contents::default();
     for (id, store) in &stores {
         contents.recordings += usize::from(id.is_recording());
@@ -56,5 +52,5 @@ pub fn read(path: &Path) -> Result<Contents, RecordError> {
             entity.components.extend(chunk.components().keys().map(ToString::to_string));
         }
     }
-    Ok(contents)
+    contents
 }
