@@ -69,9 +69,6 @@ impl std::fmt::Debug for Body {
 
 impl Body {
     /// Builds the hierarchy over a closed surface.
-    ///
-    /// # Errors
-    /// [`DistanceError::Empty`] without triangles, [`DistanceError::Open`] where an edge has only one.
     pub fn new(mesh: &TriMesh) -> Result<Self, DistanceError> {
         let topology = Topology::new(mesh);
         let mut open = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1);
@@ -83,9 +80,6 @@ impl Body {
 
     /// Builds the hierarchy over any surface; inside and outside are told by the normals alone, which is right near the
     /// surface and unreliable beyond its edges.
-    ///
-    /// # Errors
-    /// [`DistanceError::Empty`] without triangles.
     pub fn new_open(mesh: &TriMesh) -> Result<Self, DistanceError> {
         Self::build(mesh, false)
     }

@@ -24,9 +24,6 @@ pub fn stem(name: &str) -> String {
 }
 
 /// Reads a text file.
-///
-/// # Errors
-/// [`Unreadable`] names it.
 pub fn read_text(path: &Path) -> Result<String, Unreadable> {
     std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
 }

@@ -16,6 +16,7 @@ use crate::mechanics::refine::Observer;
 use crate::parts::representable_rms_m;
 use crate::range_table::TABLE_3;
 use crate::scene::{Scene, SceneSpec};
+use crate::word::word;
 
 /// What a drape is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -32,11 +33,7 @@ pub enum Against {
 
 impl fmt::Display for Against {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Canonical => "canonical",
-            Self::Own => "own",
-        })
+        self.serialize(f)
     }
 }
 
@@ -44,8 +41,7 @@ impl FromStr for Against {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = [Self::None, Self::Canonical, Self::Own].into_iter().find(|a| a.to_string() == text);
-        known.ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
+        word(text).ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
     }
 }
 
@@ -90,9 +86,6 @@ impl Job {
     }
 
     /// Drapes `scene`, which [`SceneSpec::load`] made of the job's own: points of a sweep share it.
-    ///
-    /// # Errors
-    /// As [`drape`].
     pub fn drape(&self, scene: &Scene, observer: Observer<'_>) -> Result<Drape, DrapeError> {
         if self.seed == 0 {
             return drape(scene, &self.settings, observer);

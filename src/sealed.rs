@@ -10,9 +10,6 @@ use serde::de::DeserializeOwned;
 pub type Kind = [u8; 8];
 
 /// The bytes of `value`.
-///
-/// # Errors
-/// Only what a `Serialize` of its own fails with.
 pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
     let mut bytes = postcard::to_extend(value, kind.to_vec()).map_err(std::io::Error::other)?;
     let hash = blake3::hash(&bytes);
@@ -40,17 +37,11 @@ pub mod points {
     use serde::{Deserialize, Deserializer, Serializer};
 
     /// As triples.
-    ///
-    /// # Errors
-    /// The serializer's.
     pub fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
         to.collect_seq(points.iter().map(DVec3::to_array))
     }
 
     /// From triples.
-    ///
-    /// # Errors
-    /// The deserializer's.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
         Ok(Vec::<[f64; 3]>::deserialize(from)?.into_iter().map(DVec3::from_array).collect())
     }

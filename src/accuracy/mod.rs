@@ -117,9 +117,6 @@ pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 /// Measures a result against a reference. `canonical_*` stay empty: they need a second one, see [`rms_mm`].
-///
-/// # Errors
-/// [`AccuracyError`] where lists do not match, a coordinate is not finite, or there are no triangles.
 pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
     let expected = c.mesh.vertex_count();
     for (what, list) in [("the start", c.start), ("the result", c.result), ("the reference", c.reference)] {

@@ -3,8 +3,8 @@
 use clap::Args;
 use comfy_table::{Table, presets};
 use partwise::SceneSpec;
-use partwise::mesh::fit::Placement;
 use partwise::mesh::health::{Health, health};
+use partwise::scene::Placement;
 use serde::Serialize;
 
 use super::console;

@@ -2,31 +2,31 @@
 
 use std::path::PathBuf;
 
+use crate::files::Unreadable;
+
 /// Why a mesh was refused.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum MeshError {
     /// The file cannot be read at all.
-    #[error("{file}: cannot be read: {reason}; check the path and its permissions", file = file.display())]
-    Unreadable { file: PathBuf, reason: String },
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
     /// Some other format.
     #[error(
-        "{file}: found {found}, expected a Wavefront OBJ text (lines that begin with v and f); export the mesh as .obj",
-        file = file.display()
+        "{file}: found {found}, expected a Wavefront OBJ text (lines that begin with v and f); export the mesh as .obj"
     )]
     NotObj { file: PathBuf, found: &'static str },
     /// One line is wrong.
-    #[error("{file}, line {line}: {problem}", file = file.display())]
+    #[error("{file}, line {line}: {problem}")]
     Line { file: PathBuf, line: usize, problem: LineProblem },
     /// No triangle left.
     #[error(
         "{file}: the mesh is empty: found {vertices} vertices and {faces} faces of three corners or more, and in them no \
-         triangle of three different vertices; expected at least one",
-        file = file.display()
+         triangle of three different vertices; expected at least one"
     )]
     Empty { file: PathBuf, vertices: usize, faces: usize },
     /// No group of that name.
-    #[error("{file}: no group \"{asked}\"; {there_are}", file = file.display(), there_are = list(available))]
+    #[error("{file}: no group \"{asked}\"; {there_are}", there_are = list(available))]
     UnknownGroup { file: PathBuf, asked: String, available: Vec<String> },
     /// Not a unit.
     #[error("unknown unit \"{found}\"; expected one of m, dm, cm, mm, in, ft")]
@@ -37,36 +37,29 @@ pub enum MeshError {
     /// No unit makes this a body.
     #[error(
         "{file}: the unit cannot be guessed: the body is {height} units tall, which is between 0.5 and 2.5 m in none of \
-         m, dm, cm and mm; name it with --unit (and --up)",
-        file = file.display()
+         m, dm, cm and mm; name it with --unit (and --up)"
     )]
     UnknownScale { file: PathBuf, height: f64 },
     /// No frame puts the garment near the body.
     #[error(
         "{file}: no unit and up axis puts this garment around the body; name them with --unit and --up, or place the \
-         garment around the body",
-        file = file.display()
+         garment around the body"
     )]
     NoFrame { file: PathBuf },
-    /// The garment is elsewhere.
-    #[error(
-        "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
-         the same unit, up axis and place (--unit, --up)?"
-    )]
-    NotNear { nearest: f64, limit: f64 },
     /// The body has holes.
     #[error(
         "{file}: the body is not closed: {edges} boundary edges in {loops} loops, the first at vertices {a} and {b} of \
          the file; expected a closed surface, which alone has an inside. {hint}Fill the holes, or take --open-body to go by \
-         the normals alone",
-        file = file.display()
+         the normals alone"
     )]
     BodyOpen { file: PathBuf, edges: usize, loops: usize, a: usize, b: usize, hint: String },
     /// Two meshes that should correspond do not.
-    #[error("{file}: not the topology of {other}: {difference}; expected the same vertices and faces in the same order", file = file.display(), other = other.display())]
+    #[error(
+        "{file}: not the topology of {other}: {difference}; expected the same vertices and faces in the same order"
+    )]
     OtherTopology { file: PathBuf, other: PathBuf, difference: String },
     /// A file cannot be written.
-    #[error("{file}: cannot be written: {reason}; nothing was left behind", file = file.display())]
+    #[error("{file}: cannot be written: {reason}; nothing was left behind")]
     Unwritable { file: PathBuf, reason: String },
     /// Positions for another mesh.
     #[error("{found} positions for a mesh of {expected} vertices; pass one position a vertex")]

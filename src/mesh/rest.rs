@@ -68,9 +68,6 @@ pub struct RestShape {
 
 impl RestShape {
     /// The mesh as it stands, at rest: own edges, warp along gravity.
-    ///
-    /// # Errors
-    /// [`RestError::NoArea`].
     pub fn from_edges(mesh: &TriMesh) -> Result<Self, RestError> {
         Self { corners: (0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect() }.checked()
     }

@@ -3,6 +3,9 @@
 use super::{GapRule, Level};
 use crate::files::Unreadable;
 
+/// What a table without rows lacks.
+pub(super) const EXPECTED_ROWS: &str = "at least one row [lower, upper]; [[0, inf]] makes the garment one level";
+
 /// A range table that cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
@@ -19,38 +22,30 @@ pub enum TableError {
          \"own-level\" | \"error\" and levels = [[lower, upper], ...], with an extent as a third number where wanted, or its width and height as a third and fourth"
     )]
     Syntax { place: String, message: String },
-    /// A unit other than the only one there is.
-    #[error("{place}: found unit = \"{found}\", expected unit = \"cm\"; convert the bounds to centimetres")]
-    Unit { place: String, found: String },
-    /// An unknown gap rule.
-    #[error(
-        "{place}: found gap = \"{found}\", expected \"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose who \
-         takes the distances between two rows that do not meet"
-    )]
-    Gap { place: String, found: String },
-    /// No rows.
-    #[error(
-        "{place}: found no levels, expected at least one row [lower, upper]; [[0, inf]] makes the garment one level"
-    )]
-    Empty { place: String },
-    /// A row that is not two to four numbers.
-    #[error(
-        "{place}: row {row} has {found} numbers, expected [lower, upper], [lower, upper, extent] or [lower, upper, width, height]; an \
-         open last row is [lower, inf]"
-    )]
-    RowLength { place: String, row: usize, found: usize },
     /// A row whose bounds make no sense, alone or after the row before.
     #[error("{place}: row {row} {problem}")]
     Row { place: String, row: usize, problem: BoundProblem },
-    /// Parameters that make no table.
+    /// A key's value, or a parameter, that makes no table.
     #[error("{what}: found {found}, expected {expected}")]
-    Family { what: &'static str, found: String, expected: &'static str },
+    Value { what: String, found: String, expected: &'static str },
+}
+
+impl TableError {
+    pub(super) fn value(what: impl Into<String>, found: impl ToString, expected: &'static str) -> Self {
+        Self::Value { what: what.into(), found: found.to_string(), expected }
+    }
 }
 
 /// What is wrong with the bounds of one row (cm).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum BoundProblem {
+    /// A row that is not two to four numbers.
+    #[error(
+        "has {0} numbers, expected [lower, upper], [lower, upper, extent] or [lower, upper, width, height]; an open last \
+         row is [lower, inf]"
+    )]
+    Length(usize),
     /// NaN.
     #[error("is [{0}, {1}], expected two numbers; write the bounds in centimetres")]
     NotANumber(f64, f64),

@@ -6,6 +6,8 @@
 //!
 //! Limits: a colour outside sRGB is clipped channel by channel.
 
+use crate::quantile::nearest_rank;
+
 /// An sRGB colour.
 pub type Rgb = [u8; 3];
 
@@ -87,10 +89,8 @@ impl Range {
     /// outliers (a PART of one vertex, say) would else press all others into the first colour.
     #[must_use]
     pub fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
-        let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
-        finite.sort_unstable_by(f64::total_cmp);
-        let at = ((finite.len() as f64 * share).ceil() as usize).clamp(1, finite.len().max(1)) - 1;
-        Self { low: 0.0, high: round_up(finite.get(at).copied().unwrap_or(0.0)) }
+        let finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+        Self { low: 0.0, high: round_up(nearest_rank(&finite, share)) }
     }
 
     /// Where `value` lies: 0 at the low end, 1 at the high end.

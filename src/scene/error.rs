@@ -42,6 +42,12 @@ pub enum SceneError {
     /// Measurements, given as numbers, that make no body.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
+    /// The garment is elsewhere.
+    #[error(
+        "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
+         the same unit, up axis and place (--unit, --up)?"
+    )]
+    NotNear { nearest: f64, limit: f64 },
     /// Nothing to hold.
     #[error("--hold top: the garment has no edge to hold")]
     NoEdge,

@@ -37,9 +37,6 @@ pub struct DressForm {
 
 impl DressForm {
     /// The solid whose girths are those of `spec`.
-    ///
-    /// # Errors
-    /// [`ShapeError`] where `spec` is no body.
     pub fn new(spec: &BodySpec) -> Result<Self, ShapeError> {
         let measures = spec.measures()?;
         let factors: Factors = fit(&measures, &[1.0; 11]);
@@ -149,9 +146,6 @@ fn onto(solid: &dyn Solid, mut p: DVec3) -> DVec3 {
 }
 
 /// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
-///
-/// # Errors
-/// [`ShapeError`] where the measurements are no body.
 pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
     DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
 }

@@ -1,12 +1,9 @@
 //! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of
 //! these: it is a row.
 
+use std::error::Error;
 use std::io;
-use std::path::PathBuf;
-
-use crate::fabric::FabricError;
-use crate::range_table::TableError;
-use crate::shapes::ShapeError;
+use std::path::{Path, PathBuf};
 
 /// A sweep file that cannot be used. The user can mend all of these.
 #[derive(Debug, thiserror::Error)]
@@ -24,15 +21,9 @@ pub enum PlanError {
     /// A value that will not do.
     #[error("{place}: {key}: found {found}, expected {expected}")]
     Value { place: String, key: &'static str, found: String, expected: String },
-    /// A range table that cannot be read or made.
-    #[error("{place}: table: {source}")]
-    Table { place: String, source: TableError },
-    /// A fabric that cannot be read.
-    #[error("{place}: fabric: {source}")]
-    Fabric { place: String, source: FabricError },
-    /// Measurements that make no body, or a garment that is not there.
+    /// A range table, fabric, body or garment that cannot be read or made.
     #[error("{place}: {key}: {source}")]
-    Shape { place: String, key: &'static str, source: ShapeError },
+    Input { place: String, key: &'static str, source: Box<dyn Error + Send + Sync> },
     /// Nothing to do.
     #[error(
         "{name}: found no points, expected [grid] or at least one [[points]]; an empty [grid] is one point of [base]"
@@ -44,6 +35,13 @@ pub enum PlanError {
     /// A shard that is none.
     #[error("shard: found \"{found}\", expected i/n with 1 <= i <= n, for example 2/3")]
     Shard { found: String },
+}
+
+impl PlanError {
+    /// What to make of an error about the input that `key` names at `place`.
+    pub(super) fn input<E: Error + Send + Sync + 'static>(place: &str, key: &'static str) -> impl FnOnce(E) -> Self {
+        move |source| Self::Input { place: place.to_owned(), key, source: Box::new(source) }
+    }
 }
 
 /// Rows on disk that cannot be read, written or gone on with.
@@ -84,6 +82,13 @@ pub enum StoreError {
     /// No sweep there.
     #[error("{path}: found no sweep, expected a folder that `partwise sweep` wrote")]
     Missing { path: PathBuf },
+}
+
+impl StoreError {
+    /// What to make of a system's error at `path`.
+    pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { path: path.to_owned(), doing, source }
+    }
 }
 
 /// Shards that cannot be joined.

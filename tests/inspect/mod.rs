@@ -9,7 +9,7 @@ use std::path::Path;
 use rerun::{ChunkStore, ChunkStoreConfig};
 
 /// What lies at one entity path.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Entity {
     /// Names of its components (`Mesh3D:vertex_positions`).
     pub components: BTreeSet<String>,
@@ -22,7 +22,7 @@ pub struct Entity {
 }
 
 /// The contents of an `.rrd` file.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Contents {
     /// What lies at each path of the recording.
     pub entities: BTreeMap<String, Entity>,

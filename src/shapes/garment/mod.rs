@@ -60,17 +60,11 @@ impl Surface for Cut<'_> {
 }
 
 /// The garment `spec` around the form of `body`, with `vertices` of them if that is given.
-///
-/// # Errors
-/// [`ShapeError`] where either spec makes no shape, or the number of vertices is out of range.
 pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<Garment, ShapeError> {
     garment_on(spec, &DressForm::new(body)?, vertices)
 }
 
 /// [`garment`] around a form that is made already.
-///
-/// # Errors
-/// [`ShapeError`] where `spec` makes no shape, or the number of vertices is out of range.
 pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<Garment, ShapeError> {
     spec.check()?;
     let cloth = Cloth::new(spec, form);
