@@ -58,12 +58,11 @@ pub struct SurfacePoint {
 pub struct Body {
     mesh: TriMesh,
     shape: ParryMesh,
-    closed: bool,
 }
 
 impl std::fmt::Debug for Body {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Body").field("triangles", &self.shape.num_triangles()).field("closed", &self.closed).finish()
+        f.debug_struct("Body").field("triangles", &self.shape.num_triangles()).finish_non_exhaustive()
     }
 }
 
@@ -75,35 +74,25 @@ impl Body {
         if let Some((&[a, b], _)) = open.next() {
             return Err(DistanceError::Open { count: open.count() + 1, a, b });
         }
-        Self::build(mesh, true)
+        Self::new_open(mesh)
     }
 
     /// Builds the hierarchy over any surface; inside and outside are told by the normals alone, which is right near the
     /// surface and unreliable beyond its edges.
     pub fn new_open(mesh: &TriMesh) -> Result<Self, DistanceError> {
-        Self::build(mesh, false)
-    }
-
-    fn build(mesh: &TriMesh, closed: bool) -> Result<Self, DistanceError> {
         if mesh.triangles.is_empty() {
             return Err(DistanceError::Empty);
         }
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
         let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: mesh.clone(), shape, closed })
+        Ok(Self { mesh: mesh.clone(), shape })
     }
 
     /// The surface, m.
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
-    }
-
-    /// Whether the surface was checked to be closed.
-    #[must_use]
-    pub fn is_closed(&self) -> bool {
-        self.closed
     }
 
     /// The nearest surface point to a finite `x`.

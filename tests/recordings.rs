@@ -309,7 +309,6 @@ fn any_recording_is_served_and_what_is_none_is_refused() {
     let path = folder.file("viewed.rrd");
     record_one(&path, 1);
     let served = web::serve_file(&path, None, None).unwrap();
-    assert!(served.messages() > 20);
     assert!(get(served.url()).contains("200 OK"));
     for (name, content) in [("text.rrd", "not a recording"), ("empty.rrd", "")] {
         let other = folder.file(name);

@@ -150,12 +150,6 @@ impl ReferenceCache {
         Some(Self::new(folders.cache_dir().join("references")))
     }
 
-    /// Where the references are.
-    #[must_use]
-    pub fn directory(&self) -> &Path {
-        &self.directory
-    }
-
     /// The reference of `key` for a garment of `vertices`: from disk, or else computed and kept.
     ///
     /// # Errors

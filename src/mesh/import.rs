@@ -240,7 +240,6 @@ fn build(
         frame,
         corners: scan.corners,
         faces,
-        names: scan.names,
         statements: scan.statements,
         positions: scan.positions,
         textures: scan.textures,

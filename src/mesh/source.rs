@@ -21,8 +21,6 @@ pub struct ObjSource {
     pub corners: Vec<Corner>,
     /// The faces of three corners and more; of the chosen group where one was chosen.
     pub faces: Vec<Face>,
-    /// Names of groups and objects.
-    pub names: Vec<String>,
     /// Grouping and material lines, each with the number of the face it stands before.
     pub statements: Vec<(u32, String)>,
     /// Positions by file vertex, in the file's frame.

@@ -14,40 +14,9 @@ use super::limbs::{arm, leg};
 use super::measures::Measures;
 use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
-/// Correction of each girth's radius, 1 to begin with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "named as the girths they correct")]
-pub struct Factors {
-    pub bust: f64,
-    pub underbust: f64,
-    pub waist: f64,
-    pub hip: f64,
-    pub neck: f64,
-    pub thigh: f64,
-    pub knee: f64,
-    pub calf: f64,
-    pub ankle: f64,
-    pub biceps: f64,
-    pub wrist: f64,
-}
-
-impl Default for Factors {
-    fn default() -> Self {
-        Self {
-            bust: 1.0,
-            underbust: 1.0,
-            waist: 1.0,
-            hip: 1.0,
-            neck: 1.0,
-            thigh: 1.0,
-            knee: 1.0,
-            calf: 1.0,
-            ankle: 1.0,
-            biceps: 1.0,
-            wrist: 1.0,
-        }
-    }
-}
+/// Correction of each girth's radius, 1 to begin with, in the order of [`girth_marks`](super::fitting::girth_marks): bust,
+/// underbust, waist, hip, neck, thigh, knee, calf, ankle, biceps, wrist.
+pub type Factors = [f64; 11];
 
 /// The parts of the figure. Limbs are the left ones; the right ones are their mirror images.
 #[derive(Debug, Clone)]
@@ -88,8 +57,9 @@ impl Anatomy {
     #[must_use]
     pub fn new(m: &Measures, f: &Factors) -> Self {
         let k = m.scale();
-        let hip = radius(m.hip, f.hip);
-        let bust = radius(m.bust, f.bust);
+        let [of_bust, _, _, of_hip, ..] = *f;
+        let hip = radius(m.hip, of_hip);
+        let bust = radius(m.bust, of_bust);
         let (trunk, chest_front) = trunk(m, f);
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
@@ -197,13 +167,14 @@ impl Solid for Anatomy {
 
 fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let k = m.scale();
-    let hip = radius(m.hip, f.hip);
-    let waist = radius(m.waist, f.waist);
-    let under = radius(m.underbust, f.underbust);
-    let bust = radius(m.bust, f.bust);
+    let [of_bust, of_underbust, of_waist, of_hip, of_neck, ..] = *f;
+    let hip = radius(m.hip, of_hip);
+    let waist = radius(m.waist, of_waist);
+    let under = radius(m.underbust, of_underbust);
+    let bust = radius(m.bust, of_bust);
     let chest = mix(under, bust, 0.5);
     let shoulder = shoulder_half(m);
-    let neck = radius(m.neck, f.neck);
+    let neck = radius(m.neck, of_neck);
     let under_z = underbust_height(m);
     let rise = m.acromion - m.axilla;
     let top = m.cervicale - 0.018 * k;
@@ -243,7 +214,7 @@ pub(super) fn shoulder_half(m: &Measures) -> f64 {
 
 fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let k = m.scale();
-    let r = radius(m.neck, f.neck);
+    let r = radius(m.neck, f[4]);
     let lean: f64 = 0.24;
     let axes = [DVec3::X, DVec3::new(0.0, lean.cos(), lean.sin()), DVec3::new(0.0, -lean.sin(), lean.cos())];
     let ring = |share: f64| [0.0, 0.0, 0.97 * share * r, 1.03 * share * r, 1.03 * share * r];

@@ -92,12 +92,6 @@ impl Jet {
     pub fn smooth_max(self, other: Self, k: f64) -> Self {
         -(-self).smooth_min(-other, k)
     }
-
-    /// The larger of the two.
-    #[must_use]
-    pub fn max(self, other: Self) -> Self {
-        if self.value >= other.value { self } else { other }
-    }
 }
 
 impl Add for Jet {

@@ -105,12 +105,6 @@ impl Store {
         &self.manifest
     }
 
-    /// The folder.
-    #[must_use]
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
     /// The rows so far, in the order in which they were written.
     #[must_use]
     pub fn rows(&self) -> &[Row] {

@@ -10,30 +10,30 @@ use rerun::{ChunkStore, ChunkStoreConfig};
 
 /// What lies at one entity path.
 #[derive(Debug, Default, PartialEq)]
-pub struct Entity {
+pub(crate) struct Entity {
     /// Names of its components (`Mesh3D:vertex_positions`).
-    pub components: BTreeSet<String>,
+    pub(crate) components: BTreeSet<String>,
     /// Timelines it has rows on; none where all is static.
-    pub timelines: BTreeSet<String>,
+    pub(crate) timelines: BTreeSet<String>,
     /// Rows with a time.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Rows without: logged once for all.
-    pub fixed_rows: usize,
+    pub(crate) fixed_rows: usize,
 }
 
 /// The contents of an `.rrd` file.
 #[derive(Debug, Default, PartialEq)]
-pub struct Contents {
+pub(crate) struct Contents {
     /// What lies at each path of the recording.
-    pub entities: BTreeMap<String, Entity>,
+    pub(crate) entities: BTreeMap<String, Entity>,
     /// Paths of the blueprint.
-    pub blueprint: BTreeSet<String>,
+    pub(crate) blueprint: BTreeSet<String>,
     /// Recordings in the file.
-    pub recordings: usize,
+    pub(crate) recordings: usize,
 }
 
 /// Reads a recording.
-pub fn read(path: &Path) -> Contents {
+pub(crate) fn read(path: &Path) -> Contents {
     let mut file = File::open(path).unwrap();
     let stores = ChunkStore::from_rrd_reader(&ChunkStoreConfig::ALL_DISABLED, &mut file).unwrap();
     let mut contents = Contents::default();
