@@ -19,7 +19,7 @@ mod remesh;
 pub mod solid;
 
 pub use body::dress_form;
-pub use garment::{BUILT_IN, Garment, GarmentRequest, GarmentSpec, garment};
+pub use garment::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment, garment};
 pub use measures::BodySpec;
 pub use remesh::Density;
 

@@ -32,7 +32,7 @@ const LIMITS: [usize; 2] = [400, 1_000_000];
 
 /// A garment around the form, not yet draped.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Garment {
+pub struct PlacedGarment {
     /// Its name.
     pub name: String,
     /// The mesh, m, in groups: `hem`, `neckline`, `waistband`, `cuffs`, `armholes` along the openings, else `body` or
@@ -60,12 +60,12 @@ impl Surface for Cut<'_> {
 }
 
 /// The garment `spec` around the form of `body`, with `vertices` of them if that is given.
-pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<Garment, ShapeError> {
+pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     garment_on(spec, &DressForm::new(body)?, vertices)
 }
 
 /// [`garment`] around a form that is made already.
-pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<Garment, ShapeError> {
+pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     spec.check()?;
     let cloth = Cloth::new(spec, form);
     if cloth.hem < 0.05 {
@@ -125,7 +125,7 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
     );
     let waistband = openings.iter().position(|o| matches!(o, Opening::Waistband(_))).map(|i| i as u8 + 1);
     let held = (0..tags.len() as u32).filter(|&v| Some(tags[v as usize]) == waistband).collect();
-    Ok(Garment { name: spec.name.clone(), mesh, rest: RestShape { corners }, held })
+    Ok(PlacedGarment { name: spec.name.clone(), mesh, rest: RestShape { corners }, held })
 }
 
 /// Where a skirt's fullness begins, m: at the waist, or at a dress's hip.
