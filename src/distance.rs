@@ -70,8 +70,8 @@ impl Body {
     /// Builds the hierarchy over a closed surface.
     pub fn new(mesh: &TriMesh) -> Result<Self, DistanceError> {
         let topology = Topology::new(mesh);
-        let mut open = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1);
-        if let Some((&[a, b], _)) = open.next() {
+        let mut open = topology.boundary_edges();
+        if let Some([a, b]) = open.next() {
             return Err(DistanceError::Open { count: open.count() + 1, a, b });
         }
         Self::new_open(mesh)

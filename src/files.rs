@@ -23,6 +23,17 @@ pub fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
+/// Names in a sentence, the first twenty of many.
+#[must_use]
+pub fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    let shown = names[..names.len().min(SHOWN)].join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String, Unreadable> {
     std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })

@@ -17,6 +17,13 @@ pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// A hash of `value` by its bytes, for use as a name.
+#[must_use]
+pub fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
+    // Plain data to memory does not fail; if it did, whatever bears the name would be found not to match.
+    blake3::hash(&postcard::to_extend(value, kind.to_vec()).unwrap_or_default())
+}
+
 /// The value of sealed bytes, if they are whole and of this kind.
 #[must_use]
 pub fn open<T: DeserializeOwned>(kind: &Kind, bytes: &[u8]) -> Option<T> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::files::Unreadable;
+use crate::files::{Unreadable, listed};
 
 /// Why a mesh was refused.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +26,7 @@ pub enum MeshError {
     )]
     Empty { file: PathBuf, vertices: usize, faces: usize },
     /// No group of that name.
-    #[error("{file}: no group \"{asked}\"; {there_are}", there_are = list(available))]
+    #[error("{file}: no group \"{asked}\"; {there_are}", there_are = there_are(available))]
     UnknownGroup { file: PathBuf, asked: String, available: Vec<String> },
     /// Not a unit.
     #[error("unknown unit \"{found}\"; expected one of m, dm, cm, mm, in, ft")]
@@ -129,15 +129,6 @@ fn range(there_are: usize, so_far: usize, of: Keyword) -> String {
     }
 }
 
-/// The groups of a file in a sentence; the first twenty of many.
-fn list(names: &[String]) -> String {
-    const SHOWN: usize = 20;
-    if names.is_empty() {
-        return "the file has no groups".to_owned();
-    }
-    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    match names.len() - names.len().min(SHOWN) {
-        0 => format!("there are: {shown}"),
-        more => format!("there are: {shown} and {more} more"),
-    }
+fn there_are(groups: &[String]) -> String {
+    if groups.is_empty() { "the file has no groups".to_owned() } else { format!("there are: {}", listed(groups)) }
 }

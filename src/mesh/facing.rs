@@ -29,7 +29,7 @@ impl Imported {
         let loops = topology.boundary_loops();
         let report = &mut self.report;
         report.components = topology.components().1;
-        report.boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+        report.boundary_edges = topology.boundary_edges().count();
         report.boundary_loops = loops.len();
         if turned.to_agree > 0 {
             report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });

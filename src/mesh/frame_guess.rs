@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use super::bounds;
 use super::frame::{Axis, Frame, Unit};
 
 /// The tallest and the smallest body the guess believes in, m: a toddler's torso form to a tall adult in heels.
@@ -96,11 +97,6 @@ fn lopsidedness(raw: &[DVec3], axis: usize, lo: DVec3, hi: DVec3) -> f64 {
     heights.sort_unstable_by(f64::total_cmp);
     let unlike: f64 = heights.iter().zip(heights.iter().rev()).map(|(up, down)| ((up - lo) - (hi - down)).abs()).sum();
     if hi > lo { unlike / ((hi - lo) * heights.len() as f64) } else { 0.0 }
-}
-
-fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    let first = *points.first()?;
-    Some(points.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
 }
 
 /// Shared volume over united volume of two boxes; thin boxes are thickened to a millimetre.

@@ -24,9 +24,7 @@ pub(super) struct Findings {
 impl Findings {
     pub(super) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let mut boundary = vec![0u32; mesh.vertex_count()];
-        for (edge, _) in topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1) {
-            edge.iter().for_each(|&v| boundary[v as usize] += 1);
-        }
+        topology.boundary_edges().flatten().for_each(|v| boundary[v as usize] += 1);
         let no_area = |&t: &usize| {
             let [a, b, c] = mesh.corners(t);
             let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
@@ -81,7 +79,7 @@ pub fn health(mesh: &TriMesh) -> Health {
     let topology = Topology::new(mesh);
     let findings = Findings::new(mesh, &topology);
     let (component, components) = topology.components();
-    let boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+    let boundary_edges = topology.boundary_edges().count();
     let closed = boundary_edges == 0 && !mesh.triangles.is_empty();
     let length = |&[a, b]: &[u32; 2]| mesh.positions[a as usize].distance(mesh.positions[b as usize]);
     let angles: Vec<f64> = (0..mesh.triangles.len()).map(|t| min_angle(mesh, t)).collect();

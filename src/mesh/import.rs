@@ -104,9 +104,8 @@ pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, Mes
     let mut imported = build(file, scan, faces, frame, options)?;
     face_outward(&mut imported);
     let topology = Topology::new(&imported.mesh);
-    let open: Vec<_> = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1).collect();
-    if let Some(&(&[a, b], _)) = open.first() {
-        let (edges, loops) = (open.len(), imported.report.boundary_loops);
+    if let Some([a, b]) = topology.boundary_edges().next() {
+        let (edges, loops) = (imported.report.boundary_edges, imported.report.boundary_loops);
         if !options.open_body {
             let number = imported.source.file_vertices();
             let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
@@ -183,7 +182,7 @@ fn chosen_faces(file: &Path, scan: &Scan, options: &ImportOptions) -> Result<Vec
 fn used_positions(scan: &Scan, faces: &[Face]) -> Vec<DVec3> {
     let mut used = vec![false; scan.positions.len()];
     for face in faces {
-        for corner in &scan.corners[face.first as usize..(face.first + face.count) as usize] {
+        for corner in face.among(&scan.corners) {
             used[corner.vertex as usize] = true;
         }
     }

@@ -105,8 +105,7 @@ impl TriMesh {
     /// Smallest and largest coordinate along each axis, m; `None` for a mesh without vertices.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
+        bounds(&self.positions)
     }
 
     /// The same triangles and groups at other positions.
@@ -115,4 +114,10 @@ impl TriMesh {
         debug_assert_eq!(positions.len(), self.positions.len());
         Self { positions, ..self.clone() }
     }
+}
+
+/// Smallest and largest coordinate of some points along each axis; `None` for no points.
+fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
+    let first = *points.first()?;
+    Some(points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p))))
 }

@@ -35,7 +35,7 @@ impl ObjSource {
     /// The corners of one face.
     #[must_use]
     pub fn corners_of(&self, face: &Face) -> &[Corner] {
-        &self.corners[face.first as usize..(face.first + face.count) as usize]
+        face.among(&self.corners)
     }
 
     /// The file vertex, from 0, of each mesh vertex: the first of those welded into it.

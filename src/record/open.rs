@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
-use super::blueprint::layout::Layout;
+use super::blueprint::layout::{Layout, Tab};
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
@@ -81,6 +81,11 @@ impl Open {
     /// What the recording holds, and how large its views are.
     pub(super) fn layout(&self) -> &Layout {
         &self.options.layout
+    }
+
+    /// Length of a pixel under the garment in the views of a tab, m.
+    pub(super) fn pixel_m(&self, tab: Tab) -> f64 {
+        self.layout().pixel_m(tab, &self.eye)
     }
 
     /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from

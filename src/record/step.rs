@@ -12,7 +12,7 @@ use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
 use super::panel::Panel;
-use super::{Open, levels, paths};
+use super::{Open, Tab, levels, paths};
 use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
 
@@ -113,7 +113,7 @@ fn distance(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
     let open_end = cm.iter().any(|&d| d > range.high);
     let legend = Legend { title: "distance", unit: "cm", map, range, open_end };
-    legend.log(open, paths::DISTANCE_LEGEND, open.layout().stage_pixel_m(&open.eye))
+    legend.log(open, paths::DISTANCE_LEGEND, open.pixel_m(Tab::Stages))
 }
 
 fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
@@ -140,7 +140,7 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log(paths::FORCE, &mesh)?;
     let open_end = magnitude.iter().any(|&f| f > range.high);
     let legend = Legend { title: "|F|", unit, map, range, open_end };
-    legend.log(open, paths::FORCE_LEGEND, open.layout().stage_pixel_m(&open.eye))?;
+    legend.log(open, paths::FORCE_LEGEND, open.pixel_m(Tab::Stages))?;
     arrows(open, step, range.high / factor)
 }
 
@@ -188,12 +188,11 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
-    let layout = open.layout();
     for overlay in step.overlays {
         let (branch, pixel_m) = if overlay.name == "error" {
-            (paths::ERROR.to_owned(), layout.stage_pixel_m(&open.eye))
+            (paths::ERROR.to_owned(), open.pixel_m(Tab::Stages))
         } else {
-            (format!("{}/{}", paths::FIT, overlay.name), layout.fit_pixel_m(&open.eye))
+            (format!("{}/{}", paths::FIT, overlay.name), open.pixel_m(Tab::Fit))
         };
         self::overlay(open, &branch, &draped, overlay, pixel_m)?;
     }

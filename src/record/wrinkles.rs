@@ -12,7 +12,7 @@ use super::legend::Legend;
 use super::meshes::{self, single};
 use super::open::Open;
 use super::step::{Overlay, QUANTILE, overlay};
-use super::{colours, paths};
+use super::{Tab, colours, paths};
 use crate::mesh::TriMesh;
 
 /// The seams lie this far above the cloth, m: in it they would be half hidden.
@@ -38,7 +38,7 @@ pub(super) fn log(open: &Open, view: &WrinkleView<'_>) -> Result<(), RecordError
     RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let draped = open.garment.with_positions(view.draped.to_vec());
     open.at(view.index, 6);
-    let pixel_m = open.layout().wrinkle_pixel_m(&open.eye);
+    let pixel_m = open.pixel_m(Tab::Wrinkles);
     let curvature = Overlay { name: "mean curvature", unit: "1/m", values: view.curvature_per_m };
     overlay(open, paths::CURVATURE, &draped, &curvature, pixel_m)?;
 

@@ -1,7 +1,7 @@
 //! Why there is no scene. The user can mend all of these.
 
 use crate::distance::DistanceError;
-use crate::files::Unreadable;
+use crate::files::{Unreadable, listed};
 use crate::mesh::MeshError;
 use crate::mesh::rest::RestError;
 use crate::shapes::ShapeError;
@@ -69,13 +69,9 @@ impl SceneError {
     }
 }
 
-/// The groups to choose from, the first of many.
 fn or_one_of(groups: &[String]) -> String {
-    const SHOWN: usize = 20;
     if groups.is_empty() {
         return ", as its file has no groups (lines that begin with g or o)".to_owned();
     }
-    let shown = groups.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    let more = if groups.len() > SHOWN { format!(" and {} more", groups.len() - SHOWN) } else { String::new() };
-    format!(" or one of {shown}{more}")
+    format!(" or one of {}", listed(groups))
 }

@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::ShapeError;
 use super::body::DressForm;
 use super::contour::contour;
-use super::cut::{clip, onto_edge, onto_surface};
+use super::cut::{CLOSE, clip, onto_edge, onto_surface};
 use super::measures::BodySpec;
 use super::remesh::{Density, Surface, remesh};
 use crate::mesh::{RestShape, TriMesh};
@@ -54,7 +54,7 @@ impl Surface for Cut<'_> {
     fn project(&self, p: DVec3, tag: u8) -> DVec3 {
         match self.openings.get(usize::from(tag).wrapping_sub(1)) {
             Some(opening) => onto_edge(self.cloth, |p| opening.at(p), p),
-            None => onto_surface(self.cloth, p),
+            None => onto_surface(self.cloth, p, CLOSE),
         }
     }
 }
