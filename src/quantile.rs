@@ -28,20 +28,15 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// Six figures that stand for many: each the value at the nearest place of the sorted list.
+/// Six figures that stand for many, `p01` the first percentile: each the value at the nearest place of the sorted list.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct Percentiles {
-    /// The smallest.
     pub min: f64,
-    /// The 1st percentile.
     pub p01: f64,
-    /// The 5th percentile.
     pub p05: f64,
-    /// The median.
     pub p50: f64,
-    /// The 95th percentile.
     pub p95: f64,
-    /// The largest.
     pub max: f64,
 }
 

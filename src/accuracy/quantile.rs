@@ -7,18 +7,14 @@ use crate::quantile::nearest_rank;
 /// Millimetres in a metre.
 pub(crate) const MM_PER_M: f64 = 1e3;
 
-/// Distances between matching vertices of two drapes.
+/// Distances between matching vertices of two drapes; `p95` is the 95th percentile, by nearest rank.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct ErrorSummary {
-    /// How many vertices.
     pub vertices: usize,
-    /// Mean, mm.
     pub mean_mm: f64,
-    /// Root mean square, mm.
     pub rms_mm: f64,
-    /// 95th percentile, mm.
     pub p95_mm: f64,
-    /// Maximum, mm.
     pub max_mm: f64,
 }
 

@@ -36,7 +36,6 @@ struct Report {
 }
 
 impl CheckArgs {
-    /// Prints the report.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         // As they came: what push-out would mend is a finding here.
         let mut spec = SceneSpec { push_out: false, ..self.input.spec()? };

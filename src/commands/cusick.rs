@@ -28,7 +28,6 @@ pub(crate) struct CusickArgs {
 }
 
 impl CusickArgs {
-    /// Drapes and prints.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let names: Vec<&str> = match self.fabrics.as_slice() {
             [] => BUILT_IN.to_vec(),

@@ -87,7 +87,6 @@ struct Snapshot {
 const MESH_EVERY: usize = 8;
 
 impl RunArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;

@@ -40,18 +40,15 @@ impl Findings {
 
 /// A mesh in figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct Health {
-    /// Vertices.
     pub vertices: usize,
-    /// Triangles.
     pub triangles: usize,
-    /// Connected parts.
     pub components: usize,
     /// Edges with one triangle.
     pub boundary_edges: usize,
     /// Loops they form.
     pub boundary_loops: usize,
-    /// No boundary at all.
     pub closed: bool,
     /// Edges of three triangles and more.
     pub non_manifold_edges: usize,
@@ -59,17 +56,14 @@ pub struct Health {
     pub pinched_vertices: usize,
     /// Edges whose two triangles run the same way.
     pub disagreeing_edges: usize,
-    /// Triangles without area.
     pub no_area: usize,
     /// Pairs of triangles that cross, counted exactly.
     pub self_intersecting_pairs: usize,
-    /// Area, m².
     pub area_m2: f64,
     /// Enclosed volume, m³; of closed meshes alone.
     pub volume_m3: Option<f64>,
     /// Smallest angle of each triangle, degrees.
     pub min_angle_deg: Percentiles,
-    /// Edge lengths, m.
     pub edge_length_m: Percentiles,
 }
 

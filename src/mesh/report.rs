@@ -106,20 +106,16 @@ impl fmt::Display for Remark {
 
 /// What a mesh file holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct MeshReport {
-    /// The file.
     pub file: String,
     /// How its numbers were read.
     pub frame: Frame,
-    /// Vertices of the mesh.
     pub vertices: usize,
-    /// Triangles of the mesh.
     pub triangles: usize,
     /// Faces they came from.
     pub faces: usize,
-    /// Connected parts.
     pub components: usize,
-    /// Named groups.
     pub groups: usize,
     /// Edges with one triangle.
     pub boundary_edges: usize,

@@ -84,7 +84,6 @@ pub(crate) struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         if !(2..=MOST).contains(&self.tables.len()) {
             let found = self.tables.len();
