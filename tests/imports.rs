@@ -52,11 +52,38 @@ fn order() -> Vec<String> {
     list.split(|c: char| c.is_whitespace() || c == '→').filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
 
-/// The words that follow `prefix` in code, where it is no part of a longer word.
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// The words that follow `prefix` in code, where it is no part of a longer word; of a group in braces each first one.
 fn words_after<'a>(code: &'a str, prefix: &str) -> Vec<&'a str> {
-    let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let starts = code.match_indices(prefix).filter(|(at, _)| !code[..*at].ends_with(is_word));
-    starts.map(|(at, _)| code[at + prefix.len()..].split(|c| !is_word(c)).next().unwrap()).collect()
+    let word = |at: usize| code[at..].split(|c| !is_word(c)).next().unwrap();
+    let mut words = Vec::new();
+    for (at, _) in code.match_indices(prefix).filter(|(at, _)| !code[..*at].ends_with(is_word)) {
+        let at = at + prefix.len();
+        if !code[at..].starts_with('{') {
+            words.push(word(at));
+            continue;
+        }
+        let (mut depth, mut due) = (0, false);
+        for (offset, c) in code[at..].char_indices() {
+            match c {
+                '{' => (depth, due) = (depth + 1, depth == 0),
+                '}' => depth -= 1,
+                ',' => due = depth == 1,
+                c if due && is_word(c) => {
+                    words.push(word(at + offset));
+                    due = false;
+                }
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+    }
+    words
 }
 
 /// What a source of `module` imports that comes after it, or that nobody listed.
@@ -81,7 +108,9 @@ fn imports_run_one_way() {
     // A check that finds nothing wrong in what is wrong would be none.
     assert_eq!(offences(&order, "mesh", &code_of("use crate::distance::Body; // crate::mesh")), ["distance"]);
     assert_eq!(offences(&order, "scene", "use crate::mesh::TriMesh;\nlet x = crate::drape::drape();"), ["drape"]);
-    assert_eq!(offences(&order, "parts", "use crate::{mesh, parts};"), [""], "one path a line, or nobody can tell");
+    let group = "use crate::{drape, mesh::{Topology, TriMesh}, scene};";
+    assert_eq!(offences(&order, "parts", group), ["drape"]);
+    assert_eq!(offences(&order, "mesh", group), ["drape", "scene"]);
 }
 
 #[test]
