@@ -21,7 +21,7 @@ const TALL_ENOUGH: f64 = 0.8;
 ///
 /// # Errors
 /// The height found and the tallest axis, where no unit makes it a body's.
-pub fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
+pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Ok(Frame::given(unit, up));
     }
@@ -48,8 +48,12 @@ pub fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Resul
 
 /// Unit and up axis of a garment from its vertices as they stand in the file, where the body is known in metres, z up
 /// (a built-in one): the frame that puts the garment's box best onto the body's.
-#[must_use]
-pub fn guess_frame_around(raw: &[DVec3], body: (DVec3, DVec3), unit: Option<Unit>, up: Option<Axis>) -> Option<Frame> {
+pub(super) fn guess_frame_around(
+    raw: &[DVec3],
+    body: (DVec3, DVec3),
+    unit: Option<Unit>,
+    up: Option<Axis>,
+) -> Option<Frame> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Some(Frame::given(unit, up));
     }

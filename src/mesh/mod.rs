@@ -5,31 +5,31 @@
 //! triangles (barycentric area).
 
 mod draft;
-pub mod error;
+mod error;
 pub mod export;
 mod facing;
-pub mod frame;
-pub mod frame_guess;
+mod frame;
+mod frame_guess;
 pub mod health;
 pub mod import;
-pub mod polygon;
+mod polygon;
 pub mod report;
 pub mod rest;
 mod scan;
 pub mod self_intersection;
 mod source;
-pub mod topology;
-pub mod triangle_crossing;
-pub mod winding;
+mod topology;
+mod triangle_crossing;
+mod winding;
 
 use glam::DVec3;
 
-pub use error::MeshError;
+pub use error::{Keyword, LineProblem, MeshError};
 pub use frame::{Axis, Frame, Unit};
 pub use rest::RestShape;
 pub use scan::{Corner, Face};
 pub use source::ObjSource;
-pub use topology::Topology;
+pub use topology::{NONE, Topology};
 
 /// An indexed triangle mesh with optional named groups of triangles.
 #[derive(Debug, Clone, Default, PartialEq)]

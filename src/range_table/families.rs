@@ -109,8 +109,7 @@ impl RangeTable {
 
 /// At most `shares − 1` bounds (cm, ascending, distinct, above 0) between equal shares of the distances, each halfway between
 /// two neighbouring ones so that none lies on a bound.
-#[must_use]
-pub fn quantile_bounds_cm(distances_m: &[f64], shares: usize) -> Vec<f64> {
+pub(super) fn quantile_bounds_cm(distances_m: &[f64], shares: usize) -> Vec<f64> {
     let mut sorted: Vec<f64> = distances_m.iter().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let mut bounds = Vec::new();

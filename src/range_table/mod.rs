@@ -15,7 +15,7 @@
 
 mod error;
 mod extent;
-pub mod families;
+mod families;
 mod format;
 mod rule;
 

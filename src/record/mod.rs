@@ -3,12 +3,12 @@
 //! Results come in as plain meshes and slices; [`paths`] lists what a recording holds. Triangles are logged once, later
 //! steps send only what changed. Without a sink nothing is made: see [`Recorder::disabled`].
 
-pub mod blueprint;
-pub mod colour_map;
-pub mod colours;
-pub mod compare;
-pub mod error;
-pub mod eye;
+mod blueprint;
+mod colour_map;
+mod colours;
+mod compare;
+mod error;
+mod eye;
 mod folds;
 mod labels;
 mod legend;
@@ -17,14 +17,14 @@ mod meshes;
 mod native;
 mod open;
 mod page;
-pub mod panel;
+mod panel;
 pub mod paths;
 mod remote;
-pub mod scatter;
-pub mod sinks;
-pub mod step;
+mod scatter;
+mod sinks;
+mod step;
 pub mod web;
-pub mod wrinkles;
+mod wrinkles;
 mod writer;
 
 use std::path::PathBuf;
@@ -34,6 +34,7 @@ use glam::DVec3;
 use rerun::{Scalars, TextDocument};
 
 pub use blueprint::layout::{Layout, Tab};
+pub use colour_map::Range;
 pub use compare::Chosen;
 pub use error::RecordError;
 pub use folds::FoldView;

@@ -16,11 +16,11 @@ use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
 /// Correction of each girth's radius, 1 to begin with, in the order of [`girth_marks`](super::fitting::girth_marks): bust,
 /// underbust, waist, hip, neck, thigh, knee, calf, ankle, biceps, wrist.
-pub type Factors = [f64; 11];
+pub(super) type Factors = [f64; 11];
 
 /// The parts of the figure. Limbs are the left ones; the right ones are their mirror images.
 #[derive(Debug, Clone)]
-pub struct Anatomy {
+pub(super) struct Anatomy {
     /// From the crotch to the base of the neck.
     pub trunk: Sweep,
     /// The left breast.
@@ -54,8 +54,7 @@ pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
 
 impl Anatomy {
     /// The figure for these measurements, m, and corrections.
-    #[must_use]
-    pub fn new(m: &Measures, f: &Factors) -> Self {
+    pub(super) fn new(m: &Measures, f: &Factors) -> Self {
         let k = m.scale();
         let [of_bust, _, _, of_hip, ..] = *f;
         let hip = radius(m.hip, of_hip);
@@ -96,8 +95,7 @@ impl Anatomy {
     }
 
     /// Trunk, bust, seat and neck.
-    #[must_use]
-    pub fn torso(&self, p: DVec3) -> Jet {
+    pub(super) fn torso(&self, p: DVec3) -> Jet {
         let mut field = self.trunk.at(p);
         for side in [1.0, -1.0] {
             field = Sided::new(&self.breast, side).join(field, p, 0.075);
@@ -107,20 +105,17 @@ impl Anatomy {
     }
 
     /// The arm on the side of `p`.
-    #[must_use]
-    pub fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
+    pub(super) fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
         Sided::new(&self.arm, p.x)
     }
 
     /// Trunk, neck and legs.
-    #[must_use]
-    pub fn torso_and_legs(&self, p: DVec3) -> Jet {
+    pub(super) fn torso_and_legs(&self, p: DVec3) -> Jet {
         Legs(self).join(self.torso(p), p, 0.05)
     }
 
     /// Everything but the head.
-    #[must_use]
-    pub fn below_the_head(&self, p: DVec3) -> Jet {
+    pub(super) fn below_the_head(&self, p: DVec3) -> Jet {
         self.arm_at(p).join(self.torso_and_legs(p), p, 0.065)
     }
 }
@@ -199,8 +194,7 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
 }
 
 /// Height of the underbust girth, m: a third of the way from the bust to the waist.
-#[must_use]
-pub fn underbust_height(m: &Measures) -> f64 {
+pub(super) fn underbust_height(m: &Measures) -> f64 {
     mix(m.bust_height, m.waist_height, 0.36)
 }
 
@@ -231,19 +225,16 @@ fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
 }
 
 /// Height of the thigh girth, m: the first at which the legs are apart.
-#[must_use]
-pub fn thigh_height(m: &Measures) -> f64 {
+pub(super) fn thigh_height(m: &Measures) -> f64 {
     m.crotch - 0.035 * m.scale()
 }
 
 /// Height of the calf girth, m: the EU 38 column has none; 0.72 of the knee's is usual.
-#[must_use]
-pub fn calf_height(m: &Measures) -> f64 {
+pub(super) fn calf_height(m: &Measures) -> f64 {
     0.72 * m.knee_height
 }
 
 /// Height of the ankle girth, m, above the foot.
-#[must_use]
-pub fn ankle_height(m: &Measures) -> f64 {
+pub(super) fn ankle_height(m: &Measures) -> f64 {
     0.115 * m.scale()
 }

@@ -32,7 +32,7 @@ pub struct DressForm {
     /// Its measurements.
     pub measures: Measures,
     /// Its solid.
-    pub anatomy: Anatomy,
+    pub(super) anatomy: Anatomy,
 }
 
 impl DressForm {

@@ -29,8 +29,7 @@ pub struct GirthMark {
 }
 
 /// Every girth of the form, trunk first, then limbs downward; limbs are the left ones.
-#[must_use]
-pub fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
+pub(super) fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
     let across = |name, sweep: &Sweep, at: f64, normal, asked| {
         let plane = Plane { origin: sweep.centre(at), normal };
         GirthMark { name, plane, asked }
@@ -54,8 +53,7 @@ pub fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
 }
 
 /// The tape girth of a solid where `plane` cuts it around its origin, m.
-#[must_use]
-pub fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
+pub(super) fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
     let [u, v] = plane.axes();
     let points = (0..RAYS)
         .map(|i| {
@@ -67,8 +65,7 @@ pub fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
 }
 
 /// Distance from `origin`, inside, along `direction` to the surface, m.
-#[must_use]
-pub fn ray(solid: &dyn Solid, origin: DVec3, direction: DVec3, guess: f64) -> f64 {
+pub(super) fn ray(solid: &dyn Solid, origin: DVec3, direction: DVec3, guess: f64) -> f64 {
     let mut r = guess;
     // Newton with steps of at most a third of the guess, so that one bad slope does not throw it onto another limb.
     for _ in 0..40 {
@@ -84,8 +81,7 @@ pub fn ray(solid: &dyn Solid, origin: DVec3, direction: DVec3, guess: f64) -> f6
 }
 
 /// The factors at which the solid has the girths asked for, scaled by `bias` (1 for the solid's own girths).
-#[must_use]
-pub fn fit(m: &Measures, bias: &Factors) -> Factors {
+pub(super) fn fit(m: &Measures, bias: &Factors) -> Factors {
     let mut factors = [1.0; 11];
     for _ in 0..ROUNDS {
         let form = Anatomy::new(m, &factors);

@@ -1,22 +1,22 @@
 //! The built-in dress form and the five garments, made from measurements.
 //!
-//! [`body`] is the form, [`mod@garment`] the wardrobe, [`girth`] measures either. Both are solids given by a field ([`solid`], [`anatomy`]),
-//! contoured ([`contour`]) and remeshed to even triangles (`remesh`). Everything here is deterministic: the same spec gives
+//! [`body`] is the form, [`mod@garment`] the wardrobe, [`girth`] measures either. Both are solids given by a field (`solid`, `anatomy`),
+//! contoured (`contour`) and remeshed to even triangles (`remesh`). Everything here is deterministic: the same spec gives
 //! the same bits on any number of threads.
 
-pub mod anatomy;
+mod anatomy;
 pub mod body;
-pub mod contour;
+mod contour;
 mod cut;
-pub mod fitting;
+mod fitting;
 pub mod garment;
 pub mod girth;
-pub mod jet;
+mod jet;
 mod limbs;
-pub mod measures;
-pub mod profile;
+mod measures;
+mod profile;
 mod remesh;
-pub mod solid;
+mod solid;
 
 pub use body::dress_form;
 pub use garment::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment, garment};
