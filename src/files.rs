@@ -34,6 +34,12 @@ pub fn listed(names: &[String]) -> String {
     }
 }
 
+/// Line number, from 1, of a byte offset in a text.
+#[must_use]
+pub fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
+}
+
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String, Unreadable> {
     std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })

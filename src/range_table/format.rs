@@ -5,7 +5,7 @@ use toml::Spanned;
 
 use super::error::{EXPECTED_ROWS, first_problem};
 use super::{Extent, GapRule, Level, RangeTable, TableError};
-use crate::files::{names_a_file, read_text};
+use crate::files::{line_of, names_a_file, read_text};
 use crate::word::word;
 
 /// Table 3 as printed, inside the binary.
@@ -92,11 +92,6 @@ impl RangeTable {
         text.push_str("]\n");
         text
     }
-}
-
-/// Line number, from 1, of a byte offset.
-fn line_of(text: &str, offset: usize) -> usize {
-    1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
 }
 
 #[cfg(test)]
