@@ -20,8 +20,9 @@ pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
 /// A hash of `value` by its bytes, for use as a name.
 #[must_use]
 pub fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
-    // Plain data to memory does not fail; if it did, whatever bears the name would be found not to match.
-    blake3::hash(&postcard::to_extend(value, kind.to_vec()).unwrap_or_default())
+    // Plain data of known lengths, written to memory: there is nothing that could fail.
+    let bytes = postcard::to_extend(value, kind.to_vec()).unwrap_or_else(|e| unreachable!("{e}"));
+    blake3::hash(&bytes)
 }
 
 /// The value of sealed bytes, if they are whole and of this kind.
