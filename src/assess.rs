@@ -122,9 +122,6 @@ pub fn assess(
 
 /// The canonical drape of a scene alone, found or made, and what the user should know about it: what a range table can hold
 /// at best is measured on it.
-///
-/// # Errors
-/// As [`assess`].
 pub fn canonical(
     scene: &Scene,
     fabric: &Fabric,

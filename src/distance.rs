@@ -33,20 +33,14 @@ const ROUNDED: f64 = 1.0 + 1e-12;
 
 /// What can be wrong with a body.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum DistanceError {
     /// No triangle to be near to.
     #[error("the body has no triangles")]
     Empty,
     /// A boundary edge: the surface does not separate inside from outside.
     #[error("the body is not closed: {count} boundary edges, the first between vertices {a} and {b}")]
-    Open {
-        /// Number of edges with one triangle.
-        count: usize,
-        /// First vertex of the first such edge, from 0.
-        a: u32,
-        /// Its second vertex.
-        b: u32,
-    },
+    Open { count: usize, a: u32, b: u32 },
     /// The query structure refused the mesh.
     #[error("the body cannot be searched: {0}")]
     Refused(String),
@@ -70,58 +64,41 @@ pub struct SurfacePoint {
 pub struct Body {
     mesh: TriMesh,
     shape: ParryMesh,
-    closed: bool,
 }
 
 impl std::fmt::Debug for Body {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Body").field("triangles", &self.shape.num_triangles()).field("closed", &self.closed).finish()
+        f.debug_struct("Body").field("triangles", &self.shape.num_triangles()).finish_non_exhaustive()
     }
 }
 
 impl Body {
     /// Builds the hierarchy over a closed surface.
-    ///
-    /// # Errors
-    /// [`DistanceError::Empty`] without triangles, [`DistanceError::Open`] where an edge has only one.
     pub fn new(mesh: &TriMesh) -> Result<Self, DistanceError> {
         let topology = Topology::new(mesh);
-        let mut open = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1);
-        if let Some((&[a, b], _)) = open.next() {
+        let mut open = topology.boundary_edges();
+        if let Some([a, b]) = open.next() {
             return Err(DistanceError::Open { count: open.count() + 1, a, b });
         }
-        Self::build(mesh, true)
+        Self::new_open(mesh)
     }
 
     /// Builds the hierarchy over any surface; inside and outside are told by the normals alone, which is right near the
     /// surface and unreliable beyond its edges.
-    ///
-    /// # Errors
-    /// [`DistanceError::Empty`] without triangles.
     pub fn new_open(mesh: &TriMesh) -> Result<Self, DistanceError> {
-        Self::build(mesh, false)
-    }
-
-    fn build(mesh: &TriMesh, closed: bool) -> Result<Self, DistanceError> {
         if mesh.triangles.is_empty() {
             return Err(DistanceError::Empty);
         }
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
         let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: mesh.clone(), shape, closed })
+        Ok(Self { mesh: mesh.clone(), shape })
     }
 
     /// The surface, m.
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
-    }
-
-    /// Whether the surface was checked to be closed.
-    #[must_use]
-    pub fn is_closed(&self) -> bool {
-        self.closed
     }
 
     /// The nearest surface point to a finite `x`.

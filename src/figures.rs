@@ -9,6 +9,7 @@ use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
 use crate::drape::Drape;
 use crate::parts::Parts;
+use crate::quantile::nearest_rank;
 use crate::range_table::{Extent, METRES_PER_CM, RangeTable};
 use crate::scene::Scene;
 
@@ -143,7 +144,7 @@ impl Figures {
             level_part_count: drape.level_part_count,
             singletons: parts.singletons,
             contact_parts: drape.outcomes.iter().filter(|o| o.contact).count(),
-            folds_p95_percent: drape.folds.as_ref().map(|f| accuracy::quantile::percentile(&f.excess_percent, 0.95)),
+            folds_p95_percent: drape.folds.as_ref().map(|f| nearest_rank(&f.excess_percent, 0.95)),
             hole_vertices: parts.hole_vertices,
             unassigned_vertices: parts.unassigned,
             displacement_rms_mm: accuracy::rms_mm(&drape.positions, &scene.garment.positions),

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{path}: cannot be read: {reason}; check the path and its permissions")]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub struct Unreadable {
-    /// The file.
     pub path: PathBuf,
-    /// What the system said.
     pub reason: String,
 }
 
@@ -24,10 +23,24 @@ pub fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
+/// Names in a sentence, the first twenty of many.
+#[must_use]
+pub fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    let shown = names[..names.len().min(SHOWN)].join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
+/// Line number, from 1, of a byte offset in a text.
+#[must_use]
+pub fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
+}
+
 /// Reads a text file.
-///
-/// # Errors
-/// [`Unreadable`] names it.
 pub fn read_text(path: &Path) -> Result<String, Unreadable> {
     std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
 }

@@ -6,7 +6,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::accuracy::{self, reference::ReferenceCache, representable::representable};
 use crate::assess::{AssessError, AssessOptions, Assessment, assess, canonical, perturbed};
@@ -16,6 +17,7 @@ use crate::mechanics::refine::Observer;
 use crate::parts::representable_rms_m;
 use crate::range_table::TABLE_3;
 use crate::scene::{Scene, SceneSpec};
+use crate::word::word;
 
 /// What a drape is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -32,11 +34,7 @@ pub enum Against {
 
 impl fmt::Display for Against {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Canonical => "canonical",
-            Self::Own => "own",
-        })
+        self.serialize(f)
     }
 }
 
@@ -44,8 +42,7 @@ impl FromStr for Against {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = [Self::None, Self::Canonical, Self::Own].into_iter().find(|a| a.to_string() == text);
-        known.ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
+        word(text).ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
     }
 }
 
@@ -56,6 +53,7 @@ pub struct Job {
     /// What is draped over what.
     pub scene: SceneSpec,
     /// By which dials.
+    #[serde(deserialize_with = "checked")]
     pub settings: Settings,
     /// Seed of a start put on a little differently ([`perturbed`]); 0 is the undisturbed one.
     pub seed: u64,
@@ -64,6 +62,18 @@ pub struct Job {
     /// Canonical drapes from this many perturbed starts, for the spread between equilibria; where measured against its
     /// own.
     pub spread_starts: u64,
+}
+
+/// Settings whose extents can cut something: no range table checks those of the model.
+fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
+    let settings = Settings::deserialize(from)?;
+    let extents = settings.model.extents_cm();
+    let falls = extents.is_sorted_by(|a, b| a > b);
+    if falls && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
+        return Ok(settings);
+    }
+    let expected = "finite extents above 0, from coarse to fine, or none for PARTs as the table makes them";
+    Err(D::Error::custom(format!("settings.model: found extents of {extents:?} cm, expected {expected}")))
 }
 
 /// What was measured of a drape.
@@ -90,9 +100,6 @@ impl Job {
     }
 
     /// Drapes `scene`, which [`SceneSpec::load`] made of the job's own: points of a sweep share it.
-    ///
-    /// # Errors
-    /// As [`drape`].
     pub fn drape(&self, scene: &Scene, observer: Observer<'_>) -> Result<Drape, DrapeError> {
         if self.seed == 0 {
             return drape(scene, &self.settings, observer);
@@ -170,5 +177,22 @@ mod tests {
         assert_eq!((short.scene.body.as_str(), short.accuracy), ("form", Against::None));
         let said = serde_json::from_str::<Job>(r#"{"scene": {"colour": 3}}"#).unwrap_err().to_string();
         assert!(said.contains("colour"), "{said}");
+    }
+
+    #[test]
+    fn extents_that_cut_nothing_are_refused() {
+        let with = |extents: &str| {
+            let text = format!("[settings.model.coupled]\nextents_m = {extents}\n");
+            toml::from_str::<Job>(&text).map_err(|e| e.to_string())
+        };
+        assert_eq!(with("[0.12, 0.06]").unwrap().settings.model.extents_cm(), [12.0, 6.0]);
+        assert!(with("[]").is_ok());
+        for wrong in ["[-0.1]", "[nan]", "[0.0]", "[inf]", "[0.06, 0.12]", "[0.12, -0.06]"] {
+            let said = with(wrong).unwrap_err();
+            assert!(said.contains("above 0") && said.contains("coarse to fine"), "{wrong}: {said}");
+        }
+        let json = r#"{"settings": {"model": {"coupled": {"extents_m": [-0.06]}}}}"#;
+        let said = serde_json::from_str::<Job>(json).unwrap_err().to_string();
+        assert!(said.contains("-6"), "{said}");
     }
 }

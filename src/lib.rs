@@ -46,6 +46,7 @@ pub mod job;
 pub mod mechanics;
 pub mod mesh;
 pub mod parts;
+pub mod quantile;
 pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
@@ -55,6 +56,7 @@ pub mod shapes;
 pub mod sweep;
 pub mod table_search;
 pub mod whole_file;
+pub mod word;
 pub mod wrinkles;
 
 pub use drape::Settings;

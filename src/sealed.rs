@@ -10,14 +10,19 @@ use serde::de::DeserializeOwned;
 pub type Kind = [u8; 8];
 
 /// The bytes of `value`.
-///
-/// # Errors
-/// Only what a `Serialize` of its own fails with.
 pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
     let mut bytes = postcard::to_extend(value, kind.to_vec()).map_err(std::io::Error::other)?;
     let hash = blake3::hash(&bytes);
     bytes.extend(hash.as_bytes());
     Ok(bytes)
+}
+
+/// A hash of `value` by its bytes, for use as a name.
+#[must_use]
+pub fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
+    // Plain data of known lengths, written to memory: there is nothing that could fail.
+    let bytes = postcard::to_extend(value, kind.to_vec()).unwrap_or_else(|e| unreachable!("{e}"));
+    blake3::hash(&bytes)
 }
 
 /// The value of sealed bytes, if they are whole and of this kind.
@@ -40,17 +45,11 @@ pub mod points {
     use serde::{Deserialize, Deserializer, Serializer};
 
     /// As triples.
-    ///
-    /// # Errors
-    /// The serializer's.
     pub fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
         to.collect_seq(points.iter().map(DVec3::to_array))
     }
 
     /// From triples.
-    ///
-    /// # Errors
-    /// The deserializer's.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
         Ok(Vec::<[f64; 3]>::deserialize(from)?.into_iter().map(DVec3::from_array).collect())
     }

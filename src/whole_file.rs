@@ -118,7 +118,9 @@ fn place(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("it is a circle of symbolic links, expected a file name"))
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The folder a path lies in.
+#[must_use]
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod inspect;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use partwise::range_table::RangeTable;
-use partwise::record::inspect;
 use tempfile::TempDir;
 
 const SWEEP: &str = r#"
@@ -72,7 +73,7 @@ impl Bench {
     }
 
     fn recording(&self, folder: &str) -> inspect::Contents {
-        inspect::read(&self.path(folder).join("flared-skirt@400.rrd")).unwrap()
+        inspect::read(&self.path(folder).join("flared-skirt@400.rrd"))
     }
 }
 
@@ -181,7 +182,7 @@ fn compared_tables_tell_what_is_split_and_what_is_merged() {
     assert!(fine["split"].as_u64().unwrap() > 0 && fine["merged"] == 0, "{fine}");
     let counted: u64 = fine["per_level"].as_array().unwrap().iter().map(|l| l["parts"].as_u64().unwrap()).sum();
     assert_eq!(fine["level_part_count"], counted);
-    let contents = inspect::read(&bench.path("recordings/compare/flared-skirt@400.rrd")).unwrap();
+    let contents = inspect::read(&bench.path("recordings/compare/flared-skirt@400.rrd"));
     assert!(contents.entities.contains_key("/compare/1/garment"));
     let csv =
         bench.does(&[&common[..], &["--accuracy", "none", "--format", "csv", "--no-save", "--csv", "c.csv"]].concat());
@@ -243,7 +244,7 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     assert!(promised["ratio"].as_f64().unwrap() < 0.5, "{promised}");
     assert_eq!(fs::read_to_string(bench.path("t/verdicts.csv")).unwrap().lines().count(), 1 + 5);
     assert!(fs::read_to_string(bench.path("t/front.csv")).unwrap().lines().count() > 10);
-    let contents = inspect::read(&bench.path("t/flared-skirt@400.rrd")).unwrap();
+    let contents = inspect::read(&bench.path("t/flared-skirt@400.rrd"));
     // Table 3, one exact round of levels alone, at least three with extents: a step each.
     assert!(contents.entities["/drape/garment"].rows >= 5);
     // Together each garment is within what Table 3 makes of it, not only their sum.

@@ -219,7 +219,8 @@ fn a_garment_inside_out_is_turned_to_face_away_from_the_body() {
                 f 1 2 3 4\nf 5 6 7 8\n";
     let options = ImportOptions { unit: Some(Unit::Dm), up: Some(Axis::Z), ..METRES };
     let mut garment = read_with(text, &options).unwrap();
-    garment.face_away_from(&distance);
+    let inward = partwise::scene::facing_body(&garment.mesh, &distance);
+    garment.turn_outward(&inward);
     assert!(garment.report.repairs.contains(&Repair::TurnedOutward { components: 1 }));
     let normals: Vec<f64> = (0..4).map(|t| garment.mesh.double_area_vector(t).y.signum()).collect();
     assert_eq!(normals, [1.0, 1.0, -1.0, -1.0]);

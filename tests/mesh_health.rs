@@ -6,10 +6,9 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use partwise::distance::Body;
-use partwise::mesh::fit::{Placement, check_near, facing_body};
+use partwise::mesh::TriMesh;
 use partwise::mesh::health::health;
-use partwise::mesh::push_out::push_out;
-use partwise::mesh::{MeshError, TriMesh};
+use partwise::scene::{Placement, Scene, SceneError, facing_body, push_out};
 
 /// A sphere about the origin: `n` parallels, 2n meridians, closed with two poles.
 fn sphere(radius: f64, n: u32) -> TriMesh {
@@ -57,8 +56,8 @@ fn a_sphere_is_sound_and_its_figures_are_those_of_geometry() {
     assert!((found.area_m2 / PI - 1.0).abs() < 3e-3, "{}", found.area_m2);
     assert!((found.volume_m3.unwrap() / (PI / 6.0) - 1.0).abs() < 5e-3);
     assert!(found.min_angle_deg.min > 0.0 && found.min_angle_deg.max <= 60.0);
-    let said = found.to_string();
-    assert!(said.contains("closed") && said.contains("yes, 52"), "{said}");
+    let rows = found.rows();
+    assert!(rows.iter().any(|(name, value)| *name == "closed" && value.starts_with("yes, 52")), "{rows:?}");
 }
 
 #[test]
@@ -88,11 +87,11 @@ fn a_tube_has_two_loops_and_faces_away_from_what_it_holds() {
     assert!(facing_body(&reversed, &body).iter().all(|&facing| facing));
     let fit = Placement::new(&garment, &body);
     assert_eq!((fit.penetrating_vertices, fit.crossing_pairs), (0, 0));
-    assert!((fit.clearance_m.min - 0.1).abs() < 2e-3, "{fit}");
-    assert!(check_near(&garment, &body).is_ok());
+    assert!((fit.clearance_m.min - 0.1).abs() < 2e-3, "{fit:?}");
+    assert!(Scene::of_meshes(&body_mesh, garment.clone()).is_ok());
     let away = garment.with_positions(garment.positions.iter().map(|p| p + DVec3::X * 30.0).collect());
-    let error = check_near(&away, &body).unwrap_err();
-    assert!(matches!(error, MeshError::NotNear { nearest, .. } if (nearest - 28.9).abs() < 0.01), "{error}");
+    let error = Scene::of_meshes(&body_mesh, away).unwrap_err();
+    assert!(matches!(error, SceneError::NotNear { nearest, .. } if (nearest - 28.9).abs() < 0.01), "{error}");
     assert!(error.to_string().contains("28.90 m"), "{error}");
 }
 

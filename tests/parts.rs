@@ -187,7 +187,6 @@ fn two_equal_levels_apart_are_two_parts() {
     assert_eq!(parts.part_of_vertex, [0, 0, 0, 0, 2, 2, 1, 1, 1, 1]);
     assert_eq!(parts.parts_per_level, [2, 1]);
     assert_eq!(parts.seams.iter().map(|s| s.parts).collect::<Vec<_>>(), [[0, 2], [1, 2]]);
-    assert_eq!(parts.neighbours(), [vec![2], vec![2], vec![0, 1]]);
 }
 
 #[test]

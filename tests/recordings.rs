@@ -5,13 +5,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 #![cfg(feature = "viewer")]
 
+mod inspect;
 mod scene;
 
 use std::path::{Path, PathBuf};
 
 use partwise::record::{
     Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
-    When, WrinkleView, inspect, paths, web,
+    When, WrinkleView, paths, web,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -72,9 +73,12 @@ fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
     let summary = record_one(&path, 2);
     assert_eq!(summary.path.as_deref(), Some(path.as_path()));
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
-    let contents = inspect::read(&path).unwrap();
+    let contents = inspect::read(&path);
     assert_eq!(contents.recordings, 1);
-    for wanted in paths::ALWAYS {
+    let bars = ["distance", "force"].map(|of| [format!("/{of}/legend/bar"), format!("/{of}/legend/ticks")]);
+    let others = [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::FORCE_ARROWS];
+    let others = others.into_iter().chain([paths::DRAPE, paths::REPORT, "/numbers/part_count"]);
+    for wanted in others.chain(bars.as_flattened().iter().map(String::as_str)) {
         assert!(contents.entities.contains_key(wanted), "{wanted} is missing of {:?}", contents.entities.keys());
     }
     for wanted in ["/viewport", "/time_panel", "/selection_panel", "/blueprint_panel"] {
@@ -146,7 +150,7 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
         record("sweep-side.rrd", 5);
         record("sweep-numbers.rrd", 5);
     }
-    let contents = inspect::read(&five.path.unwrap()).unwrap();
+    let contents = inspect::read(&five.path.unwrap());
     for fixed in [paths::BODY, paths::GARMENT, paths::PARTS, paths::DRAPE, "/error/garment"] {
         assert!(contents.entities[fixed].components.contains("Mesh3D:triangle_indices"), "{fixed}");
     }
@@ -200,7 +204,7 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
     recorder.wrinkles(&view).unwrap();
     let error = recorder.wrinkles(&WrinkleView { curvature_per_m: &[], ..view }).unwrap_err();
     assert!(matches!(error, RecordError::Mismatch { .. }), "{error}");
-    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap());
     for path in ["seams/lines", "seams/legend/bar", "curvature/garment", "curvature/legend/ticks"] {
         assert!(contents.entities.contains_key(&format!("/wrinkles/{path}")), "{path}");
     }
@@ -237,7 +241,7 @@ fn a_watched_recording_takes_new_steps_and_new_meshes() {
         recorder.step(&step(index, scene, &solved, &[])).unwrap();
     }
     recorder.notice(2, "table.toml, line 4: upper value 3 below lower value 5").unwrap();
-    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap()).unwrap();
+    let contents = inspect::read(&recorder.finish().unwrap().path.unwrap());
     assert_eq!(contents.entities[paths::BODY].rows, 1, "the body stayed");
     assert_eq!(contents.entities[paths::GARMENT].rows, 2, "the garment changed once");
     assert_eq!(contents.entities[paths::DRAPE].fixed_rows, 0, "what is static cannot be replaced at a step");
@@ -249,7 +253,6 @@ fn without_a_sink_nothing_is_made() {
     let scene = Scene::new(1);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
     let mut recorder = Recorder::open(RecordOptions::default()).unwrap();
-    assert!(!recorder.is_enabled());
     recorder.body(0, &scene.body).unwrap();
     recorder.garment(0, &scene.garment).unwrap();
     recorder.step(&step(0, &scene, &solved, &[])).unwrap();
@@ -297,7 +300,7 @@ fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
     let page = get(&url);
     assert!(page.contains("200 OK") && page.contains("<html"), "{page}");
     recorder.finish().unwrap();
-    assert!(inspect::read(&path).unwrap().entities.contains_key(paths::DRAPE));
+    assert!(inspect::read(&path).entities.contains_key(paths::DRAPE));
 }
 
 #[test]
@@ -306,7 +309,6 @@ fn any_recording_is_served_and_what_is_none_is_refused() {
     let path = folder.file("viewed.rrd");
     record_one(&path, 1);
     let served = web::serve_file(&path, None, None).unwrap();
-    assert!(served.messages() > 20);
     assert!(get(served.url()).contains("200 OK"));
     for (name, content) in [("text.rrd", "not a recording"), ("empty.rrd", "")] {
         let other = folder.file(name);

@@ -12,18 +12,18 @@ use partwise::mesh::{Topology, TriMesh};
 use partwise::shapes::body::{BodySpec, DressForm};
 use partwise::shapes::garment::{TABLE_4_SIZES, garment_on};
 use partwise::shapes::girth::{Plane, section};
-use partwise::shapes::{BUILT_IN, Garment, GarmentRequest, GarmentSpec};
+use partwise::shapes::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment};
 
 static FORM: LazyLock<DressForm> = LazyLock::new(|| DressForm::new(&BodySpec::default()).unwrap());
 static BODY: LazyLock<TriMesh> = LazyLock::new(|| FORM.mesh(15_000).unwrap());
 
 /// Every garment at both sizes of Table 4.
-static WARDROBE: LazyLock<Vec<(usize, Garment)>> = LazyLock::new(|| {
+static WARDROBE: LazyLock<Vec<(usize, PlacedGarment)>> = LazyLock::new(|| {
     let sizes = BUILT_IN.iter().zip(TABLE_4_SIZES).flat_map(|(name, sizes)| sizes.map(|n| (*name, n)));
     sizes.map(|(name, n)| (n, make(name, Some(n)))).collect()
 });
 
-fn make(name: &str, vertices: Option<usize>) -> Garment {
+fn make(name: &str, vertices: Option<usize>) -> PlacedGarment {
     garment_on(&GarmentSpec::by_name(name).unwrap(), &FORM, vertices).unwrap()
 }
 
@@ -48,7 +48,7 @@ fn vertex_counts_are_those_of_table_4() {
 
 #[test]
 fn each_is_one_manifold_piece_with_openings_exactly_where_it_has_them() {
-    for (_, Garment { name, mesh, .. }) in WARDROBE.iter() {
+    for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter() {
         let topology = Topology::new(mesh);
         assert!(topology.edge_valence.iter().all(|&v| v <= 2), "{name}");
         assert_eq!(topology.components().1, 1, "{name}");
@@ -86,7 +86,7 @@ fn openings_are_where_they_are_worn() {
             (0..mesh.triangles.len()).filter(|&t| mesh.triangle_group[t] == g).flat_map(|t| mesh.corners(t)).collect();
         points.iter().sum::<DVec3>() / points.len() as f64
     };
-    for (_, Garment { name, mesh, held, .. }) in WARDROBE.iter() {
+    for (_, PlacedGarment { name, mesh, held, .. }) in WARDROBE.iter() {
         let low = mesh.bounds().unwrap().0.z;
         assert!((centre(mesh, "hem").z - low).abs() < 0.02, "{name}");
         if name == "flared-skirt" {
@@ -111,7 +111,7 @@ fn angles(c: [DVec3; 3]) -> [f64; 3] {
 
 #[test]
 fn triangles_are_well_shaped_and_of_even_size() {
-    for (_, Garment { name, mesh, .. }) in WARDROBE.iter() {
+    for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter() {
         let small = (0..mesh.triangles.len()).filter(|&t| angles(mesh.corners(t)).iter().any(|&a| a < 20.0)).count();
         assert!(small * 100 <= mesh.triangles.len(), "{name}: {small}");
         // No long triangles anywhere, so none where a sleeve meets the bodice.
@@ -149,7 +149,7 @@ fn no_direction_of_edges_is_preferred() {
 #[test]
 fn nothing_is_inside_the_body_and_nothing_crosses() {
     let body = Body::new(&BODY).unwrap();
-    for (_, Garment { name, mesh, .. }) in WARDROBE.iter() {
+    for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter() {
         let least = body.nearest_all(&mesh.positions).iter().map(|p| p.signed_distance).fold(f64::INFINITY, f64::min);
         assert!(least > 0.003, "{name}: {least}");
         assert_eq!(crossing_pairs(mesh, &BODY), Vec::<[u32; 2]>::new(), "{name}");
@@ -160,7 +160,7 @@ fn nothing_is_inside_the_body_and_nothing_crosses() {
 #[test]
 fn outward_is_away_from_the_body() {
     let body = Body::new(&BODY).unwrap();
-    for (_, Garment { name, mesh, .. }) in WARDROBE.iter().take(9).step_by(2) {
+    for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter().take(9).step_by(2) {
         let normals = mesh.vertex_normals();
         let facing = body
             .nearest_all(&mesh.positions)
@@ -174,7 +174,7 @@ fn outward_is_away_from_the_body() {
 
 #[test]
 fn the_rest_shape_is_the_placed_one_but_where_there_is_fullness() {
-    for (_, Garment { name, mesh, rest, .. }) in WARDROBE.iter().step_by(2) {
+    for (_, PlacedGarment { name, mesh, rest, .. }) in WARDROBE.iter().step_by(2) {
         assert_eq!(rest.corners.len(), mesh.triangles.len());
         let mut lengths: BTreeMap<(u32, u32), f64> = BTreeMap::new();
         let (mut placed_area, mut rest_area) = (0.0, 0.0);
@@ -225,7 +225,7 @@ fn the_skirt_s_hem_holds_its_fullness_and_its_waist_none() {
 
 #[test]
 fn lengths_and_eases_are_those_of_the_spec() {
-    for (_, Garment { name, mesh, .. }) in WARDROBE.iter().step_by(2) {
+    for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter().step_by(2) {
         let spec = GarmentSpec::by_name(name).unwrap();
         let (low, high) = mesh.bounds().unwrap();
         // Along the middle of the shoulder the cloth rises a little towards the neck.

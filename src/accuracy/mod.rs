@@ -35,25 +35,14 @@ pub const CONTACT_ZONE: f64 = 0.005;
 
 /// Why two drapes cannot be compared.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum AccuracyError {
     /// Lists of different meshes.
     #[error("{what} has {found} vertices and the garment {expected}: both drapes must be of one mesh")]
-    Count {
-        /// Which list.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The garment's vertices.
-        expected: usize,
-    },
+    Count { what: &'static str, found: usize, expected: usize },
     /// A coordinate that is not finite.
     #[error("vertex number {} of {what} is not finite: the solve that made it has failed", .vertex + 1)]
-    NotFinite {
-        /// Which list.
-        what: &'static str,
-        /// The vertex, from 0.
-        vertex: usize,
-    },
+    NotFinite { what: &'static str, vertex: usize },
     /// No surface to measure to.
     #[error("the drapes cannot be searched: {0}")]
     Distance(#[from] DistanceError),
@@ -128,9 +117,6 @@ pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 /// Measures a result against a reference. `canonical_*` stay empty: they need a second one, see [`rms_mm`].
-///
-/// # Errors
-/// [`AccuracyError`] where lists do not match, a coordinate is not finite, or there are no triangles.
 pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
     let expected = c.mesh.vertex_count();
     for (what, list) in [("the start", c.start), ("the result", c.result), ("the reference", c.reference)] {

@@ -2,21 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantile::nearest_rank;
+
 /// Millimetres in a metre.
 pub(crate) const MM_PER_M: f64 = 1e3;
 
-/// Distances between matching vertices of two drapes.
+/// Distances between matching vertices of two drapes; `p95` is the 95th percentile, by nearest rank.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct ErrorSummary {
-    /// How many vertices.
     pub vertices: usize,
-    /// Mean, mm.
     pub mean_mm: f64,
-    /// Root mean square, mm.
     pub rms_mm: f64,
-    /// 95th percentile, mm.
     pub p95_mm: f64,
-    /// Maximum, mm.
     pub max_mm: f64,
 }
 
@@ -32,19 +30,10 @@ impl ErrorSummary {
             vertices: errors_m.len(),
             mean_mm: MM_PER_M * errors_m.iter().sum::<f64>() / n,
             rms_mm: MM_PER_M * (errors_m.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
-            p95_mm: MM_PER_M * percentile(errors_m, 0.95),
+            p95_mm: MM_PER_M * nearest_rank(errors_m, 0.95),
             max_mm: MM_PER_M * errors_m.iter().copied().fold(0.0, f64::max),
         }
     }
-}
-
-/// The smallest value that a `share` of all values do not exceed (nearest rank); zero for an empty list.
-#[must_use]
-pub(crate) fn percentile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let rank = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! The key of a reference is the BLAKE3 hash of everything it depends on: the crate's version and the file format's, the
 //! garment's positions and triangles, the rest shape, the fabric, the body, the held vertices, the start and the solver's
-//! options. Numbers enter by their bits, lists with their lengths, so two inputs never share a key by running together.
+//! options, as [`sealed`] bytes: numbers by their bits, lists with their lengths, so two inputs never share a key.
 //!
 //! A file is the key and the reference, [`sealed`]. It is written whole or not at all, so a reader never sees
 //! half of one. A file that does not match its hash, its key or its garment is no error: the reference is computed again,
@@ -49,56 +49,20 @@ impl ReferenceKey {
     /// Hashes everything a reference depends on.
     #[must_use]
     pub fn new(input: &ReferenceInput<'_>) -> Self {
-        let mut hash = Hasher(blake3::Hasher::new());
-        hash.bytes(KIND);
-        hash.bytes(env!("CARGO_PKG_VERSION").as_bytes());
-        for mesh in [input.garment, input.body] {
-            hash.points(&mesh.positions);
-            hash.length(mesh.triangles.len());
-            mesh.triangles.iter().flatten().for_each(|v| hash.raw(&v.to_le_bytes()));
-        }
-        hash.length(input.rest.corners.len());
-        for corner in input.rest.corners.iter().flatten() {
-            hash.number(corner.x);
-            hash.number(corner.y);
-        }
-        let f = input.fabric;
-        let constants = [f.density_kg_per_m2, f.thickness_m, f.stretch_weft_n_per_m, f.stretch_warp_n_per_m];
-        constants.iter().for_each(|&c| hash.number(c));
-        [f.shear_n_per_m, f.poisson, f.friction].iter().chain(&f.bending_nm).for_each(|&c| hash.number(c));
-        hash.length(input.held.len());
-        input.held.iter().for_each(|v| hash.raw(&v.to_le_bytes()));
-        hash.points(input.start);
-        hash.bytes(input.options.as_bytes());
-        Self(hash.0.finalize())
+        let points = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<_>>();
+        let mesh = |mesh: &TriMesh| (points(&mesh.positions), mesh.triangles.clone());
+        let rest: Vec<[[f64; 2]; 3]> = input.rest.corners.iter().map(|t| t.map(|corner| corner.to_array())).collect();
+        // What a fabric is called changes nothing.
+        let fabric = Fabric { name: String::new(), source: String::new(), ..input.fabric.clone() };
+        let cloth = (mesh(input.garment), rest, fabric, input.held);
+        let solve = (mesh(input.body), points(input.start), input.options);
+        Self(sealed::hash(KIND, &(env!("CARGO_PKG_VERSION"), cloth, solve)))
     }
 
     /// File name in the cache.
     #[must_use]
     pub fn file_name(&self) -> String {
         format!("{}.drape", self.0.to_hex())
-    }
-}
-
-struct Hasher(blake3::Hasher);
-
-impl Hasher {
-    fn raw(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-    fn length(&mut self, n: usize) {
-        self.raw(&(n as u64).to_le_bytes());
-    }
-    fn bytes(&mut self, bytes: &[u8]) {
-        self.length(bytes.len());
-        self.raw(bytes);
-    }
-    fn number(&mut self, x: f64) {
-        self.raw(&x.to_bits().to_le_bytes());
-    }
-    fn points(&mut self, points: &[DVec3]) {
-        self.length(points.len());
-        points.iter().flat_map(DVec3::to_array).for_each(|x| self.number(x));
     }
 }
 
@@ -148,12 +112,6 @@ impl ReferenceCache {
     pub fn in_user_cache() -> Option<Self> {
         let folders = directories::ProjectDirs::from("", "", "partwise")?;
         Some(Self::new(folders.cache_dir().join("references")))
-    }
-
-    /// Where the references are.
-    #[must_use]
-    pub fn directory(&self) -> &Path {
-        &self.directory
     }
 
     /// The reference of `key` for a garment of `vertices`: from disk, or else computed and kept.

@@ -29,9 +29,6 @@ pub struct SectionGirth {
 }
 
 /// Symmetric Hausdorff distance of two positions of one mesh, m.
-///
-/// # Errors
-/// [`DistanceError`] where the mesh has no triangles to be near to.
 pub fn hausdorff(mesh: &TriMesh, a: &[DVec3], b: &[DVec3]) -> Result<f64, DistanceError> {
     let one_way = |from: &[DVec3], to: &[DVec3]| -> Result<f64, DistanceError> {
         // The sign means nothing here, so an open surface will do.

@@ -13,10 +13,11 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::quantile::{MM_PER_M, percentile};
+use super::quantile::MM_PER_M;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::principal_strain;
+use crate::quantile::nearest_rank;
 
 /// Figures of one drape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,7 +51,7 @@ impl State {
         Self {
             energy_j,
             residual_over_weight: residual / cloth.weight,
-            strain_p95: percentile(&strains, 0.95),
+            strain_p95: nearest_rank(&strains, 0.95),
             strain_max: strains.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             penetrating_vertices,
             penetration_mm: MM_PER_M * depth,

@@ -3,8 +3,8 @@
 use clap::Args;
 use comfy_table::{Table, presets};
 use partwise::SceneSpec;
-use partwise::mesh::fit::Placement;
 use partwise::mesh::health::{Health, health};
+use partwise::scene::Placement;
 use serde::Serialize;
 
 use super::console;
@@ -36,7 +36,6 @@ struct Report {
 }
 
 impl CheckArgs {
-    /// Prints the report.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         // As they came: what push-out would mend is a finding here.
         let mut spec = SceneSpec { push_out: false, ..self.input.spec()? };

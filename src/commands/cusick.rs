@@ -6,9 +6,8 @@ use clap::Args;
 use comfy_table::{Table, presets};
 use partwise::fabric::{BUILT_IN, Fabric};
 use partwise::mechanics::cusick::results_csv;
-use partwise::whole_file::WholeFile;
 
-use super::failure::UserError;
+use super::work::write_csv;
 use super::{console, interrupt};
 
 /// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
@@ -29,7 +28,6 @@ pub(crate) struct CusickArgs {
 }
 
 impl CusickArgs {
-    /// Drapes and prints.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let names: Vec<&str> = match self.fabrics.as_slice() {
             [] => BUILT_IN.to_vec(),
@@ -52,9 +50,7 @@ impl CusickArgs {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.csv {
-            WholeFile::write(path, &csv).map_err(|e| {
-                UserError::new(format!("{}: cannot be written: {e}; choose another file with --csv", path.display()))
-            })?;
+            write_csv(path, &csv)?;
         }
         let mut table = Table::new();
         table.load_preset(presets::UTF8_FULL_CONDENSED);

@@ -31,7 +31,6 @@ pub(crate) struct MergeArgs {
 }
 
 impl MergeArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let started = Instant::now();
         let rows = merge(&self.shards, &self.out)?;

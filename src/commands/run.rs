@@ -1,5 +1,7 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
+mod recording;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,7 +10,7 @@ use glam::DVec3;
 use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::{Against, Measured};
-use partwise::record::{FoldView, Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::record::{Layout, RecordOptions, Recorder};
 use partwise::scene::Loaded;
 
 use super::inputs::InputArgs;
@@ -73,15 +75,6 @@ struct Solved {
     summary: Summary,
 }
 
-impl Solved {
-    /// What the tab *Fit* shows side by side.
-    fn fit(&self) -> Vec<String> {
-        let of_cloth = if self.drape.state.is_some() { &["strain", "pressure"][..] } else { &[] };
-        let folds = self.drape.folds.is_some().then_some("folds");
-        of_cloth.iter().copied().chain(folds).map(str::to_owned).collect()
-    }
-}
-
 /// The cloth at one of the solver's steps; the mesh every so often.
 struct Snapshot {
     iteration: usize,
@@ -94,7 +87,6 @@ struct Snapshot {
 const MESH_EVERY: usize = 8;
 
 impl RunArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
@@ -102,7 +94,7 @@ impl RunArgs {
         let start = Instant::now();
         let mut solved = self.solve(self.job()?, start, None)?;
         let mut recorder = Recorder::open(self.record_options(&solved))?;
-        self.record(&mut recorder, &mut solved, 0)?;
+        solved.record(&mut recorder, 0, self.records_iterations())?;
         if let Some(path) = &self.export {
             solved.loaded.write(path, &solved.drape.positions)?;
             solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
@@ -132,6 +124,8 @@ impl RunArgs {
     }
 
     fn record_options(&self, solved: &Solved) -> RecordOptions {
+        let overlays = solved.overlays();
+        let of_cloth = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
         RecordOptions {
             sinks: self.sinks.sinks(&solved.loaded.garment_name),
             name: solved.loaded.garment_name.clone(),
@@ -141,7 +135,7 @@ impl RunArgs {
                 iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.measured.assessment.is_some(),
                 wrinkles: solved.measured.assessment.is_some(),
-                fit: solved.fit(),
+                fit: of_cloth.map(str::to_owned).collect(),
                 ..Layout::default()
             },
             replaceable: self.watch,
@@ -187,65 +181,6 @@ impl RunArgs {
 
     fn records_iterations(&self) -> bool {
         !self.watch && !self.no_iterations
-    }
-
-    fn record(&self, recorder: &mut Recorder, solved: &mut Solved, index: i64) -> anyhow::Result<()> {
-        let start = Instant::now();
-        let scene = &solved.loaded.scene;
-        recorder.body(index, scene.body.mesh())?;
-        recorder.garment(index, &scene.garment)?;
-        let forces: Vec<DVec3> = solved.drape.outcomes.iter().map(|o| o.force_n).collect();
-        let mut overlays = Vec::new();
-        if let Some(state) = &solved.drape.state {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
-            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
-        }
-        if let Some(folds) = &solved.drape.folds {
-            overlays.push(Overlay { name: "folds", unit: "%", values: &folds.excess_percent });
-        }
-        if solved.measured.assessment.is_some() {
-            overlays.push(Overlay { name: "error", unit: "mm", values: &solved.measured.error_mm });
-        }
-        let mut scalars = solved.summary.figures.scalars();
-        scalars.retain(|(name, _)| name.starts_with("error/"));
-        recorder.step(&StepView {
-            index,
-            distance_m: &solved.drape.distance,
-            part_of_vertex: &solved.drape.parts.part_of_vertex,
-            part_force_n: &forces,
-            draped: &solved.drape.positions,
-            panel: &solved.summary.panel(&solved.job.settings.fabric),
-            scalars: &scalars,
-            overlays: &overlays,
-        })?;
-        if let Some(folds) = &solved.drape.folds {
-            let draped = &solved.drape.positions;
-            let (excess_percent, across) = (&folds.excess_percent, &folds.across);
-            recorder.folds(&FoldView { index, draped, excess_percent, across })?;
-        }
-        if let Some(assessment) = &solved.measured.assessment {
-            let joining = scene.topology.edges.as_slice();
-            let seams = solved.drape.parts.seams.iter().zip(&assessment.wrinkles.seams);
-            let jumps_mm: Vec<([u32; 2], f64)> = seams
-                .flat_map(|(seam, measured)| {
-                    seam.edges.iter().map(|&e| (joining[e as usize], measured.displacement_difference_mm))
-                })
-                .collect();
-            recorder.wrinkles(&WrinkleView {
-                index,
-                draped: &solved.drape.positions,
-                jumps_mm: &jumps_mm,
-                curvature_per_m: &assessment.wrinkles.vertex_curvature_per_m,
-            })?;
-        }
-        if self.records_iterations() {
-            for s in &solved.snapshots {
-                let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);
-                recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
-            }
-        }
-        solved.summary.timings_ms.insert("record", ms(start.elapsed()));
-        Ok(())
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
@@ -294,7 +229,7 @@ impl RunArgs {
             match solved {
                 Ok(mut solved) => {
                     index += 1;
-                    self.record(recorder, &mut solved, index)?;
+                    solved.record(recorder, index, self.records_iterations())?;
                     self.print(&solved)?;
                     last = Some(solved.loaded);
                 }

@@ -8,6 +8,7 @@ use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::files::names_a_file;
 use partwise::mechanics::coupled::Motion;
 use partwise::range_table::{GapRule, RangeTable, TABLE_3};
+use partwise::word::word;
 
 use super::failure::UserError;
 use super::readings::{self, Reading};
@@ -101,6 +102,5 @@ fn extent(text: &str) -> Result<f64, String> {
 }
 
 fn gap_rule(text: &str) -> Result<GapRule, String> {
-    let known = GapRule::ALL.into_iter().find(|rule| rule.as_str() == text);
-    known.ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
+    word(text).ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
 }

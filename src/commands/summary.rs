@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use comfy_table::{CellAlignment, Table, presets};
 use partwise::Settings;
+use partwise::accuracy::Accuracy;
 use partwise::drape::Drape;
 use partwise::fabric::Fabric;
 use partwise::figures::{Figures, LevelCount};
@@ -13,7 +14,7 @@ use partwise::job::Measured;
 use partwise::record::Panel;
 use partwise::scene::Loaded;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 /// The summary of one draped garment. Field names are the keys of `--format json`.
 #[derive(Debug, Clone, Serialize)]
@@ -57,7 +58,7 @@ impl Summary {
     ) -> anyhow::Result<Self> {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
-        let accuracy = measured.assessment.as_ref().map(|a| serde_json::to_value(&a.accuracy)).transpose()?;
+        let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
         let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
         Ok(Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -73,7 +74,7 @@ impl Summary {
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
-            accuracy: accuracy.map(without_state),
+            accuracy,
             timings_ms: BTreeMap::from([
                 ("distance", ms(drape.times.distance)),
                 ("segment", ms(drape.times.segment)),
@@ -154,15 +155,11 @@ impl Summary {
 }
 
 /// An accuracy's JSON without the state of the drape, which the figures tell: one key, one meaning.
-fn without_state(mut accuracy: Value) -> Value {
-    if let Some(keys) = accuracy.as_object_mut() {
-        for key in
-            ["energy_j", "residual_over_weight", "strain_p95", "strain_max", "penetrating_vertices", "penetration_mm"]
-        {
-            keys.remove(key);
-        }
-    }
-    accuracy
+fn without_state(accuracy: &Accuracy) -> serde_json::Result<Value> {
+    let mut all: Map<String, Value> = serde_json::from_value(serde_json::to_value(accuracy)?)?;
+    let state: Map<String, Value> = serde_json::from_value(serde_json::to_value(accuracy.state)?)?;
+    all.retain(|key, _| !state.contains_key(key));
+    Ok(Value::Object(all))
 }
 
 /// The command line as typed, the program by its bare name.

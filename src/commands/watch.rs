@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use notify::{RecursiveMode, Watcher as _};
+use partwise::whole_file::folder_of;
 
 use super::interrupt;
 
@@ -29,7 +30,7 @@ impl FileWatch {
     pub(crate) fn new(files: Vec<PathBuf>) -> anyhow::Result<Self> {
         let (sender, events) = channel();
         let mut watcher = notify::recommended_watcher(sender).context("cannot watch files on this system")?;
-        let mut folders: Vec<&Path> = files.iter().map(|f| folder(f)).collect();
+        let mut folders: Vec<&Path> = files.iter().map(|f| folder_of(f)).collect();
         folders.sort();
         folders.dedup();
         for folder in folders {
@@ -72,10 +73,6 @@ impl FileWatch {
         }
         changed
     }
-}
-
-fn folder(file: &Path) -> &Path {
-    file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// What is in the file now; `None` while it is away, between an editor's delete and rename.

@@ -1,10 +1,11 @@
 //! What every command that computes needs: threads, references, progress that Ctrl-C is heard beside.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use partwise::accuracy::reference::ReferenceCache;
 use partwise::mechanics::refine::Observer;
+use partwise::whole_file::WholeFile;
 
 use super::failure::UserError;
 use super::{console, interrupt};
@@ -27,6 +28,13 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
         ))),
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?),
     }
+}
+
+/// Writes a CSV that was asked for beside what is printed.
+pub(crate) fn write_csv(path: &Path, text: &str) -> anyhow::Result<()> {
+    WholeFile::write(path, text).map_err(|e| {
+        UserError::new(format!("{}: cannot be written: {e}; choose another file with --csv", path.display()))
+    })
 }
 
 /// Runs `work` with the solver's progress shown and Ctrl-C heard.

@@ -75,6 +75,7 @@ pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distance::Body;
     use crate::fabric::Fabric;
     use crate::mesh::{RestShape, Topology, TriMesh};
 

@@ -33,7 +33,7 @@ impl Draft {
     ) -> Self {
         let mut used = vec![false; positions.len()];
         for face in faces {
-            corners_of(corners, face).iter().for_each(|corner| used[corner.vertex as usize] = true);
+            face.among(corners).iter().for_each(|corner| used[corner.vertex as usize] = true);
         }
         let (stand_in, coincident) = coincident(positions, &used);
         let stands_for = |v: u32| if weld { stand_in[v as usize] } else { v };
@@ -115,10 +115,6 @@ impl Draft {
         self.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
         self.mesh_vertex = (0..positions.len() as u32).map(|v| number[stands_for(v) as usize]).collect();
     }
-}
-
-fn corners_of<'a>(corners: &'a [Corner], face: &Face) -> &'a [Corner] {
-    &corners[face.first as usize..(face.first + face.count) as usize]
 }
 
 /// For each vertex the first used one at exactly its place, and how many used vertices lie on an earlier one.

@@ -15,17 +15,11 @@ use super::topology::NONE;
 use crate::whole_file::WholeFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
-///
-/// # Errors
-/// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.
 pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> Result<(), MeshError> {
     write(path, &imported_text(imported, positions)?)
 }
 
 /// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
-///
-/// # Errors
-/// [`MeshError::Unwritable`]; nothing is left behind then.
 pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
     write(path, &mesh_text(mesh))
 }

@@ -1,21 +1,17 @@
 //! An imported mesh made to face one way: neighbours agree, a body faces outward, a garment away from its body.
 
-use super::fit::facing_body;
 use super::health::Findings;
 use super::import::Imported;
 use super::report::{Remark, Repair};
 use super::topology::Topology;
 use super::winding;
-use crate::distance::Body;
 
 impl Imported {
-    /// Turns the connected parts of a garment that face the body, so that normals point away from it, and says so.
-    pub fn face_away_from(&mut self, body: &Body) {
-        let facing = facing_body(&self.mesh, body);
-        let topology = Topology::new(&self.mesh);
-        let (component, count) = topology.components();
+    /// Turns the triangles that face inward, whole connected parts of them, and says so.
+    pub fn turn_outward(&mut self, inward: &[bool]) {
+        let (component, count) = Topology::new(&self.mesh).components();
         let mut turned = vec![false; count];
-        for t in (0..facing.len()).filter(|&t| facing[t]) {
+        for t in (0..inward.len()).filter(|&t| inward[t]) {
             turned[component[self.mesh.triangles[t][0] as usize] as usize] = true;
             self.turn(t);
         }
@@ -33,7 +29,7 @@ impl Imported {
         let loops = topology.boundary_loops();
         let report = &mut self.report;
         report.components = topology.components().1;
-        report.boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+        report.boundary_edges = topology.boundary_edges().count();
         report.boundary_loops = loops.len();
         if turned.to_agree > 0 {
             report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });
@@ -62,16 +58,10 @@ impl Imported {
 
 /// Turns the connected parts that enclose a negative volume.
 pub(super) fn face_outward(imported: &mut Imported) {
-    let (component, count) = Topology::new(&imported.mesh).components();
-    let inward: Vec<bool> =
-        winding::signed_volumes(&imported.mesh, &component, count).iter().map(|&volume| volume < 0.0).collect();
-    for t in 0..imported.mesh.triangles.len() {
-        if inward[component[imported.mesh.triangles[t][0] as usize] as usize] {
-            imported.turn(t);
-        }
-    }
-    let components = inward.iter().filter(|&&turned| turned).count();
-    if components > 0 {
-        imported.report.repairs.push(Repair::TurnedOutward { components });
-    }
+    let mesh = &imported.mesh;
+    let (component, count) = Topology::new(mesh).components();
+    let volumes = winding::signed_volumes(mesh, &component, count);
+    let part = |triangle: &[u32; 3]| component[triangle[0] as usize] as usize;
+    let inward: Vec<bool> = mesh.triangles.iter().map(|triangle| volumes[part(triangle)] < 0.0).collect();
+    imported.turn_outward(&inward);
 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::error::MeshError;
+use crate::word::word;
 
 /// Length of one unit in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,9 +28,6 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Every unit there is.
-    pub const ALL: [Self; 6] = [Self::M, Self::Dm, Self::Cm, Self::Mm, Self::In, Self::Ft];
-
     /// Metres in one unit.
     #[must_use]
     pub fn metres(self) -> f64 {
@@ -46,14 +44,7 @@ impl Unit {
 
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::M => "m",
-            Self::Dm => "dm",
-            Self::Cm => "cm",
-            Self::Mm => "mm",
-            Self::In => "in",
-            Self::Ft => "ft",
-        })
+        self.serialize(f)
     }
 }
 
@@ -61,10 +52,8 @@ impl FromStr for Unit {
     type Err = MeshError;
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
-        Self::ALL
-            .into_iter()
-            .find(|unit| unit.to_string().eq_ignore_ascii_case(text.trim()))
-            .ok_or_else(|| MeshError::UnknownUnit { found: text.to_owned() })
+        let unknown = || MeshError::UnknownUnit { found: text.to_owned() };
+        word(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
     }
 }
 
@@ -81,21 +70,14 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// The three axes.
-    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
-
     pub(super) fn index(self) -> usize {
-        match self {
-            Self::X => 0,
-            Self::Y => 1,
-            Self::Z => 2,
-        }
+        self as usize
     }
 }
 
 impl fmt::Display for Axis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(["x", "y", "z"][self.index()])
+        self.serialize(f)
     }
 }
 
@@ -103,10 +85,8 @@ impl FromStr for Axis {
     type Err = MeshError;
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
-        Self::ALL
-            .into_iter()
-            .find(|axis| axis.to_string().eq_ignore_ascii_case(text.trim()))
-            .ok_or_else(|| MeshError::UnknownAxis { found: text.to_owned() })
+        let unknown = || MeshError::UnknownAxis { found: text.to_owned() };
+        word(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
     }
 }
 
@@ -161,8 +141,8 @@ mod tests {
     #[test]
     fn frames_turn_without_mirroring_and_back() {
         let p = DVec3::new(0.3, -1.2, 0.7);
-        for up in Axis::ALL {
-            for unit in Unit::ALL {
+        for up in [Axis::X, Axis::Y, Axis::Z] {
+            for unit in [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm, Unit::In, Unit::Ft] {
                 let frame = Frame::given(unit, up);
                 assert!((frame.to_file(frame.to_metres(p)) - p).length() < 1e-15);
                 let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| frame.to_metres(axis) / unit.metres());

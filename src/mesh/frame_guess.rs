@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use super::bounds;
 use super::frame::{Axis, Frame, Unit};
 
 /// The tallest and the smallest body the guess believes in, m: a toddler's torso form to a tall adult in heels.
@@ -20,7 +21,7 @@ const TALL_ENOUGH: f64 = 0.8;
 ///
 /// # Errors
 /// The height found and the tallest axis, where no unit makes it a body's.
-pub fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
+pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Ok(Frame::given(unit, up));
     }
@@ -47,8 +48,12 @@ pub fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Resul
 
 /// Unit and up axis of a garment from its vertices as they stand in the file, where the body is known in metres, z up
 /// (a built-in one): the frame that puts the garment's box best onto the body's.
-#[must_use]
-pub fn guess_frame_around(raw: &[DVec3], body: (DVec3, DVec3), unit: Option<Unit>, up: Option<Axis>) -> Option<Frame> {
+pub(super) fn guess_frame_around(
+    raw: &[DVec3],
+    body: (DVec3, DVec3),
+    unit: Option<Unit>,
+    up: Option<Axis>,
+) -> Option<Frame> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Some(Frame::given(unit, up));
     }
@@ -96,11 +101,6 @@ fn lopsidedness(raw: &[DVec3], axis: usize, lo: DVec3, hi: DVec3) -> f64 {
     heights.sort_unstable_by(f64::total_cmp);
     let unlike: f64 = heights.iter().zip(heights.iter().rev()).map(|(up, down)| ((up - lo) - (hi - down)).abs()).sum();
     if hi > lo { unlike / ((hi - lo) * heights.len() as f64) } else { 0.0 }
-}
-
-fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    let first = *points.first()?;
-    Some(points.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
 }
 
 /// Shared volume over united volume of two boxes; thin boxes are thickened to a millimetre.

@@ -1,11 +1,10 @@
 //! The state of a mesh in figures: what `partwise check` prints of a body and of a garment, each by itself.
 
-use std::fmt;
-
 use serde::Serialize;
 
 use super::self_intersection::self_intersecting_pairs;
 use super::{Topology, TriMesh, winding};
+use crate::quantile::Percentiles;
 
 /// A triangle lower than this share of its longest edge has no area worth the name: with coordinates written to seven
 /// digits, its normal would be noise.
@@ -25,9 +24,7 @@ pub(super) struct Findings {
 impl Findings {
     pub(super) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let mut boundary = vec![0u32; mesh.vertex_count()];
-        for (edge, _) in topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1) {
-            edge.iter().for_each(|&v| boundary[v as usize] += 1);
-        }
+        topology.boundary_edges().flatten().for_each(|v| boundary[v as usize] += 1);
         let no_area = |&t: &usize| {
             let [a, b, c] = mesh.corners(t);
             let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
@@ -41,56 +38,17 @@ impl Findings {
     }
 }
 
-/// Five figures that stand for many: by nearest rank.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Percentiles {
-    /// The smallest.
-    pub min: f64,
-    /// The 1st percentile.
-    pub p01: f64,
-    /// The 5th percentile.
-    pub p05: f64,
-    /// The median.
-    pub p50: f64,
-    /// The 95th percentile.
-    pub p95: f64,
-    /// The largest.
-    pub max: f64,
-}
-
-impl Percentiles {
-    /// Of these values; zeros for none.
-    #[must_use]
-    pub fn of(mut values: Vec<f64>) -> Self {
-        values.sort_unstable_by(f64::total_cmp);
-        let last = values.len().saturating_sub(1);
-        let at = |share: f64| values.get((share * last as f64).round() as usize).copied().unwrap_or_default();
-        Self { min: at(0.0), p01: at(0.01), p05: at(0.05), p50: at(0.5), p95: at(0.95), max: at(1.0) }
-    }
-
-    /// As words, each value times `scale`, with `digits` behind the point.
-    #[must_use]
-    pub fn text(&self, scale: f64, digits: usize) -> String {
-        let [min, p01, p05, p50, p95, max] =
-            [self.min, self.p01, self.p05, self.p50, self.p95, self.max].map(|v| format!("{:.digits$}", v * scale));
-        format!("{min} smallest, {p01} (1 %), {p05} (5 %), {p50} median, {p95} (95 %), {max} largest")
-    }
-}
-
 /// A mesh in figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct Health {
-    /// Vertices.
     pub vertices: usize,
-    /// Triangles.
     pub triangles: usize,
-    /// Connected parts.
     pub components: usize,
     /// Edges with one triangle.
     pub boundary_edges: usize,
     /// Loops they form.
     pub boundary_loops: usize,
-    /// No boundary at all.
     pub closed: bool,
     /// Edges of three triangles and more.
     pub non_manifold_edges: usize,
@@ -98,17 +56,14 @@ pub struct Health {
     pub pinched_vertices: usize,
     /// Edges whose two triangles run the same way.
     pub disagreeing_edges: usize,
-    /// Triangles without area.
     pub no_area: usize,
     /// Pairs of triangles that cross, counted exactly.
     pub self_intersecting_pairs: usize,
-    /// Area, m².
     pub area_m2: f64,
     /// Enclosed volume, m³; of closed meshes alone.
     pub volume_m3: Option<f64>,
     /// Smallest angle of each triangle, degrees.
     pub min_angle_deg: Percentiles,
-    /// Edge lengths, m.
     pub edge_length_m: Percentiles,
 }
 
@@ -118,9 +73,11 @@ pub fn health(mesh: &TriMesh) -> Health {
     let topology = Topology::new(mesh);
     let findings = Findings::new(mesh, &topology);
     let (component, components) = topology.components();
-    let boundary_edges = topology.edge_valence.iter().filter(|&&v| v == 1).count();
+    let boundary_edges = topology.boundary_edges().count();
     let closed = boundary_edges == 0 && !mesh.triangles.is_empty();
     let length = |&[a, b]: &[u32; 2]| mesh.positions[a as usize].distance(mesh.positions[b as usize]);
+    let angles: Vec<f64> = (0..mesh.triangles.len()).map(|t| min_angle(mesh, t)).collect();
+    let lengths: Vec<f64> = topology.edges.iter().map(length).collect();
     Health {
         vertices: mesh.vertex_count(),
         triangles: mesh.triangles.len(),
@@ -135,8 +92,8 @@ pub fn health(mesh: &TriMesh) -> Health {
         self_intersecting_pairs: self_intersecting_pairs(mesh).len(),
         area_m2: mesh.triangle_areas().iter().sum(),
         volume_m3: closed.then(|| winding::signed_volumes(mesh, &component, components).iter().sum()),
-        min_angle_deg: Percentiles::of((0..mesh.triangles.len()).map(|t| min_angle(mesh, t)).collect()),
-        edge_length_m: Percentiles::of(topology.edges.iter().map(length).collect()),
+        min_angle_deg: Percentiles::of(&angles),
+        edge_length_m: Percentiles::of(&lengths),
     }
 }
 
@@ -176,11 +133,5 @@ impl Health {
             ("smallest angles, degrees", self.min_angle_deg.text(1.0, 1)),
             ("edge lengths, mm", self.edge_length_m.text(1e3, 1)),
         ]
-    }
-}
-
-impl fmt::Display for Health {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.rows().iter().try_for_each(|(name, value)| writeln!(f, "{name:<26} {value}"))
     }
 }

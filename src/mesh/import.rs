@@ -15,8 +15,8 @@ use super::facing::face_outward;
 use super::frame::{Axis, Frame, Unit};
 use super::frame_guess::{guess_frame, guess_frame_around};
 use super::report::{MeshReport, Remark, Repair};
-use super::scan::Face;
-use super::source::{ObjSource, RawObj};
+use super::scan::{Face, Scan};
+use super::source::{ObjSource, read};
 use super::topology::{NONE, Topology};
 
 /// Name of the triangles without a group in a file that has groups.
@@ -67,9 +67,6 @@ impl Imported {
     }
 
     /// This mesh at the vertices of `other`, a file of the same faces: the garment in its rest shape.
-    ///
-    /// # Errors
-    /// [`MeshError::OtherTopology`] with the first difference.
     pub fn in_the_shape_of(&self, other: &Self) -> Result<TriMesh, MeshError> {
         let differs = |difference: String| MeshError::OtherTopology {
             file: other.source.file.clone(),
@@ -100,28 +97,15 @@ impl Imported {
 /// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; a unit that
 /// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
 pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
-    body_from(RawObj::read(file)?, options)
-}
-
-/// Reads a garment that belongs to a body.
-///
-/// # Errors
-/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; no frame that
-/// puts it around the body.
-pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
-    garment_from(RawObj::read(file)?, options, body)
-}
-
-fn body_from(raw: RawObj, options: &ImportOptions) -> Result<Imported, MeshError> {
-    let faces = chosen_faces(&raw, options)?;
-    let frame = guess_frame(&used_positions(&raw, &faces), options.unit, options.up)
-        .map_err(|height| MeshError::UnknownScale { file: raw.file.clone(), height })?;
-    let mut imported = build(raw, faces, frame, options)?;
+    let scan = read(file)?;
+    let faces = chosen_faces(file, &scan, options)?;
+    let frame = guess_frame(&used_positions(&scan, &faces), options.unit, options.up)
+        .map_err(|height| MeshError::UnknownScale { file: file.to_owned(), height })?;
+    let mut imported = build(file, scan, faces, frame, options)?;
     face_outward(&mut imported);
     let topology = Topology::new(&imported.mesh);
-    let open: Vec<_> = topology.edges.iter().zip(&topology.edge_valence).filter(|&(_, &v)| v == 1).collect();
-    if let Some(&(&[a, b], _)) = open.first() {
-        let (edges, loops) = (open.len(), imported.report.boundary_loops);
+    if let Some([a, b]) = topology.boundary_edges().next() {
+        let (edges, loops) = (imported.report.boundary_edges, imported.report.boundary_loops);
         if !options.open_body {
             let number = imported.source.file_vertices();
             let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
@@ -131,6 +115,28 @@ fn body_from(raw: RawObj, options: &ImportOptions) -> Result<Imported, MeshError
         imported.report.remarks.push(Remark::Open { edges, loops });
     }
     Ok(imported)
+}
+
+/// Reads a garment that belongs to a body.
+///
+/// # Errors
+/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; no frame that
+/// puts it around the body.
+pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
+    let scan = read(file)?;
+    let faces = chosen_faces(file, &scan, options)?;
+    let frame = match (body, options.unit, options.up) {
+        (_, Some(unit), Some(up)) => Frame::given(unit, up),
+        (Beside::File(frame), unit, up) => Frame {
+            unit: unit.unwrap_or(frame.unit),
+            up: up.unwrap_or(frame.up),
+            guessed: frame.guessed,
+            reason: "as the body".to_owned(),
+        },
+        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&used_positions(&scan, &faces), (lo, hi), unit, up)
+            .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() })?,
+    };
+    build(file, scan, faces, frame, options)
 }
 
 /// What may close a body that came in open: its seams joined, or the body alone taken out of a scene.
@@ -149,24 +155,7 @@ fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
     hint
 }
 
-fn garment_from(raw: RawObj, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
-    let faces = chosen_faces(&raw, options)?;
-    let frame = match (body, options.unit, options.up) {
-        (_, Some(unit), Some(up)) => Frame::given(unit, up),
-        (Beside::File(frame), unit, up) => Frame {
-            unit: unit.unwrap_or(frame.unit),
-            up: up.unwrap_or(frame.up),
-            guessed: frame.guessed,
-            reason: "as the body".to_owned(),
-        },
-        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&used_positions(&raw, &faces), (lo, hi), unit, up)
-            .ok_or_else(|| MeshError::NoFrame { file: raw.file.clone() })?,
-    };
-    build(raw, faces, frame, options)
-}
-
-fn chosen_faces(raw: &RawObj, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
-    let scan = &raw.scan;
+fn chosen_faces(file: &Path, scan: &Scan, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
     let faces = match &options.group {
         None => scan.faces.clone(),
         Some(asked) => {
@@ -177,31 +166,36 @@ fn chosen_faces(raw: &RawObj, options: &ImportOptions) -> Result<Vec<Face>, Mesh
                 let used: BTreeSet<u32> = scan.faces.iter().flat_map(|face| [face.group, face.object]).collect();
                 let available =
                     (0u32..).zip(&scan.names).filter(|(i, _)| used.contains(i)).map(|(_, name)| name.clone());
-                let (file, asked) = (raw.file.clone(), asked.clone());
+                let (file, asked) = (file.to_owned(), asked.clone());
                 return Err(MeshError::UnknownGroup { file, asked, available: available.collect() });
             }
             chosen
         }
     };
     if faces.is_empty() {
-        let file = raw.file.clone();
+        let file = file.to_owned();
         return Err(MeshError::Empty { file, vertices: scan.positions.len(), faces: 0 });
     }
     Ok(faces)
 }
 
-fn used_positions(raw: &RawObj, faces: &[Face]) -> Vec<DVec3> {
-    let mut used = vec![false; raw.scan.positions.len()];
+fn used_positions(scan: &Scan, faces: &[Face]) -> Vec<DVec3> {
+    let mut used = vec![false; scan.positions.len()];
     for face in faces {
-        for corner in &raw.scan.corners[face.first as usize..(face.first + face.count) as usize] {
+        for corner in face.among(&scan.corners) {
             used[corner.vertex as usize] = true;
         }
     }
-    raw.scan.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
+    scan.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
 }
 
-fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -> Result<Imported, MeshError> {
-    let RawObj { file, scan } = raw;
+fn build(
+    file: &Path,
+    scan: Scan,
+    faces: Vec<Face>,
+    frame: Frame,
+    options: &ImportOptions,
+) -> Result<Imported, MeshError> {
     let placed: Vec<DVec3> = scan.positions.iter().map(|&p| frame.to_metres(p)).collect();
     let mut repairs = Vec::new();
     let mut remarks = Vec::new();
@@ -210,8 +204,8 @@ fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -
     }
     let draft = Draft::new(&placed, &scan.corners, &faces, options.weld, &mut repairs);
     if draft.triangles.is_empty() {
-        let empty = MeshError::Empty { file, vertices: scan.positions.len(), faces: faces.len() };
-        return Err(empty);
+        let (file, vertices) = (file.to_owned(), scan.positions.len());
+        return Err(MeshError::Empty { file, vertices, faces: faces.len() });
     }
     let group: Vec<u32> = draft.face.iter().map(|&f| scan.group_of(&faces[f as usize])).collect();
     let (groups, triangle_group) = named_groups(&group, &scan.names);
@@ -241,11 +235,10 @@ fn build(raw: RawObj, faces: Vec<Face>, frame: Frame, options: &ImportOptions) -
         remarks,
     };
     let source = ObjSource {
-        file,
+        file: file.to_owned(),
         frame,
         corners: scan.corners,
         faces,
-        names: scan.names,
         statements: scan.statements,
         positions: scan.positions,
         textures: scan.textures,

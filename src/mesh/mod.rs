@@ -7,35 +7,33 @@
 pub mod coarse;
 mod decimate;
 mod draft;
-pub mod error;
+mod error;
 pub mod export;
 mod facing;
-pub mod fit;
 pub(crate) mod flip;
-pub mod frame;
-pub mod frame_guess;
+mod frame;
+mod frame_guess;
 pub(crate) mod half_edge;
 pub mod health;
 pub mod import;
-pub mod polygon;
-pub mod push_out;
+mod polygon;
 pub mod report;
 pub mod rest;
 mod scan;
 pub mod self_intersection;
 mod source;
-pub mod topology;
-pub mod triangle_crossing;
-pub mod winding;
+mod topology;
+mod triangle_crossing;
+mod winding;
 
 use glam::DVec3;
 
-pub use error::MeshError;
+pub use error::{Keyword, LineProblem, MeshError};
 pub use frame::{Axis, Frame, Unit};
 pub use rest::RestShape;
 pub use scan::{Corner, Face};
 pub use source::ObjSource;
-pub use topology::Topology;
+pub use topology::{NONE, Topology};
 
 /// An indexed triangle mesh with optional named groups of triangles.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -111,8 +109,7 @@ impl TriMesh {
     /// Smallest and largest coordinate along each axis, m; `None` for a mesh without vertices.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
+        bounds(&self.positions)
     }
 
     /// The same triangles and groups at other positions.
@@ -121,4 +118,10 @@ impl TriMesh {
         debug_assert_eq!(positions.len(), self.positions.len());
         Self { positions, ..self.clone() }
     }
+}
+
+/// Smallest and largest coordinate of some points along each axis; `None` for no points.
+fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
+    let first = *points.first()?;
+    Some(points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p))))
 }

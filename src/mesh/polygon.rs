@@ -21,8 +21,7 @@ const MANY_CORNERS: usize = 32;
 type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 /// Corner numbers of the triangles of a polygon, wound as it is; n − 2 of them for n ≥ 3 corners, else none.
-#[must_use]
-pub fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
+pub(super) fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
     match corners.len() {
         0..=2 => Vec::new(),
         3 => vec![[0, 1, 2]],

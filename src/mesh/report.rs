@@ -9,51 +9,24 @@ use super::frame::Frame;
 /// Something changed on the way in.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum Repair {
     /// Faces with more than three corners were cut.
-    PolygonsCut {
-        /// Faces of four corners.
-        quads: usize,
-        /// Faces of five and more.
-        larger: usize,
-    },
+    PolygonsCut { quads: usize, larger: usize },
     /// Vertices at the same place were joined, as asked.
-    Welded {
-        /// Vertices that vanished.
-        vertices: usize,
-    },
+    Welded { vertices: usize },
     /// Triangles that name a vertex twice were dropped.
-    DegenerateDropped {
-        /// How many.
-        triangles: usize,
-    },
+    DegenerateDropped { triangles: usize },
     /// Triangles of the same three vertices as an earlier one were dropped.
-    DuplicatesDropped {
-        /// How many.
-        triangles: usize,
-    },
+    DuplicatesDropped { triangles: usize },
     /// Vertices that no face uses were dropped.
-    UnusedDropped {
-        /// How many.
-        vertices: usize,
-    },
+    UnusedDropped { vertices: usize },
     /// Triangles were turned round to agree with their neighbours.
-    WindingTurned {
-        /// How many.
-        triangles: usize,
-    },
+    WindingTurned { triangles: usize },
     /// Parts of the surface were turned inside out to face outward.
-    TurnedOutward {
-        /// How many connected parts.
-        components: usize,
-    },
+    TurnedOutward { components: usize },
     /// A group was chosen and the rest left out.
-    GroupChosen {
-        /// Its name.
-        name: String,
-        /// Faces left out.
-        left_out: usize,
-    },
+    GroupChosen { name: String, left_out: usize },
 }
 
 impl fmt::Display for Repair {
@@ -84,53 +57,24 @@ impl fmt::Display for Repair {
 /// Something worth knowing that was left as it is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum Remark {
     /// Vertices at the place of another, not joined.
-    Coincident {
-        /// How many.
-        vertices: usize,
-    },
+    Coincident { vertices: usize },
     /// Edges of three triangles and more.
-    NonManifold {
-        /// How many.
-        edges: usize,
-    },
+    NonManifold { edges: usize },
     /// Vertices where the boundary meets itself.
-    Pinched {
-        /// How many.
-        vertices: usize,
-    },
+    Pinched { vertices: usize },
     /// Neighbours that cannot agree on a side.
-    OneSided {
-        /// Patches.
-        patches: usize,
-    },
+    OneSided { patches: usize },
     /// Triangles without area.
-    NoArea {
-        /// How many.
-        triangles: usize,
-    },
+    NoArea { triangles: usize },
     /// The body has a boundary.
-    Open {
-        /// Boundary edges.
-        edges: usize,
-        /// Loops they form.
-        loops: usize,
-    },
+    Open { edges: usize, loops: usize },
     /// Points and lines, passed over.
-    SmallFaces {
-        /// How many.
-        count: usize,
-    },
+    SmallFaces { count: usize },
     /// Lines of no known keyword, passed over.
-    UnknownLines {
-        /// How many.
-        count: usize,
-        /// The first one's number.
-        line: usize,
-        /// How it begins.
-        text: String,
-    },
+    UnknownLines { count: usize, line: usize, text: String },
 }
 
 impl fmt::Display for Remark {
@@ -162,20 +106,16 @@ impl fmt::Display for Remark {
 
 /// What a mesh file holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct MeshReport {
-    /// The file.
     pub file: String,
     /// How its numbers were read.
     pub frame: Frame,
-    /// Vertices of the mesh.
     pub vertices: usize,
-    /// Triangles of the mesh.
     pub triangles: usize,
     /// Faces they came from.
     pub faces: usize,
-    /// Connected parts.
     pub components: usize,
-    /// Named groups.
     pub groups: usize,
     /// Edges with one triangle.
     pub boundary_edges: usize,

@@ -26,6 +26,7 @@ const METRIC_AREA_RATIO: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 
 /// Why a rest shape cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum RestError {
     /// A triangle without shape.
     #[error(
@@ -33,52 +34,29 @@ pub enum RestError {
          with an area; repair the mesh, or take another rest shape",
         first + 1
     )]
-    NoArea {
-        /// How many.
-        count: usize,
-        /// The first, from 0.
-        first: usize,
-    },
+    NoArea { count: usize, first: usize },
     /// The second mesh has other vertices.
     #[error("the rest mesh has {found} vertices, expected the garment's {expected}; give the garment in another shape")]
-    Vertices {
-        /// In the second mesh.
-        found: usize,
-        /// In the garment.
-        expected: usize,
-    },
+    Vertices { found: usize, expected: usize },
     /// The second mesh has other triangles.
     #[error(
         "the rest mesh has other triangles than the garment, from number {} on; expected the same faces in the same \
          order; give the garment in another shape",
         first + 1
     )]
-    Triangles {
-        /// The first that differs, from 0.
-        first: usize,
-    },
+    Triangles { first: usize },
     /// Corners without texture coordinates.
     #[error(
         "{count} of {of} triangles have no texture coordinates, so they hold no pattern; expected one at every corner; \
          take the rest shape from the edges instead"
     )]
-    NoTexture {
-        /// Triangles without.
-        count: usize,
-        /// Triangles in all.
-        of: usize,
-    },
+    NoTexture { count: usize, of: usize },
     /// Texture coordinates of some other scale.
     #[error(
         "the texture coordinates are no metric pattern: with {metres_per_unit} m a unit they hold {ratio:.3e} times the \
          garment's area, expected 0.25 to 4; name their unit, or take the rest shape from the edges"
     )]
-    NotMetric {
-        /// Metres per unit as given.
-        metres_per_unit: f64,
-        /// Area of the pattern over area in space.
-        ratio: f64,
-    },
+    NotMetric { metres_per_unit: f64, ratio: f64 },
 }
 
 /// Each triangle's corners in its own flat frame, m: x along the weft, y along the warp, counter-clockwise.
@@ -90,9 +68,6 @@ pub struct RestShape {
 
 impl RestShape {
     /// The mesh as it stands, at rest: own edges, warp along gravity.
-    ///
-    /// # Errors
-    /// [`RestError::NoArea`].
     pub fn from_edges(mesh: &TriMesh) -> Result<Self, RestError> {
         Self { corners: (0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect() }.checked()
     }

@@ -42,6 +42,14 @@ pub struct Face {
     pub object: u32,
 }
 
+impl Face {
+    /// Its own among the corners of all faces.
+    #[must_use]
+    pub fn among<'a>(&self, corners: &'a [Corner]) -> &'a [Corner] {
+        &corners[self.first as usize..(self.first + self.count) as usize]
+    }
+}
+
 /// What the lines hold.
 #[derive(Debug, Default)]
 pub(super) struct Scan {

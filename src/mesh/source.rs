@@ -8,6 +8,7 @@ use super::error::MeshError;
 use super::frame::Frame;
 use super::scan::{Corner, Face, Scan};
 use super::topology::NONE;
+use crate::files::Unreadable;
 
 /// What an export needs to give a file back with other positions.
 #[derive(Debug, Clone)]
@@ -20,8 +21,6 @@ pub struct ObjSource {
     pub corners: Vec<Corner>,
     /// The faces of three corners and more; of the chosen group where one was chosen.
     pub faces: Vec<Face>,
-    /// Names of groups and objects.
-    pub names: Vec<String>,
     /// Grouping and material lines, each with the number of the face it stands before.
     pub statements: Vec<(u32, String)>,
     /// Positions by file vertex, in the file's frame.
@@ -36,7 +35,7 @@ impl ObjSource {
     /// The corners of one face.
     #[must_use]
     pub fn corners_of(&self, face: &Face) -> &[Corner] {
-        &self.corners[face.first as usize..(face.first + face.count) as usize]
+        face.among(&self.corners)
     }
 
     /// The file vertex, from 0, of each mesh vertex: the first of those welded into it.
@@ -53,31 +52,18 @@ impl ObjSource {
     }
 }
 
-/// A file read and checked, before anything is chosen or repaired.
-pub(super) struct RawObj {
-    pub(super) file: PathBuf,
-    pub(super) scan: Scan,
-}
-
-impl RawObj {
-    /// Reads a file.
-    pub(super) fn read(file: &Path) -> Result<Self, MeshError> {
-        let unreadable = |reason: String| MeshError::Unreadable { file: file.to_owned(), reason };
-        if file.is_dir() {
-            return Err(unreadable("it is a folder, expected an OBJ file".to_owned()));
-        }
-        let bytes = std::fs::read(file).map_err(|e| unreadable(e.to_string()))?;
-        if let Some(found) = other_format(file, &bytes) {
-            return Err(MeshError::NotObj { file: file.to_owned(), found });
-        }
-        // Comments and names come in any encoding; numbers are ASCII in all of them.
-        Self::parse(file, &String::from_utf8_lossy(&bytes))
+/// Reads the lines of a file.
+pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
+    let unreadable = |reason: String| Unreadable { path: file.to_owned(), reason };
+    if file.is_dir() {
+        return Err(unreadable("it is a folder, expected an OBJ file".to_owned()).into());
     }
-
-    /// Reads a text; `file` is for the messages.
-    pub(super) fn parse(file: &Path, text: &str) -> Result<Self, MeshError> {
-        Ok(Self { file: file.to_owned(), scan: Scan::new(file, text)? })
+    let bytes = std::fs::read(file).map_err(|e| unreadable(e.to_string()))?;
+    if let Some(found) = other_format(file, &bytes) {
+        return Err(MeshError::NotObj { file: file.to_owned(), found });
     }
+    // Comments and names come in any encoding; numbers are ASCII in all of them.
+    Scan::new(file, &String::from_utf8_lossy(&bytes))
 }
 
 /// What a file is if it's no OBJ; told by its first bytes, not by its name, except where the bytes tell nothing.

@@ -87,16 +87,16 @@ impl Topology {
         self.edges.binary_search(&[a.min(b), a.max(b)]).ok()
     }
 
+    /// The edges of one triangle, ascending.
+    pub fn boundary_edges(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.edges.iter().zip(&self.edge_valence).filter(|(_, valence)| **valence == 1).map(|(edge, _)| *edge)
+    }
+
     /// Whether each vertex lies on a boundary edge.
     #[must_use]
     pub fn boundary_vertices(&self) -> Vec<bool> {
         let mut on = vec![false; self.neighbour_start.len().saturating_sub(1)];
-        for (edge, &valence) in self.edges.iter().zip(&self.edge_valence) {
-            if valence == 1 {
-                on[edge[0] as usize] = true;
-                on[edge[1] as usize] = true;
-            }
-        }
+        self.boundary_edges().flatten().for_each(|v| on[v as usize] = true);
         on
     }
 
@@ -131,11 +131,9 @@ impl Topology {
     #[must_use]
     pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
         let mut links: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();
-        for (&[a, b], &valence) in self.edges.iter().zip(&self.edge_valence) {
-            if valence == 1 {
-                links.entry(a).or_default().push(b);
-                links.entry(b).or_default().push(a);
-            }
+        for [a, b] in self.boundary_edges() {
+            links.entry(a).or_default().push(b);
+            links.entry(b).or_default().push(a);
         }
         let mut loops = Vec::new();
         // Everything before the last start is used up: looked through once, not once a loop.

@@ -12,8 +12,7 @@ use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// Whether triangles `a` and `b` cross. Symmetric, and the same for any order of the corners.
-#[must_use]
-pub fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+pub(super) fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
     let a_sides = a.map(|p| side(b, p));
     if same_side(a_sides) {
         return false;

@@ -12,7 +12,7 @@ use super::{DVec3, TriMesh};
 
 /// What was turned.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Turned {
+pub(super) struct Turned {
     /// Triangles turned to agree with their neighbours.
     pub to_agree: usize,
     /// Patches that cannot agree.
@@ -20,8 +20,7 @@ pub struct Turned {
 }
 
 /// Which triangles must be turned so that neighbours agree, the fewest in each patch, and the patch of each triangle.
-#[must_use]
-pub fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
+pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
     let topology = Topology::new(mesh);
     let n = mesh.triangles.len();
     let mut across = vec![[NONE; 3]; n];
@@ -81,8 +80,7 @@ pub fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
 }
 
 /// Number of edges along which two triangles run in the same direction.
-#[must_use]
-pub fn disagreeing_edges(mesh: &TriMesh, topology: &Topology) -> usize {
+pub(super) fn disagreeing_edges(mesh: &TriMesh, topology: &Topology) -> usize {
     topology
         .edges
         .iter()
@@ -97,8 +95,7 @@ pub fn disagreeing_edges(mesh: &TriMesh, topology: &Topology) -> usize {
 
 /// Signed volume of each vertex-connected component about its own middle, m³; positive where it faces outward. For an
 /// open component, the volume of the cone from its middle, whose sign still tells the outside of a bowl.
-#[must_use]
-pub fn signed_volumes(mesh: &TriMesh, component: &[u32], count: usize) -> Vec<f64> {
+pub(super) fn signed_volumes(mesh: &TriMesh, component: &[u32], count: usize) -> Vec<f64> {
     let mut middle = vec![(DVec3::ZERO, 0.0); count];
     for (p, &c) in mesh.positions.iter().zip(component) {
         middle[c as usize].0 += p;

@@ -88,20 +88,6 @@ impl Parts {
         self.parts.is_empty()
     }
 
-    /// PARTs that share a seam with each PART, ascending.
-    #[must_use]
-    pub fn neighbours(&self) -> Vec<Vec<u32>> {
-        let mut list = vec![Vec::new(); self.parts.len()];
-        // Seams come sorted by their pair, smaller number first, so both directions fill in ascending order.
-        for seam in &self.seams {
-            list[seam.parts[1] as usize].push(seam.parts[0]);
-        }
-        for seam in &self.seams {
-            list[seam.parts[0] as usize].push(seam.parts[1]);
-        }
-        list
-    }
-
     /// PARTs as the connected pieces of equal label; `level_of` gives the level of a label.
     pub(crate) fn from_labels(
         topology: &Topology,

@@ -7,6 +7,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use ordered_float::OrderedFloat;
+
 use super::grain::Ruler;
 
 /// The nearest seed of each of these connected vertices, and how many seeds it takes for none to be farther than half of
@@ -76,7 +78,7 @@ struct Spread {
     seed_of_vertex: Vec<u32>,
     /// The vertex before each on its way from the seed.
     before: Vec<usize>,
-    heap: BinaryHeap<Reverse<(Metres, usize)>>,
+    heap: BinaryHeap<Reverse<(OrderedFloat<f64>, usize)>>,
 }
 
 impl Spread {
@@ -94,12 +96,12 @@ impl Spread {
         self.distance[at] = 0.0;
         self.seed_of_vertex[at] = seed as u32;
         self.before[at] = usize::MAX;
-        self.heap.push(Reverse((Metres(0.0), at)));
+        self.heap.push(Reverse((OrderedFloat(0.0), at)));
     }
 
     /// Dijkstra's algorithm from the seeds put since the last time, over what they are nearer to.
     fn flow(&mut self, graph: &Graph) {
-        while let Some(Reverse((Metres(d), i))) = self.heap.pop() {
+        while let Some(Reverse((OrderedFloat(d), i))) = self.heap.pop() {
             if d > self.distance[i] {
                 continue;
             }
@@ -111,7 +113,7 @@ impl Spread {
                     self.distance[j] = d + length;
                     self.seed_of_vertex[j] = self.seed_of_vertex[i];
                     self.before[j] = i;
-                    self.heap.push(Reverse((Metres(d + length), j)));
+                    self.heap.push(Reverse((OrderedFloat(d + length), j)));
                 }
             }
         }
@@ -121,23 +123,5 @@ impl Spread {
     fn farthest(&self) -> (usize, f64) {
         let farther = |best: (usize, f64), (i, &d): (usize, &f64)| if d > best.1 { (i, d) } else { best };
         self.distance.iter().enumerate().fold((0, 0.0), farther)
-    }
-}
-
-/// A finite, non-negative distance with a total order, for the heap.
-#[derive(PartialEq, Clone, Copy)]
-struct Metres(f64);
-
-impl Eq for Metres {}
-
-impl PartialOrd for Metres {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Metres {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0)
     }
 }

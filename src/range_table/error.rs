@@ -3,15 +3,16 @@
 use super::{GapRule, Level};
 use crate::files::Unreadable;
 
+/// What a table without rows lacks.
+pub(super) const EXPECTED_ROWS: &str = "at least one row [lower, upper]; [[0, inf]] makes the garment one level";
+
 /// A range table that cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum TableError {
     /// No such name.
     #[error("no range table is called `{found}`; expected `table-3` or a file ending in .toml")]
-    Unknown {
-        /// What was asked for.
-        found: String,
-    },
+    Unknown { found: String },
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
@@ -20,77 +21,31 @@ pub enum TableError {
         "{place}: {message}; a range table has name = \"...\", unit = \"cm\", gap = \"extend-lower\" | \"extend-upper\" | \
          \"own-level\" | \"error\" and levels = [[lower, upper], ...], with an extent as a third number where wanted, or its width and height as a third and fourth"
     )]
-    Syntax {
-        /// File and line.
-        place: String,
-        /// What the parser found and expected.
-        message: String,
-    },
-    /// A unit other than the only one there is.
-    #[error("{place}: found unit = \"{found}\", expected unit = \"cm\"; convert the bounds to centimetres")]
-    Unit {
-        /// File and line.
-        place: String,
-        /// What was written.
-        found: String,
-    },
-    /// An unknown gap rule.
-    #[error(
-        "{place}: found gap = \"{found}\", expected \"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose who \
-         takes the distances between two rows that do not meet"
-    )]
-    Gap {
-        /// File and line.
-        place: String,
-        /// What was written.
-        found: String,
-    },
-    /// No rows.
-    #[error(
-        "{place}: found no levels, expected at least one row [lower, upper]; [[0, inf]] makes the garment one level"
-    )]
-    Empty {
-        /// File and line.
-        place: String,
-    },
-    /// A row that is not two to four numbers.
-    #[error(
-        "{place}: row {row} has {found} numbers, expected [lower, upper], [lower, upper, extent] or [lower, upper, width, height]; an \
-         open last row is [lower, inf]"
-    )]
-    RowLength {
-        /// File and line.
-        place: String,
-        /// Row number, from 1.
-        row: usize,
-        /// How many numbers it has.
-        found: usize,
-    },
+    Syntax { place: String, message: String },
     /// A row whose bounds make no sense, alone or after the row before.
     #[error("{place}: row {row} {problem}")]
-    Row {
-        /// File and line, or the table's name.
-        place: String,
-        /// Row number, from 1.
-        row: usize,
-        /// What is wrong.
-        problem: BoundProblem,
-    },
-    /// Parameters that make no table.
+    Row { place: String, row: usize, problem: BoundProblem },
+    /// A key's value, or a parameter, that makes no table.
     #[error("{what}: found {found}, expected {expected}")]
-    Family {
-        /// Which family of tables.
-        what: &'static str,
-        /// The value given.
-        found: String,
-        /// What would do.
-        expected: &'static str,
-    },
+    Value { what: String, found: String, expected: &'static str },
+}
+
+impl TableError {
+    pub(super) fn value(what: impl Into<String>, found: impl ToString, expected: &'static str) -> Self {
+        Self::Value { what: what.into(), found: found.to_string(), expected }
+    }
 }
 
 /// What is wrong with the bounds of one row (cm).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum BoundProblem {
+    /// A row that is not two to four numbers.
+    #[error(
+        "has {0} numbers, expected [lower, upper], [lower, upper, extent] or [lower, upper, width, height]; an open last \
+         row is [lower, inf]"
+    )]
+    Length(usize),
     /// NaN.
     #[error("is [{0}, {1}], expected two numbers; write the bounds in centimetres")]
     NotANumber(f64, f64),
@@ -107,31 +62,16 @@ pub enum BoundProblem {
     #[error(
         "starts at {lower}, expected at least {before}, the upper value of the row before; sort the rows by distance"
     )]
-    OutOfOrder {
-        /// Its lower value.
-        lower: f64,
-        /// The upper value before.
-        before: f64,
-    },
+    OutOfOrder { lower: f64, before: f64 },
     /// Starts inside the row before.
     #[error("starts at {lower}, inside the row before, which ends at {before}; let it start at {before}")]
-    Overlap {
-        /// Its lower value.
-        lower: f64,
-        /// The upper value before.
-        before: f64,
-    },
+    Overlap { lower: f64, before: f64 },
     /// A hole where none is allowed.
     #[error(
         "starts at {lower}, but the row before ends at {before} and gap = \"error\" allows no hole; close it, or choose \
          \"extend-lower\", \"extend-upper\" or \"own-level\""
     )]
-    Hole {
-        /// Its lower value.
-        lower: f64,
-        /// The upper value before.
-        before: f64,
-    },
+    Hole { lower: f64, before: f64 },
     /// An extent that is not above 0.
     #[error(
         "has the extent {0:?}, expected centimetres above 0; inf never cuts the level, and without a third number it is cut as \

@@ -8,15 +8,10 @@ impl RangeTable {
     /// The same table with every bound times `factor`; an open end stays open.
     ///
     /// # Errors
-    /// [`TableError::Family`] for a factor that is not positive and finite.
+    /// [`TableError::Value`] for a factor that is not positive and finite.
     pub fn scaled(&self, factor: f64) -> Result<Self, TableError> {
         if !(factor.is_finite() && factor > 0.0) {
-            let expected = "a positive, finite number";
-            return Err(TableError::Family {
-                what: "the factor of a scaled table",
-                found: factor.to_string(),
-                expected,
-            });
+            return Err(TableError::value("the factor of a scaled table", factor, "a positive, finite number"));
         }
         // Extents run along the cloth, which does not scale with the distances.
         let scale = |l: &Level| Level { lower_cm: l.lower_cm * factor, upper_cm: l.upper_cm * factor, ..*l };
@@ -29,12 +24,12 @@ impl RangeTable {
     /// extents that its distances had.
     ///
     /// # Errors
-    /// [`TableError::Family`] for no levels, or for more where no finite level is left to split.
+    /// [`TableError::Value`] for no levels, or for more where no finite level is left to split.
     pub fn with_level_count(&self, count: usize) -> Result<Self, TableError> {
         let levels = self.effective_levels();
         let mut bounds: Vec<f64> = levels.iter().map(|l| l.lower_cm).collect();
         bounds.extend(levels.last().map(|l| l.upper_cm));
-        let refuse = |expected| TableError::Family { what: "the number of levels", found: count.to_string(), expected };
+        let refuse = |expected| TableError::value("the number of levels", count, expected);
         if count == 0 {
             return Err(refuse("at least 1"));
         }
@@ -67,15 +62,14 @@ impl RangeTable {
     /// two neighbouring distances; where the sample repeats a value there are fewer levels than asked for.
     ///
     /// # Errors
-    /// [`TableError::Family`] for no levels or a sample without a finite distance.
+    /// [`TableError::Value`] for no levels or a sample without a finite distance.
     pub fn quantiles(distances_m: &[f64], count: usize) -> Result<Self, TableError> {
         if count == 0 {
-            return Err(TableError::Family { what: "the number of levels", found: "0".into(), expected: "at least 1" });
+            return Err(TableError::value("the number of levels", 0, "at least 1"));
         }
         let inner = quantile_bounds_cm(distances_m, count);
         if !distances_m.iter().any(|d| d.is_finite()) {
-            let what = "the sample of a quantile table";
-            return Err(TableError::Family { what, found: "no finite distance".into(), expected: "at least one" });
+            return Err(TableError::value("the sample of a quantile table", "no finite distance", "at least one"));
         }
         let bounds: Vec<f64> = std::iter::once(0.0).chain(inner).chain([f64::INFINITY]).collect();
         let levels = bounds.len() - 1;
@@ -87,16 +81,15 @@ impl RangeTable {
     /// the lower value of the open last one.
     ///
     /// # Errors
-    /// [`TableError::Family`] for fewer than three levels or bounds that do not grow.
+    /// [`TableError::Value`] for fewer than three levels or bounds that do not grow.
     pub fn geometric(first_cm: f64, last_cm: f64, count: usize) -> Result<Self, TableError> {
         if count < 3 {
-            let (what, expected) = ("the number of levels of a geometric table", "at least 3");
-            return Err(TableError::Family { what, found: count.to_string(), expected });
+            return Err(TableError::value("the number of levels of a geometric table", count, "at least 3"));
         }
         if !(first_cm > 0.0 && last_cm > first_cm && last_cm.is_finite()) {
             let found = format!("{first_cm} to {last_cm}");
             let expected = "0 < first < last, in centimetres";
-            return Err(TableError::Family { what: "the bounds of a geometric table", found, expected });
+            return Err(TableError::value("the bounds of a geometric table", found, expected));
         }
         let steps = (count - 2) as f64;
         let ratio = last_cm / first_cm;
@@ -107,9 +100,6 @@ impl RangeTable {
     }
 
     /// A table from its inner bounds, from 0 to open.
-    ///
-    /// # Errors
-    /// As [`RangeTable::new`].
     pub fn from_inner_bounds(name: impl Into<String>, inner_cm: &[f64]) -> Result<Self, TableError> {
         let bounds: Vec<f64> = std::iter::once(0.0).chain(inner_cm.iter().copied()).chain([f64::INFINITY]).collect();
         let table = Self::from_bounds(name, &bounds)?;
@@ -119,8 +109,7 @@ impl RangeTable {
 
 /// At most `shares − 1` bounds (cm, ascending, distinct, above 0) between equal shares of the distances, each halfway between
 /// two neighbouring ones so that none lies on a bound.
-#[must_use]
-pub fn quantile_bounds_cm(distances_m: &[f64], shares: usize) -> Vec<f64> {
+pub(super) fn quantile_bounds_cm(distances_m: &[f64], shares: usize) -> Vec<f64> {
     let mut sorted: Vec<f64> = distances_m.iter().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let mut bounds = Vec::new();

@@ -3,9 +3,10 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::error::first_problem;
+use super::error::{EXPECTED_ROWS, first_problem};
 use super::{Extent, GapRule, Level, RangeTable, TableError};
-use crate::files::{names_a_file, read_text};
+use crate::files::{line_of, names_a_file, read_text};
+use crate::word::word;
 
 /// Table 3 as printed, inside the binary.
 const TABLE_3: &str = include_str!("../../assets/tables/table-3.toml");
@@ -30,9 +31,6 @@ impl RangeTable {
     }
 
     /// The table of this name: `table-3`, or a file.
-    ///
-    /// # Errors
-    /// [`TableError::Unknown`], [`TableError::Unreadable`]; for a file as [`parse`](Self::parse).
     pub fn by_name(name: &str) -> Result<Self, TableError> {
         match name {
             super::TABLE_3 => Ok(Self::table_3()),
@@ -42,9 +40,6 @@ impl RangeTable {
     }
 
     /// Reads a table; `source_name` (a path) only serves the messages.
-    ///
-    /// # Errors
-    /// [`TableError`] with file, line, row, what was found and what was expected.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, TableError> {
         let at = |offset: usize| format!("{source_name}:{}", line_of(text, offset));
         let file: File = toml::from_str(text).map_err(|e| TableError::Syntax {
@@ -52,26 +47,26 @@ impl RangeTable {
             message: e.message().replace('\n', ", "),
         })?;
         if file.unit.get_ref() != "cm" {
-            return Err(TableError::Unit { place: at(file.unit.span().start), found: file.unit.into_inner() });
+            let found = format!("unit = \"{}\"", file.unit.get_ref());
+            let expected = "unit = \"cm\"; convert the bounds to centimetres";
+            return Err(TableError::value(at(file.unit.span().start), found, expected));
         }
         let gap = match &file.gap {
             None => GapRule::default(),
-            Some(word) => {
-                let known = GapRule::ALL.into_iter().find(|r| r.as_str() == word.get_ref());
-                let found = || TableError::Gap { place: at(word.span().start), found: word.get_ref().clone() };
-                known.ok_or_else(found)?
-            }
+            Some(rule) => word(rule.get_ref()).ok_or_else(|| {
+                let expected = "\"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose who takes the \
+                                distances between two rows that do not meet";
+                TableError::value(at(rule.span().start), format!("gap = \"{}\"", rule.get_ref()), expected)
+            })?,
         };
         let rows = file.levels.get_ref();
         if rows.is_empty() {
-            return Err(TableError::Empty { place: at(file.levels.span().start) });
+            return Err(TableError::value(at(file.levels.span().start), "no levels", EXPECTED_ROWS));
         }
         let mut levels = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            levels.push(Level::from_numbers(row.get_ref()).ok_or_else(|| {
-                let (place, row, found) = (at(row.span().start), i + 1, row.get_ref().len());
-                TableError::RowLength { place, row, found }
-            })?);
+            let wrong = |problem| TableError::Row { place: at(row.span().start), row: i + 1, problem };
+            levels.push(Level::from_numbers(row.get_ref()).map_err(wrong)?);
         }
         if let Some((row, problem)) = first_problem(&levels, gap) {
             return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });
@@ -87,7 +82,7 @@ impl RangeTable {
         if !self.source.is_empty() {
             text.push_str(&format!("source = {}\n", quoted(&self.source)));
         }
-        text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap.as_str()));
+        text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap));
         for level in &self.levels {
             // `{:?}` is the shortest text that reads back to the same bits; TOML spells infinity the same way.
             let numbers =
@@ -97,11 +92,6 @@ impl RangeTable {
         text.push_str("]\n");
         text
     }
-}
-
-/// Line number, from 1, of a byte offset.
-fn line_of(text: &str, offset: usize) -> usize {
-    1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
 }
 
 #[cfg(test)]

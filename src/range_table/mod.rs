@@ -15,9 +15,11 @@
 
 mod error;
 mod extent;
-pub mod families;
+mod families;
 mod format;
 mod rule;
+
+use std::fmt;
 
 pub use error::{BoundProblem, TableError};
 pub use extent::Extent;
@@ -46,14 +48,14 @@ impl Level {
     }
 
     /// A row as written: lower and upper value, and an extent, or its width and height, where there is one.
-    fn from_numbers(row: &[f64]) -> Option<Self> {
+    fn from_numbers(row: &[f64]) -> Result<Self, BoundProblem> {
         let (lower_cm, upper_cm, extent) = match *row {
             [lower, upper] => (lower, upper, None),
             [lower, upper, extent] => (lower, upper, Some(Extent::even(extent))),
             [lower, upper, width_cm, height_cm] => (lower, upper, Some(Extent { width_cm, height_cm })),
-            _ => return None,
+            _ => return Err(BoundProblem::Length(row.len())),
         };
-        Some(Self { lower_cm, upper_cm, extent })
+        Ok(Self { lower_cm, upper_cm, extent })
     }
 }
 
@@ -75,19 +77,9 @@ pub enum GapRule {
     Error,
 }
 
-impl GapRule {
-    /// Every rule there is.
-    pub const ALL: [Self; 4] = [Self::ExtendLower, Self::ExtendUpper, Self::OwnLevel, Self::Error];
-
-    /// As written in a table file.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::ExtendLower => "extend-lower",
-            Self::ExtendUpper => "extend-upper",
-            Self::OwnLevel => "own-level",
-            Self::Error => "error",
-        }
+impl fmt::Display for GapRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        serde::Serialize::serialize(self, f)
     }
 }
 
@@ -105,19 +97,6 @@ pub struct RangeTable {
     pub levels: Vec<Level>,
 }
 
-/// A level after the holes are given away.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectiveLevel {
-    /// Lower value, cm.
-    pub lower_cm: f64,
-    /// Upper value, cm.
-    pub upper_cm: f64,
-    /// The table's row it stands for, from 0; `None` for a hole that is a level of its own.
-    pub row: Option<usize>,
-    /// The row's extent; a hole has none.
-    pub extent: Option<Extent>,
-}
-
 impl RangeTable {
     /// A checked table.
     ///
@@ -131,18 +110,12 @@ impl RangeTable {
     }
 
     /// A checked table without holes from its ascending bounds in centimetres: `n + 1` bounds make `n` levels.
-    ///
-    /// # Errors
-    /// As [`RangeTable::new`].
     pub fn from_bounds(name: impl Into<String>, bounds_cm: &[f64]) -> Result<Self, TableError> {
         let levels = bounds_cm.windows(2).map(|w| Level::new(w[0], w[1])).collect();
         Self::new(name, GapRule::default(), levels)
     }
 
     /// The same table with the extents of its rows: see [`Level::extent`]. Rows beyond the list keep theirs.
-    ///
-    /// # Errors
-    /// [`TableError`] names the row whose extent is not above 0.
     pub fn with_extents(mut self, extents: &[Option<Extent>]) -> Result<Self, TableError> {
         for (level, &extent) in self.levels.iter_mut().zip(extents) {
             level.extent = extent;
@@ -165,9 +138,6 @@ impl RangeTable {
     }
 
     /// Checks rows that were put together by hand.
-    ///
-    /// # Errors
-    /// As [`RangeTable::new`].
     pub fn validate(&self) -> Result<(), TableError> {
         match error::first_problem(&self.levels, self.gap) {
             None => Ok(()),
@@ -184,9 +154,9 @@ impl RangeTable {
 
     /// The levels after the gap rule, ascending, without holes; PARTs number their level by this list.
     #[must_use]
-    pub fn effective_levels(&self) -> Vec<EffectiveLevel> {
-        let mut out: Vec<EffectiveLevel> = Vec::with_capacity(self.levels.len() + 1);
-        for (row, level) in self.levels.iter().enumerate() {
+    pub fn effective_levels(&self) -> Vec<Level> {
+        let mut out: Vec<Level> = Vec::with_capacity(self.levels.len() + 1);
+        for level in &self.levels {
             let mut lower_cm = level.lower_cm;
             let before = out.last().map(|l| l.upper_cm);
             if let (Some(before), Some(last)) = (before, out.last_mut())
@@ -195,16 +165,13 @@ impl RangeTable {
                 match self.gap {
                     GapRule::ExtendLower => last.upper_cm = lower_cm,
                     GapRule::ExtendUpper => lower_cm = before,
-                    GapRule::OwnLevel => {
-                        out.push(EffectiveLevel { lower_cm: before, upper_cm: lower_cm, row: None, extent: None });
-                    }
+                    GapRule::OwnLevel => out.push(Level::new(before, lower_cm)),
                     // A checked table has no hole under this rule; an unchecked one keeps it, and its vertices stay
                     // unassigned, which is reported.
                     GapRule::Error => {}
                 }
             }
-            let (upper_cm, extent) = (level.upper_cm, level.extent);
-            out.push(EffectiveLevel { lower_cm, upper_cm, row: Some(row), extent });
+            out.push(Level { lower_cm, ..*level });
         }
         out
     }
@@ -223,7 +190,7 @@ impl RangeTable {
         let level_of_vertex: Vec<_> = distances_m.iter().map(|&d| level_in(&levels, d)).collect();
         let in_hole = |d: &&f64| holes.iter().any(|[from, to]| from * METRES_PER_CM <= **d && **d < to * METRES_PER_CM);
         let hole_vertices = distances_m.iter().filter(in_hole).count();
-        Assignment { level_of_vertex, level_count: levels.len(), hole_vertices }
+        Assignment { level_of_vertex, hole_vertices }
     }
 }
 
@@ -232,13 +199,11 @@ impl RangeTable {
 pub struct Assignment {
     /// Index into the effective levels, or `None` outside the table.
     pub level_of_vertex: Vec<Option<usize>>,
-    /// Number of effective levels.
-    pub level_count: usize,
     /// How many distances lie in a hole of the table as printed.
     pub hole_vertices: usize,
 }
 
-fn level_in(levels: &[EffectiveLevel], distance_m: f64) -> Option<usize> {
+fn level_in(levels: &[Level], distance_m: f64) -> Option<usize> {
     let above = levels.partition_point(|l| l.lower_cm * METRES_PER_CM <= distance_m);
     let level = above.checked_sub(1)?;
     (distance_m < levels[level].upper_cm * METRES_PER_CM || levels[level].upper_cm == f64::INFINITY).then_some(level)
@@ -267,7 +232,7 @@ mod tests {
         assert_eq!(of(&table), Some(13));
         table.gap = GapRule::OwnLevel;
         assert_eq!(of(&table), Some(13));
-        assert_eq!(table.effective_levels()[13].row, None);
+        assert_eq!(table.effective_levels()[13], Level::new(3.0, 3.5));
         assert_eq!(table.level_of(0.036), Some(14));
         table.gap = GapRule::Error;
         assert!(matches!(table.validate(), Err(TableError::Row { row: 14, problem: BoundProblem::Hole { .. }, .. })));

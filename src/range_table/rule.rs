@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::error::EXPECTED_ROWS;
 use super::{Extent, GapRule, Level, RangeTable, TableError};
 
 /// A range table, or the rule that makes one from the garment's distances.
@@ -47,9 +48,6 @@ impl TableRule {
     }
 
     /// The table for a garment whose vertices have these distances to the body (m).
-    ///
-    /// # Errors
-    /// [`TableError`] where the distances make no table (no vertices, not finite).
     pub fn resolve(&self, distances_m: &[f64]) -> Result<RangeTable, TableError> {
         match self {
             Self::Rows(table) => Ok(table.clone()),
@@ -122,15 +120,11 @@ impl TryFrom<Plain> for RangeTable {
         let place = || format!("table \"{}\"", plain.name);
         let rows = plain.levels.iter().enumerate().map(|(i, row)| {
             let cm: Vec<f64> = row.iter().map(|cm| cm.0).collect();
-            Level::from_numbers(&cm).ok_or_else(|| TableError::RowLength {
-                place: place(),
-                row: i + 1,
-                found: cm.len(),
-            })
+            Level::from_numbers(&cm).map_err(|problem| TableError::Row { place: place(), row: i + 1, problem })
         });
         let levels = rows.collect::<Result<Vec<_>, _>>()?;
         if levels.is_empty() {
-            return Err(TableError::Empty { place: place() });
+            return Err(TableError::value(place(), "no levels", EXPECTED_ROWS));
         }
         Ok(Self::new(plain.name, plain.gap, levels)?.with_source(plain.source))
     }

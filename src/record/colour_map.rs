@@ -6,19 +6,19 @@
 //!
 //! Limits: a colour outside sRGB is clipped channel by channel.
 
+use crate::quantile::nearest_rank;
+
 /// An sRGB colour.
-pub type Rgb = [u8; 3];
+pub(super) type Rgb = [u8; 3];
 
 /// sRGB of OKLCH: lightness 0–1, chroma (0–0.3), hue in degrees.
-#[must_use]
-pub fn oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
+pub(super) fn oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
     let (sin, cos) = hue_deg.to_radians().sin_cos();
     oklab(lightness, chroma * cos, chroma * sin)
 }
 
 /// sRGB of OKLab.
-#[must_use]
-pub fn oklab(lightness: f64, a: f64, b: f64) -> Rgb {
+pub(super) fn oklab(lightness: f64, a: f64, b: f64) -> Rgb {
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
     let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
     let s = (lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
@@ -38,7 +38,7 @@ fn gamma(linear: f64) -> u8 {
 
 /// A colour map: lightness rises evenly while the hue turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ColourMap {
+pub(super) struct ColourMap {
     lightness: (f64, f64),
     hue_deg: (f64, f64),
     chroma: (f64, f64),
@@ -46,15 +46,14 @@ pub struct ColourMap {
 
 impl ColourMap {
     /// Dark blue over teal to yellow: distances.
-    pub const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
+    pub(super) const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
     /// Dark violet over red to pale yellow: forces.
-    pub const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
+    pub(super) const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
     /// Pale grey over orange to dark red: errors, strains and pressures, where much is bad.
-    pub const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
+    pub(super) const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
 
     /// The colour at `t` in 0–1; outside it the end's, and grey for what is not a number.
-    #[must_use]
-    pub fn at(&self, t: f64) -> Rgb {
+    pub(super) fn at(&self, t: f64) -> Rgb {
         if t.is_nan() {
             return [128, 128, 128];
         }
@@ -67,8 +66,7 @@ impl ColourMap {
     }
 
     /// The colours of many values over `range`.
-    #[must_use]
-    pub fn colours(&self, values: &[f64], range: Range) -> Vec<Rgb> {
+    pub(super) fn colours(&self, values: &[f64], range: Range) -> Vec<Rgb> {
         values.iter().map(|&v| self.at(range.place(v))).collect()
     }
 }
@@ -87,10 +85,8 @@ impl Range {
     /// outliers (a PART of one vertex, say) would else press all others into the first colour.
     #[must_use]
     pub fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
-        let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
-        finite.sort_unstable_by(f64::total_cmp);
-        let at = ((finite.len() as f64 * share).ceil() as usize).clamp(1, finite.len().max(1)) - 1;
-        Self { low: 0.0, high: round_up(finite.get(at).copied().unwrap_or(0.0)) }
+        let finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+        Self { low: 0.0, high: round_up(nearest_rank(&finite, share)) }
     }
 
     /// Where `value` lies: 0 at the low end, 1 at the high end.

@@ -9,20 +9,19 @@
 use super::colour_map::{Rgb, oklch};
 
 /// The body: a matte grey with a trace of skin, so that the garment keeps the colour.
-pub const BODY: Rgb = [186, 178, 172];
+pub(super) const BODY: Rgb = [186, 178, 172];
 /// The garment as loaded.
-pub const CLOTH: Rgb = [196, 202, 210];
+pub(super) const CLOTH: Rgb = [196, 202, 210];
 /// The displaced garment.
-pub const DRAPED: Rgb = [118, 176, 228];
+pub(super) const DRAPED: Rgb = [118, 176, 228];
 
 /// Hues of the palette; its first so many entries are of one lightness.
-pub const HUES: usize = 12;
+pub(super) const HUES: usize = 12;
 /// Colours this far apart (see `difference`) are told apart at a glance; farther is no better.
 const FAR_ENOUGH: u32 = 12_000;
 
 /// Twelve hues in three lightnesses; neighbouring entries lie far apart.
-#[must_use]
-pub fn palette() -> Vec<Rgb> {
+pub(super) fn palette() -> Vec<Rgb> {
     let mut colours = Vec::with_capacity(3 * HUES);
     for (lightness, chroma, turn) in [(0.76, 0.14, 0.0), (0.88, 0.09, 12.0), (0.60, 0.15, 20.0)] {
         for i in 0..HUES {
@@ -37,8 +36,12 @@ pub fn palette() -> Vec<Rgb> {
 ///
 /// `part_of_vertex`: PART of each vertex. `triangles`: whose edges make two PARTs neighbours. `before`: palette index
 /// of each vertex in the previous step (empty, or of another length: none).
-#[must_use]
-pub fn colour_parts(part_of_vertex: &[u32], part_count: usize, triangles: &[[u32; 3]], before: &[u8]) -> Vec<u8> {
+pub(super) fn colour_parts(
+    part_of_vertex: &[u32],
+    part_count: usize,
+    triangles: &[[u32; 3]],
+    before: &[u8],
+) -> Vec<u8> {
     let colours = palette();
     let neighbours = adjacency(part_of_vertex, part_count, triangles);
     let mut size = vec![0usize; part_count];

@@ -8,8 +8,8 @@ use super::error::RecordError;
 use super::legend::caption;
 use super::meshes;
 use super::open::Open;
-use super::paths;
 use super::step::{Overlay, covering};
+use super::{Tab, paths};
 use crate::parts::UNASSIGNED;
 
 /// One of two to six results shown side by side, each in a view of its own with the same eye.
@@ -30,13 +30,8 @@ pub struct Chosen<'a> {
 }
 
 pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError> {
-    let expected = open.garment.positions.len();
-    for (what, found) in [("positions", chosen.draped.len()), ("PART numbers", chosen.part_of_vertex.len())] {
-        if found != expected {
-            let (what, of) = (format!("{what} of slot {}", chosen.slot), "vertices of the garment");
-            return Err(RecordError::Mismatch { what, found, expected, of });
-        }
-    }
+    let lists = [("positions", chosen.draped.len()), ("PART numbers", chosen.part_of_vertex.len())];
+    RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let branch = format!("{}/{}", paths::COMPARE, chosen.slot);
     let path = format!("{branch}/garment");
     let draped = open.garment.with_positions(chosen.draped.to_vec());
@@ -56,5 +51,5 @@ pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError
         let shades = meshes::rerun_colours(cells.owner.iter().map(|&v| shade(v)));
         open.log(&path, &cells.shape().with_vertex_colors(shades))?;
     }
-    caption(open, &format!("{branch}/caption"), chosen.caption, open.layout().compare_pixel_m(&open.eye))
+    caption(open, &format!("{branch}/caption"), chosen.caption, open.pixel_m(Tab::SideBySide))
 }

@@ -25,7 +25,7 @@ const LEGEND_HEIGHT: f64 = 0.42;
 
 /// An eye and the directions of its picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Eye {
+pub(crate) struct Eye {
     /// Where it stands, m.
     pub position: DVec3,
     /// What it looks at, m.
@@ -49,8 +49,7 @@ pub struct Eye {
 impl Eye {
     /// The eye for a garment whose wearer looks along `front` (horizontal), in views of the given width over height.
     /// `None` for a garment without vertices.
-    #[must_use]
-    pub fn on(garment: &TriMesh, front: DVec3, aspect: f64) -> Option<Self> {
+    pub(crate) fn on(garment: &TriMesh, front: DVec3, aspect: f64) -> Option<Self> {
         let forward = DVec3::new(front.x, front.y, 0.0).try_normalize().unwrap_or(DVec3::NEG_Y);
         let side = DVec3::Z.cross(forward);
         let (sin, cos) = AZIMUTH_DEG.to_radians().sin_cos();
@@ -80,8 +79,7 @@ impl Eye {
     }
 
     /// The same, as near as a view of this width over height allows.
-    #[must_use]
-    pub fn through(&self, aspect: f64) -> Self {
+    pub(crate) fn through(&self, aspect: f64) -> Self {
         let legend = LEGEND_HEIGHT * self.half_height.max(self.half_width);
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
         let fit = ((self.half_height + 0.5 * legend) / tan).max(self.half_width / (tan * aspect));
@@ -89,8 +87,7 @@ impl Eye {
     }
 
     /// Length of a pixel in the plane of the garment's nearest point, m, in a view of this height.
-    #[must_use]
-    pub fn pixel_m(&self, height_px: f64) -> f64 {
+    pub(crate) fn pixel_m(&self, height_px: f64) -> f64 {
         let off = (self.position - self.target).dot(self.toward) - self.half_depth;
         2.0 * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan() * off / height_px
     }

@@ -44,12 +44,7 @@ pub(super) fn log(open: &Open, view: &FoldView<'_>) -> Result<(), RecordError> {
         ("excess lengths", view.excess_percent.len()),
         ("directions of folds", view.across.len()),
     ];
-    for (what, found) in lists {
-        if found != expected {
-            let (what, of) = (what.to_owned(), "vertices of the garment");
-            return Err(RecordError::Mismatch { what, found, expected, of });
-        }
-    }
+    RecordError::unless_per_vertex(expected, &lists)?;
     open.at(view.index, 6);
     let normals = open.garment.with_positions(view.draped.to_vec()).vertex_normals();
     let every = expected.div_ceil(MOST).max(1);

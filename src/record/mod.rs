@@ -3,14 +3,13 @@
 //! Results come in as plain meshes and slices; [`paths`] lists what a recording holds. Triangles are logged once, later
 //! steps send only what changed. Without a sink nothing is made: see [`Recorder::disabled`].
 
-pub mod blueprint;
-pub mod colour_map;
-pub mod colours;
-pub mod compare;
-pub mod error;
-pub mod eye;
+mod blueprint;
+mod colour_map;
+mod colours;
+mod compare;
+mod error;
+mod eye;
 mod folds;
-pub mod inspect;
 mod labels;
 mod legend;
 mod levels;
@@ -18,14 +17,14 @@ mod meshes;
 mod native;
 mod open;
 mod page;
-pub mod panel;
+mod panel;
 pub mod paths;
 mod remote;
-pub mod scatter;
-pub mod sinks;
-pub mod step;
+mod scatter;
+mod sinks;
+mod step;
 pub mod web;
-pub mod wrinkles;
+mod wrinkles;
 mod writer;
 
 use std::path::PathBuf;
@@ -35,6 +34,7 @@ use glam::DVec3;
 use rerun::{Scalars, TextDocument};
 
 pub use blueprint::layout::{Layout, Tab};
+pub use colour_map::Range;
 pub use compare::Chosen;
 pub use error::RecordError;
 pub use folds::FoldView;
@@ -87,7 +87,7 @@ pub struct RecordSummary {
     pub log_ms: f64,
 }
 
-/// A recording in the making.
+/// A recording in the making. What logs to it fails with what Rerun refuses, and where a slice does not fit the garment.
 pub struct Recorder {
     open: Option<Box<Open>>,
 }
@@ -110,12 +110,6 @@ impl Recorder {
         Ok(Self { open: Some(Box::new(Open::new(options)?)) })
     }
 
-    /// Whether anything is recorded.
-    #[must_use]
-    pub fn is_enabled(&self) -> bool {
-        self.open.is_some()
-    }
-
     /// The address of the web viewer, where one is served.
     #[must_use]
     pub fn web_url(&self) -> Option<&str> {
@@ -123,25 +117,16 @@ impl Recorder {
     }
 
     /// The body. `index` is the step it belongs to where meshes are replaceable.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn body(&mut self, index: i64, body: &TriMesh) -> Result<(), RecordError> {
         self.timed(|open| open.take_body(index, body))
     }
 
     /// The garment as loaded; with the first one the layout is sent.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
         self.timed(|open| open.take_garment(index, garment))
     }
 
     /// One range table's result.
-    ///
-    /// # Errors
-    /// A slice that does not fit the garment; what Rerun refuses.
     pub fn step(&mut self, step: &StepView<'_>) -> Result<(), RecordError> {
         self.timed(|open| {
             step.check(open.garment.positions.len())?;
@@ -151,9 +136,6 @@ impl Recorder {
     }
 
     /// Puts a message above the text panel of a step that stays as it is: what is wrong with a file just edited.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn notice(&mut self, index: i64, message: &str) -> Result<(), RecordError> {
         self.timed(|open| {
             open.at(index, 6);
@@ -165,9 +147,6 @@ impl Recorder {
     }
 
     /// One iteration of the solver: energy in J, residual over weight, and the mesh every so often.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn iteration(
         &mut self,
         iteration: i64,
@@ -193,33 +172,21 @@ impl Recorder {
     }
 
     /// The jumps at the PARTs' seams beside the mean curvature.
-    ///
-    /// # Errors
-    /// A slice that does not fit the garment; what Rerun refuses.
     pub fn wrinkles(&mut self, view: &WrinkleView<'_>) -> Result<(), RecordError> {
         self.timed(|open| wrinkles::log(open, view))
     }
 
     /// Lines along the folds that no PART shows.
-    ///
-    /// # Errors
-    /// A slice that does not fit the garment; what Rerun refuses.
     pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
         self.timed(|open| folds::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.
-    ///
-    /// # Errors
-    /// A slice that does not fit the garment; what Rerun refuses.
     pub fn compare(&mut self, chosen: &Chosen<'_>) -> Result<(), RecordError> {
         self.timed(|open| compare::chosen(open, chosen))
     }
 
     /// All points of cost against error so far; `cost` is the axis' title (`time, ms`).
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn scatter(&mut self, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
         self.timed(|open| scatter::scatter(open, when, cost, points))
     }

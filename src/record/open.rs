@@ -2,18 +2,16 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
-use std::io::Stdout;
 use std::time::{Duration, Instant};
 
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
-use super::blueprint::layout::Layout;
+use super::blueprint::layout::{Layout, Tab};
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::sinks::{OpenSinks, Target};
 use super::web::WebViewer;
-use super::writer::RrdWriter;
 use super::{RecordOptions, RecordSummary, blueprint, colours, paths};
 use crate::mesh::TriMesh;
 
@@ -26,7 +24,6 @@ const LAST_FLUSH: Duration = Duration::from_secs(10);
 pub(crate) struct Open {
     pub(super) stream: RecordingStream,
     targets: Vec<Target>,
-    stdout: Option<RrdWriter<Stdout>>,
     pub(super) web: Option<WebViewer>,
     pub(super) options: RecordOptions,
     body: TriMesh,
@@ -52,7 +49,7 @@ impl Open {
     /// Opens every sink, or none.
     pub(super) fn new(options: RecordOptions) -> Result<Self, RecordError> {
         let started = Instant::now();
-        let OpenSinks { sinks, targets, stdout, web } = OpenSinks::open(&options.sinks)?;
+        let OpenSinks { sinks, targets, web } = OpenSinks::open(&options.sinks)?;
         let stream = RecordingStreamBuilder::new(application(&options.name))
             .recording_name(options.name.as_str())
             .set_sinks(sinks)?;
@@ -62,7 +59,6 @@ impl Open {
         Ok(Self {
             stream,
             targets,
-            stdout,
             web,
             options,
             body: TriMesh::default(),
@@ -85,6 +81,11 @@ impl Open {
     /// What the recording holds, and how large its views are.
     pub(super) fn layout(&self) -> &Layout {
         &self.options.layout
+    }
+
+    /// Length of a pixel under the garment in the views of a tab, m.
+    pub(super) fn pixel_m(&self, tab: Tab) -> f64 {
+        self.layout().pixel_m(tab, &self.eye)
     }
 
     /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from
@@ -217,9 +218,6 @@ impl Open {
             let file = target.writer.end().map_err(|reason| target.incomplete(&reason))?;
             summary.bytes = file.finish().map_err(|error| target.incomplete(&error.to_string()))?;
             summary.path = Some(target.path);
-        }
-        if let Some(stdout) = self.stdout.take() {
-            stdout.end().map_err(|e| RecordError::Incomplete { reason: format!("standard output: {e}") })?;
         }
         flushed.map_err(not_taken)?;
         summary.raw_bytes = self.raw_bytes.get();

@@ -6,7 +6,7 @@ use super::legend::number;
 use crate::figures::LevelCount;
 
 /// Version of the viewer the recording is made for.
-pub const RERUN_VERSION: &str = "0.36.3";
+pub(super) const RERUN_VERSION: &str = "0.36.3";
 
 /// Everything the text panel shows. Empty pieces are left out.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -72,8 +72,7 @@ impl Panel {
 }
 
 /// A range in centimetres as the paper prints it.
-#[must_use]
-pub fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
+pub(super) fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
     // A scaled bound has a long tail; a micrometre is far below any bound.
     let cm = |cm: f64| number((cm * 1e4).round() / 1e4);
     if upper_cm.is_finite() {

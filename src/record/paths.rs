@@ -28,53 +28,31 @@
 //! | `/compare/<slot>/garment`, `.../caption`, `.../caption/plate` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
 //! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
 
-/// The body.
+#![allow(missing_docs, reason = "the table above says what lies at each path")]
+
 pub const BODY: &str = "/body";
-/// The garment as loaded.
 pub const GARMENT: &str = "/garment";
-/// The garment coloured by its distance to the body.
 pub const DISTANCE: &str = "/distance/garment";
-/// Colour bar of the distance.
 pub const DISTANCE_LEGEND: &str = "/distance/legend";
-/// The garment coloured by PART.
 pub const PARTS: &str = "/parts/garment";
-/// The garment coloured by the resultant force of each PART.
 pub const FORCE: &str = "/force/garment";
-/// One arrow per PART.
 pub const FORCE_ARROWS: &str = "/force/arrows";
-/// Colour bar of the force.
 pub const FORCE_LEGEND: &str = "/force/legend";
-/// The displaced garment.
 pub const DRAPE: &str = "/drape/garment";
-/// Strain, pressure and other per-vertex values, one branch each.
 pub const FIT: &str = "/fit";
-/// The PARTs' seams, coloured by the jump of the displacement.
 pub const SEAMS: &str = "/wrinkles/seams";
-/// The mean curvature of the drape.
 pub const CURVATURE: &str = "/wrinkles/curvature";
-/// Distance to the reference drape.
 pub const ERROR: &str = "/error";
-/// The text panel.
 pub const REPORT: &str = "/report";
-/// Distances split by level.
 pub const HISTOGRAM: &str = "/levels/histogram";
-/// PARTs of each level.
 pub const LEVEL_PARTS: &str = "/levels/parts";
-/// Scalars over `table`.
 pub const NUMBERS: &str = "/numbers";
-/// The same numbers, a row per table.
 pub const ROWS: &str = "/rows";
-/// Times of the stages over `table`, ms.
 pub const STAGE_MS: &str = "/numbers/ms";
-/// Energy over `iteration`, J.
 pub const ENERGY: &str = "/solver/energy";
-/// Residual over weight over `iteration`.
 pub const RESIDUAL: &str = "/solver/residual";
-/// Its decimal logarithm, for the plot.
 pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";
-/// The chosen tables, side by side.
 pub const COMPARE: &str = "/compare";
-/// Time against error.
 pub const SCATTER: &str = "/scatter";
 
 /// One step per range table (or per reload under `--watch`).
@@ -83,20 +61,3 @@ pub const TABLE: &str = "table";
 pub const STAGE: &str = "stage";
 /// The iterations of the solver.
 pub const ITERATION: &str = "iteration";
-
-/// Paths that every recording of one drape holds, whatever its options.
-pub const ALWAYS: [&str; 13] = [
-    BODY,
-    GARMENT,
-    DISTANCE,
-    "/distance/legend/bar",
-    "/distance/legend/ticks",
-    PARTS,
-    FORCE,
-    FORCE_ARROWS,
-    "/force/legend/bar",
-    "/force/legend/ticks",
-    DRAPE,
-    REPORT,
-    "/numbers/part_count",
-];

@@ -1,10 +1,10 @@
-//! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser, standard output; several at once.
+//! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser; several at once.
 //!
 //! Rerun's own sinks report most failures late or only to the log, so each is tried before the first result is sent: a
 //! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is there whole or not
 //! at all.
 
-use std::io::{ErrorKind, Read as _, Stdout, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -45,8 +45,6 @@ pub enum Sink {
         /// Port of the data.
         grpc_port: Option<u16>,
     },
-    /// Standard output, as an `.rrd` stream.
-    Stdout,
 }
 
 /// A file in the making.
@@ -62,7 +60,6 @@ pub(crate) struct Target {
 pub(crate) struct OpenSinks {
     pub(crate) sinks: Vec<Box<dyn LogSink>>,
     pub(crate) targets: Vec<Target>,
-    pub(super) stdout: Option<RrdWriter<Stdout>>,
     pub(crate) web: Option<WebViewer>,
 }
 
@@ -89,12 +86,6 @@ impl OpenSinks {
                 let (sink, grpc_port) = serve(*grpc_port)?;
                 self.sinks.push(Box::new(sink));
                 self.web = Some(WebViewer::start(web_port, grpc_port)?);
-            }
-            Sink::Stdout => {
-                let writer = RrdWriter::new(std::io::stdout())
-                    .map_err(|e| RecordError::Incomplete { reason: format!("standard output: {e}") })?;
-                self.sinks.push(Box::new(writer.clone()));
-                self.stdout = Some(writer);
             }
         }
         Ok(())

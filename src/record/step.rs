@@ -12,7 +12,7 @@ use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
 use super::panel::Panel;
-use super::{Open, levels, paths};
+use super::{Open, Tab, levels, paths};
 use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
 
@@ -73,25 +73,13 @@ impl StepView<'_> {
             ("displaced positions", self.draped.len()),
         ];
         let overlays = self.overlays.iter().map(|o| (o.name, o.values.len()));
-        for (what, found) in lengths.into_iter().chain(overlays) {
-            if found != vertices {
-                return Err(RecordError::Mismatch {
-                    what: what.to_owned(),
-                    found,
-                    expected: vertices,
-                    of: "vertices of the garment",
-                });
-            }
-        }
+        let all: Vec<(&str, usize)> = lengths.into_iter().chain(overlays).collect();
+        RecordError::unless_per_vertex(vertices, &all)?;
         let known = self.part_of_vertex.iter().filter(|p| **p != UNASSIGNED);
         let expected = known.max().map_or(0, |&p| p as usize + 1);
         if self.part_force_n.len() < expected {
-            return Err(RecordError::Mismatch {
-                what: "forces".to_owned(),
-                found: self.part_force_n.len(),
-                expected,
-                of: "PARTs",
-            });
+            let found = self.part_force_n.len();
+            return Err(RecordError::Mismatch { what: "forces".to_owned(), found, expected, of: "PARTs" });
         }
         Ok(())
     }
@@ -124,11 +112,8 @@ fn distance(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let map = ColourMap::DISTANCE;
     open.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
     let open_end = cm.iter().any(|&d| d > range.high);
-    Legend { title: "distance", unit: "cm", map, range, open_end }.log(
-        open,
-        paths::DISTANCE_LEGEND,
-        open.layout().stage_pixel_m(&open.eye),
-    )
+    let legend = Legend { title: "distance", unit: "cm", map, range, open_end };
+    legend.log(open, paths::DISTANCE_LEGEND, open.pixel_m(Tab::Stages))
 }
 
 fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
@@ -154,11 +139,8 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let mesh = open.cells.colours(|v| shades[v as usize]);
     open.log(paths::FORCE, &mesh)?;
     let open_end = magnitude.iter().any(|&f| f > range.high);
-    Legend { title: "|F|", unit, map, range, open_end }.log(
-        open,
-        paths::FORCE_LEGEND,
-        open.layout().stage_pixel_m(&open.eye),
-    )?;
+    let legend = Legend { title: "|F|", unit, map, range, open_end };
+    legend.log(open, paths::FORCE_LEGEND, open.pixel_m(Tab::Stages))?;
     arrows(open, step, range.high / factor)
 }
 
@@ -206,12 +188,11 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
-    let layout = open.layout();
     for overlay in step.overlays {
         let (branch, pixel_m) = if overlay.name == "error" {
-            (paths::ERROR.to_owned(), layout.stage_pixel_m(&open.eye))
+            (paths::ERROR.to_owned(), open.pixel_m(Tab::Stages))
         } else {
-            (format!("{}/{}", paths::FIT, overlay.name), layout.fit_pixel_m(&open.eye))
+            (format!("{}/{}", paths::FIT, overlay.name), open.pixel_m(Tab::Fit))
         };
         self::overlay(open, &branch, &draped, overlay, pixel_m)?;
     }

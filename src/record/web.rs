@@ -41,7 +41,6 @@ impl WebViewer {
 pub struct Served {
     viewer: WebViewer,
     _data: GrpcServerSink,
-    messages: usize,
 }
 
 impl Served {
@@ -49,12 +48,6 @@ impl Served {
     #[must_use]
     pub fn url(&self) -> &str {
         self.viewer.url()
-    }
-
-    /// How many messages the recording holds.
-    #[must_use]
-    pub fn messages(&self) -> usize {
-        self.messages
     }
 }
 
@@ -74,10 +67,9 @@ pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) ->
     let messages = read(path)?;
     let web_port = free_port(web_port, "--web-port")?;
     let (data, grpc_port) = serve(grpc_port)?;
-    let count = messages.len();
     data.send_all(messages);
     let viewer = WebViewer::start(web_port, grpc_port)?;
-    Ok(Served { viewer, _data: data, messages: count })
+    Ok(Served { viewer, _data: data })
 }
 
 /// The messages of a recording; damage of some kinds ends in an allocation that ends the program.

@@ -12,7 +12,7 @@ use super::legend::Legend;
 use super::meshes::{self, single};
 use super::open::Open;
 use super::step::{Overlay, QUANTILE, overlay};
-use super::{colours, paths};
+use super::{Tab, colours, paths};
 use crate::mesh::TriMesh;
 
 /// The seams lie this far above the cloth, m: in it they would be half hidden.
@@ -34,16 +34,11 @@ pub struct WrinkleView<'a> {
 }
 
 pub(super) fn log(open: &Open, view: &WrinkleView<'_>) -> Result<(), RecordError> {
-    let expected = open.garment.positions.len();
-    for (what, found) in [("displaced positions", view.draped.len()), ("curvatures", view.curvature_per_m.len())] {
-        if found != expected {
-            let (what, of) = (what.to_owned(), "vertices of the garment");
-            return Err(RecordError::Mismatch { what, found, expected, of });
-        }
-    }
+    let lists = [("displaced positions", view.draped.len()), ("curvatures", view.curvature_per_m.len())];
+    RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let draped = open.garment.with_positions(view.draped.to_vec());
     open.at(view.index, 6);
-    let pixel_m = open.layout().wrinkle_pixel_m(&open.eye);
+    let pixel_m = open.pixel_m(Tab::Wrinkles);
     let curvature = Overlay { name: "mean curvature", unit: "1/m", values: view.curvature_per_m };
     overlay(open, paths::CURVATURE, &draped, &curvature, pixel_m)?;
 

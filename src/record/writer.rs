@@ -1,4 +1,4 @@
-//! Recordings written by us: the file and standard output.
+//! The recording's file, written by us.
 //!
 //! Rerun's own file sink opens its file by name, ends its thread silently when the disk is full, and then blocks whoever
 //! waits for it. Here the first failure is kept, nothing more is written, and the end says what it was.

@@ -1,13 +1,14 @@
 //! Why there is no scene. The user can mend all of these.
 
 use crate::distance::DistanceError;
-use crate::files::Unreadable;
+use crate::files::{Unreadable, listed};
 use crate::mesh::MeshError;
 use crate::mesh::rest::RestError;
 use crate::shapes::ShapeError;
 
 /// A body or garment that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum SceneError {
     /// A mesh file, or a garment nowhere near the body.
     #[error(transparent)]
@@ -23,12 +24,7 @@ pub enum SceneError {
     Shape(#[from] ShapeError),
     /// The same, in a file.
     #[error("{file} cannot be used: {source}")]
-    ShapeFile {
-        /// The file.
-        file: String,
-        /// What is wrong in it.
-        source: ShapeError,
-    },
+    ShapeFile { file: String, source: ShapeError },
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
@@ -36,41 +32,31 @@ pub enum SceneError {
     #[error(
         "no body is called `{found}`; expected `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file"
     )]
-    UnknownBody {
-        /// What was asked for.
-        found: String,
-    },
+    UnknownBody { found: String },
     /// A built-in garment on somebody's body.
     #[error(
         "the built-in garments are cut for the dress form, not for {body}; give --garment an OBJ file placed around that \
          body, or leave --body out and give its measurements (--bust, --waist, ...)"
     )]
-    NotCutForIt {
-        /// The body.
-        body: String,
-    },
+    NotCutForIt { body: String },
     /// Measurements, given as numbers, that make no body.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
+    /// The garment is elsewhere.
+    #[error(
+        "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
+         the same unit, up axis and place (--unit, --up)?"
+    )]
+    NotNear { nearest: f64, limit: f64 },
     /// Nothing to hold.
     #[error("--hold top: the garment has no edge to hold")]
     NoEdge,
     /// A group to hold that is not there.
     #[error("--hold: found no group \"{found}\" in the garment, expected `top`{}", or_one_of(known))]
-    UnknownGroup {
-        /// What was asked for.
-        found: String,
-        /// What there is.
-        known: Vec<String>,
-    },
+    UnknownGroup { found: String, known: Vec<String> },
     /// Any of these, where it does not say itself which body, garment or file it is about.
     #[error("{name}: {source}")]
-    In {
-        /// The name or file.
-        name: String,
-        /// What is wrong with it.
-        source: Box<SceneError>,
-    },
+    In { name: String, source: Box<SceneError> },
 }
 
 impl SceneError {
@@ -83,13 +69,9 @@ impl SceneError {
     }
 }
 
-/// The groups to choose from, the first of many.
 fn or_one_of(groups: &[String]) -> String {
-    const SHOWN: usize = 20;
     if groups.is_empty() {
         return ", as its file has no groups (lines that begin with g or o)".to_owned();
     }
-    let shown = groups.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
-    let more = if groups.len() > SHOWN { format!(" and {} more", groups.len() - SHOWN) } else { String::new() };
-    format!(" or one of {shown}{more}")
+    format!(" or one of {}", listed(groups))
 }

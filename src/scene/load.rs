@@ -4,12 +4,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Scene, SceneError, SceneSpec};
+use super::{PushOutReport, Scene, SceneError, SceneSpec, facing_body};
 use crate::distance::Body;
 use crate::files::{names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::push_out::PushOutReport;
 use crate::mesh::report::MeshReport;
 use crate::mesh::{MeshError, RestShape, TriMesh};
 use crate::shapes::body::dress_form;
@@ -88,7 +87,7 @@ impl SceneSpec {
             };
             let options = self.import_options(self.garment_group.as_ref());
             let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
-            imported.face_away_from(body);
+            imported.turn_outward(&facing_body(&imported.mesh, body));
             let rest = self.imported_rest(&imported)?;
             return Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) });
         }
@@ -142,9 +141,6 @@ impl Loaded {
 
     /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
     /// coordinates.
-    ///
-    /// # Errors
-    /// [`MeshError::WrongCount`], [`MeshError::Unwritable`]; nothing is left behind then.
     pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
         match &self.imported {
             Some(imported) => write_imported(path.as_ref(), imported, positions),
@@ -155,9 +151,6 @@ impl Loaded {
 
 impl Scene {
     /// The vertices of the garment's highest edge (`top`), or of the edges that a group lies on.
-    ///
-    /// # Errors
-    /// [`SceneError::NoEdge`], [`SceneError::UnknownGroup`].
     pub fn edge(&self, what: &str) -> Result<Vec<u32>, SceneError> {
         let Self { garment: mesh, topology, .. } = self;
         let height = |edge: &[u32]| edge.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() / edge.len() as f64;

@@ -6,16 +6,19 @@
 
 mod error;
 mod load;
+mod placement;
+mod push_out;
 mod spec;
 
 pub use error::SceneError;
 pub use load::Loaded;
+pub use placement::{FARTHEST, Placement, facing_body};
+pub use push_out::{PushOutReport, push_out};
 pub use spec::{DRESS_FORM, SceneSpec};
 
 use crate::distance::Body;
-use crate::mesh::fit::{check_near, facing_body};
-use crate::mesh::push_out::{PushOutReport, push_out};
 use crate::mesh::{RestShape, Topology, TriMesh};
+use placement::check_near;
 
 /// Pushed-out vertices come to rest this far from the body, m: a thick knit's thickness.
 const PUSHED_CLEARANCE: f64 = 1e-3;

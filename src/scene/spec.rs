@@ -86,9 +86,6 @@ impl SceneSpec {
     }
 
     /// Finds names that mean nothing before any time is spent.
-    ///
-    /// # Errors
-    /// [`SceneError`] for a body or garment that is neither built in nor a file.
     pub fn check_names(&self) -> Result<(), SceneError> {
         if self.body != DRESS_FORM && !names_a_file(&self.body) {
             return Err(SceneError::UnknownBody { found: self.body.clone() });
@@ -115,9 +112,6 @@ impl SceneSpec {
     }
 
     /// The form's measurements, where the body is a file of them from there.
-    ///
-    /// # Errors
-    /// [`SceneError`] for a file that cannot be read or is none of measurements.
     pub fn form(&self) -> Result<BodySpec, SceneError> {
         if !self.body.ends_with(".toml") {
             return Ok(self.measurements.clone());

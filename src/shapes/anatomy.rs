@@ -14,44 +14,13 @@ use super::limbs::{arm, leg};
 use super::measures::Measures;
 use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
-/// Correction of each girth's radius, 1 to begin with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "named as the girths they correct")]
-pub struct Factors {
-    pub bust: f64,
-    pub underbust: f64,
-    pub waist: f64,
-    pub hip: f64,
-    pub neck: f64,
-    pub thigh: f64,
-    pub knee: f64,
-    pub calf: f64,
-    pub ankle: f64,
-    pub biceps: f64,
-    pub wrist: f64,
-}
-
-impl Default for Factors {
-    fn default() -> Self {
-        Self {
-            bust: 1.0,
-            underbust: 1.0,
-            waist: 1.0,
-            hip: 1.0,
-            neck: 1.0,
-            thigh: 1.0,
-            knee: 1.0,
-            calf: 1.0,
-            ankle: 1.0,
-            biceps: 1.0,
-            wrist: 1.0,
-        }
-    }
-}
+/// Correction of each girth's radius, 1 to begin with, in the order of [`girth_marks`](super::fitting::girth_marks): bust,
+/// underbust, waist, hip, neck, thigh, knee, calf, ankle, biceps, wrist.
+pub(super) type Factors = [f64; 11];
 
 /// The parts of the figure. Limbs are the left ones; the right ones are their mirror images.
 #[derive(Debug, Clone)]
-pub struct Anatomy {
+pub(super) struct Anatomy {
     /// From the crotch to the base of the neck.
     pub trunk: Sweep,
     /// The left breast.
@@ -85,11 +54,11 @@ pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
 
 impl Anatomy {
     /// The figure for these measurements, m, and corrections.
-    #[must_use]
-    pub fn new(m: &Measures, f: &Factors) -> Self {
+    pub(super) fn new(m: &Measures, f: &Factors) -> Self {
         let k = m.scale();
-        let hip = radius(m.hip, f.hip);
-        let bust = radius(m.bust, f.bust);
+        let [of_bust, _, _, of_hip, ..] = *f;
+        let hip = radius(m.hip, of_hip);
+        let bust = radius(m.bust, of_bust);
         let (trunk, chest_front) = trunk(m, f);
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
@@ -126,8 +95,7 @@ impl Anatomy {
     }
 
     /// Trunk, bust, seat and neck.
-    #[must_use]
-    pub fn torso(&self, p: DVec3) -> Jet {
+    pub(super) fn torso(&self, p: DVec3) -> Jet {
         let mut field = self.trunk.at(p);
         for side in [1.0, -1.0] {
             field = Sided::new(&self.breast, side).join(field, p, 0.075);
@@ -137,20 +105,17 @@ impl Anatomy {
     }
 
     /// The arm on the side of `p`.
-    #[must_use]
-    pub fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
+    pub(super) fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
         Sided::new(&self.arm, p.x)
     }
 
     /// Trunk, neck and legs.
-    #[must_use]
-    pub fn torso_and_legs(&self, p: DVec3) -> Jet {
+    pub(super) fn torso_and_legs(&self, p: DVec3) -> Jet {
         Legs(self).join(self.torso(p), p, 0.05)
     }
 
     /// Everything but the head.
-    #[must_use]
-    pub fn below_the_head(&self, p: DVec3) -> Jet {
+    pub(super) fn below_the_head(&self, p: DVec3) -> Jet {
         self.arm_at(p).join(self.torso_and_legs(p), p, 0.065)
     }
 }
@@ -197,13 +162,14 @@ impl Solid for Anatomy {
 
 fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let k = m.scale();
-    let hip = radius(m.hip, f.hip);
-    let waist = radius(m.waist, f.waist);
-    let under = radius(m.underbust, f.underbust);
-    let bust = radius(m.bust, f.bust);
+    let [of_bust, of_underbust, of_waist, of_hip, of_neck, ..] = *f;
+    let hip = radius(m.hip, of_hip);
+    let waist = radius(m.waist, of_waist);
+    let under = radius(m.underbust, of_underbust);
+    let bust = radius(m.bust, of_bust);
     let chest = mix(under, bust, 0.5);
     let shoulder = shoulder_half(m);
-    let neck = radius(m.neck, f.neck);
+    let neck = radius(m.neck, of_neck);
     let under_z = underbust_height(m);
     let rise = m.acromion - m.axilla;
     let top = m.cervicale - 0.018 * k;
@@ -228,8 +194,7 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
 }
 
 /// Height of the underbust girth, m: a third of the way from the bust to the waist.
-#[must_use]
-pub fn underbust_height(m: &Measures) -> f64 {
+pub(super) fn underbust_height(m: &Measures) -> f64 {
     mix(m.bust_height, m.waist_height, 0.36)
 }
 
@@ -243,7 +208,7 @@ pub(super) fn shoulder_half(m: &Measures) -> f64 {
 
 fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let k = m.scale();
-    let r = radius(m.neck, f.neck);
+    let r = radius(m.neck, f[4]);
     let lean: f64 = 0.24;
     let axes = [DVec3::X, DVec3::new(0.0, lean.cos(), lean.sin()), DVec3::new(0.0, -lean.sin(), lean.cos())];
     let ring = |share: f64| [0.0, 0.0, 0.97 * share * r, 1.03 * share * r, 1.03 * share * r];
@@ -260,19 +225,16 @@ fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
 }
 
 /// Height of the thigh girth, m: the first at which the legs are apart.
-#[must_use]
-pub fn thigh_height(m: &Measures) -> f64 {
+pub(super) fn thigh_height(m: &Measures) -> f64 {
     m.crotch - 0.035 * m.scale()
 }
 
 /// Height of the calf girth, m: the EU 38 column has none; 0.72 of the knee's is usual.
-#[must_use]
-pub fn calf_height(m: &Measures) -> f64 {
+pub(super) fn calf_height(m: &Measures) -> f64 {
     0.72 * m.knee_height
 }
 
 /// Height of the ankle girth, m, above the foot.
-#[must_use]
-pub fn ankle_height(m: &Measures) -> f64 {
+pub(super) fn ankle_height(m: &Measures) -> f64 {
     0.115 * m.scale()
 }

@@ -9,20 +9,20 @@ use glam::DVec3;
 use super::ShapeError;
 use super::anatomy::{Anatomy, Factors};
 use super::contour::contour;
+use super::cut::onto_surface;
 pub use super::fitting::GirthMark;
 use super::fitting::{fit, girth_marks};
 use super::girth::loop_around;
 pub use super::measures::{BodySpec, Measures};
 use super::remesh::{Density, Surface, remesh};
-use super::solid::Solid;
 use crate::mesh::TriMesh;
 
 /// Triangles of the form unless asked otherwise.
 pub const DEFAULT_TRIANGLES: usize = 15_000;
 /// Spacing of the first contour, m: a quarter of the thinnest part, a hand.
 const SPACING: f64 = 0.012;
-/// Newton steps of a projection.
-const PROJECTION_STEPS: usize = 3;
+/// A Newton step onto the surface this short, m, is the last.
+const CLOSE: f64 = 1e-7;
 /// Corrections with girths measured on the mesh.
 const MESH_ROUNDS: usize = 2;
 
@@ -32,14 +32,11 @@ pub struct DressForm {
     /// Its measurements.
     pub measures: Measures,
     /// Its solid.
-    pub anatomy: Anatomy,
+    pub(super) anatomy: Anatomy,
 }
 
 impl DressForm {
     /// The solid whose girths are those of `spec`.
-    ///
-    /// # Errors
-    /// [`ShapeError`] where `spec` is no body.
     pub fn new(spec: &BodySpec) -> Result<Self, ShapeError> {
         let measures = spec.measures()?;
         let factors: Factors = fit(&measures, &[1.0; 11]);
@@ -91,7 +88,7 @@ impl DressForm {
             }
             let corrected = Anatomy::new(&self.measures, &fit(&self.measures, &bias));
             for p in &mut mesh.positions {
-                *p = onto(&corrected, *p);
+                *p = onto_surface(&corrected, *p, CLOSE);
             }
         }
     }
@@ -108,7 +105,7 @@ struct Skin<'a> {
 
 impl Surface for Skin<'_> {
     fn project(&self, p: DVec3, _tag: u8) -> DVec3 {
-        onto(self.solid, p)
+        onto_surface(self.solid, p, CLOSE)
     }
 
     fn relative_size(&self, p: DVec3) -> f64 {
@@ -135,23 +132,7 @@ fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The point of the solid's surface near `p`.
-fn onto(solid: &dyn Solid, mut p: DVec3) -> DVec3 {
-    for _ in 0..PROJECTION_STEPS {
-        let at = solid.at(p);
-        let step = at.value / at.gradient.length_squared().max(0.05);
-        p -= step * at.gradient;
-        if step.abs() < 1e-7 {
-            break;
-        }
-    }
-    p
-}
-
 /// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
-///
-/// # Errors
-/// [`ShapeError`] where the measurements are no body.
 pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
     DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
 }

@@ -23,8 +23,7 @@ const END_GAP: f64 = 0.02;
 
 /// The surface of `solid` within the box from `low` to `high`, sampled every `spacing` metres. Its winding is outward.
 /// The box must hold the whole surface for the mesh to be closed.
-#[must_use]
-pub fn contour(solid: &dyn Solid, low: DVec3, high: DVec3, spacing: f64) -> TriMesh {
+pub(super) fn contour(solid: &dyn Solid, low: DVec3, high: DVec3, spacing: f64) -> TriMesh {
     let blocks = ((high - low) / (spacing * f64::from(BLOCK))).ceil().as_ivec3().max(IVec3::ONE);
     let nodes = blocks * BLOCK;
     let position = |n: IVec3| low + n.as_dvec3() * spacing;

@@ -15,7 +15,7 @@ use crate::mesh::{Topology, TriMesh};
 /// Newton steps of a projection; the relaxation before it moves a vertex by a fraction of an edge.
 const STEPS: usize = 3;
 /// A Newton step this short, m, is the last: the next one is of the order of its square over a body's curvature.
-const CLOSE: f64 = 1e-4;
+pub(crate) const CLOSE: f64 = 1e-4;
 
 /// The mesh without the parts where `h` is positive, and its tags with `tag` on the new boundary. Only the component
 /// with the most vertices is kept.
@@ -82,13 +82,13 @@ fn largest_component(mesh: &TriMesh, tags: &[u8]) -> (TriMesh, Vec<u8>) {
     (kept, kept_tags)
 }
 
-/// The point near `p` on the surface of `solid`.
-pub(crate) fn onto_surface(solid: &dyn Solid, mut p: DVec3) -> DVec3 {
+/// The point near `p` on the surface of `solid`; a step shorter than `close`, m, is the last.
+pub(crate) fn onto_surface(solid: &dyn Solid, mut p: DVec3, close: f64) -> DVec3 {
     for _ in 0..STEPS {
         let f = solid.at(p);
         let step = f.value / f.gradient.length_squared().max(0.05);
         p -= step * f.gradient;
-        if step.abs() < CLOSE {
+        if step.abs() < close {
             break;
         }
     }
@@ -103,7 +103,7 @@ pub(crate) fn onto_edge(solid: &dyn Solid, h: impl Fn(DVec3) -> Jet, mut p: DVec
         let determinant = ff * hh - fh * fh;
         if determinant <= 1e-4 * ff * hh {
             // Surface and opening touch, or the opening has no edge near: no crossing to go to, so the surface comes first.
-            return onto_surface(solid, p);
+            return onto_surface(solid, p, CLOSE);
         }
         let a = (f.value * hh - h.value * fh) / determinant;
         let b = (h.value * ff - f.value * fh) / determinant;

@@ -5,12 +5,12 @@
 //! asked/found until all agree; neighbouring girths hardly influence each other, so a few rounds do. The mesh's chords are a little
 //! shorter than the solid's curves, so the same correction is made once more with girths measured on the mesh ([`body`](super::body)).
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::anatomy::{Anatomy, Factors, ankle_height, calf_height, thigh_height, underbust_height};
 use super::girth::{Plane, hull_length};
 use super::measures::Measures;
-use super::solid::Solid;
+use super::solid::{Solid, Sweep};
 
 /// Rays of a girth: their polygon in a circle is short by (π/N)²/6 = 0.04 %.
 const RAYS: usize = 64;
@@ -29,30 +29,20 @@ pub struct GirthMark {
 }
 
 /// Every girth of the form, trunk first, then limbs downward; limbs are the left ones.
-#[must_use]
-pub fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
-    let trunk = |name, z, asked| GirthMark {
-        name,
-        plane: Plane { origin: form.trunk.centre(z), normal: glam::DVec3::Z },
-        asked,
+pub(super) fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
+    let across = |name, sweep: &Sweep, at: f64, normal, asked| {
+        let plane = Plane { origin: sweep.centre(at), normal };
+        GirthMark { name, plane, asked }
     };
-    let leg =
-        |name, z, asked| GirthMark { name, plane: Plane { origin: form.leg.centre(z), normal: glam::DVec3::Z }, asked };
-    let arm = |name, t, asked| GirthMark {
-        name,
-        plane: Plane { origin: form.arm.centre(t), normal: form.arm.direction() },
-        asked,
-    };
+    let trunk = |name, z, asked| across(name, &form.trunk, z, DVec3::Z, asked);
+    let leg = |name, z, asked| across(name, &form.leg, z, DVec3::Z, asked);
+    let arm = |name, t, asked| across(name, &form.arm, t, form.arm.direction(), asked);
     [
         trunk("bust", m.bust_height, m.bust),
         trunk("underbust", underbust_height(m), m.underbust),
         trunk("waist", m.waist_height, m.waist),
         trunk("hip", m.hip_height, m.hip),
-        GirthMark {
-            name: "neck",
-            plane: Plane { origin: form.neck.centre(form.neck_at), normal: form.neck.direction() },
-            asked: m.neck,
-        },
+        across("neck", &form.neck, form.neck_at, form.neck.direction(), m.neck),
         leg("thigh", thigh_height(m), m.thigh),
         leg("knee", m.knee_height, m.knee),
         leg("calf", calf_height(m), m.calf),
@@ -63,8 +53,7 @@ pub fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
 }
 
 /// The tape girth of a solid where `plane` cuts it around its origin, m.
-#[must_use]
-pub fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
+pub(super) fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
     let [u, v] = plane.axes();
     let points = (0..RAYS)
         .map(|i| {
@@ -76,8 +65,7 @@ pub fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
 }
 
 /// Distance from `origin`, inside, along `direction` to the surface, m.
-#[must_use]
-pub fn ray(solid: &dyn Solid, origin: glam::DVec3, direction: glam::DVec3, guess: f64) -> f64 {
+pub(super) fn ray(solid: &dyn Solid, origin: DVec3, direction: DVec3, guess: f64) -> f64 {
     let mut r = guess;
     // Newton with steps of at most a third of the guess, so that one bad slope does not throw it onto another limb.
     for _ in 0..40 {
@@ -93,36 +81,15 @@ pub fn ray(solid: &dyn Solid, origin: glam::DVec3, direction: glam::DVec3, guess
 }
 
 /// The factors at which the solid has the girths asked for, scaled by `bias` (1 for the solid's own girths).
-#[must_use]
-pub fn fit(m: &Measures, bias: &[f64; 11]) -> Factors {
-    let mut factors = Factors::default();
+pub(super) fn fit(m: &Measures, bias: &Factors) -> Factors {
+    let mut factors = [1.0; 11];
     for _ in 0..ROUNDS {
         let form = Anatomy::new(m, &factors);
         let marks = girth_marks(m, &form);
-        let mut ratios = [1.0; 11];
-        for ((ratio, mark), bias) in ratios.iter_mut().zip(&marks).zip(bias) {
+        for ((factor, mark), bias) in factors.iter_mut().zip(&marks).zip(bias) {
             let found = solid_girth(&form, mark.plane, 0.8 * mark.asked / std::f64::consts::TAU);
-            *ratio = (bias * mark.asked / found).clamp(0.7, 1.4);
+            *factor *= (bias * mark.asked / found).clamp(0.7, 1.4);
         }
-        factors = factors.times(&ratios);
     }
     factors
-}
-
-impl Factors {
-    fn times(&self, r: &[f64; 11]) -> Self {
-        Self {
-            bust: self.bust * r[0],
-            underbust: self.underbust * r[1],
-            waist: self.waist * r[2],
-            hip: self.hip * r[3],
-            neck: self.neck * r[4],
-            thigh: self.thigh * r[5],
-            knee: self.knee * r[6],
-            calf: self.calf * r[7],
-            ankle: self.ankle * r[8],
-            biceps: self.biceps * r[9],
-            wrist: self.wrist * r[10],
-        }
-    }
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 /// A scalar function's value and gradient at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jet {
+pub(super) struct Jet {
     /// The value.
     pub value: f64,
     /// Its gradient with respect to position.
@@ -18,20 +18,17 @@ pub struct Jet {
 
 impl Jet {
     /// A value with its gradient.
-    #[must_use]
-    pub fn new(value: f64, gradient: DVec3) -> Self {
+    pub(super) fn new(value: f64, gradient: DVec3) -> Self {
         Self { value, gradient }
     }
 
     /// A value that does not depend on position.
-    #[must_use]
-    pub fn constant(value: f64) -> Self {
+    pub(super) fn constant(value: f64) -> Self {
         Self { value, gradient: DVec3::ZERO }
     }
 
     /// √f; zero, with zero gradient, where f is not positive.
-    #[must_use]
-    pub fn sqrt(self) -> Self {
+    pub(super) fn sqrt(self) -> Self {
         if self.value <= 0.0 {
             return Self::constant(0.0);
         }
@@ -40,8 +37,7 @@ impl Jet {
     }
 
     /// |f|ⁿ for n > 1.
-    #[must_use]
-    pub fn abs_powf(self, n: f64) -> Self {
+    pub(super) fn abs_powf(self, n: f64) -> Self {
         let size = self.value.abs();
         if size < 1e-12 {
             return Self::constant(0.0);
@@ -51,22 +47,19 @@ impl Jet {
     }
 
     /// f / g.
-    #[must_use]
-    pub fn over(self, g: Self) -> Self {
+    pub(super) fn over(self, g: Self) -> Self {
         let value = self.value / g.value;
         Self { value, gradient: (self.gradient - value * g.gradient) / g.value }
     }
 
     /// f² .
-    #[must_use]
-    pub fn square(self) -> Self {
+    pub(super) fn square(self) -> Self {
         self * self
     }
 
     /// f / |∇f|, with the direction of ∇f: to first order the distance to f = 0. The change of |∇f| is left out of the
     /// gradient, which is exact on f = 0 and wrong by O(f) away from it.
-    #[must_use]
-    pub fn to_distance(self) -> Self {
+    pub(super) fn to_distance(self) -> Self {
         let slope = self.gradient.length();
         if slope < 1e-9 {
             return self;
@@ -76,8 +69,7 @@ impl Jet {
 
     /// Smooth minimum over the width k: min(a, b) − k h³/6 with h = max(0, 1 − |a − b|/k). C², exact where |a − b| > k
     /// (I. Quilez, "Smooth minimum", cubic form).
-    #[must_use]
-    pub fn smooth_min(self, other: Self, k: f64) -> Self {
+    pub(super) fn smooth_min(self, other: Self, k: f64) -> Self {
         let (low, high) = if self.value <= other.value { (self, other) } else { (other, self) };
         let h = 1.0 - (high.value - low.value) / k;
         if h <= 0.0 {
@@ -88,15 +80,8 @@ impl Jet {
     }
 
     /// Smooth maximum, the mirror of [`smooth_min`](Self::smooth_min).
-    #[must_use]
-    pub fn smooth_max(self, other: Self, k: f64) -> Self {
+    pub(super) fn smooth_max(self, other: Self, k: f64) -> Self {
         -(-self).smooth_min(-other, k)
-    }
-
-    /// The larger of the two.
-    #[must_use]
-    pub fn max(self, other: Self) -> Self {
-        if self.value >= other.value { self } else { other }
     }
 }
 

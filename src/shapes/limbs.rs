@@ -16,7 +16,8 @@ const ARM_ANGLE: f64 = 40.0 * std::f64::consts::PI / 180.0;
 /// The left arm with its hand, and how far along its axis the wrist and the biceps girth are, m.
 pub(super) fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
     let k = m.scale();
-    let (b, w) = (radius(m.biceps, f.biceps), radius(m.wrist, f.wrist));
+    let [.., of_biceps, of_wrist] = *f;
+    let (b, w) = (radius(m.biceps, of_biceps), radius(m.wrist, of_wrist));
     let t = DVec3::new(ARM_ANGLE.sin(), -0.07, -ARM_ANGLE.cos()).normalize();
     let u = t.cross(DVec3::Y).normalize();
     let v = u.cross(t);
@@ -48,10 +49,11 @@ const THIGH_GAP: f64 = 0.012;
 /// The left leg down to the ankle, and its foot.
 pub(super) fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
     let k = m.scale();
-    let thigh = radius(m.thigh, f.thigh);
-    let knee = radius(m.knee, f.knee);
-    let calf = radius(m.calf, f.calf);
-    let ankle = radius(m.ankle, f.ankle);
+    let [.., of_thigh, of_knee, of_calf, of_ankle, _, _] = *f;
+    let thigh = radius(m.thigh, of_thigh);
+    let knee = radius(m.knee, of_knee);
+    let calf = radius(m.calf, of_calf);
+    let ankle = radius(m.ankle, of_ankle);
     let inner = 0.88 * thigh + THIGH_GAP;
     let foot_x = (0.085 * k).max(1.1 * calf + 0.01);
     let knee_x = mix(inner, foot_x, 0.45).max(knee + 0.008);

@@ -100,17 +100,11 @@ impl Default for BodySpec {
 
 impl BodySpec {
     /// Reads a spec from TOML.
-    ///
-    /// # Errors
-    /// [`ShapeError::Spec`] with the place and the fault.
     pub fn from_toml(text: &str) -> Result<Self, ShapeError> {
         toml::from_str(text).map_err(|e| ShapeError::Spec(e.to_string()))
     }
 
     /// The same spec with one measurement, named as its field without `_cm`, set to `cm`.
-    ///
-    /// # Errors
-    /// [`ShapeError::Spec`] if there is no such measurement.
     pub fn with(&self, name: &str, cm: f64) -> Result<Self, ShapeError> {
         let fault = |e: &dyn std::fmt::Display| ShapeError::Spec(e.to_string());
         let mut table = toml::Table::try_from(self).map_err(|e| fault(&e))?;

@@ -15,7 +15,7 @@ struct Segment<const K: usize> {
 
 /// K channels as functions of one coordinate.
 #[derive(Debug, Clone)]
-pub struct Profile<const K: usize> {
+pub(super) struct Profile<const K: usize> {
     segments: Vec<Segment<K>>,
     first: f64,
     last: f64,
@@ -24,8 +24,7 @@ pub struct Profile<const K: usize> {
 impl<const K: usize> Profile<K> {
     /// The curve through `stations` (coordinate, values); coordinates must ascend. Fewer than two stations make a
     /// constant.
-    #[must_use]
-    pub fn new(stations: &[(f64, [f64; K])]) -> Self {
+    pub(super) fn new(stations: &[(f64, [f64; K])]) -> Self {
         let n = stations.len();
         let slope = |i: usize, c: usize| -> f64 {
             (stations[i + 1].1[c] - stations[i].1[c]) / (stations[i + 1].0 - stations[i].0)
@@ -56,14 +55,12 @@ impl<const K: usize> Profile<K> {
     }
 
     /// First and last coordinate.
-    #[must_use]
-    pub fn range(&self) -> (f64, f64) {
+    pub(super) fn range(&self) -> (f64, f64) {
         (self.first, self.last)
     }
 
     /// All channels at `s`, with gradients.
-    #[must_use]
-    pub fn at(&self, s: Jet) -> [Jet; K] {
+    pub(super) fn at(&self, s: Jet) -> [Jet; K] {
         let clamped = s.value.clamp(self.first, self.last);
         let slope = if clamped == s.value { s.gradient } else { glam::DVec3::ZERO };
         let index = self.segments.partition_point(|g| g.start <= clamped).saturating_sub(1);
@@ -76,8 +73,7 @@ impl<const K: usize> Profile<K> {
     }
 
     /// All channels at `s`.
-    #[must_use]
-    pub fn values(&self, s: f64) -> [f64; K] {
+    pub(super) fn values(&self, s: f64) -> [f64; K] {
         self.at(Jet::constant(s)).map(|j| j.value)
     }
 }

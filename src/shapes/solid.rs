@@ -18,7 +18,7 @@ use super::jet::Jet;
 use super::profile::Profile;
 
 /// Anything with a signed field.
-pub trait Solid: Sync {
+pub(super) trait Solid: Sync {
     /// The field and its gradient at `p`, m.
     fn at(&self, p: DVec3) -> Jet;
 
@@ -41,11 +41,11 @@ fn box_distance(p: DVec3, low: DVec3, high: DVec3) -> f64 {
 }
 
 /// The channels of a sweep's profile: c_u, c_v, a, b₋, b₊, m.
-pub type Section = [f64; 5];
+pub(super) type Section = [f64; 5];
 
 /// A superellipse swept along a straight axis, its ends rounded.
 #[derive(Debug, Clone)]
-pub struct Sweep {
+pub(super) struct Sweep {
     origin: DVec3,
     axes: [DVec3; 3],
     exponent: f64,
@@ -69,8 +69,7 @@ fn section_box(stations: &[(f64, Section)]) -> (DVec3, DVec3) {
 impl Sweep {
     /// A sweep from stations (t, section) along `axes[2]` from `origin`, with sections in `axes[0]` (u) and `axes[1]` (v);
     /// `rounding` are the radii of its lower and upper end, m.
-    #[must_use]
-    pub fn new(
+    pub(super) fn new(
         origin: DVec3,
         axes: [DVec3; 3],
         exponent: f64,
@@ -82,45 +81,38 @@ impl Sweep {
     }
 
     /// Upright: u is x, v is y and t is z.
-    #[must_use]
-    pub fn upright(exponent: f64, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
+    pub(super) fn upright(exponent: f64, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
         Self::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z], exponent, stations, rounding)
     }
 
     /// A sweep along the same axis with other sections.
-    #[must_use]
-    pub fn with_stations(&self, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
+    pub(super) fn with_stations(&self, stations: &[(f64, Section)], rounding: [f64; 2]) -> Self {
         Self::new(self.origin, self.axes, self.exponent, stations, rounding)
     }
 
     /// The coordinate of `p` along the axis, m.
-    #[must_use]
-    pub fn along(&self, p: DVec3) -> f64 {
+    pub(super) fn along(&self, p: DVec3) -> f64 {
         (p - self.origin).dot(self.axes[2])
     }
 
     /// The point of the axis at coordinate `t`, at the section's centre.
-    #[must_use]
-    pub fn centre(&self, t: f64) -> DVec3 {
+    pub(super) fn centre(&self, t: f64) -> DVec3 {
         let [cu, cv, ..] = self.profile.values(t);
         self.origin + cu * self.axes[0] + cv * self.axes[1] + t * self.axes[2]
     }
 
     /// First and last coordinate of the stations, m.
-    #[must_use]
-    pub fn range(&self) -> (f64, f64) {
+    pub(super) fn range(&self) -> (f64, f64) {
         self.profile.range()
     }
 
     /// Direction of the axis.
-    #[must_use]
-    pub fn direction(&self) -> DVec3 {
+    pub(super) fn direction(&self) -> DVec3 {
         self.axes[2]
     }
 
     /// The section's sizes at coordinate `t`.
-    #[must_use]
-    pub fn section(&self, t: f64) -> Section {
+    pub(super) fn section(&self, t: f64) -> Section {
         self.profile.values(t)
     }
 }
@@ -161,7 +153,7 @@ impl Solid for Sweep {
 
 /// An ellipsoid along given axes.
 #[derive(Debug, Clone, Copy)]
-pub struct Ellipsoid {
+pub(super) struct Ellipsoid {
     /// Its centre, m.
     pub centre: DVec3,
     /// Half axes along x, y, z, m.
@@ -194,15 +186,14 @@ impl Solid for Ellipsoid {
 
 /// A part of the left side, or its mirror image on the right.
 #[derive(Debug, Clone, Copy)]
-pub struct Sided<'a, S> {
+pub(super) struct Sided<'a, S> {
     part: &'a S,
     mirror: DVec3,
 }
 
 impl<'a, S: Solid> Sided<'a, S> {
     /// The part itself for a `side` that is not negative, else its mirror image in x = 0.
-    #[must_use]
-    pub fn new(part: &'a S, side: f64) -> Self {
+    pub(super) fn new(part: &'a S, side: f64) -> Self {
         Self { part, mirror: DVec3::new(if side < 0.0 { -1.0 } else { 1.0 }, 1.0, 1.0) }
     }
 }

@@ -148,7 +148,7 @@ fn fabric(source: Source<'_>, value: &At, inputs: &Inputs) -> Result<Vec<Edit>, 
         true => Fabric::parse(&inputs.text(&label, &place)?, &label),
         false => Fabric::by_name(&label),
     };
-    let fabric = Fabric { name: label, ..fabric.map_err(|source| PlanError::Fabric { place, source })? };
+    let fabric = Fabric { name: label, ..fabric.map_err(PlanError::input(&place, "fabric"))? };
     Ok(one(move |point| point.job.settings.fabric = fabric.clone()))
 }
 

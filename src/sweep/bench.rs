@@ -131,9 +131,6 @@ impl<'a> Bench<'a> {
     }
 
     /// The scene of a point. Others wait while one is made: they most likely want the same.
-    ///
-    /// # Errors
-    /// [`PointError::Failed`] in the words of [`SceneError`](crate::scene::SceneError).
     pub fn scene(&self, point: &Point) -> Result<Arc<Loaded>, PointError> {
         let mut made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         let id = point.scene_id();

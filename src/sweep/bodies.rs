@@ -33,15 +33,12 @@ fn chosen(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<(Input,
     let (mut input, mut measurements) = named_body(source, value, of, expected, inputs)?;
     for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
         let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
-        let changed = measurements.with(measure, cm);
-        measurements = changed.map_err(|e| PlanError::Shape { place: place.clone(), key: "body", source: e })?;
+        measurements = measurements.with(measure, cm).map_err(PlanError::input(&place, "body"))?;
         input.label = format!("{} {measure}={cm}", input.label);
     }
     input.label = name.map_or(input.label, str::to_owned);
-    match measurements.measures() {
-        Ok(_) => Ok((input, measurements)),
-        Err(source) => Err(PlanError::Shape { place, key: "body", source }),
-    }
+    measurements.measures().map_err(PlanError::input(&place, "body"))?;
+    Ok((input, measurements))
 }
 
 /// The form, as it comes or from a file of measurements, or a mesh.
@@ -62,8 +59,7 @@ fn named_body(
     }
     if label.ends_with(".toml") {
         let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
-        let measurements = spec.map_err(|source| PlanError::Shape { place, key: "body", source })?;
-        return Ok((form, measurements));
+        return Ok((form, spec.map_err(PlanError::input(&place, "body"))?));
     }
     Ok((inputs.input(label, &place)?, BodySpec::default()))
 }

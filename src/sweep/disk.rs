@@ -16,9 +16,6 @@ pub trait Append: Send {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     /// Cuts back to this length, bytes.
-    ///
-    /// # Errors
-    /// What the system says.
     fn cut(&mut self, length: u64) -> io::Result<()>;
 }
 
@@ -38,7 +35,7 @@ impl Append for File {
 pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
     let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
     let at_end = opened.and_then(|mut file| file.seek(SeekFrom::End(0)).map(|_| file));
-    at_end.map_err(|source| StoreError::Io { path: path.to_owned(), doing: "cannot be opened for writing", source })
+    at_end.map_err(StoreError::io(path, "cannot be opened for writing"))
 }
 
 /// The file's bytes, or nothing where there is no file.
@@ -46,14 +43,13 @@ pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> 
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(source) => Err(StoreError::Io { path: path.to_owned(), doing: "cannot be read", source }),
+        Err(error) => Err(StoreError::io(path, "cannot be read")(error)),
     }
 }
 
 /// Replaces a file: whoever looks, and whatever breaks, sees the old or the new one.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let cannot = |source| StoreError::Io { path: path.to_owned(), doing: "cannot be written", source };
-    WholeFile::write(path, bytes).map_err(cannot)
+    WholeFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
 }
 
 /// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
@@ -63,12 +59,7 @@ pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
     match found {
         Some(found) if found == text => Ok(()),
         Some(found) if found.starts_with(text) => {
-            let cut = open_end(path)?.cut(text.len() as u64);
-            cut.map_err(|source| StoreError::Io {
-                path: path.to_owned(),
-                doing: "a torn line cannot be cut off",
-                source,
-            })
+            open_end(path)?.cut(text.len() as u64).map_err(StoreError::io(path, "a torn line cannot be cut off"))
         }
         _ => replace(path, text),
     }

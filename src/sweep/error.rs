@@ -1,189 +1,99 @@
 //! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of
 //! these: it is a row.
 
+use std::error::Error;
 use std::io;
-use std::path::PathBuf;
-
-use crate::fabric::FabricError;
-use crate::range_table::TableError;
-use crate::shapes::ShapeError;
+use std::path::{Path, PathBuf};
 
 /// A sweep file that cannot be used. The user can mend all of these.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum PlanError {
     /// A file that cannot be read.
     #[error("{place}: {path}: cannot be read: {source}; paths count from the folder of the sweep file")]
-    Read {
-        /// Sweep file and line that names it, or the sweep file.
-        place: String,
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    Read { place: String, path: PathBuf, source: io::Error },
     /// Not TOML, or a key that is missing, unknown or of another type.
     #[error(
         "{place}: {message}; a sweep file has name = \"...\", and [grid] with lists (tables = [...]) or [[points]] one by \
          one (table = ...), or both; [base] holds what all share"
     )]
-    Syntax {
-        /// File and line.
-        place: String,
-        /// What the parser found and expected.
-        message: String,
-    },
+    Syntax { place: String, message: String },
     /// A value that will not do.
     #[error("{place}: {key}: found {found}, expected {expected}")]
-    Value {
-        /// File and line.
-        place: String,
-        /// The key it was given for.
-        key: &'static str,
-        /// What was written.
-        found: String,
-        /// What would do, and how to get there.
-        expected: String,
-    },
-    /// A range table that cannot be read or made.
-    #[error("{place}: table: {source}")]
-    Table {
-        /// File and line of the sweep file.
-        place: String,
-        /// What is wrong with it.
-        source: TableError,
-    },
-    /// A fabric that cannot be read.
-    #[error("{place}: fabric: {source}")]
-    Fabric {
-        /// File and line of the sweep file.
-        place: String,
-        /// What is wrong with it.
-        source: FabricError,
-    },
-    /// Measurements that make no body, or a garment that is not there.
+    Value { place: String, key: &'static str, found: String, expected: String },
+    /// A range table, fabric, body or garment that cannot be read or made.
     #[error("{place}: {key}: {source}")]
-    Shape {
-        /// File and line of the sweep file.
-        place: String,
-        /// `body` or `garment`.
-        key: &'static str,
-        /// What is wrong with them.
-        source: ShapeError,
-    },
+    Input { place: String, key: &'static str, source: Box<dyn Error + Send + Sync> },
     /// Nothing to do.
     #[error(
         "{name}: found no points, expected [grid] or at least one [[points]]; an empty [grid] is one point of [base]"
     )]
-    Empty {
-        /// The sweep file.
-        name: String,
-    },
+    Empty { name: String },
     /// More than anybody means.
     #[error("{name}: found {found} points, expected at most {limit}; split the sweep or shorten an axis")]
-    TooMany {
-        /// The sweep file.
-        name: String,
-        /// Points in the full grid.
-        found: usize,
-        /// The limit.
-        limit: usize,
-    },
+    TooMany { name: String, found: usize, limit: usize },
     /// A shard that is none.
     #[error("shard: found \"{found}\", expected i/n with 1 <= i <= n, for example 2/3")]
-    Shard {
-        /// What was written.
-        found: String,
-    },
+    Shard { found: String },
+}
+
+impl PlanError {
+    /// What to make of an error about the input that `key` names at `place`.
+    pub(super) fn input<E: Error + Send + Sync + 'static>(place: &str, key: &'static str) -> impl FnOnce(E) -> Self {
+        move |source| Self::Input { place: place.to_owned(), key, source: Box::new(source) }
+    }
 }
 
 /// Rows on disk that cannot be read, written or gone on with.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum StoreError {
     /// Reading, or preparing to write, failed.
     #[error("{path}: {doing}: {source}; check the path, its permissions and the room on its disk")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        doing: &'static str,
-        /// What the system said.
-        source: io::Error,
-    },
+    Io { path: PathBuf, doing: &'static str, source: io::Error },
     /// A row could not be written: a full disk, most often.
     #[error(
         "{path}: a row cannot be written: {source}; the {kept} rows before it are intact: make room and go on with --resume"
     )]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Whole rows on disk.
-        kept: usize,
-        /// What the system said.
-        source: io::Error,
-    },
+    Write { path: PathBuf, kept: usize, source: io::Error },
     /// Another process has it.
     #[error("{path}: another process is writing this sweep; wait for it, or give this one another folder")]
-    Locked {
-        /// The lock.
-        path: PathBuf,
-    },
+    Locked { path: PathBuf },
     /// There are rows already and nobody said to go on.
     #[error("{path}: found {rows} rows of a sweep, expected none; go on with --resume, or choose another folder")]
-    Exists {
-        /// The rows.
-        path: PathBuf,
-        /// How many.
-        rows: usize,
-    },
+    Exists { path: PathBuf, rows: usize },
     /// Rows of another sweep.
     #[error(
         "{path}: found {found}, expected {expected}: what determines a result has changed (sweep file, a file it names, \
          shard or program); choose another folder, or keep the rows the two have in common with --adopt"
     )]
-    OtherPlan {
-        /// The manifest.
-        path: PathBuf,
-        /// The sweep it belongs to.
-        found: String,
-        /// The sweep asked for.
-        expected: String,
-    },
+    OtherPlan { path: PathBuf, found: String, expected: String },
     /// A line in the middle that is no row: not a torn end, which is mended, but something else's work.
     #[error("{path}:{line}: not a row of this sweep: {message}; remove the line to compute its point again")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// What the parser said.
-        message: String,
-    },
+    Damaged { path: PathBuf, line: usize, message: String },
     /// An id that is no hash: it must not become a file name.
     #[error(
         "{path}: found the point id {found:?}, expected 32 hexadecimal digits; it is not what `partwise sweep` wrote"
     )]
-    BadId {
-        /// The manifest.
-        path: PathBuf,
-        /// The id.
-        found: String,
-    },
+    BadId { path: PathBuf, found: String },
     /// Rows nobody can tell the sweep of.
     #[error("{path}: found rows but no plan.json beside them, expected both; put it back, or choose another folder")]
-    Orphans {
-        /// The rows.
-        path: PathBuf,
-    },
+    Orphans { path: PathBuf },
     /// No sweep there.
     #[error("{path}: found no sweep, expected a folder that `partwise sweep` wrote")]
-    Missing {
-        /// The manifest looked for.
-        path: PathBuf,
-    },
+    Missing { path: PathBuf },
+}
+
+impl StoreError {
+    /// What to make of a system's error at `path`.
+    pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { path: path.to_owned(), doing, source }
+    }
 }
 
 /// Shards that cannot be joined.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum MergeError {
     /// Nothing given.
     #[error("found no folders to join, expected those that `partwise sweep --shard i/n` wrote")]
@@ -193,41 +103,14 @@ pub enum MergeError {
     Store(#[from] StoreError),
     /// Two sweeps.
     #[error("{second}: found {found}, expected {expected} as in {first}; join shards of one sweep by one version only")]
-    OtherPlan {
-        /// The first folder.
-        first: PathBuf,
-        /// The folder that differs.
-        second: PathBuf,
-        /// What the folder holds.
-        found: String,
-        /// What the first holds.
-        expected: String,
-    },
+    OtherPlan { first: PathBuf, second: PathBuf, found: String, expected: String },
     /// Points nobody computed.
     #[error("{count} of {total} points are missing: {}; run their shards to the end with --resume", list.join("; "))]
-    Missing {
-        /// How many.
-        count: usize,
-        /// Of how many.
-        total: usize,
-        /// The first of them, by number and label.
-        list: Vec<String>,
-    },
+    Missing { count: usize, total: usize, list: Vec<String> },
     /// The same point computed twice, with different results.
     #[error(
         "point {index} ({label}): {first} and {second} disagree in {}; one of them was made by another program or on a \
          machine with other arithmetic: leave one out", columns.join(", ")
     )]
-    Disagree {
-        /// The point's number.
-        index: usize,
-        /// What it is.
-        label: String,
-        /// A folder.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-        /// Where they differ.
-        columns: Vec<String>,
-    },
+    Disagree { index: usize, label: String, first: PathBuf, second: PathBuf, columns: Vec<String> },
 }

@@ -38,6 +38,7 @@ use serde::Deserialize;
 use toml::{Spanned, Value};
 
 use super::error::PlanError;
+use crate::files::line_of;
 
 /// A value and where it stands.
 pub(super) type At = Spanned<Value>;
@@ -122,8 +123,7 @@ impl Source<'_> {
 
     /// `file:line` of a byte offset.
     pub(super) fn line(self, offset: usize) -> String {
-        let line = 1 + self.text.bytes().take(offset).filter(|&b| b == b'\n').count();
-        format!("{}:{line}", self.name)
+        format!("{}:{}", self.name, line_of(self.text, offset))
     }
 
     /// The error for a value that will not do.

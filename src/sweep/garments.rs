@@ -21,7 +21,7 @@ pub(super) fn garments(axis: Axis<'_>, inputs: &mut Inputs) -> Result<Vec<Edit>,
                 let label = source.text(v, "garment", "a name, name@vertices or a file")?;
                 if !names_a_file(&label) {
                     let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
-                    known.map_err(|e| PlanError::Shape { place: source.place(v), key: "garment", source: e })?;
+                    known.map_err(PlanError::input(&source.place(v), "garment"))?;
                 }
                 inputs.input(&label, &source.place(v))
             };

@@ -67,6 +67,6 @@ impl Inputs {
     }
 }
 
-fn unreadable(path: &Path, place: &str, source: std::io::Error) -> PlanError {
+pub(super) fn unreadable(path: &Path, place: &str, source: std::io::Error) -> PlanError {
     PlanError::Read { place: place.to_owned(), path: path.to_owned(), source }
 }

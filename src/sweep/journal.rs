@@ -19,9 +19,7 @@ pub(super) struct Journal {
 impl Journal {
     pub(super) fn open(path: PathBuf, medium: &Medium<'_>) -> Result<Self, StoreError> {
         let file = disk::open_end(&path)?;
-        let length = file.metadata().map(|m| m.len());
-        let length =
-            length.map_err(|source| StoreError::Io { path: path.clone(), doing: "cannot be measured", source })?;
+        let length = file.metadata().map_err(StoreError::io(&path, "cannot be measured"))?.len();
         Ok(Self { path, medium: medium(file), length })
     }
 
@@ -43,8 +41,6 @@ pub(super) fn take_lock(path: &Path) -> Result<File, StoreError> {
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path: path.to_owned() }),
-        Err(TryLockError::Error(source)) => {
-            Err(StoreError::Io { path: path.to_owned(), doing: "cannot be locked", source })
-        }
+        Err(TryLockError::Error(error)) => Err(StoreError::io(path, "cannot be locked")(error)),
     }
 }

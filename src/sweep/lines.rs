@@ -16,13 +16,14 @@ pub(super) fn json_text(rows: &[Row]) -> Vec<u8> {
 pub(super) fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
     let bytes = disk::read_if_there(path)?.unwrap_or_default();
     let places = manifest.places();
+    let damaged = |line, message| StoreError::Damaged { path: path.to_owned(), line, message };
     let mut rows: Vec<Row> = Vec::new();
     let mut seen = vec![false; manifest.points.len()];
     let mut bad: Option<(usize, String)> = None;
     for (i, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
         // Only the last line can lack its end, and only the last may be bad: then it was torn.
         if let Some((line, message)) = bad {
-            return Err(StoreError::Damaged { path: path.to_owned(), line, message });
+            return Err(damaged(line, message));
         }
         let parsed = match line.strip_suffix(b"\n") {
             None => Err("the line has no end".to_owned()),
@@ -39,11 +40,7 @@ pub(super) fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, St
                 let Some(&place) = place.filter(|&&i| !std::mem::replace(&mut seen[i], true)) else {
                     let message =
                         if place.is_some() { "its point has a row before" } else { "its point is not in plan.json" };
-                    return Err(StoreError::Damaged {
-                        path: path.to_owned(),
-                        line: i + 1,
-                        message: message.to_owned(),
-                    });
+                    return Err(damaged(i + 1, message.to_owned()));
                 };
                 row.index = place;
                 rows.push(row);

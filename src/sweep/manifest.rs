@@ -160,11 +160,8 @@ impl Manifest {
     /// Writes it, whole or not at all.
     pub(super) fn write(&self, folder: &Path) -> Result<(), StoreError> {
         let path = folder.join(MANIFEST);
-        let mut text = serde_json::to_string_pretty(self).map_err(|e| StoreError::Io {
-            path: path.clone(),
-            doing: "cannot be written",
-            source: e.into(),
-        })?;
+        let text = serde_json::to_string_pretty(self);
+        let mut text = text.map_err(|e| StoreError::io(&path, "cannot be written")(e.into()))?;
         text.push('\n');
         disk::make(&path, text.as_bytes())
     }

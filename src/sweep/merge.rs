@@ -26,9 +26,6 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<Row>, MergeError> {
 }
 
 /// The joined rows in the plan's order, and whose they are.
-///
-/// # Errors
-/// As [`merge`].
 pub fn join(folders: &[PathBuf]) -> Result<(Manifest, Vec<Row>), MergeError> {
     let (first, rest) = folders.split_first().ok_or(MergeError::Nothing)?;
     let (manifest, rows) = store::read(first)?;

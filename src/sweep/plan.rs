@@ -13,7 +13,7 @@ use std::path::Path;
 use super::axes::Axes;
 use super::error::PlanError;
 use super::file::{Grid, Source};
-use super::inputs::Inputs;
+use super::inputs::{Inputs, unreadable};
 use super::point::Point;
 use crate::job::Job;
 
@@ -36,23 +36,13 @@ pub struct Plan {
 
 impl Plan {
     /// Reads a sweep file; the files it names count from its folder, and what it does not say is as in `start`.
-    ///
-    /// # Errors
-    /// [`PlanError`] with file, line, what was found and what was expected.
     pub fn read(path: &Path, start: &Job) -> Result<Self, PlanError> {
         let name = path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|source| PlanError::Read {
-            place: name.clone(),
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = fs::read_to_string(path).map_err(|e| unreadable(path, &name, e))?;
         Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")), start)
     }
 
     /// The plan of a sweep file's text; `name` only serves the messages, `folder` is where its paths count from.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
     pub fn parse(text: &str, name: &str, folder: &Path, start: &Job) -> Result<Self, PlanError> {
         let source = Source { text, name };
         let file = source.parse()?;
@@ -70,11 +60,8 @@ impl Plan {
             all.extend(single.clone());
             let axes = Axes::read(source, &all, &Grid::default(), &mut inputs)?;
             if let (Some(table), true) = (single.get("table"), axes.count() > 1) {
-                return Err(source.wrong(
-                    table,
-                    "table",
-                    "one table for one point; lists belong into [grid] as tables",
-                ));
+                let expected = "one table for one point; lists belong into [grid] as tables";
+                return Err(source.wrong(table, "table", expected));
             }
             axes.expand(&mut points, start, name)?;
         }
@@ -86,9 +73,6 @@ impl Plan {
     }
 
     /// The plan of jobs, one timed pass each; the files they name are hashed here.
-    ///
-    /// # Errors
-    /// [`PlanError::Read`] for a body or garment that cannot be read.
     pub fn of_jobs(name: &str, jobs: Vec<Job>) -> Result<Self, PlanError> {
         let mut inputs = Inputs::new(Path::new(""));
         let mut point = |job: Job| {
@@ -108,11 +92,8 @@ fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
     let (mut kept, mut notes): (Vec<Point>, Vec<String>) = (Vec::with_capacity(points.len()), Vec::new());
     for mut point in points {
         if let Some(&first) = seen.get(&point.id) {
-            notes.push(format!(
-                "point left out, the same as point {first} ({}): {}",
-                kept[first].label(),
-                point.label()
-            ));
+            let (same, left_out) = (kept[first].label(), point.label());
+            notes.push(format!("point left out, the same as point {first} ({same}): {left_out}"));
             continue;
         }
         seen.insert(point.id.clone(), kept.len());

@@ -30,20 +30,16 @@ pub enum Status {
 
 /// One point and what came of it. The fields, in order, are the columns.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub struct Row {
-    /// Content hash of the point.
     pub point: String,
-    /// Place in the plan.
     pub index: usize,
-    /// What the body is called.
     pub body: String,
     /// What the garment is called, with its size.
     pub garment: String,
-    /// What the fabric is called.
     pub fabric: String,
     /// `paper` or `coupled`.
     pub model: String,
-    /// What the range table is called.
     pub table: String,
     /// `none`, one extent, or a cascade `12>6>3`, cm.
     pub extent_cm: String,
@@ -57,16 +53,13 @@ pub struct Row {
     pub seed: u64,
     /// `name=value` of each.
     pub options: String,
-    /// Whether there is a result.
     pub status: Status,
     /// Why it failed; empty where it did not.
     pub error: String,
-    /// The figures of the drape.
     #[serde(flatten)]
     pub figures: Option<Figures>,
     /// blake3 over the bits of the displaced positions.
     pub result_hash: String,
-    /// How long it took.
     #[serde(flatten)]
     pub timing: Option<Timing>,
 }

@@ -19,8 +19,6 @@ pub struct SweepProgress<'a> {
     pub total: usize,
     /// Rows on disk, those found there included.
     pub done: usize,
-    /// Rows found there at the start: what time is left counts without them.
-    pub skipped: usize,
     /// Rows that are errors.
     pub failed: usize,
     /// The row just written; none in the first call, before any work.
@@ -86,14 +84,8 @@ pub fn sweep(
 /// [`StoreError::Write`] when a row cannot be written; the points in hand are then lost, the rows before are not.
 pub fn run_missing(plan: &Plan, store: &mut Store, run: &Run<'_>, row: &Maker<'_>) -> Result<(), StoreError> {
     let todo: Vec<_> = plan.points.iter().filter(|p| store.lacks(p.index)).collect();
-    let skipped = store.rows().len();
-    let progress = SweepProgress {
-        total: store.manifest().share(),
-        done: skipped,
-        skipped,
-        failed: count_failed(store.rows()),
-        row: None,
-    };
+    let (total, done) = (store.manifest().share(), store.rows().len());
+    let progress = SweepProgress { total, done, failed: count_failed(store.rows()), row: None };
     (run.progress)(progress);
     let next = AtomicUsize::new(0);
     let broken = AtomicBool::new(false);

@@ -66,28 +66,18 @@ impl std::fmt::Debug for Store {
 
 impl Store {
     /// Opens the folder for the rows of `manifest`, made if it is not there.
-    ///
-    /// # Errors
-    /// [`StoreError`]: rows already there or another plan's, a lock held, a damaged line, a disk that will not.
     pub fn open(folder: &Path, manifest: Manifest, existing: Existing) -> Result<Self, StoreError> {
         Self::open_on(folder, manifest, existing, &|file| Box::new(file))
     }
 
     /// As [`open`](Self::open), on media other than plain files.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_on(
         folder: &Path,
         manifest: Manifest,
         existing: Existing,
         medium: &Medium<'_>,
     ) -> Result<Self, StoreError> {
-        fs::create_dir_all(folder).map_err(|source| StoreError::Io {
-            path: folder.to_owned(),
-            doing: "cannot be made a folder",
-            source,
-        })?;
+        fs::create_dir_all(folder).map_err(StoreError::io(folder, "cannot be made a folder"))?;
         let lock = take_lock(&folder.join(LOCK))?;
         let rows = match Manifest::read(folder)? {
             None if disk::read_if_there(&folder.join(JSON_LINES))?.is_some_and(|bytes| !bytes.is_empty()) => {
@@ -113,12 +103,6 @@ impl Store {
     #[must_use]
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
-    }
-
-    /// The folder.
-    #[must_use]
-    pub fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// The rows so far, in the order in which they were written.
@@ -167,9 +151,6 @@ impl Store {
 }
 
 /// The manifest and rows of a folder nobody need be writing; a torn last line is left out.
-///
-/// # Errors
-/// [`StoreError`] where there is no sweep or a line is damaged.
 pub fn read(folder: &Path) -> Result<(Manifest, Vec<Row>), StoreError> {
     let manifest = Manifest::read(folder)?.ok_or_else(|| StoreError::Missing { path: folder.join(MANIFEST) })?;
     let rows = read_rows(&folder.join(JSON_LINES), &manifest)?;

@@ -61,9 +61,9 @@ fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRul
     if kinds.iter().filter(|k| **k).count() != 1 || (ends && !kinds[2]) || (family.of.is_some() && !kinds[0]) {
         return Err(source.wrong(entry, "table", EXPECTED));
     }
-    let made = |label: String, table: Result<RangeTable, TableError>| match table {
-        Ok(table) => Ok(TableRule::from(table).named(label)),
-        Err(error) => Err(PlanError::Table { place: source.place(entry), source: error }),
+    let made = |label: String, table: Result<RangeTable, TableError>| {
+        let table = table.map_err(PlanError::input(&source.place(entry), "table"))?;
+        Ok(TableRule::from(table).named(label))
     };
     let mut choices = if let Some(value) = &family.quantile {
         let counts = counts(source, entry, value)?.into_iter();
@@ -104,11 +104,8 @@ fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRul
     };
     if let Some(name) = family.name {
         let [choice] = choices.as_mut_slice() else {
-            return Err(source.wrong(
-                entry,
-                "table",
-                "one table where there is a name; leave the name out or split the entry",
-            ));
+            let expected = "one table where there is a name; leave the name out or split the entry";
+            return Err(source.wrong(entry, "table", expected));
         };
         *choice = choice.clone().named(name);
     }
@@ -125,7 +122,7 @@ fn base(source: Source<'_>, entry: &At, name: &str, inputs: &Inputs) -> Result<R
     }
     let place = source.place(entry);
     let text = inputs.text(name, &place)?;
-    RangeTable::parse(&text, name).map_err(|source| PlanError::Table { place, source })
+    RangeTable::parse(&text, name).map_err(PlanError::input(&place, "table"))
 }
 
 /// One number or a list of them.

@@ -12,6 +12,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::drape::StageTimes;
+use crate::quantile::interpolated;
 
 /// Median of each stage, and spread where there is more than one repeat: the columns that differ from run to run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -34,9 +35,9 @@ impl Timing {
     #[must_use]
     pub fn of(passes: &[StageTimes]) -> Self {
         let stage = |pick: fn(&StageTimes) -> Duration| {
-            let mut ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(t).as_secs_f64()).collect();
-            ms.sort_by(f64::total_cmp);
-            (quantile(&ms, 0.5), (ms.len() > 1).then(|| quantile(&ms, 0.75) - quantile(&ms, 0.25)))
+            let ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(t).as_secs_f64()).collect();
+            let spread = || interpolated(&ms, 0.75) - interpolated(&ms, 0.25);
+            (interpolated(&ms, 0.5), (ms.len() > 1).then(spread))
         };
         let (time_distance_ms, time_distance_spread_ms) = stage(|t| t.distance);
         let (time_segment_ms, time_segment_spread_ms) = stage(|t| t.segment);
@@ -67,15 +68,6 @@ impl Timing {
             ("refine", self.time_refine_ms),
         ]
     }
-}
-
-/// Quantile of sorted values by linear interpolation; 0 of none.
-fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
-    let at = p * last as f64;
-    let low = at.floor() as usize;
-    let high = (low + 1).min(last);
-    sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
 #[cfg(test)]

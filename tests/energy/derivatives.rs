@@ -182,6 +182,22 @@ fn bearing_hessian_is_exact_for_what_the_bending_bears() {
     check_bearing(&cloth, &squeezed, &Contacts::none(), 1e-5);
 }
 
+/// The whole matrix, column by column.
+fn dense(cloth: &Cloth, blocks: &[glam::DMat3]) -> faer::Mat<f64> {
+    let unknowns = cloth.order().len();
+    let mut matrix = faer::Mat::zeros(3 * unknowns, 3 * unknowns);
+    let (mut unit, mut column) = (vec![DVec3::ZERO; unknowns], Vec::new());
+    for j in 0..3 * unknowns {
+        unit[j / 3][j % 3] = 1.0;
+        cloth.multiply(blocks, &unit, &mut column);
+        unit[j / 3][j % 3] = 0.0;
+        for (i, entry) in column.iter().flat_map(DVec3::to_array).enumerate() {
+            matrix[(i, j)] = entry;
+        }
+    }
+    matrix
+}
+
 #[test]
 fn hessian_is_never_negative() {
     let (mesh, body) = (sheet(), block());
@@ -192,12 +208,14 @@ fn hessian_is_never_negative() {
         let contacts = cloth.contacts(&body, &x);
         let mut blocks = Vec::new();
         cloth.hessian(&x, &contacts, &mut blocks);
-        for k in 0..40 {
-            let d: Vec<DVec3> = (0..cloth.order().len()).map(|i| jitters(100 * k + i)).collect();
-            let mut product = Vec::new();
-            cloth.multiply(&blocks, &d, &mut product);
-            let curvature: f64 = product.iter().zip(&d).map(|(p, d)| p.dot(*d)).sum();
-            assert!(curvature > 0.0, "squeezed to {squeeze}: {curvature}");
-        }
+        let mut hessian = dense(&cloth, &blocks);
+        let asymmetry = (&hessian - hessian.transpose()).norm_max();
+        assert!(asymmetry <= 1e-12 * hessian.norm_max(), "squeezed to {squeeze}: {asymmetry}");
+        // Cholesky's factor is there exactly where the matrix is positive definite.
+        assert!(hessian.llt(faer::Side::Lower).is_ok(), "squeezed to {squeeze}");
+        // One direction that gives way is enough for it to fail.
+        let last = hessian.nrows() - 1;
+        hessian[(last, last)] *= -1e-6;
+        assert!(hessian.llt(faer::Side::Lower).is_err(), "a negative diagonal passed");
     }
 }

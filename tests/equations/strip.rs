@@ -1,5 +1,11 @@
 //! p_f: strips that hang, against the closed form; and a wall that carries nothing.
 
+use std::ops::ControlFlow;
+
+use partwise::mechanics::energy::{Cloth, Contacts};
+use partwise::mechanics::refine::{RefineOptions, Stop, refine_with};
+use partwise::mesh::RestShape;
+
 use super::*;
 
 #[test]
@@ -78,4 +84,31 @@ fn the_closed_form_of_a_strip_ends_at_rho_g_l_squared_over_two_k() {
     let lowest = found.parts.iter().map(|p| -p.displacement.z).fold(0.0, f64::max);
     let exact = DENSITY * GRAVITY * 0.8 * 0.8 / (2.0 * WARP);
     assert!((lowest / exact - 1.0).abs() < 5e-3, "{lowest} m, exactly {exact} m");
+}
+
+#[test]
+fn parts_of_a_hanging_strip_sink_as_the_cloth_itself_does() {
+    let options = PaperOptions { cosine: Cosine::InSurface, untouched: Untouched::Contactless, ..Default::default() };
+    let case = hanging_strip(90.0, 0.8, 0.1);
+    let found = case.solve(&options);
+    // The same strip as an energy of triangles, which knows nothing of PARTs or line forces, held at its upper edge.
+    let mesh = &case.garment;
+    let top = mesh.bounds().unwrap().1.z;
+    let held: Vec<u32> =
+        (0..mesh.vertex_count() as u32).filter(|&v| mesh.positions[v as usize].z > top - 1e-6).collect();
+    let fabric = Fabric { poisson: 0.0, ..cloth() };
+    let rest = RestShape::from_edges(mesh).unwrap();
+    let energy = Cloth::new(mesh, &case.topology, &rest, &fabric, &held).unwrap();
+    let settling = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
+    let start = mesh.positions.clone();
+    let end = refine_with(&energy, Contacts::none(), start, &settling, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(end.stop, Stop::Converged);
+    let sink = |v: &u32| mesh.positions[*v as usize].z - end.positions[*v as usize].z;
+    let deepest = (0..mesh.vertex_count() as u32).map(|v| sink(&v)).fold(0.0, f64::max);
+    assert!(deepest > 0.01, "{deepest} m");
+    for (part, forces) in case.parts.parts.iter().zip(&found.parts) {
+        let settled = part.vertices.iter().map(sink).sum::<f64>() / part.vertices.len() as f64;
+        let gave = -forces.displacement.z;
+        assert!((gave - settled).abs() < 0.03 * deepest, "{gave} m, the cloth {settled} m of {deepest} m");
+    }
 }

@@ -14,7 +14,6 @@ use partwise::parts::{Parts, segment};
 use partwise::range_table::{RangeTable, TableRule};
 use partwise::record::Tab;
 use partwise::sweep::{Bench, Plan, Row, Status};
-use partwise::whole_file::WholeFile;
 use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
@@ -27,7 +26,7 @@ use super::sweep::points::KeepingBench;
 use super::sweep::record_all;
 use super::sweep::report::{Format, line};
 use super::sweep::store::PointStore;
-use super::work::{cache, use_threads};
+use super::work::{cache, use_threads, write_csv};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -85,13 +84,11 @@ pub(crate) struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         if !(2..=MOST).contains(&self.tables.len()) {
             let found = self.tables.len();
-            return Err(UserError::new(format!(
-                "found {found} range tables, expected 2 to {MOST}; `partwise sweep` takes more"
-            )));
+            let text = format!("found {found} range tables, expected 2 to {MOST}; `partwise sweep` takes more");
+            return Err(UserError::new(text));
         }
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
@@ -113,10 +110,7 @@ impl CompareArgs {
         }
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
-            let written = WholeFile::write(path, table::csv(&compared)?);
-            written.map_err(|e| {
-                UserError::new(format!("{}: cannot be written: {e}; choose another file", path.display()))
-            })?;
+            write_csv(path, &table::csv(&compared)?)?;
         }
         let folder = Path::new("recordings").join("compare");
         let recordings = record_all(&rows, &store, "compare", &folder, &self.sinks, Tab::SideBySide)?;

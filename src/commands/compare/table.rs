@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{Table, presets};
 use partwise::figures::LevelCount;
 use partwise::range_table::Extent;
 use partwise::sweep::{Row, Status, cell};
@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::changes::Changes;
-use crate::commands::sweep::report::rows_table;
+use crate::commands::sweep::report::{right, rows_table};
 
 /// One table on one garment.
 #[derive(Debug, Clone, Serialize)]
@@ -76,14 +76,6 @@ fn range(level: &LevelCount) -> String {
     let own = level.extent.filter(Extent::cuts).map_or_else(String::new, |extent| format!(", cut to {extent}"));
     let upper = if level.upper_cm.is_finite() { short(level.upper_cm) } else { "∞".to_owned() };
     format!("{}–{upper} cm{own}", short(level.lower_cm))
-}
-
-fn right(table: &mut Table, columns: std::ops::Range<usize>) {
-    for column in columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
 }
 
 /// Columns of the CSV: of the row, and of the level.

@@ -87,7 +87,6 @@ pub(crate) struct SweepArgs {
 }
 
 impl SweepArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         if !(1..=MOST_THREADS).contains(&self.jobs) {

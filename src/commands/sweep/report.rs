@@ -138,10 +138,15 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             mm(figures.representable_rms_mm),
         ]);
     }
-    for column in [0, 3, 4, 5, 6, 7, 8] {
+    right(&mut table, [0].into_iter().chain(3..9));
+    table
+}
+
+/// Sets columns of numbers to the right.
+pub(crate) fn right(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
+    for column in columns {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    table
 }

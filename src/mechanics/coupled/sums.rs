@@ -184,8 +184,8 @@ fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<
 fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<'_>, all: &Elements) {
     let State { cloth, x, contacts, damping, .. } = *here;
     let mut values: Vec<Four> = Vec::new();
-    for v in 0..x.len() {
-        values_at(l, functions, all, v, x[v], &mut values);
+    for (v, x) in x.iter().enumerate() {
+        values_at(l, functions, all, v, *x, &mut values);
         let mass = Pack::splat(l, cloth.masses[v] * damping);
         for pair in all.pairs(v) {
             let a = Pack::load(l, &values[pair.row as usize]) * mass;

@@ -123,6 +123,8 @@ pub struct Target {
     pub low_percent: f64,
     /// Greatest published coefficient, percent.
     pub high_percent: f64,
+    /// Whether a constant of the fabric was set so that it falls inside: no check of the model then.
+    pub calibrated_to: bool,
     /// Where it was published.
     pub source: String,
 }
@@ -141,13 +143,15 @@ pub fn targets() -> Result<Vec<Target>, CusickError> {
 /// As [`run`], and [`FabricError`] for an unknown name or a file that is none of a fabric.
 pub fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
     let targets = targets()?;
-    let mut csv =
-        String::from("fabric,coefficient_percent,low_percent,high_percent,verdict,folds,residual_over_weight,steps\n");
+    let mut csv = String::from(
+        "fabric,coefficient_percent,low_percent,high_percent,calibrated_to,verdict,folds,residual_over_weight,steps\n",
+    );
     for name in fabrics {
         let result = run(&Fabric::by_name(name)?, rows)?;
         let percent = 100.0 * result.coefficient;
         let target = targets.iter().find(|t| t.fabric == *name);
-        let band = target.map_or_else(|| ",".to_owned(), |t| format!("{},{}", t.low_percent, t.high_percent));
+        let band = target
+            .map_or_else(|| ",,".to_owned(), |t| format!("{},{},{}", t.low_percent, t.high_percent, t.calibrated_to));
         let verdict = target.map_or_else(|| "no published band".to_owned(), |t| verdict(percent, t));
         let quoted = || format!("\"{}\"", name.replace('"', "\"\""));
         let label = if name.contains([',', '"', '\n', '\r']) { quoted() } else { (*name).to_owned() };

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
-use super::layout::Layout;
+use super::layout::HessianLayout;
 use super::membrane::{Stiffness, Triangle};
 use super::packs::TrianglePack;
 use super::pattern::{HELD, Pattern};
@@ -89,7 +89,7 @@ pub struct Cloth {
     /// The triangles by fours.
     pub(super) packs: Vec<TrianglePack>,
     placed: Arc<Vec<DVec3>>,
-    layout: Arc<OnceLock<Layout>>,
+    layout: Arc<OnceLock<HessianLayout>>,
 }
 
 impl Cloth {
@@ -152,8 +152,8 @@ impl Cloth {
 
     /// Unknowns and pattern of the Hessian, made when first asked for.
     #[must_use]
-    pub fn layout(&self) -> &Layout {
-        self.layout.get_or_init(|| Layout::new(&self.placed, &self.triangles, &self.bending, &self.held))
+    pub fn layout(&self) -> &HessianLayout {
+        self.layout.get_or_init(|| HessianLayout::new(&self.placed, &self.triangles, &self.bending, &self.held))
     }
 
     /// The unknown vertices in elimination order.

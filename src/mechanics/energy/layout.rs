@@ -11,7 +11,7 @@ use super::pattern::{HELD, Pattern, Slot};
 
 /// Order, pattern and slots of one cloth.
 #[derive(Debug, Clone)]
-pub struct Layout {
+pub struct HessianLayout {
     /// Vertex of each unknown, in elimination order.
     pub order: Vec<u32>,
     /// Unknown of each vertex, [`HELD`] where it is held.
@@ -24,7 +24,7 @@ pub struct Layout {
     pub(super) bending_blocks: Vec<f64>,
 }
 
-impl Layout {
+impl HessianLayout {
     /// Of the vertices that are not `held`; `placed` is where they are cut apart for the elimination.
     pub(super) fn new(placed: &[DVec3], triangles: &[Triangle], bending: &Bending, held: &[bool]) -> Self {
         let n = held.len();

@@ -32,4 +32,4 @@ pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;
 pub use evaluate::Scratch;
 pub use friction::Friction;
-pub use layout::Layout;
+pub use layout::HessianLayout;

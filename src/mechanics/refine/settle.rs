@@ -30,7 +30,10 @@ const RELAXING: usize = 20;
 /// 42 steps together, with 60 31, with 80 34 (damping from 100).
 const RELAXING_TRIAL: usize = 60;
 
-/// Settles `cloth` on `body` from `start`.
+/// Settles `cloth` on `body` from the vertex positions `start` (m), one for each vertex, held ones included.
+///
+/// `observer` sees the start and the cloth after every step; where it breaks off, what there is by then is returned with
+/// [`Stop::Interrupted`]. Runs in rayon's pool; the bits do not depend on its size.
 ///
 /// # Errors
 /// [`SolveError`] where the start holds positions that are not finite.
@@ -45,7 +48,8 @@ pub fn refine(
     refine_with(cloth, contacts, start, options, observer)
 }
 
-/// [`refine`] with contacts made by the caller: [`Contacts::none`] for a cloth that hangs free.
+/// [`refine`] with contacts made by the caller: [`Contacts::none`] for a cloth that hangs free, or those of an earlier state,
+/// whose anchors of friction and stiffness then go on.
 ///
 /// # Errors
 /// As [`refine`].

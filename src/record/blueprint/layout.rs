@@ -80,10 +80,10 @@ impl Layout {
             tabs.push((Tab::Fit, self.fit(eye)));
         }
         if self.wrinkles {
-            tabs.push((Tab::Wrinkles, wrinkles(eye)));
+            tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
         if self.iterations {
-            tabs.push((Tab::Solver, solver(eye)));
+            tabs.push((Tab::Solver, solver(&self.eye(Tab::Solver, eye))));
         }
         let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
         let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
@@ -93,41 +93,28 @@ impl Layout {
         }
     }
 
-    fn stage_eye(&self, eye: &Eye) -> Eye {
-        let wide = if self.error { 5.0 } else { 4.0 } + f64::from(REPORT_OVER_STAGE);
-        eye.through(ASPECT / (wide * STAGE_HEIGHT))
+    /// The eye for the views of a tab, which share its width.
+    fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
+        eye.through(match tab {
+            Tab::Stages | Tab::Numbers => {
+                let wide = if self.error { 5.0 } else { 4.0 } + f64::from(REPORT_OVER_STAGE);
+                ASPECT / (wide * STAGE_HEIGHT)
+            }
+            Tab::SideBySide => ASPECT / self.compare.len() as f64,
+            Tab::Fit => ASPECT / self.fit.len() as f64,
+            Tab::Wrinkles => 0.5 * ASPECT,
+            Tab::Solver => ASPECT / 3.0,
+        })
     }
 
-    fn compare_eye(&self, eye: &Eye) -> Eye {
-        eye.through(ASPECT / self.compare.len() as f64)
-    }
-
-    fn fit_eye(&self, eye: &Eye) -> Eye {
-        eye.through(ASPECT / self.fit.len() as f64)
-    }
-
-    /// Length of a pixel under the garment in the stages' views, m.
-    pub(crate) fn stage_pixel_m(&self, eye: &Eye) -> f64 {
-        self.stage_eye(eye).pixel_m(HEIGHT_PX * STAGE_HEIGHT)
-    }
-
-    /// Length of a pixel under the garment where tables stand side by side, m.
-    pub(crate) fn compare_pixel_m(&self, eye: &Eye) -> f64 {
-        self.compare_eye(eye).pixel_m(HEIGHT_PX)
-    }
-
-    /// Length of a pixel under the garment where the fit is shown, m.
-    pub(crate) fn fit_pixel_m(&self, eye: &Eye) -> f64 {
-        self.fit_eye(eye).pixel_m(HEIGHT_PX)
-    }
-
-    /// Length of a pixel under the garment where wrinkles are shown, m.
-    pub(crate) fn wrinkle_pixel_m(&self, eye: &Eye) -> f64 {
-        eye.through(0.5 * ASPECT).pixel_m(HEIGHT_PX)
+    /// Length of a pixel under the garment in the views of a tab, m.
+    pub(crate) fn pixel_m(&self, tab: Tab, eye: &Eye) -> f64 {
+        let share = if tab == Tab::Stages { STAGE_HEIGHT } else { 1.0 };
+        self.eye(tab, eye).pixel_m(HEIGHT_PX * share)
     }
 
     fn stages(&self, eye: &Eye) -> Node {
-        let eye = &self.stage_eye(eye);
+        let eye = &self.eye(Tab::Stages, eye);
         let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
         let mut views = vec![seen("Distance", "/distance"), seen("PARTs", "/parts")];
         if !self.held {
@@ -185,7 +172,7 @@ impl Layout {
     }
 
     fn side_by_side(&self, eye: &Eye) -> Node {
-        let eye = &self.compare_eye(eye);
+        let eye = &self.eye(Tab::SideBySide, eye);
         let views = self.compare.iter().enumerate().map(|(slot, title)| {
             let path = format!("{}/{slot}", paths::COMPARE);
             (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
@@ -194,7 +181,7 @@ impl Layout {
     }
 
     fn fit(&self, eye: &Eye) -> Node {
-        let eye = &self.fit_eye(eye);
+        let eye = &self.eye(Tab::Fit, eye);
         let mut views: Vec<(f32, Node)> = Vec::new();
         for name in &self.fit {
             let path = format!("{}/{name}", paths::FIT);
@@ -205,7 +192,6 @@ impl Layout {
 }
 
 fn wrinkles(eye: &Eye) -> Node {
-    let eye = &eye.through(0.5 * ASPECT);
     let views = vec![
         (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
         (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
@@ -214,7 +200,6 @@ fn wrinkles(eye: &Eye) -> Node {
 }
 
 fn solver(eye: &Eye) -> Node {
-    let eye = &eye.through(ASPECT / 3.0);
     let plots = vec![
         (1.0, View::plot("Energy, J", &[paths::ENERGY], false).into()),
         (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], false).into()),

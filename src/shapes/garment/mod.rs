@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::ShapeError;
 use super::body::DressForm;
 use super::contour::contour;
-use super::cut::{clip, onto_edge, onto_surface};
+use super::cut::{CLOSE, clip, onto_edge, onto_surface};
 use super::measures::BodySpec;
 use super::remesh::{Density, Surface, remesh};
 use crate::mesh::{RestShape, TriMesh};
@@ -32,7 +32,7 @@ const LIMITS: [usize; 2] = [400, 1_000_000];
 
 /// A garment around the form, not yet draped.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Garment {
+pub struct PlacedGarment {
     /// Its name.
     pub name: String,
     /// The mesh, m, in groups: `hem`, `neckline`, `waistband`, `cuffs`, `armholes` along the openings, else `body` or
@@ -54,24 +54,18 @@ impl Surface for Cut<'_> {
     fn project(&self, p: DVec3, tag: u8) -> DVec3 {
         match self.openings.get(usize::from(tag).wrapping_sub(1)) {
             Some(opening) => onto_edge(self.cloth, |p| opening.at(p), p),
-            None => onto_surface(self.cloth, p),
+            None => onto_surface(self.cloth, p, CLOSE),
         }
     }
 }
 
 /// The garment `spec` around the form of `body`, with `vertices` of them if that is given.
-///
-/// # Errors
-/// [`ShapeError`] where either spec makes no shape, or the number of vertices is out of range.
-pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<Garment, ShapeError> {
+pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     garment_on(spec, &DressForm::new(body)?, vertices)
 }
 
 /// [`garment`] around a form that is made already.
-///
-/// # Errors
-/// [`ShapeError`] where `spec` makes no shape, or the number of vertices is out of range.
-pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<Garment, ShapeError> {
+pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     spec.check()?;
     let cloth = Cloth::new(spec, form);
     if cloth.hem < 0.05 {
@@ -131,7 +125,7 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
     );
     let waistband = openings.iter().position(|o| matches!(o, Opening::Waistband(_))).map(|i| i as u8 + 1);
     let held = (0..tags.len() as u32).filter(|&v| Some(tags[v as usize]) == waistband).collect();
-    Ok(Garment { name: spec.name.clone(), mesh, rest: RestShape { corners }, held })
+    Ok(PlacedGarment { name: spec.name.clone(), mesh, rest: RestShape { corners }, held })
 }
 
 /// Where a skirt's fullness begins, m: at the waist, or at a dress's hip.

@@ -111,9 +111,6 @@ pub struct GarmentSpec {
 
 impl GarmentSpec {
     /// One of the built-in garments.
-    ///
-    /// # Errors
-    /// [`ShapeError::Unknown`] for any other name.
     pub fn by_name(name: &str) -> Result<Self, ShapeError> {
         match BUILT_IN.iter().position(|&n| n == name) {
             Some(i) => Self::from_toml(SPECS[i]),
@@ -122,9 +119,6 @@ impl GarmentSpec {
     }
 
     /// Reads a spec from TOML and checks it.
-    ///
-    /// # Errors
-    /// [`ShapeError::Spec`] with the place and the fault, [`ShapeError::Length`] for a length that makes no garment.
     pub fn from_toml(text: &str) -> Result<Self, ShapeError> {
         let spec: Self = toml::from_str(text).map_err(|e| ShapeError::Spec(e.to_string()))?;
         spec.check()?;
@@ -132,9 +126,6 @@ impl GarmentSpec {
     }
 
     /// Checks every length.
-    ///
-    /// # Errors
-    /// [`ShapeError::Length`] for the first that makes no garment, [`ShapeError::Spec`] for a missing neckline.
     pub fn check(&self) -> Result<(), ShapeError> {
         let check = |name: &'static str, found: f64, low: f64, high: f64| {
             if (low..=high).contains(&found) { Ok(()) } else { Err(ShapeError::Length { name, found, low, high }) }

@@ -18,11 +18,11 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::{Topology, TriMesh};
 use crate::distance::Body;
+use crate::mesh::{Topology, TriMesh};
 
 /// Deeper than this (m) the nearest surface may be that of the far side: half the thickness of a slender forearm.
-pub const DEEPEST: f64 = 0.03;
+const DEEPEST: f64 = 0.03;
 /// Rings smoothed at the first try, and how often they are doubled after that.
 const RINGS: u32 = 3;
 /// Tries with doubled rings: up to 3 · 2⁴ = 48 rings, half a garment.

@@ -1,13 +1,12 @@
 //! How a garment lies about a body before anything is draped.
 
-use std::fmt;
-
 use serde::Serialize;
 
-use super::health::Percentiles;
-use super::self_intersection::crossing_pairs;
-use super::{MeshError, Topology, TriMesh};
+use super::SceneError;
 use crate::distance::Body;
+use crate::mesh::self_intersection::crossing_pairs;
+use crate::mesh::{Topology, TriMesh};
+use crate::quantile::Percentiles;
 
 /// A garment whose nearest vertex is farther than this from the body (m) is not worn: the loosest gown hangs from a shoulder
 /// or a waist.
@@ -35,7 +34,7 @@ impl Placement {
             penetrating_vertices: distance.iter().filter(|&&q| q < 0.0).count(),
             deepest_m: distance.iter().fold(0.0, |deepest, &q| f64::max(deepest, -q)),
             crossing_pairs: crossing_pairs(garment, body.mesh()).len(),
-            clearance_m: Percentiles::of(distance),
+            clearance_m: Percentiles::of(&distance),
         }
     }
 
@@ -54,20 +53,11 @@ impl Placement {
     }
 }
 
-impl fmt::Display for Placement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.rows().iter().try_for_each(|(name, value)| writeln!(f, "{name:<26} {value}"))
-    }
-}
-
-/// Whether the body is near at all.
-///
-/// # Errors
-/// [`MeshError::NotNear`] if every vertex is farther than [`FARTHEST`] from it.
-pub fn check_near(garment: &TriMesh, body: &Body) -> Result<(), MeshError> {
+/// Refuses a garment of which every vertex is farther than [`FARTHEST`] from the body.
+pub(super) fn check_near(garment: &TriMesh, body: &Body) -> Result<(), SceneError> {
     let distances = body.nearest_all(&garment.positions);
     let nearest = distances.iter().map(|near| near.signed_distance.abs()).fold(f64::INFINITY, f64::min);
-    if nearest > FARTHEST { Err(MeshError::NotNear { nearest, limit: FARTHEST }) } else { Ok(()) }
+    if nearest > FARTHEST { Err(SceneError::NotNear { nearest, limit: FARTHEST }) } else { Ok(()) }
 }
 
 /// Triangles of the connected parts of a garment that face the body, which by our winding they should not: those to be
