@@ -92,7 +92,7 @@ fn couple(
 /// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
 const ENOUGH: usize = 8;
 
-/// Steps at full resolution after coarser ones: they take off what the prolongation strained, and tell the forces.
+/// Steps of a level after the coarsest: they take off what the prolongation strained, and tell the forces.
 const STEPS_AFTER_COARSE: usize = 2;
 
 /// The coupled model on the coarsest cloth whose vertices still tell these PARTs apart, then on the finer ones.

@@ -140,9 +140,11 @@ impl Map {
 
     fn is_moderate(&self) -> bool {
         let [u, v] = self.gradients;
-        let (trace, determinant) = (u.length_squared() + v.length_squared(), u.cross(v).length());
-        // Of the singular values the sum of squares and the product.
-        trace.is_finite() && trace <= MOST_STRETCH.powi(2) && determinant * MOST_STRETCH.powi(2) >= trace
+        // Squares of the singular values, by their sum and product.
+        let (half, product) = (0.5 * (u.length_squared() + v.length_squared()), u.cross(v).length_squared());
+        let apart = (half * half - product).max(0.0).sqrt();
+        let most = MOST_STRETCH * MOST_STRETCH;
+        half + apart <= most && (half - apart) * most >= 1.0
     }
 }
 

@@ -1,0 +1,115 @@
+//! A garment with fewer triangles: what it keeps, and that the full one follows it.
+
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DQuat, DVec3};
+use partwise::mesh::coarse::Coarse;
+use partwise::mesh::{RestShape, Topology, TriMesh};
+
+/// An open tube of this radius and height, m, its rows shifted against each other.
+fn tube(radius: f64, height: f64, around: usize, rows: usize) -> TriMesh {
+    let point = |row: usize, i: usize| {
+        let angle = TAU * (i as f64 + 0.5 * (row % 2) as f64) / around as f64;
+        DVec3::new(radius * angle.cos(), radius * angle.sin(), height * row as f64 / (rows - 1) as f64)
+    };
+    let positions = (0..rows).flat_map(|row| (0..around).map(move |i| point(row, i))).collect();
+    let mut triangles = Vec::new();
+    for row in 0..rows - 1 {
+        let at = |row: usize, i: usize| (row * around + i % around) as u32;
+        for i in 0..around {
+            // The upper row runs half an edge ahead of an even one.
+            let lead = row % 2;
+            let (a, b) = (at(row, i), at(row, i + 1));
+            let (c, d) = (at(row + 1, i + lead), at(row + 1, i + lead + around - 1));
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    TriMesh::new(positions, triangles)
+}
+
+fn coarse(mesh: &TriMesh) -> Coarse {
+    Coarse::new(mesh, &RestShape::from_edges(mesh).unwrap(), mesh.vertex_count() / 4).unwrap()
+}
+
+#[test]
+fn it_has_a_quarter_of_the_vertices_the_same_edges_of_cloth_and_no_slivers() {
+    let mesh = tube(0.2, 0.6, 60, 33);
+    let coarse = coarse(&mesh);
+    let count = coarse.mesh.vertex_count();
+    // A regular grid leaves edges that are all as long: some may not go.
+    assert!((490..=600).contains(&count), "{count} vertices of {}", mesh.vertex_count());
+    assert_eq!(coarse.topology.boundary_loops().len(), Topology::new(&mesh).boundary_loops().len());
+    assert!(coarse.topology.edge_valence.iter().all(|v| *v <= 2));
+    for t in 0..coarse.mesh.triangles.len() {
+        let [a, b, c] = coarse.mesh.corners(t);
+        let squares = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        let shape = 2.0 * 3f64.sqrt() * coarse.mesh.double_area_vector(t).length() / squares;
+        assert!(shape > 0.3, "triangle {t} is a sliver: {shape} of an equilateral one");
+    }
+    let (old, new) = (mesh.triangle_areas(), coarse.rest.areas());
+    let ratio = new.iter().sum::<f64>() / old.iter().sum::<f64>();
+    assert!((0.98..=1.0).contains(&ratio), "{ratio} of the cloth");
+}
+
+#[test]
+fn its_rest_shape_is_that_of_the_cloth_about_it() {
+    // Cut wider than it stands by a tenth, and shorter by a twentieth.
+    let mesh = tube(0.2, 0.6, 60, 33);
+    let mut rest = RestShape::from_edges(&mesh).unwrap();
+    for p in rest.corners.iter_mut().flatten() {
+        *p = glam::DVec2::new(1.1 * p.x, 0.95 * p.y);
+    }
+    let coarse = Coarse::new(&mesh, &rest, mesh.vertex_count() / 4).unwrap();
+    let as_it_stands = RestShape::from_edges(&coarse.mesh).unwrap();
+    for (t, (rest, stands)) in coarse.rest.corners.iter().zip(&as_it_stands.corners).enumerate() {
+        for i in 0..3 {
+            let (rest, stands) = (rest[(i + 1) % 3] - rest[i], stands[(i + 1) % 3] - stands[i]);
+            let expected = glam::DVec2::new(1.1 * stands.x, 0.95 * stands.y);
+            // Up and down are one direction of the warp.
+            let off = rest.distance(expected).min(rest.distance(-expected));
+            assert!(off < 0.01 * expected.length(), "triangle {t}: {rest}, expected {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_full_garment_follows_any_affine_map_exactly() {
+    let mesh = tube(0.2, 0.6, 60, 33);
+    let coarse = coarse(&mesh);
+    let turn = DMat3::from_quat(DQuat::from_rotation_y(0.7) * DQuat::from_rotation_z(2.0));
+    let moved = |x: DVec3| turn * x + DVec3::new(0.3, -0.2, 1.0);
+    let to: Vec<DVec3> = coarse.mesh.positions.iter().map(|x| moved(*x)).collect();
+    let followed = coarse.prolong(&mesh.positions, &to);
+    let off = mesh.positions.iter().zip(&followed).map(|(x, y)| moved(*x).distance(*y)).fold(0.0, f64::max);
+    assert!(off < 1e-12, "off by {off} m");
+}
+
+#[test]
+fn it_bends_between_coarse_vertices_and_is_not_creased_along_their_edges() {
+    // A tube flattened to an ellipse: chords alone would be off by their sag, s²/8R: 3 mm for edges of 7 cm.
+    let mesh = tube(0.2, 0.6, 60, 33);
+    let coarse = coarse(&mesh);
+    let moved = |x: DVec3| {
+        let angle = x.y.atan2(x.x);
+        let radius = 0.2 + 0.02 * (2.0 * angle).cos();
+        DVec3::new(radius * angle.cos(), radius * angle.sin(), x.z)
+    };
+    let to: Vec<DVec3> = coarse.mesh.positions.iter().map(|x| moved(*x)).collect();
+    let followed = coarse.prolong(&mesh.positions, &to);
+    // At a hem the neighbours are on one side.
+    let inner = mesh.positions.iter().zip(&followed).filter(|(x, _)| (0.1..0.5).contains(&x.z));
+    let off = inner.map(|(x, y)| moved(*x).distance(*y)).fold(0.0, f64::max);
+    assert!(off < 1e-3, "off by {off} m");
+}
+
+#[test]
+fn what_is_no_manifold_or_far_from_its_rest_shape_has_none() {
+    let mesh = tube(0.2, 0.6, 60, 33);
+    let mut rest = RestShape::from_edges(&mesh).unwrap();
+    rest.corners[7] = rest.corners[7].map(|p| 0.2 * p);
+    assert!(Coarse::new(&mesh, &rest, 400).is_none(), "a seam that stands open");
+    let mut three = mesh.clone();
+    three.triangles.push([0, 1, 300]);
+    let rest = RestShape::from_edges(&three).unwrap();
+    assert!(Coarse::new(&three, &rest, 400).is_none(), "three triangles at an edge");
+}
