@@ -1,5 +1,7 @@
 //! A garment with fewer triangles: what it keeps, and that the full one follows it.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};

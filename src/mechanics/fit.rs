@@ -16,6 +16,7 @@
 use glam::DVec3;
 
 use super::energy::{Cloth, Contacts};
+use crate::quantile::nearest_rank;
 
 /// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,11 +55,9 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
         let v = touch.vertex as usize;
         pressure_kpa[v] = 1e-3 * touch.force() / cloth.areas[v];
     }
-    strains.sort_by(f64::total_cmp);
-    let at = |share: f64| strains.get(((strains.len().max(1) - 1) as f64 * share).round() as usize).copied();
     Fit {
-        strain_p95_percent: at(0.95).unwrap_or(0.0),
-        strain_max_percent: at(1.0).unwrap_or(0.0),
+        strain_p95_percent: nearest_rank(&strains, 0.95),
+        strain_max_percent: nearest_rank(&strains, 1.0),
         pressure_max_kpa: pressure_kpa.iter().copied().fold(0.0, f64::max),
         strain_percent,
         pressure_kpa,

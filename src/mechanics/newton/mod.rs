@@ -18,6 +18,7 @@
 //! | ε | damping | 1/s² |
 //! | M | lumped masses | kg |
 
+mod factor;
 mod flat;
 pub(crate) mod relax;
 mod solver;
