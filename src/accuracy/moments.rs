@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! translation: e = Σ|c|²
-//! affine:      e = Σ|c − A d|² = Σ|c|² − A : R − λ|A|²,   A = R (Σ d dᵀ + λ)⁻¹,   R = Σ c dᵀ
+//! affine:      e = min over A of Σ|c − A d|² + λ|A|² = Σ|c|² − tr R N⁻¹ Rᵀ,   R = Σ c dᵀ,   N = Σ d dᵀ + λ
 //! ```
 //!
 //! so that e follows from sums that add up when pieces are joined and take away when vertices leave.
@@ -91,9 +91,17 @@ impl Moments {
         if ridge <= 0.0 {
             return spread;
         }
-        let gradient = right * (normal + DMat3::from_diagonal(DVec3::splat(ridge))).inverse();
-        let along = |a: &DMat3, b: &DMat3| a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis);
-        let held = along(&gradient, &right) + ridge * along(&gradient, &gradient);
+        // N = L D Lᵀ and R = Y Lᵀ: an inverse would lose what a flat piece has across it, this does not.
+        let n = (normal + DMat3::from_diagonal(DVec3::splat(ridge))).to_cols_array_2d();
+        let d0 = n[0][0];
+        let (l10, l20) = (n[0][1] / d0, n[0][2] / d0);
+        let d1 = n[1][1] - l10 * l10 * d0;
+        let l21 = (n[1][2] - l10 * l20 * d0) / d1;
+        let d2 = n[2][2] - l20 * l20 * d0 - l21 * l21 * d1;
+        let y0 = right.x_axis;
+        let y1 = right.y_axis - y0 * l10;
+        let y2 = right.z_axis - y0 * l20 - y1 * l21;
+        let held = y0.length_squared() / d0 + y1.length_squared() / d1 + y2.length_squared() / d2;
         // Of a piece without extent nothing is left but rounding.
         if held.is_finite() { (spread - held).clamp(0.0, spread) } else { spread }
     }
