@@ -15,11 +15,12 @@ use rayon::prelude::*;
 use super::garment::{Garment, Holds, Worth};
 use crate::commands::{console, interrupt};
 
-/// Tables of least guiding error whose blended bound is computed.
-const BOUNDED: usize = 96;
+/// Previews of one search, for several garments no fewer than [`LEAST`] tables of them all.
+const PREVIEWS: usize = 32;
+const LEAST: usize = 12;
 
-/// Tables of least blended bound that are draped.
-const DRAPED: usize = 32;
+/// Bounds computed for each table that is draped.
+const BOUNDS: usize = 3;
 
 /// A table taken from a front.
 #[derive(Debug, Clone)]
@@ -88,8 +89,9 @@ fn near(
         }
     }
     points.sort_by(|a, b| a.rms_m.total_cmp(&b.rms_m));
+    let draped = (PREVIEWS / garments.len().max(1)).max(LEAST);
     let mut bounded: Vec<(f64, RangeTable)> = Vec::new();
-    for some in points.chunks(BOUNDED) {
+    for some in points.chunks(BOUNDS * draped) {
         let bounds = some.par_iter().with_max_len(1).map(|point| {
             let table = point.table(name, "")?;
             let parts: Vec<_> = garments.iter().map(|w| w.parts(&table)).collect();
@@ -105,12 +107,12 @@ fn near(
         });
         bounded.extend(bounds.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten());
         // Where garments have limits of their own, most of a front is beyond one of them.
-        if bounded.len() >= DRAPED {
+        if bounded.len() >= draped {
             break;
         }
     }
     bounded.sort_by(|a, b| a.0.total_cmp(&b.0));
-    bounded.truncate(DRAPED - 1);
+    bounded.truncate(draped - 1);
     Ok(bounded.into_iter().map(|(_, table)| table).collect())
 }
 
