@@ -14,7 +14,6 @@ use crate::assess::{AssessError, AssessOptions, Assessment, assess, canonical, p
 use crate::drape::{Drape, DrapeError, Refine, Settings, drape};
 use crate::figures::Figures;
 use crate::mechanics::refine::Observer;
-use crate::parts::representable_rms_m;
 use crate::range_table::TABLE_3;
 use crate::scene::{Scene, SceneSpec};
 use crate::word::word;
@@ -137,14 +136,13 @@ impl Job {
                 (found.canonical.positions.clone(), Some(found.clone()), found.warnings)
             }
         };
-        let moved: Vec<_> = reference.iter().zip(&scene.garment.positions).map(|(a, b)| *a - *b).collect();
-        let mut held = vec![false; moved.len()];
+        let mut held = vec![false; reference.len()];
         scene.held.iter().for_each(|&v| held[v as usize] = true);
         let best = representable(&scene.topology, &drape.parts, &held, &scene.garment.positions, &reference);
         let affine = Some(best.blended_affine_rms_mm).filter(|mm| mm.is_finite());
         let mut figures = Figures {
             canonical_rms_mm: Some(accuracy::rms_mm(&drape.positions, &reference)),
-            representable_rms_mm: Some(1e3 * representable_rms_m(&drape.parts, &moved)),
+            representable_rms_mm: Some(best.translation_rms_mm),
             representable_affine_rms_mm: affine,
             ..figures
         };

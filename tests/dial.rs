@@ -220,7 +220,8 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     assert!(fitted["extent_factor"] != 1.0, "{fitted}");
     for v in verdicts.iter().filter(|v| v["held_out"] == false) {
         assert!(v["parts"].as_u64() <= v["table_3_parts"].as_u64(), "{v}");
-        assert!(v["ratio"].as_f64().unwrap() < 1.0, "{v}");
+        assert!(v["affine_ratio"].as_f64().unwrap() < 1.0 && v["model_ratio"].as_f64().unwrap() < 1.0, "{v}");
+        assert!(v["own_mm"].as_f64().unwrap() > 0.0 && v["table_3_own_mm"].as_f64().unwrap() > 0.0, "{v}");
     }
     let path = bench.path("t/flared-skirt@400-levels.toml");
     let table = RangeTable::parse(&fs::read_to_string(&path).unwrap(), "tuned").unwrap();
@@ -241,7 +242,11 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
         ["run", "--garment", "flared-skirt@400", "--table", &both, "--refine", "0", "--no-save", "--format", "json"];
     let promised = verdicts.iter().find(|v| v["held_out"] == false && v["kind"] != "levels").unwrap();
     assert_eq!(json(&bench.does(&run))["part_count"], promised["parts"]);
-    assert!(promised["ratio"].as_f64().unwrap() < 0.5, "{promised}");
+    let measured = json(&bench.does(&[&run[..], &["--accuracy"]].concat()));
+    let error = |of: &serde_json::Value, key: &str| of[key].as_f64().unwrap();
+    assert!((error(&measured, "canonical_rms_mm") - error(promised, "model_mm")).abs() < 1e-9, "{measured}");
+    assert!((error(&measured, "rms_mm") - error(promised, "own_mm")).abs() < 1e-9, "{measured}");
+    assert!(promised["affine_ratio"].as_f64().unwrap() < 0.5, "{promised}");
     assert_eq!(fs::read_to_string(bench.path("t/verdicts.csv")).unwrap().lines().count(), 1 + 5);
     assert!(fs::read_to_string(bench.path("t/front.csv")).unwrap().lines().count() > 10);
     let contents = inspect::read(&bench.path("t/flared-skirt@400.rrd"));
@@ -250,6 +255,7 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     // Together each garment is within what Table 3 makes of it, not only their sum.
     let together =
         [&tune[..2], &["flared-skirt@400", "--garment", "pullover-1@400", "--together"], &tune[5..]].concat();
+    let levels_alone = found;
     let found = json(&bench.does(&[&together[..], &["--no-save", "--format", "json"]].concat()));
     let verdicts = found["verdicts"].as_array().unwrap();
     assert_eq!(verdicts.len(), 4);
@@ -257,6 +263,12 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
         assert_eq!(v["tuned_on"], "flared-skirt@400+pullover-1@400");
         assert!(v["parts"].as_u64() <= v["table_3_parts"].as_u64(), "{v}");
     }
+    // The paper's question is another one, and has its own optimum.
+    let paper =
+        [&tune[..3], &["--motion", "translation", "--levels-only", "--out", "p", "--no-save", "--format", "json"]];
+    let paper = json(&bench.does(&paper.concat()));
+    let of = |v: &serde_json::Value, key: &str| v["verdicts"][0][key].as_f64().unwrap();
+    assert!(of(&paper, "translation_mm") <= of(&levels_alone, "translation_mm"), "{paper}");
     bench.refuses(&["tune", "--garment", "toga", "--out", "u"], "toga");
     bench.refuses(&["tune", "--garment", "flared-skirt@400", "--extents", "0", "--out", "u"], "--extents");
     assert!(!Path::new(&bench.path("u")).exists());

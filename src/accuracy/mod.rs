@@ -9,6 +9,7 @@
 //!
 //! Limits: no figure tells whether either drape is *the* drape of a real cloth; that is what the drape tests are for.
 
+pub(crate) mod moments;
 pub mod quantile;
 pub mod reference;
 pub mod representable;

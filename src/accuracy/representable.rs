@@ -3,23 +3,21 @@
 //! With u_i the displacement of vertex i from its start to the reference, and X_i its start,
 //!
 //! - translation: u_i ≈ mean of u over the PART, the least squares answer;
-//! - affine: u_i ≈ b_p + A_p X_i, least squares over the PART;
+//! - affine: u_i ≈ b_p + A_p X_i, least squares over the PART, where it has more than three vertices;
 //! - blended: the same two with the coupled model's blending weights, least squares over the whole garment.
 //!
 //! The RMS of the remainder splits a table's fault from a model's. The blended affine one is what the coupled model's PARTs could hold
 //! at best, before its relaxations. Source: design of the accuracy report; the least squares fits are textbook.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::quantile::ErrorSummary;
+use super::moments::Moments;
+use super::quantile::{ErrorSummary, MM_PER_M};
 use crate::mechanics::coupled::{Motion, Motions, Weights};
+use crate::mechanics::newton::SolveError;
 use crate::mesh::Topology;
 use crate::parts::{Parts, UNASSIGNED};
-
-/// Ridge of the affine fit relative to the spread of a PART: it leaves the direction across a flat PART undetermined at no
-/// cost to the others (its error is this share of the fit).
-const RIDGE: f64 = 1e-9;
 
 /// What the best motion of each kind leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,52 +43,49 @@ pub fn representable(
     reference: &[DVec3],
 ) -> Representable {
     let u: Vec<DVec3> = reference.iter().zip(start).map(|(r, s)| *r - *s).collect();
-    let means: Vec<DVec3> = parts.map(|_, part| mean(&part.vertices, &u));
-    let gradients: Vec<DMat3> = parts.map(|p, part| {
-        let middle = mean(&part.vertices, start);
-        let (mut normal, mut right) = (DMat3::ZERO, DMat3::ZERO);
-        for &v in &part.vertices {
-            let (x, change) = (start[v as usize] - middle, u[v as usize] - means[p]);
-            normal += outer(x, x);
-            right += outer(change, x);
-        }
-        let spread = normal.x_axis.x + normal.y_axis.y + normal.z_axis.z;
-        if spread <= 0.0 {
-            return DMat3::ZERO;
-        }
-        right * (normal + DMat3::from_diagonal(DVec3::splat(RIDGE * spread))).inverse()
-    });
-    let middles: Vec<DVec3> = parts.map(|_, part| mean(&part.vertices, start));
-    let rms = |guess: &dyn Fn(usize) -> DVec3| {
-        let errors: Vec<f64> = (0..u.len()).map(|v| u[v].distance(guess(v))).collect();
-        ErrorSummary::of(&errors).rms_mm
-    };
-    let part_of = |v: usize| parts.part_of_vertex[v] as usize;
-    let still = |v: usize| parts.part_of_vertex[v] == UNASSIGNED;
     let weights = Weights::new(topology, start, parts).without(held);
     let blended = |motion| {
         let fit = Motions::new(parts, weights.clone(), start, motion).nearest(start, &u);
-        fit.map_or(f64::NAN, |fit| rms(&|v| fit[v]))
+        fit.map_or(f64::NAN, |fit| {
+            let errors: Vec<f64> = u.iter().zip(&fit).map(|(u, fit)| u.distance(*fit)).collect();
+            ErrorSummary::of(&errors).rms_mm
+        })
     };
     Representable {
-        translation_rms_mm: rms(&|v| if still(v) { DVec3::ZERO } else { means[part_of(v)] }),
-        affine_rms_mm: rms(&|v| {
-            if still(v) {
-                return DVec3::ZERO;
-            }
-            let p = part_of(v);
-            means[p] + gradients[p] * (start[v] - middles[p])
-        }),
+        translation_rms_mm: MM_PER_M * unblended_rms_m(parts, start, &u, Motion::Translation),
+        affine_rms_mm: MM_PER_M * unblended_rms_m(parts, start, &u, Motion::Affine),
         blended_translation_rms_mm: blended(Motion::Translation),
         blended_affine_rms_mm: blended(Motion::Affine),
     }
 }
 
-fn mean(vertices: &[u32], values: &[DVec3]) -> DVec3 {
-    vertices.iter().map(|&v| values[v as usize]).sum::<DVec3>() / vertices.len() as f64
+/// The displacement nearest to `u` (m, from `start`) that the PARTs' motions, blended over the seams, can hold.
+///
+/// # Errors
+/// [`SolveError`] where positions are not finite.
+pub fn blended(
+    topology: &Topology,
+    parts: &Parts,
+    held: &[bool],
+    start: &[DVec3],
+    u: &[DVec3],
+    motion: Motion,
+) -> Result<Vec<DVec3>, SolveError> {
+    let weights = Weights::new(topology, start, parts).without(held);
+    Motions::new(parts, weights, start, motion).nearest(start, u)
 }
 
-/// a bᵀ.
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+/// The error, m, that remains of the displacement `u` from `start` (m) with a motion of each PART's own; 0 for a garment without
+/// vertices.
+#[must_use]
+pub fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
+    let squared = |vertices: &[u32]| {
+        let mut sums = Moments::default();
+        Moments::of_each(vertices, start, u).iter().for_each(|m| sums += m);
+        sums.error(motion)
+    };
+    let moved: f64 = parts.parts.iter().map(|part| squared(&part.vertices)).sum();
+    let still = parts.part_of_vertex.iter().zip(u).filter(|(p, _)| **p == UNASSIGNED);
+    let still: f64 = still.map(|(_, u)| u.length_squared()).sum();
+    ((moved + still) / u.len().max(1) as f64).sqrt()
 }

@@ -16,13 +16,11 @@
 mod extent;
 mod grain;
 mod join;
-mod representable;
 mod seams;
 mod seeding;
 
 pub use grain::Grain;
 pub(crate) use grain::Ruler;
-pub use representable::representable_rms_m;
 pub use seams::Seam;
 pub(crate) use seeding::spread_seeds;
 

@@ -20,11 +20,13 @@
 //! Source: Everett 1963, "Generalized Lagrange multiplier method for solving problems of optimum allocation of resources",
 //! Operations Research 11(3). Limits: a relaxation, so tables that no choice of charges puts first are not found.
 
+use std::ops::ControlFlow;
+
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
 use super::front::{Front, FrontPoint};
-use super::intervals::{Cost, row};
+use super::intervals::{Cost, Intervals};
 use super::ladder::Ladder;
 use super::program::{Path, Program};
 use super::{Sample, SearchOptions, forbid, shares};
@@ -65,26 +67,26 @@ impl Charges {
     }
 }
 
-/// The front over one set of candidates, and the best table within all limits.
+/// The front over one set of candidates, and the best table within all limits; none where `step` breaks off.
 pub(super) fn round(
     samples: &[Sample<'_>],
     candidates: &Candidates,
     ladder: &Ladder,
     options: &SearchOptions,
     charges: &mut Charges,
-    step: &(dyn Fn() + Sync),
-) -> Front {
+    step: &(dyn Fn() -> ControlFlow<()> + Sync),
+) -> Option<Front> {
     let bins = candidates.bins();
     let members: Vec<Vec<Vec<u32>>> = samples.iter().map(|s| candidates.members(s.distances_m)).collect();
-    let of_garments = |lower: usize| -> Vec<Vec<Cost>> {
-        let each = samples.iter().zip(&members);
-        let mut rows: Vec<_> = each.map(|(s, members)| row(s, &members[lower..], ladder, s.max_parts)).collect();
+    let intervals: Vec<Intervals<'_>> = samples.iter().map(|s| Intervals::new(s, ladder, options.motion)).collect();
+    let of_garments = |lower: usize| -> Option<Vec<Vec<Cost>>> {
+        let mut rows: Vec<_> = intervals.iter().zip(&members).map(|(i, members)| i.row(&members[lower..])).collect();
         let too_thin = candidates.too_thin(lower, options.thinnest_cm);
         rows.iter_mut().for_each(|row| forbid(row, too_thin, ladder, options));
-        step();
-        rows
+        step().is_continue().then_some(rows)
     };
-    let rows: Vec<Vec<Vec<Cost>>> = (0..bins).into_par_iter().with_max_len(1).map(of_garments).collect();
+    let rows: Vec<Vec<Vec<Cost>>> =
+        (0..bins).into_par_iter().with_max_len(1).map(of_garments).collect::<Option<_>>()?;
     let inner_cm = candidates.inner_cm();
     let mut front = Front::default();
     let mut before = Vec::new();
@@ -115,7 +117,7 @@ pub(super) fn round(
         charges.adjust(samples, &last);
         before = now;
     }
-    front
+    Some(front)
 }
 
 /// The costs of levels over all garments, PARTs charged; a level over any garment's limit costs more than any budget.

@@ -1,13 +1,13 @@
 //! PARTs and squared error of every level [a, b) between candidate bounds, uncut and cut to each extent.
 //!
-//! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces, and the
-//! squared error about a piece's mean follows the merge, e = e₁ + e₂ + n₁ n₂/(n₁ + n₂) |ū₁ − ū₂|². A piece that changed is
-//! cut as stage one would cut it: its seeds lie where they lie for every extent, so one run of them gives all.
-
-use glam::DVec3;
+//! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces and the sums
+//! their errors follow from ([`Moments`]). A piece that changed is cut as stage one would cut it: its seeds lie where they lie for
+//! every extent, so one run of them gives all, and from seed to seed only the vertices that change hands are counted anew.
 
 use super::Sample;
 use super::ladder::Ladder;
+use crate::accuracy::moments::Moments;
+use crate::mechanics::coupled::Motion;
 use crate::parts::{Ruler, spread_seeds};
 
 /// What a level costs.
@@ -15,7 +15,7 @@ use crate::parts::{Ruler, spread_seeds};
 pub(super) struct Cost {
     /// PARTs.
     pub(super) parts: u32,
-    /// Σ |u_i − ū_k|² over its vertices, m².
+    /// What the PARTs' motions leave, squared, over its vertices, m².
     pub(super) error: f64,
 }
 
@@ -28,30 +28,46 @@ impl Cost {
     }
 }
 
-/// The costs of [a, a + 1), [a, a + 2), ... at each step of the ladder, for the vertices of the smallest levels from a on.
-pub(super) fn row(sample: &Sample<'_>, members: &[Vec<u32>], ladder: &Ladder, max_parts: usize) -> Vec<Cost> {
-    let mut pieces = Pieces::new(sample, ladder, max_parts);
-    let mut row = Vec::with_capacity(members.len() * ladder.len());
-    for vertices in members {
-        pieces.grow(vertices);
-        pieces.costs(&mut row);
+/// What all rows of a garment share.
+pub(super) struct Intervals<'a> {
+    sample: &'a Sample<'a>,
+    /// Sums of each vertex by itself.
+    each: Vec<Moments>,
+    ladder: &'a Ladder,
+    motion: Motion,
+}
+
+impl<'a> Intervals<'a> {
+    pub(super) fn new(sample: &'a Sample<'a>, ladder: &'a Ladder, motion: Motion) -> Self {
+        let all: Vec<u32> = (0..sample.displacement.len() as u32).collect();
+        Self { sample, each: Moments::of_each(&all, &sample.mesh.positions, sample.displacement), ladder, motion }
     }
-    row
+
+    /// The costs of [a, a + 1), [a, a + 2), ... at each step of the ladder, for the vertices of the smallest levels from a on.
+    pub(super) fn row(&self, members: &[Vec<u32>]) -> Vec<Cost> {
+        let mut pieces = Pieces::new(self);
+        let mut row = Vec::with_capacity(members.len() * self.ladder.len());
+        for vertices in members {
+            pieces.grow(vertices);
+            pieces.costs(&mut row);
+        }
+        row
+    }
 }
 
 /// The connected pieces of the vertices so far.
 struct Pieces<'a> {
-    sample: &'a Sample<'a>,
-    ladder: &'a Ladder,
-    /// A level with more PARTs is in no table, so cuts stop there.
-    max_parts: usize,
+    of: &'a Intervals<'a>,
     /// Union-find; `ABSENT` for vertices not in yet.
     parent: Vec<u32>,
     /// Number of pieces and their squared errors, uncut.
     whole: Cost,
-    /// By root: number of vertices and sum of displacements.
+    /// By root: number of vertices, their sums, and their squared error, 0 until it is known.
     size: Vec<u32>,
-    sum: Vec<DVec3>,
+    sum: Vec<Moments>,
+    error: Vec<f64>,
+    /// Roots that have grown.
+    grown: Vec<u32>,
     /// By root, only where PARTs are cut: the vertices, and the costs at each step, empty where not known.
     vertices: Vec<Vec<u32>>,
     cut: Vec<Vec<Cost>>,
@@ -63,17 +79,17 @@ struct Pieces<'a> {
 const ABSENT: u32 = u32::MAX;
 
 impl<'a> Pieces<'a> {
-    fn new(sample: &'a Sample<'a>, ladder: &'a Ladder, max_parts: usize) -> Self {
-        let n = sample.displacement.len();
-        let cuts = if ladder.cuts() { n } else { 0 };
+    fn new(of: &'a Intervals<'a>) -> Self {
+        let n = of.each.len();
+        let cuts = if of.ladder.cuts() { n } else { 0 };
         Self {
-            sample,
-            ladder,
-            max_parts,
+            of,
             parent: vec![ABSENT; n],
             whole: Cost::default(),
             size: vec![0; n],
-            sum: vec![DVec3::ZERO; n],
+            sum: vec![Moments::default(); n],
+            error: vec![0.0; n],
+            grown: Vec::new(),
             vertices: vec![Vec::new(); cuts],
             cut: vec![Vec::new(); cuts],
             roots: Vec::new(),
@@ -93,29 +109,31 @@ impl<'a> Pieces<'a> {
     fn grow(&mut self, vertices: &[u32]) {
         for &v in vertices {
             let i = v as usize;
-            (self.parent[i], self.size[i], self.sum[i]) = (v, 1, self.sample.displacement[i]);
+            (self.parent[i], self.size[i], self.sum[i]) = (v, 1, self.of.each[i]);
             self.whole.parts += 1;
-            if self.ladder.cuts() {
+            if self.of.ladder.cuts() {
                 self.vertices[i] = vec![v];
                 self.roots.push(v);
             }
-            for &w in self.sample.topology.neighbours(v) {
+            for &w in self.of.sample.topology.neighbours(v) {
                 if self.parent[w as usize] != ABSENT {
                     self.join(v, w);
                 }
+            }
+        }
+        for r in std::mem::take(&mut self.grown) {
+            let i = r as usize;
+            if self.parent[i] == r && self.error[i] == 0.0 {
+                let error = self.sum[i].error(self.of.motion);
+                self.error[i] = error;
+                self.whole.error += error;
             }
         }
         let parent = &self.parent;
         self.roots.retain(|&r| parent[r as usize] == r);
         for &r in &self.roots {
             if self.cut[r as usize].is_empty() {
-                self.cut[r as usize] = cut_costs(
-                    self.sample,
-                    &mut self.vertices[r as usize],
-                    &mut self.place,
-                    self.ladder,
-                    self.max_parts,
-                );
+                self.cut[r as usize] = cut_costs(self.of, &mut self.vertices[r as usize], &mut self.place);
             }
         }
     }
@@ -128,15 +146,14 @@ impl<'a> Pieces<'a> {
         // The larger stays root; of equals the lower number, so that sums do not depend on anything but the input.
         let (p, q) = if (self.size[q as usize], p) > (self.size[p as usize], q) { (q, p) } else { (p, q) };
         let (i, j) = (p as usize, q as usize);
-        let (ni, nj) = (f64::from(self.size[i]), f64::from(self.size[j]));
-        let apart = (self.sum[i] / ni).distance_squared(self.sum[j] / nj);
-        self.whole.error += ni * nj / (ni + nj) * apart;
+        self.whole.error -= std::mem::take(&mut self.error[i]) + std::mem::take(&mut self.error[j]);
         self.whole.parts -= 1;
         self.parent[j] = p;
         self.size[i] += self.size[j];
         let sum = self.sum[j];
-        self.sum[i] += sum;
-        if self.ladder.cuts() {
+        self.sum[i] += &sum;
+        self.grown.push(p);
+        if self.of.ladder.cuts() {
             let moved = std::mem::take(&mut self.vertices[j]);
             self.vertices[i].extend(moved);
             self.cut[i].clear();
@@ -146,20 +163,16 @@ impl<'a> Pieces<'a> {
 
     /// Appends the costs of all vertices so far, uncut and at each further step.
     fn costs(&self, out: &mut Vec<Cost>) {
-        out.push(self.whole);
+        // Rounding may leave less than nothing of what came and went.
+        out.push(Cost { error: self.whole.error.max(0.0), ..self.whole });
         let at = |step: usize| self.roots.iter().map(|&r| self.cut[r as usize][step]).fold(Cost::default(), Cost::plus);
-        out.extend((0..self.ladder.len() - 1).map(at));
+        out.extend((0..self.of.ladder.len() - 1).map(at));
     }
 }
 
-/// The costs of one connected piece cut to each extent, or [`TOO_MANY`].
-fn cut_costs(
-    sample: &Sample<'_>,
-    vertices: &mut [u32],
-    place: &mut [u32],
-    ladder: &Ladder,
-    max_parts: usize,
-) -> Vec<Cost> {
+/// The costs of one connected piece cut to each extent, or [`TOO_MANY`] where no table may have as many PARTs.
+fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec<Cost> {
+    let Intervals { sample, ladder, motion, .. } = of;
     vertices.sort_unstable();
     if vertices.len() == 1 {
         return vec![Cost { parts: 1, error: 0.0 }; ladder.len() - 1];
@@ -172,35 +185,60 @@ fn cut_costs(
         let i = place[w as usize] as usize;
         (vertices.get(i) == Some(&w)).then_some(i)
     };
-    // About the mean of the whole piece, so that little is lost in the difference below.
-    let mean = vertices.iter().map(|&v| sample.displacement[v as usize]).sum::<DVec3>() / vertices.len() as f64;
-    let moved: Vec<DVec3> = vertices.iter().map(|&v| sample.displacement[v as usize] - mean).collect();
-    let squares: f64 = moved.iter().map(|u| u.length_squared()).sum();
-    let mut sums: Vec<(DVec3, u32)> = Vec::new();
+    // About the middle of the piece, so that little is lost where vertices leave.
+    let each = Moments::of_each(vertices, &sample.mesh.positions, sample.displacement);
     let mut all = Vec::with_capacity(ladder.len() - 1);
     for shape in ladder.shapes() {
         let mut left = &shape.extents_m[..];
         let ruler =
             Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };
+        let mut seeded = Seeded::new(&each);
         spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
             let reached = left.iter().take_while(|&&e| radius_m <= 0.5 * e).count();
             if reached > 0 {
                 left = &left[reached..];
-                // Σ |u − ū_s|² = Σ |u|² − Σ_s |Σ u|²/n_s
-                sums.clear();
-                sums.resize(seeds, (DVec3::ZERO, 0));
-                for (&u, &s) in moved.iter().zip(seed_of_vertex) {
-                    let (sum, count) = &mut sums[s as usize];
-                    *sum += u;
-                    *count += 1;
-                }
-                let held: f64 = sums.iter().map(|(sum, count)| sum.length_squared() / f64::from((*count).max(1))).sum();
-                let cost = Cost { parts: seeds as u32, error: (squares - held).max(0.0) };
+                let cost = Cost { parts: seeds as u32, error: seeded.error(seeds, seed_of_vertex, *motion) };
                 all.extend(std::iter::repeat_n(cost, reached));
             }
-            left.is_empty() || seeds >= max_parts
+            left.is_empty() || seeds >= sample.max_parts
         });
         all.extend(std::iter::repeat_n(TOO_MANY, left.len()));
     }
     all
+}
+
+/// Sums and errors by seed, kept from one number of seeds to the next.
+struct Seeded<'a> {
+    each: &'a [Moments],
+    seed_of_vertex: Vec<u32>,
+    sums: Vec<Moments>,
+    /// Negative where a seed's vertices have changed.
+    errors: Vec<f64>,
+}
+
+impl<'a> Seeded<'a> {
+    fn new(each: &'a [Moments]) -> Self {
+        Self { each, seed_of_vertex: vec![u32::MAX; each.len()], sums: Vec::new(), errors: Vec::new() }
+    }
+
+    /// The squared error of all seeds' vertices, m².
+    fn error(&mut self, seeds: usize, seed_of_vertex: &[u32], motion: Motion) -> f64 {
+        self.sums.resize(seeds, Moments::default());
+        self.errors.resize(seeds, -1.0);
+        for ((before, &now), own) in self.seed_of_vertex.iter_mut().zip(seed_of_vertex).zip(self.each) {
+            if *before != now {
+                if let Some(sum) = self.sums.get_mut(*before as usize) {
+                    *sum -= own;
+                    self.errors[*before as usize] = -1.0;
+                }
+                self.sums[now as usize] += own;
+                self.errors[now as usize] = -1.0;
+                *before = now;
+            }
+        }
+        for (error, sum) in self.errors.iter_mut().zip(&self.sums).filter(|(error, _)| **error < 0.0) {
+            *error = sum.error(motion);
+        }
+        self.errors.iter().sum()
+    }
 }

@@ -18,12 +18,12 @@
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | c(a, b, e) | PARTs of level [a, b) cut to extent e, over all garments | – |
-//! | v(a, b, e) | their share of the squared representable error, Σ over garments of weight/vertices · Σ \|u_i − ū_k\|² | m² |
+//! | v(a, b, e) | their share of the squared representable error, Σ over garments of weight/vertices · e ([`Moments`](crate::accuracy::moments)) | m² |
 //! | E(b, p) | least squared error of the vertices below b with p PARTs | m² |
 //!
 //! Source: own; segmentation by dynamic programming goes back to Bellman 1961, "On the approximation of curves by line segments
-//! using dynamic programming", Communications of the ACM 4(6). Limits: the error is of one translation a PART against one
-//! reference drape; O(m n + m² p) for m candidates, n vertices and p PARTs without extents, m² cuts with them.
+//! using dynamic programming", Communications of the ACM 4(6). Limits: the error is of one motion a PART by itself, an affine map unless asked
+//! otherwise, against one reference drape, and no mechanics: the coupled model blends the maps, and folds or does not; O(m n + m² p) for m candidates, n vertices and p PARTs without extents, m² cuts with them.
 
 mod candidates;
 mod charges;
@@ -34,6 +34,7 @@ mod ladder;
 mod options;
 mod program;
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
@@ -47,6 +48,7 @@ use crate::mesh::{Topology, TriMesh};
 use crate::parts::Grain;
 use candidates::Candidates;
 use charges::Charges;
+use intervals::Intervals;
 use ladder::Ladder;
 use program::Program;
 
@@ -101,14 +103,14 @@ impl Search {
 }
 
 /// Finds the tables on the Pareto front of PARTs and representable error. The result has the same bits on any number of threads;
-/// `progress` is called from any of them.
+/// `progress` is called from any of them, and where it breaks off, what the rounds before found is what there is.
 ///
 /// # Errors
 /// [`SearchError`] where the samples do not fit together or no table is coarse enough.
 pub fn search(
     samples: &[Sample<'_>],
     options: &SearchOptions,
-    progress: &(dyn Fn(Progress) + Sync),
+    progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
 ) -> Result<Search, SearchError> {
     error::check(samples)?;
     let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
@@ -122,12 +124,13 @@ pub fn search(
         let done = AtomicUsize::new(0);
         let step = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(Progress { round, rounds: round_count, done, total });
+            progress(Progress { round, rounds: round_count, done, total })
         };
         let found = match samples {
             [sample] => one_garment(sample, &candidates, &ladder, options, &step),
             several => charges::round(several, &candidates, &ladder, options, &mut charges, &step),
         };
+        let Some(found) = found else { return Ok(Search { rounds, exact: false }) };
         let front = rounds.last().map_or_else(|| found.clone(), |before| before.union(&found));
         let Some(best) = front.best.as_ref() else {
             return Err(SearchError::TooFewParts { max_parts: samples.iter().map(|s| s.max_parts).collect() });
@@ -166,28 +169,28 @@ fn forbid(row: &mut [intervals::Cost], too_thin: usize, ladder: &Ladder, options
     }
 }
 
-/// The front of one garment over one set of candidates.
+/// The front of one garment over one set of candidates; none where `step` breaks off.
 fn one_garment(
     sample: &Sample<'_>,
     candidates: &Candidates,
     ladder: &Ladder,
     options: &SearchOptions,
-    step: &(dyn Fn() + Sync),
-) -> Front {
+    step: &(dyn Fn() -> ControlFlow<()> + Sync),
+) -> Option<Front> {
     let bins = candidates.bins();
     let members = candidates.members(sample.distances_m);
     let share = 1.0 / sample.distances_m.len() as f64;
+    let intervals = Intervals::new(sample, ladder, options.motion);
     let row = |lower: usize| {
-        let mut costs = intervals::row(sample, &members[lower..], ladder, sample.max_parts);
+        let mut costs = intervals.row(&members[lower..]);
         costs.iter_mut().for_each(|cost| cost.error *= share);
         forbid(&mut costs, candidates.too_thin(lower, options.thinnest_cm), ladder, options);
-        step();
-        costs
+        step().is_continue().then_some(costs)
     };
     let mut program = Program::new(bins, sample.max_parts, ladder.len());
     for from in (0..bins).step_by(BATCH) {
         let batch = from..bins.min(from + BATCH);
-        let rows: Vec<_> = batch.clone().into_par_iter().with_max_len(1).map(row).collect();
+        let rows: Vec<_> = batch.clone().into_par_iter().with_max_len(1).map(row).collect::<Option<_>>()?;
         for (lower, row) in batch.zip(&rows) {
             program.take(lower, row);
         }
@@ -195,5 +198,5 @@ fn one_garment(
     let inner_cm = candidates.inner_cm();
     let points: Vec<_> =
         program.paths().iter().map(|path| FrontPoint::on(path, path.parts, &inner_cm, ladder)).collect();
-    Front { best: points.last().cloned(), points }
+    Some(Front { best: points.last().cloned(), points })
 }

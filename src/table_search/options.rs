@@ -1,10 +1,13 @@
 //! What a search tries: bounds, extents, rounds.
 
+use crate::mechanics::coupled::Motion;
 use crate::range_table::RangeTable;
 
 /// What to search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchOptions {
+    /// How a PART moves: by an affine map, as the coupled model moves it, or as in the paper by a translation.
+    pub motion: Motion,
     /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
     /// extents means cut.
     pub candidates: usize,
@@ -35,6 +38,7 @@ impl Default for SearchOptions {
     fn default() -> Self {
         let include = vec![RangeTable::table_3()];
         Self {
+            motion: Motion::Affine,
             candidates: 400,
             candidates_around: 400,
             exact_up_to: 12_000,

@@ -1,9 +1,10 @@
-//! The search itself: levels alone, then levels and extents; what was best after each iteration; which table is taken.
+//! The search itself: levels alone, then levels and extents; what was best after each iteration.
 
-use partwise::range_table::RangeTable;
-use partwise::table_search::{Front, FrontPoint, Progress, Search, SearchError, SearchOptions, search};
+use std::ops::ControlFlow;
 
-use super::garment::{Garment, Holds};
+use partwise::table_search::{Front, Progress, Search, SearchError, SearchOptions, search};
+
+use super::garment::Garment;
 use crate::commands::{console, interrupt};
 
 /// One iteration: a round of one search.
@@ -22,21 +23,10 @@ pub(crate) struct Iteration {
 pub(crate) struct Found {
     /// Every iteration, levels alone first.
     pub(crate) iterations: Vec<Iteration>,
-    /// The front of levels alone.
-    pub(crate) levels: Front,
-    /// Whether every bound was tried for it: no table of levels alone is better then.
+    /// How many of them are of levels alone.
+    pub(crate) levels: usize,
+    /// Whether every bound was tried there: no table of levels alone is better then.
     pub(crate) exact: bool,
-    /// The front of levels and extents together.
-    pub(crate) all: Front,
-}
-
-/// A table taken from a front.
-#[derive(Debug, Clone)]
-pub(crate) struct Taken {
-    /// The table.
-    pub(crate) table: RangeTable,
-    /// What it holds, garment by garment, in the order of the garments it was tuned on.
-    pub(crate) holds: Vec<Holds>,
 }
 
 /// Widths a level may be cut to, cm.
@@ -62,13 +52,14 @@ const THINNEST_CM: f64 = 0.5;
 /// Searches on all garments together, over so many candidate bounds a round. Where the user stops it, what was found until then.
 pub(crate) fn find(
     garments: &[&Garment],
-    max_parts: usize,
+    limits: &[usize],
     (extents_cm, shapes): (&[f64], &[f64]),
     candidates: Option<usize>,
     what: &str,
 ) -> Result<Option<Found>, SearchError> {
-    let samples: Vec<_> = garments.iter().zip(limits(garments, max_parts)).map(|(w, limit)| w.sample(limit)).collect();
-    let mut found = Found { iterations: Vec::new(), levels: Front::default(), exact: false, all: Front::default() };
+    let samples: Vec<_> = garments.iter().zip(limits).map(|(w, limit)| w.sample(*limit)).collect();
+    let mut found = Found { iterations: Vec::new(), levels: 0, exact: false };
+    let mut all = Front::default();
     let levels = ("levels alone", SearchOptions::default());
     let both =
         ("levels and extents", SearchOptions { shapes: shapes.to_vec(), ..SearchOptions::with_extents(extents_cm) });
@@ -81,6 +72,7 @@ pub(crate) fn find(
             (options.thinnest_cm, options.uncut) = (THINNEST_CM, false);
             (options.candidates, options.rounds) = (80, 4);
         }
+        options.motion = garments.first().map_or(options.motion, |w| w.motion);
         if let Some(candidates) = candidates {
             (options.candidates, options.exact_up_to) = (candidates, candidates);
         }
@@ -88,34 +80,24 @@ pub(crate) fn find(
         let progress = |p: Progress| {
             bar.set_length((p.total * p.rounds) as u64);
             bar.set_position((p.total * (p.round - 1) + p.done) as u64);
+            if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let searched = search(&samples, &options, &progress);
         bar.finish_and_clear();
         let Search { rounds, exact } = searched?;
         for (round, front) in (1..).zip(&rounds) {
-            found.iterations.push(Iteration { what: title, round, front: found.all.union(front) });
+            found.iterations.push(Iteration { what: title, round, front: all.union(front) });
         }
-        let last = rounds.last().cloned().unwrap_or_default();
         if options.widths_cm.is_empty() {
-            (found.levels, found.exact) = (last.clone(), exact);
+            (found.levels, found.exact) = (rounds.len(), exact);
         }
-        found.all = found.all.union(&last);
+        all = found.iterations.last().map(|i| i.front.clone()).unwrap_or_default();
     }
-    Ok((!found.all.points.is_empty()).then_some(found))
+    Ok((!all.points.is_empty()).then_some(found))
 }
 
 /// The most PARTs of each garment: its share of a total, as Table 3 spends them.
-fn limits(garments: &[&Garment], max_parts: usize) -> Vec<usize> {
+pub(crate) fn limits(garments: &[&Garment], max_parts: usize) -> Vec<usize> {
     let total: usize = garments.iter().map(|w| w.table_3.parts).sum();
     garments.iter().map(|w| w.table_3.parts * max_parts / total.max(1)).collect()
-}
-
-/// The best table with which every garment is within its limit, and what it holds.
-pub(crate) fn take(front: &Front, garments: &[&Garment], name: &str) -> anyhow::Result<Option<Taken>> {
-    let taken = |point: &FrontPoint| {
-        let table = point.table(name, "")?;
-        let holds = garments.iter().map(|w| w.holds(&table)).collect();
-        Ok(Taken { table, holds })
-    };
-    front.best.as_ref().map(taken).transpose()
 }

@@ -3,9 +3,13 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use partwise::assess::{AssessError, AssessOptions, canonical};
+use partwise::accuracy::{self, representable};
+use partwise::assess::{AssessError, AssessOptions, assess, canonical};
+use partwise::drape::{Drape, DrapeError, Refine, Settings, drape, unobserved};
 use partwise::fabric::Fabric;
-use partwise::parts::{Grain, Parts, representable_rms_m, segment};
+use partwise::mechanics::coupled::Motion;
+use partwise::mechanics::refine::SolveError;
+use partwise::parts::{Grain, Parts, segment};
 use partwise::range_table::RangeTable;
 use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
@@ -13,13 +17,28 @@ use partwise::{Scene, SceneSpec};
 use crate::commands::work::refining;
 use crate::commands::{console, interrupt};
 
-/// PARTs and representable error of a table on a garment.
+/// PARTs of a table on a garment, and the error that guides the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Holds {
     /// PARTs.
     pub(crate) parts: usize,
-    /// Representable error, mm.
+    /// What a motion of each PART's own leaves, mm.
     pub(crate) rms_mm: f64,
+}
+
+/// What a table is worth on a garment: two bounds, which more freedom makes smaller whatever the table, and what comes of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Worth {
+    /// What a translation of each PART leaves, mm: the paper's bound.
+    pub(crate) translation_mm: f64,
+    /// What affine maps, blended over the seams, leave, mm: the coupled model's bound.
+    pub(crate) affine_mm: f64,
+    /// What the coupled model leaves of the canonical drape after both stages, mm. A garment has several rests, millimetres to
+    /// centimetres apart, and where the model ends near another one this cannot be small.
+    pub(crate) model_mm: f64,
+    /// How far the model's result is from where it would settle itself, mm. What lies on the floor is near its rest, too, so it
+    /// never stands alone. `None` where the user stopped it.
+    pub(crate) own_mm: Option<f64>,
 }
 
 /// A garment with its reference drape.
@@ -34,10 +53,16 @@ pub(crate) struct Garment {
     pub(crate) reference: Vec<DVec3>,
     /// From undraped to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
+    fabric: Fabric,
+    options: AssessOptions,
+    /// How PARTs move in the search.
+    pub(crate) motion: Motion,
     /// Its grain, which pieces narrow and tall follow.
     grain: Grain,
     /// What Table 3 makes of it.
     pub(crate) table_3: Holds,
+    /// What Table 3 is worth on it.
+    pub(crate) table_3_worth: Worth,
 }
 
 impl Garment {
@@ -46,6 +71,7 @@ impl Garment {
         name: &str,
         body: &str,
         fabric: &Fabric,
+        motion: Motion,
         options: &AssessOptions,
     ) -> anyhow::Result<Option<Self>> {
         let loaded = SceneSpec::new(body, name).load()?;
@@ -73,9 +99,15 @@ impl Garment {
             scene,
             reference: reference.positions,
             displacement,
+            fabric: fabric.clone(),
+            options: options.clone(),
+            motion,
             table_3: Holds { parts: 0, rms_mm: 0.0 },
+            table_3_worth: Worth { translation_mm: 0.0, affine_mm: 0.0, model_mm: 0.0, own_mm: None },
         };
-        garment.table_3 = garment.holds(&RangeTable::table_3());
+        let table_3 = RangeTable::table_3();
+        garment.table_3 = garment.holds(&table_3);
+        garment.table_3_worth = garment.worth(&table_3)?;
         Ok(Some(garment))
     }
 
@@ -107,6 +139,56 @@ impl Garment {
     /// What a table holds of the reference.
     pub(crate) fn holds(&self, table: &RangeTable) -> Holds {
         let parts = self.parts(table);
-        Holds { parts: parts.len(), rms_mm: 1e3 * representable_rms_m(&parts, &self.displacement) }
+        Holds { parts: parts.len(), rms_mm: self.unblended_mm(&parts, self.motion) }
+    }
+
+    fn unblended_mm(&self, parts: &Parts, motion: Motion) -> f64 {
+        let start = &self.scene.garment.positions;
+        1e3 * representable::unblended_rms_m(parts, start, &self.displacement, motion)
+    }
+
+    /// The displacement nearest to the reference's that these PARTs can hold, blended over the seams, m.
+    pub(crate) fn nearest(&self, parts: &Parts, motion: Motion) -> Result<Vec<DVec3>, SolveError> {
+        let Scene { garment, topology, held, .. } = &self.scene;
+        let mut still = vec![false; garment.vertex_count()];
+        held.iter().for_each(|&v| still[v as usize] = true);
+        representable::blended(topology, parts, &still, &garment.positions, &self.displacement, motion)
+    }
+
+    /// The bound of the coupled model, mm.
+    pub(crate) fn affine_mm(&self, parts: &Parts) -> Result<f64, SolveError> {
+        Ok(accuracy::rms_mm(&self.nearest(parts, Motion::Affine)?, &self.displacement))
+    }
+
+    /// What a table is worth: takes a preview, and a drape from there until it has settled.
+    pub(crate) fn worth(&self, table: &RangeTable) -> anyhow::Result<Worth> {
+        let (settings, draped) = self.preview(table)?;
+        let own = refining(&format!("{}: the rest of a preview", self.name), |observer| {
+            assess(&self.scene, &settings, &draped, &self.options, observer)
+        });
+        let own_mm = match own {
+            Ok(own) => Some(own.accuracy.vertices.rms_mm),
+            Err(AssessError::Interrupted) => None,
+            Err(other) => return Err(other.into()),
+        };
+        Ok(Worth {
+            translation_mm: self.unblended_mm(&draped.parts, Motion::Translation),
+            affine_mm: self.affine_mm(&draped.parts)?,
+            model_mm: accuracy::rms_mm(&draped.positions, &self.reference),
+            own_mm,
+        })
+    }
+
+    /// What the coupled model leaves of the reference, mm.
+    pub(crate) fn model_mm(&self, table: &RangeTable) -> Result<f64, DrapeError> {
+        Ok(accuracy::rms_mm(&self.preview(table)?.1.positions, &self.reference))
+    }
+
+    /// Both stages, and no step at full resolution.
+    fn preview(&self, table: &RangeTable) -> Result<(Settings, Drape), DrapeError> {
+        let (fabric, table) = (self.fabric.clone(), table.clone().into());
+        let settings = Settings { fabric, table, refine: Refine::Steps(0), ..Settings::default() };
+        let draped = drape(&self.scene, &settings, &mut unobserved)?;
+        Ok((settings, draped))
     }
 }

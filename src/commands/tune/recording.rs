@@ -1,5 +1,6 @@
 //! The recording of a search: a step for Table 3, one for each iteration with the best table so far, and the tables taken side
-//! by side. No mechanics runs, so there are no forces and no times of stages. What is shown as the drape is the best these PARTs can hold: each moved by the mean of the reference's displacement.
+//! by side. No forces and times of stages are shown: what is shown as the drape is the best these PARTs can hold, blended over the
+//! seams, and what the model makes of the tables taken is said beside it.
 
 use glam::DVec3;
 use partwise::accuracy::vertex_errors;
@@ -11,7 +12,8 @@ use partwise::record::{
 };
 use partwise::table_search::Front;
 
-use super::find::{Found, Iteration, Taken, take};
+use super::check::Taken;
+use super::find::{Found, Iteration};
 use super::garment::Garment;
 use crate::commands::summary::command_line;
 
@@ -42,16 +44,17 @@ pub(super) fn record(
     let start = Shown { index: 0, title: "table-3".to_owned(), table: &table_3 };
     step(&mut recorder, garment, &start)?;
     scatter(&mut recorder, 0, all, &Front::default())?;
-    slot(&mut recorder, garment, 0, &start)?;
+    slot(&mut recorder, garment, (0, garment.table_3_worth.model_mm), &start)?;
     for (index, iteration) in (1..).zip(&found.iterations) {
-        let Some(best) = take(&iteration.front, all, "best so far")? else { continue };
-        let shown = Shown { index, title: title(iteration), table: &best.table };
+        let Some(best) = &iteration.front.best else { continue };
+        let shown = Shown { index, title: title(iteration), table: &best.table("best so far", "")? };
         step(&mut recorder, garment, &shown)?;
         scatter(&mut recorder, index, all, &iteration.front)?;
     }
     for (place, (kind, taken)) in (1..).zip(taken) {
         let shown = Shown { index: 0, title: (*kind).to_owned(), table: &taken.table };
-        slot(&mut recorder, garment, place, &shown)?;
+        let worth = all.iter().zip(&taken.worth).find(|(w, _)| w.name == garment.name);
+        slot(&mut recorder, garment, (place, worth.map_or(f64::NAN, |(_, worth)| worth.model_mm)), &shown)?;
     }
     Ok(recorder.finish()?)
 }
@@ -60,20 +63,15 @@ fn title(iteration: &Iteration) -> String {
     format!("best after {}, round {}", iteration.what, iteration.round)
 }
 
-/// The garment with each PART moved by its mean.
-fn held(garment: &Garment, parts: &Parts) -> Vec<DVec3> {
-    let mut positions = garment.scene.garment.positions.clone();
-    for part in &parts.parts {
-        let sum: DVec3 = part.vertices.iter().map(|&v| garment.displacement[v as usize]).sum();
-        let mean = sum / part.vertices.len() as f64;
-        part.vertices.iter().for_each(|&v| positions[v as usize] += mean);
-    }
-    positions
+/// The garment with its PARTs moved as near to the reference as they can.
+fn held(garment: &Garment, parts: &Parts) -> anyhow::Result<Vec<DVec3>> {
+    let moved = garment.nearest(parts, garment.motion)?;
+    Ok(garment.scene.garment.positions.iter().zip(moved).map(|(x, u)| *x + u).collect())
 }
 
 fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow::Result<()> {
     let parts = garment.parts(shown.table);
-    let positions = held(garment, &parts);
+    let positions = held(garment, &parts)?;
     let error_mm: Vec<f64> = vertex_errors(&positions, &garment.reference).iter().map(|e| 1e3 * e).collect();
     let holds = garment.holds(shown.table);
     let fact = |name: &str, value: String| (name.to_owned(), value);
@@ -85,7 +83,7 @@ fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow
             fact("PARTs", holds.parts.to_string()),
             fact("representable error", format!("{:.2} mm RMS", holds.rms_mm)),
             fact("of Table 3's", format!("{:.2}", holds.rms_mm / garment.table_3.rms_mm)),
-            fact("shown as drape", "each PART moved by the reference's mean".to_owned()),
+            fact("shown as drape", format!("what {} motions of the PARTs can hold", garment.motion.name())),
         ],
         command_line: command_line(),
         ..Panel::default()
@@ -103,14 +101,19 @@ fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow
     Ok(())
 }
 
-fn slot(recorder: &mut Recorder, garment: &Garment, slot: usize, shown: &Shown<'_>) -> anyhow::Result<()> {
+fn slot(
+    recorder: &mut Recorder,
+    garment: &Garment,
+    (slot, model_mm): (usize, f64),
+    shown: &Shown<'_>,
+) -> anyhow::Result<()> {
     let parts = garment.parts(shown.table);
     let holds = garment.holds(shown.table);
     recorder.compare(&Chosen {
         index: shown.index,
         slot,
-        caption: &format!("{} PARTs · {:.1} mm", holds.parts, holds.rms_mm),
-        draped: &held(garment, &parts),
+        caption: &format!("{} PARTs · holds to {:.1} mm · model {model_mm:.1} mm", holds.parts, holds.rms_mm),
+        draped: &held(garment, &parts)?,
         part_of_vertex: &parts.part_of_vertex,
         overlay: None,
     })?;

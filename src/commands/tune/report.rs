@@ -7,8 +7,8 @@ use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::Front;
 use serde::Serialize;
 
-use super::find::Taken;
-use super::garment::{Garment, Holds};
+use super::check::Taken;
+use super::garment::{Garment, Holds, Worth};
 use crate::commands::summary::command_line;
 
 /// A tuned table beside Table 3 on one garment.
@@ -28,41 +28,53 @@ pub(super) struct Verdict {
     /// How many of them are cut to an extent.
     pub(super) cut_levels: usize,
     pub(super) parts: usize,
-    pub(super) rms_mm: f64,
     pub(super) table_3_parts: usize,
-    pub(super) table_3_rms_mm: f64,
-    /// Error over Table 3's.
-    pub(super) ratio: f64,
+    /// What a translation of each PART leaves at best; over Table 3's.
+    pub(super) translation_mm: f64,
+    pub(super) translation_ratio: f64,
+    /// What affine maps, blended over the seams, leave at best; over Table 3's.
+    pub(super) affine_mm: f64,
+    pub(super) affine_ratio: f64,
+    /// What the coupled model leaves of the canonical drape after both stages, of the table and of Table 3, and one over the other.
+    pub(super) model_mm: f64,
+    pub(super) table_3_model_mm: f64,
+    pub(super) model_ratio: f64,
+    /// The same, of where each result itself would settle.
+    pub(super) own_mm: Option<f64>,
+    pub(super) table_3_own_mm: Option<f64>,
+    pub(super) own_ratio: Option<f64>,
 }
 
 impl Verdict {
-    pub(super) fn new(
-        tuned_on: &str,
-        kind: &'static str,
-        table: &RangeTable,
-        garment: &Garment,
-        held_out: bool,
-    ) -> Self {
-        let Holds { parts, rms_mm } = garment.holds(table);
+    pub(super) fn new((tuned_on, kind): (&str, &'static str), table: &RangeTable, worth: Worth, on: &Garment) -> Self {
+        let Worth { translation_mm, affine_mm, model_mm, own_mm } = worth;
+        let three = on.table_3_worth;
         Self {
             tuned_on: tuned_on.to_owned(),
             kind,
-            garment: garment.name.clone(),
-            held_out,
+            garment: on.name.clone(),
+            held_out: false,
             extent_factor: 1.0,
             levels: table.levels.len(),
             cut_levels: table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
-            parts,
-            rms_mm,
-            table_3_parts: garment.table_3.parts,
-            table_3_rms_mm: garment.table_3.rms_mm,
-            ratio: rms_mm / garment.table_3.rms_mm,
+            parts: on.parts(table).len(),
+            table_3_parts: on.table_3.parts,
+            translation_mm,
+            translation_ratio: translation_mm / three.translation_mm,
+            affine_mm,
+            affine_ratio: affine_mm / three.affine_mm,
+            model_mm,
+            table_3_model_mm: three.model_mm,
+            model_ratio: model_mm / three.model_mm,
+            own_mm,
+            table_3_own_mm: three.own_mm,
+            own_ratio: own_mm.zip(three.own_mm).map(|(own, three)| own / three),
         }
     }
 
-    /// The same of a table with its extents scaled.
-    pub(super) fn scaled(self, extent_factor: f64) -> Self {
-        Self { extent_factor, ..self }
+    /// The same of a table whose search did not see the garment, with its extents scaled.
+    pub(super) fn held_out(self, extent_factor: f64) -> Self {
+        Self { held_out: true, extent_factor, ..self }
     }
 }
 
@@ -76,10 +88,11 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
         "levels",
         "cut",
         "PARTs",
-        "mm",
-        "Table 3: PARTs",
-        "mm",
-        "ratio",
+        "Table 3",
+        "translations mm",
+        "affine mm",
+        "model mm",
+        "to its own rest mm",
     ]);
     for v in all {
         table.add_row([
@@ -89,18 +102,28 @@ pub(super) fn verdicts(all: &[Verdict]) -> Table {
             v.levels.to_string(),
             v.cut_levels.to_string(),
             v.parts.to_string(),
-            format!("{:.2}", v.rms_mm),
             v.table_3_parts.to_string(),
-            format!("{:.2}", v.table_3_rms_mm),
-            format!("{:.2}", v.ratio),
+            format!("{:.1} ({:.2})", v.translation_mm, v.translation_ratio),
+            format!("{:.1} ({:.2})", v.affine_mm, v.affine_ratio),
+            format!("{:.1} ({:.2})", v.model_mm, v.model_ratio),
+            v.own_mm.zip(v.own_ratio).map_or_else(String::new, |(mm, ratio)| format!("{mm:.1} ({ratio:.2})")),
         ]);
     }
-    for column in 3..10 {
+    for column in 3..11 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     table
+}
+
+/// Tables that the model makes less of than of Table 3, with no more PARTs than it.
+pub(super) fn worse(all: &[Verdict]) -> String {
+    let mut out = String::new();
+    for v in all.iter().filter(|v| v.model_ratio > 1.0) {
+        let _ = writeln!(out, "Table 3 itself is nearer in the model: {}, {}, on {}", v.tuned_on, v.kind, v.garment);
+    }
+    out
 }
 
 /// Lines of a front shown on the terminal at most; the CSV has all.
@@ -197,25 +220,24 @@ pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<St
 
 /// The table with its provenance: who made it how, from what, and how good it is there.
 pub(super) fn with_provenance(taken: &Taken, garments: &[&Garment]) -> RangeTable {
-    let figures: Vec<String> = garments
-        .iter()
-        .zip(&taken.holds)
-        .map(|(w, h)| {
-            format!(
-                "{}: {} PARTs, {:.2} mm (Table 3: {}, {:.2} mm)",
-                w.name, h.parts, h.rms_mm, w.table_3.parts, w.table_3.rms_mm
-            )
-        })
-        .collect();
+    let of = |parts: usize, worth: &Worth| {
+        let Worth { translation_mm, affine_mm, model_mm, .. } = worth;
+        format!("{parts} PARTs, {translation_mm:.2}, {affine_mm:.2} and {model_mm:.2} mm")
+    };
+    let figure = |((w, h), worth): ((&&Garment, &Holds), &Worth)| {
+        format!("{}: {} (Table 3: {})", w.name, of(h.parts, worth), of(w.table_3.parts, &w.table_3_worth))
+    };
+    let figures: Vec<String> = garments.iter().zip(&taken.holds).zip(&taken.worth).map(figure).collect();
     let extent = if taken.table.has_extents() {
         "every level with its extent, whatever --max-extent says"
     } else {
         "levels alone (--max-extent 0)"
     };
     let source = format!(
-        "partwise {} by `{}`, {extent}; representable error on the canonical drape of {}",
+        "partwise {} by `{}`, {extent}, of {} draped; left of the canonical drape by translations, by blended affine maps and by the model, {}",
         env!("CARGO_PKG_VERSION"),
         command_line(),
+        taken.draped,
         figures.join("; ")
     );
     taken.table.clone().with_source(source)
