@@ -29,7 +29,6 @@ use parry3d_f64::shape::Triangle;
 use rayon::prelude::*;
 
 use super::decimate::{Decimated, decimate};
-use super::half_edge::NONE;
 use super::{RestShape, Topology, TriMesh};
 
 /// A triangle farther from its rest shape than by this factor, in any direction, is no cloth that merely hangs undraped.
@@ -61,8 +60,20 @@ impl Coarse {
         let Decimated { mesh: coarse, vertices, onto } = decimate(mesh, count)?;
         let topology = Topology::new(&coarse);
         let triangles_of = incidence(&coarse);
-        let anchors: Vec<_> = (mesh.positions.par_iter().zip(&onto))
-            .map(|(x, &owner)| anchor(&coarse, &topology, &triangles_of, *x, owner))
+        // Who ended on a vertex is looked for in its triangles and those of its neighbours, each once.
+        let about: Vec<Vec<u32>> = (0..coarse.vertex_count() as u32)
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|v| {
+                let near = std::iter::once(&v).chain(topology.neighbours(v));
+                let mut about: Vec<u32> = near.flat_map(|&w| &triangles_of[w as usize]).copied().collect();
+                about.sort_unstable();
+                about.dedup();
+                about
+            })
+            .collect();
+        let anchors: Vec<_> = (mesh.positions.par_iter().zip(&onto).with_min_len(256))
+            .map(|(x, &owner)| anchor(&coarse, about.get(owner as usize)?, *x))
             .collect();
         let corners = rest_corners(mesh, &maps, &coarse, &vertices, &anchors)?;
         let anchors =
@@ -159,26 +170,19 @@ fn incidence(mesh: &TriMesh) -> Vec<Vec<u32>> {
     of
 }
 
-/// The nearest of the coarse triangles about the vertex that a fine one ended on, with barycentric coordinates.
-fn anchor(
-    coarse: &TriMesh,
-    topology: &Topology,
-    triangles_of: &[Vec<u32>],
-    x: DVec3,
-    owner: u32,
-) -> Option<(usize, [f64; 3])> {
-    if owner == NONE {
-        return None;
-    }
-    let about = std::iter::once(&owner).chain(topology.neighbours(owner)).flat_map(|&v| &triangles_of[v as usize]);
+/// The nearest of some coarse triangles, the first of those as near, with barycentric coordinates.
+fn anchor(coarse: &TriMesh, about: &[u32], x: DVec3) -> Option<(usize, [f64; 3])> {
     let mut best: Option<(f64, usize, [f64; 3])> = None;
     for &t in about {
         let [a, b, c] = coarse.corners(t as usize);
         let (found, place) = Triangle::new(a, b, c).project_local_point_and_get_location(x, false);
         let distance = found.point.distance_squared(x);
-        let nearer = best.is_none_or(|best| distance < best.0 || distance == best.0 && (t as usize) < best.1);
-        if let (true, Some(coordinates)) = (nearer, place.barycentric_coordinates()) {
+        if let (true, Some(coordinates)) = (best.is_none_or(|best| distance < best.0), place.barycentric_coordinates())
+        {
             best = Some((distance, t as usize, coordinates));
+        }
+        if distance == 0.0 {
+            break;
         }
     }
     best.map(|(_, t, coordinates)| (t, coordinates))

@@ -39,17 +39,15 @@ pub(super) struct Decimated {
 /// `mesh` with about `count` vertices; `None` where it is not a manifold.
 pub(super) fn decimate(mesh: &TriMesh, count: usize) -> Option<Decimated> {
     let n = mesh.vertex_count();
-    let mut tags = vec![0u8; n];
     let area: f64 = mesh.triangle_areas().iter().sum();
     let edge = (2.0 * area / (3f64.sqrt() * count.max(1) as f64)).sqrt();
-    let linked = HalfEdgeMesh::new(mesh, tags.clone())?;
-    for h in 0..linked.half_edge_count() as u32 {
-        if linked.twin(h) == NONE {
-            tags[linked.origin(h) as usize] = 1;
-            tags[linked.target(h) as usize] = 1;
+    let mut work = HalfEdgeMesh::new(mesh, vec![0; n])?;
+    for h in 0..work.half_edge_count() as u32 {
+        if work.twin(h) == NONE {
+            let ends = [work.origin(h), work.target(h)];
+            ends.into_iter().for_each(|v| work.tags[v as usize] = 1);
         }
     }
-    let mut work = HalfEdgeMesh::new(mesh, tags)?;
     let locked = pinched(mesh, &work);
     let mut onto: Vec<u32> = (0..n as u32).collect();
     for share in PASSES {

@@ -37,17 +37,31 @@ impl Plate {
     /// From the Hessian's scalars, each pair of an element once.
     pub(super) fn new(vertices: usize, hessian: impl Iterator<Item = ([u32; 2], f64)>) -> Self {
         let of_pair = |([a, b], scalar): ([u32; 2], f64)| (a.max(b), a.min(b), scalar);
-        let mut all: Vec<(u32, u32, f64)> = hessian.map(of_pair).filter(|(i, j, _)| i != j).collect();
-        // Stable, so that equal entries are summed in the order of their elements.
-        all.sort_by_key(|&(i, j, _)| (i, j));
+        let all: Vec<(u32, u32, f64)> = hessian.map(of_pair).filter(|(i, j, _)| i != j).collect();
+        let mut ends = vec![0usize; vertices + 1];
+        for &(i, ..) in &all {
+            ends[i as usize + 1] += 1;
+        }
+        for i in 0..vertices {
+            ends[i + 1] += ends[i];
+        }
+        // In the order of their elements by i, then by j: sorts are stable, so that equal entries are summed in that order.
+        let mut next = ends.clone();
+        let mut by_row = vec![(0u32, 0.0f64); all.len()];
+        for (i, j, scalar) in all {
+            by_row[next[i as usize]] = (j, scalar);
+            next[i as usize] += 1;
+        }
         let mut plate = Self { starts: vec![0], own: vec![0.0; vertices], ..Self::default() };
-        let mut sums = all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
-        for i in 0..vertices as u32 {
-            let mut row: Vec<(u32, f64)> = Vec::new();
-            while let Some(same) = sums.next_if(|same| same[0].0 == i) {
-                let (j, scalar) = (same[0].1, same.iter().map(|e| e.2).sum());
+        let mut row: Vec<(u32, f64)> = Vec::new();
+        for i in 0..vertices {
+            let entries = &mut by_row[ends[i]..ends[i + 1]];
+            entries.sort_by_key(|e| e.0);
+            row.clear();
+            for same in entries.chunk_by(|a, b| a.0 == b.0) {
+                let (j, scalar) = (same[0].0, same.iter().map(|e| e.1).sum());
                 row.push((j, scalar));
-                plate.own[i as usize] -= scalar;
+                plate.own[i] -= scalar;
                 plate.own[j as usize] -= scalar;
             }
             // Filled up by what it has already, and not by i, whose sum the product keeps to itself.
