@@ -8,8 +8,8 @@ use glam::DVec3;
 use crate::fabric::Fabric;
 use crate::mechanics::coupled::Garment;
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mesh::TriMesh;
 use crate::mesh::coarse::Coarse;
+use crate::mesh::{Topology, TriMesh};
 use crate::parts::{Parts, UNASSIGNED};
 use crate::scene::Scene;
 
@@ -86,6 +86,13 @@ impl Level {
 
     pub(super) fn mesh(&self) -> &TriMesh {
         &self.coarse.mesh
+    }
+
+    /// Mean length of an edge, m.
+    pub(super) fn edge_m(&self) -> f64 {
+        let Topology { edges, .. } = &self.coarse.topology;
+        let at = |v: u32| self.coarse.mesh.positions[v as usize];
+        edges.iter().map(|&[a, b]| at(a).distance(at(b))).sum::<f64>() / edges.len().max(1) as f64
     }
 
     /// What is draped at this level.

@@ -6,7 +6,7 @@ use super::levels::{Level, Levels};
 use super::{DrapeError, Model, PartOutcome, Refine, Settings};
 use crate::distance::SurfacePoint;
 use crate::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Garment};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment};
 use crate::mechanics::paper::{self, PartForces};
 use crate::parts::{Parts, segment};
 use crate::range_table::RangeTable;
@@ -92,6 +92,13 @@ fn couple(
 /// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
 const ENOUGH: usize = 8;
 
+/// Edges of a fold's width that a cloth needs to make folds: with half of them a knit skirt in PARTs of 14 cm ends 40 mm from its
+/// rest instead of 20.
+const EDGES_A_FOLD: f64 = 8.0;
+
+/// Share of the garment in PARTs that make folds from which these count.
+const FOLDING: f64 = 0.5;
+
 /// Steps of a level after the coarsest: they take off what the prolongation strained, and tell the forces.
 const STEPS_AFTER_COARSE: usize = 2;
 
@@ -104,7 +111,11 @@ fn through_levels(
     start: &[DVec3],
     options: &CoupledOptions,
 ) -> Result<CoupledResult, CoupledError> {
-    let enough = |level: &&Level| level.mesh().vertex_count() >= ENOUGH * parts.len();
+    let folding = Folding::of(&scene.garment, parts, fabric);
+    let enough = |level: &&Level| {
+        level.mesh().vertex_count() >= ENOUGH * parts.len()
+            && (folding.share < FOLDING || EDGES_A_FOLD * level.edge_m() <= folding.width_m)
+    };
     let coarsest = levels.coarser.iter().take_while(enough).count();
     let mut x = start.to_vec();
     for number in (1..=coarsest).rev() {

@@ -34,6 +34,7 @@ use glam::DVec3;
 pub use clearance::push_out;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
+pub use slack::Folding;
 pub use weights::Weights;
 
 use super::energy::{Cloth, Contacts, gravity};

@@ -40,6 +40,26 @@ use crate::mechanics::energy::membrane;
 /// from 28 to 5 mm of its rest; cut to 60 cm it comes no nearer at five.
 const NARROW: f64 = 2.0;
 
+/// What folds there are to make, by how wide the PARTs are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Folding {
+    /// λ, the width of a fold, m.
+    pub width_m: f64,
+    /// Share of the vertices in PARTs so narrow that they fold with their neighbours.
+    pub share: f64,
+}
+
+impl Folding {
+    /// Of these PARTs of a garment in this fabric.
+    #[must_use]
+    pub fn of(mesh: &TriMesh, parts: &Parts, fabric: &Fabric) -> Self {
+        let width_m = fold_width(mesh, fabric);
+        let folding = parts.parts.iter().filter(|part| width(mesh, &part.vertices) <= NARROW * width_m);
+        let vertices: usize = folding.map(|part| part.vertices.len()).sum();
+        Self { width_m, share: vertices as f64 / mesh.vertex_count().max(1) as f64 }
+    }
+}
+
 /// Share r of each triangle: that of the widest PART it touches.
 pub(super) fn shares(mesh: &TriMesh, parts: &Parts, fabric: &Fabric) -> Vec<f64> {
     let stiffness = fabric.stretch_weft_n_per_m.min(fabric.stretch_warp_n_per_m);
