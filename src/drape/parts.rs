@@ -100,7 +100,7 @@ const EDGES_A_FOLD: f64 = 8.0;
 const FOLDING: f64 = 0.5;
 
 /// Steps of a level after the coarsest: they take off what the prolongation strained, and tell the forces.
-const STEPS_AFTER_COARSE: usize = 2;
+const STEPS_AFTER_COARSE: usize = 6;
 
 /// The coupled model on the coarsest cloth whose vertices still tell these PARTs apart, then on the finer ones.
 fn through_levels(

@@ -96,7 +96,7 @@ impl Default for CoupledOptions {
             motion: Motion::Affine,
             extents_m: Vec::new(),
             max_steps: 40,
-            least_move_m: 6e-3,
+            least_move_m: 3e-3,
             damping: 30.0,
             // A 60 cm skirt then hangs at most 1.5 mm too long.
             soft_strain: 0.005,
