@@ -10,7 +10,7 @@ use crate::files::{names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::report::MeshReport;
-use crate::mesh::{MeshError, RestShape, TriMesh};
+use crate::mesh::{MeshError, RestShape, TriMesh, retain};
 use crate::shapes::body::dress_form;
 use crate::shapes::garment::garment;
 
@@ -88,7 +88,7 @@ impl SceneSpec {
             let options = self.import_options(self.garment_group.as_ref());
             let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
             imported.turn_outward(&facing_body(&imported.mesh, body));
-            let rest = self.imported_rest(&imported)?;
+            let rest = self.imported_rest(&mut imported)?;
             return Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) });
         }
         if of_body.is_some() {
@@ -99,13 +99,15 @@ impl SceneSpec {
         Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, imported: None })
     }
 
-    fn imported_rest(&self, imported: &Imported) -> Result<RestShape, SceneError> {
+    /// The rest shape of a garment, which loses the triangles that have no area in it.
+    fn imported_rest(&self, imported: &mut Imported) -> Result<RestShape, SceneError> {
         let about = SceneError::about;
-        Ok(match self.rest.as_str() {
-            "own" => RestShape::from_edges(&imported.mesh).map_err(about(&self.garment))?,
+        let mut name = self.garment.as_str();
+        let mut rest = match self.rest.as_str() {
+            "own" => RestShape::edges_of(&imported.mesh),
             "texture" => {
-                let rest = RestShape::from_texture(&imported.mesh, &imported.texture, 1.0);
-                rest.map_err(about(&self.garment))?
+                let rest = RestShape::texture_of(&imported.mesh, &imported.texture, 1.0);
+                rest.map_err(about(name))?
             }
             file => {
                 let frame = imported.frame();
@@ -116,9 +118,17 @@ impl SceneSpec {
                 };
                 let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
                 let shape = imported.in_the_shape_of(&other)?;
-                RestShape::from_mesh(&imported.mesh, &shape).map_err(about(file))?
+                name = file;
+                RestShape::edges_of(&shape)
             }
-        })
+        };
+        let flat = rest.without_area();
+        if flat.iter().all(|&flat| flat) {
+            return rest.checked().map_err(about(name));
+        }
+        imported.drop_triangles(&flat);
+        retain(&mut rest.corners, |t| !flat[t]);
+        Ok(rest)
     }
 }
 
