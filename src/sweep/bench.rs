@@ -19,6 +19,7 @@ use crate::drape::{Drape, StageTimes};
 use crate::figures::Figures;
 use crate::job::Measured;
 use crate::mechanics::refine::{Step, Stop};
+use crate::said::said;
 use crate::scene::Loaded;
 use crate::shapes::MeshCache;
 
@@ -37,17 +38,7 @@ impl PointError {
     /// A failure in the words of an error and of all that caused it.
     #[must_use]
     pub fn failed(error: &(dyn Error + 'static)) -> Self {
-        let mut text = error.to_string();
-        let mut cause = error.source();
-        while let Some(error) = cause {
-            let said = error.to_string();
-            // Some errors repeat their cause in their own message.
-            if !text.contains(&said) {
-                text = format!("{text}: {said}");
-            }
-            cause = error.source();
-        }
-        Self::Failed(text)
+        Self::Failed(said(error, ": "))
     }
 }
 
