@@ -11,8 +11,11 @@ fn check_count(count: usize, least: usize) -> Result<(), TableError> {
     if (least..=MOST_LEVELS).contains(&count) {
         return Ok(());
     }
-    let expected = if least == 3 { "at least 3 and at most 10000" } else { "at least 1 and at most 10000" };
-    Err(TableError::value("the number of levels", count, expected))
+    let (what, expected) = match least {
+        3 => ("the number of levels of a geometric table", "at least 3 and at most 10000"),
+        _ => ("the number of levels", "at least 1 and at most 10000"),
+    };
+    Err(TableError::value(what, count, expected))
 }
 
 impl RangeTable {
