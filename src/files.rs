@@ -11,6 +11,13 @@ pub struct Unreadable {
     pub reason: String,
 }
 
+/// A folder in the user's cache (`$XDG_CACHE_HOME/partwise`, or under `~/.cache`, on Linux; where the system keeps caches
+/// elsewhere); `None` where the user has no home.
+#[must_use]
+pub fn user_cache(folder: &str) -> Option<PathBuf> {
+    Some(directories::ProjectDirs::from("", "", "partwise")?.cache_dir().join(folder))
+}
+
 /// Whether a name is that of a file rather than of something built in.
 #[must_use]
 pub fn names_a_file(name: &str) -> bool {

@@ -50,6 +50,7 @@ pub mod quantile;
 pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
+pub mod said;
 pub mod scene;
 pub mod sealed;
 pub mod shapes;

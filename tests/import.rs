@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
+use partwise::SceneSpec;
 use partwise::mesh::export::{write_imported, write_mesh};
 use partwise::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use partwise::mesh::report::{Remark, Repair};
@@ -314,4 +315,34 @@ proptest! {
     ) {
         let _ = read_with(&lines.join("\n"), &METRES);
     }
+}
+
+#[test]
+fn triangles_without_area_at_rest_are_dropped_with_what_only_they_had() {
+    // A tip without area on its own two vertices, a quad of which half has none, a sliver that is kept.
+    let text = format!("{SQUARE}v 2 1 0\nv 3 1 0\nv 0.5 2 0\nf 1 2 3 4\nf 3 5 6\nf 4 3 7\n");
+    let (folder, path) = file(&text);
+    let body = "v -9 -9 -2\nv 9 -9 -2\nv 0 9 -2\nv 0 0 -0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    fs::write(folder.path().join("body.obj"), body).unwrap();
+    let name = |file: &str| folder.path().join(file).to_string_lossy().into_owned();
+    let mut spec = SceneSpec::new(name("body.obj"), path.to_string_lossy());
+    (spec.unit, spec.up, spec.push_out) = (Some(Unit::M), Some(Axis::Z), false);
+    let loaded = spec.load().unwrap();
+    assert_eq!(loaded.reports[1].repairs.last(), Some(&Repair::NoAreaDropped { triangles: 1, first: 2 }));
+    assert_eq!((loaded.scene.garment.vertex_count(), loaded.scene.garment.triangles.len()), (5, 3));
+    assert_eq!((loaded.reports[1].vertices, loaded.reports[1].triangles), (5, 3));
+    assert_eq!(loaded.scene.rest.areas(), [0.5, 0.5, 0.5]);
+    let notes = loaded.notes().join("\n");
+    assert!(notes.contains("1 triangles that have no area at rest, the first of face 2"), "{notes}");
+    assert!(!notes.contains("note:"), "{notes}");
+    let moved: Vec<_> = loaded.scene.garment.positions.iter().map(|p| *p + DVec3::Z).collect();
+    let out = folder.path().join("out.obj");
+    loaded.write(&out, &moved).unwrap();
+    let again = read(&fs::read_to_string(out).unwrap());
+    assert_eq!(again.mesh.positions, moved);
+    assert_eq!(again.mesh.triangles, loaded.scene.garment.triangles);
+    // Of a garment without any area there is nothing to drape.
+    fs::write(&path, "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").unwrap();
+    let nothing = spec.load().unwrap_err().to_string();
+    assert!(nothing.contains("mesh.obj") && nothing.contains("1 triangles of the rest shape"), "{nothing}");
 }

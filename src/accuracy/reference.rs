@@ -14,6 +14,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::fabric::Fabric;
+use crate::files::user_cache;
 use crate::mesh::{RestShape, TriMesh};
 use crate::sealed::{self, Kind};
 use crate::whole_file::WholeFile;
@@ -106,12 +107,10 @@ impl ReferenceCache {
         Self { directory: directory.into() }
     }
 
-    /// The user's cache (`$XDG_CACHE_HOME/partwise/references`, or under `~/.cache`, on Linux; where the system keeps
-    /// caches elsewhere); `None` where the user has no home.
+    /// `references` in the user's cache ([`user_cache`]); `None` where the user has no home.
     #[must_use]
     pub fn in_user_cache() -> Option<Self> {
-        let folders = directories::ProjectDirs::from("", "", "partwise")?;
-        Some(Self::new(folders.cache_dir().join("references")))
+        user_cache("references").map(Self::new)
     }
 
     /// The reference of `key` for a garment of `vertices`: from disk, or else computed and kept.

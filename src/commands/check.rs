@@ -33,6 +33,27 @@ struct Report {
     garment: Health,
     fit: Placement,
     notes: Vec<String>,
+    verdict: String,
+}
+
+/// What of it all is in the way of a drape.
+fn verdict(body: &Health, garment: &Health, fit: &Placement) -> String {
+    let found = [
+        (usize::from(!body.closed), "an open body, whose inside goes by its normals alone"),
+        (body.self_intersecting_pairs, "pairs of body triangles that cross"),
+        (garment.non_manifold_edges, "garment edges of three triangles or more"),
+        (garment.no_area, "garment triangles without area"),
+        (garment.self_intersecting_pairs, "pairs of garment triangles that cross, and stay crossed"),
+        (fit.penetrating_vertices, "garment vertices inside the body, which a drape pushes out first"),
+        (fit.crossing_pairs, "pairs of a garment and a body triangle that cross"),
+    ];
+    let found: Vec<String> =
+        found.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    if found.is_empty() {
+        "nothing is in the way of a drape".to_owned()
+    } else {
+        format!("look at {}", found.join("; "))
+    }
 }
 
 impl CheckArgs {
@@ -43,12 +64,10 @@ impl CheckArgs {
         spec.garment = self.garment_file.clone().unwrap_or(spec.garment);
         let loaded = self.input.load(&spec)?;
         let scene = &loaded.scene;
-        let report = Report {
-            body: health(scene.body.mesh()),
-            garment: health(&scene.garment),
-            fit: Placement::new(&scene.garment, &scene.body),
-            notes: loaded.notes(),
-        };
+        let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
+        let fit = Placement::new(&scene.garment, &scene.body);
+        let verdict = verdict(&body, &garment, &fit);
+        let report = Report { body, garment, fit, notes: loaded.notes(), verdict };
         if self.format == Format::Json {
             console::result(&serde_json::to_string(&report)?);
             return Ok(());
@@ -64,7 +83,7 @@ impl CheckArgs {
         for (name, value) in report.fit.rows() {
             table.add_row([name.to_owned(), String::new(), value]);
         }
-        console::result(&table.to_string());
+        console::result(&format!("{table}\nverdict: {}", report.verdict));
         Ok(())
     }
 }

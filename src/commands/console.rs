@@ -2,17 +2,15 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
-use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use partwise::said::{plain, said};
 
 /// Whether a result could not be printed.
 static UNPRINTED: AtomicBool = AtomicBool::new(false);
-/// Characters of one cause of an error: names and lines from a file can be megabytes.
-const LONGEST_CAUSE: usize = 2000;
 
 /// A result, on stdout. A closed pipe (`| head`) is no error; any other failure is said, and ends the program with 1.
 pub(crate) fn result(text: &str) {
@@ -41,15 +39,6 @@ fn say(mark: &str, text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{mark}{}", plain(text));
 }
 
-/// Without control characters: names and words from files are quoted, and must not move the cursor or set a title.
-fn plain(text: &str) -> Cow<'_, str> {
-    let harmful = |c: char| c.is_control() && c != '\n' && c != '\t';
-    if !text.contains(harmful) {
-        return text.into();
-    }
-    text.chars().flat_map(|c| if harmful(c) { c.escape_default().collect() } else { vec![c] }).collect()
-}
-
 /// Something to act upon, on stderr.
 pub(crate) fn warning(text: &str) {
     say(&paint("warning: ", "33;1"), text);
@@ -57,21 +46,7 @@ pub(crate) fn warning(text: &str) {
 
 /// An error with its causes, on stderr.
 pub(crate) fn error(error: &anyhow::Error) {
-    let mut said = String::new();
-    for cause in error.chain().map(ToString::to_string) {
-        // An outer message often quotes its source already.
-        if said.contains(&cause) {
-            continue;
-        }
-        if !said.is_empty() {
-            said.push_str("\n  because: ");
-        }
-        match cause.char_indices().nth(LONGEST_CAUSE) {
-            None => said.push_str(&cause),
-            Some((end, _)) => said += &format!("{} ... ({} bytes in all)", &cause[..end], cause.len()),
-        }
-    }
-    say(&paint("error: ", "31;1"), &said);
+    say(&paint("error: ", "31;1"), &said(error.as_ref(), "\n  because: "));
 }
 
 fn paint(text: &str, code: &str) -> String {
@@ -96,15 +71,4 @@ pub(crate) fn progress(length: Option<u64>, what: &str) -> ProgressBar {
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_file_says_cannot_move_the_cursor() {
-        assert_eq!(plain("two\nlines,\ta tab, é"), "two\nlines,\ta tab, é");
-        assert_eq!(plain("a\u{1b}]0;title\u{7}b\r"), "a\\u{1b}]0;title\\u{7}b\\r");
-    }
 }

@@ -6,6 +6,7 @@ use clap::Args;
 use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
 use partwise::scene::{Loaded, SceneError};
+use partwise::shapes::MeshCache;
 
 use super::measurements::MeasurementArgs;
 
@@ -48,6 +49,9 @@ pub(crate) struct InputArgs {
     /// Leave garment vertices that start inside the body where they are
     #[arg(long)]
     no_push_out: bool,
+    /// Make the built-in form and garment anew instead of reading those made before from the user's cache folder
+    #[arg(long)]
+    no_cache: bool,
     #[command(flatten)]
     measurements: MeasurementArgs,
 }
@@ -73,7 +77,8 @@ impl InputArgs {
 
     /// Loads a scene of these flags, saying where measurements that make no body were given.
     pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
-        spec.load().map_err(|error| match error {
+        let meshes = if self.no_cache { MeshCache::default() } else { MeshCache::in_user_cache() };
+        spec.load_with(&meshes).map_err(|error| match error {
             SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
             other => other.into(),
         })

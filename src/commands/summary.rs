@@ -43,6 +43,9 @@ pub(crate) struct Summary {
     pub(crate) outputs: Vec<String>,
 }
 
+/// Strain above which a result is no garment that could be worn.
+const TORN: f64 = 0.5;
+
 /// Milliseconds, for people.
 pub(crate) fn ms(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
@@ -59,7 +62,13 @@ impl Summary {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
-        let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
+        let mut warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
+        if let Some(strain) = measured.figures.strain_max.filter(|strain| *strain > TORN) {
+            warnings.push(format!(
+                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
+                1e2 * strain
+            ));
+        }
         Ok(Self {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),

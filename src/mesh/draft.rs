@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::polygon;
 use super::report::Repair;
+use super::retain;
 use super::scan::{Corner, Face};
 use super::topology::NONE;
 
@@ -93,13 +94,9 @@ impl Draft {
         }
         let dropped = keep.iter().filter(|&&keep| !keep).count();
         if dropped > 0 {
-            fn retain<T>(list: &mut Vec<T>, keep: &[bool]) {
-                let mut flags = keep.iter();
-                list.retain(|_| flags.next().is_some_and(|&keep| keep));
-            }
-            retain(&mut self.triangles, &keep);
-            retain(&mut self.corner, &keep);
-            retain(&mut self.face, &keep);
+            retain(&mut self.triangles, |t| keep[t]);
+            retain(&mut self.corner, |t| keep[t]);
+            retain(&mut self.face, |t| keep[t]);
         }
         dropped
     }

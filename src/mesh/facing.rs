@@ -3,8 +3,8 @@
 use super::health::Findings;
 use super::import::Imported;
 use super::report::{Remark, Repair};
-use super::topology::Topology;
-use super::winding;
+use super::topology::{NONE, Topology};
+use super::{retain, winding};
 
 impl Imported {
     /// Turns the triangles that face inward, whole connected parts of them, and says so.
@@ -25,26 +25,67 @@ impl Imported {
     pub(super) fn make_agree(&mut self, coincident: usize) {
         let (turn, _, turned) = winding::agree(&self.mesh);
         (0..turn.len()).filter(|&t| turn[t]).for_each(|t| self.turn(t));
-        let topology = Topology::new(&self.mesh);
-        let loops = topology.boundary_loops();
         let report = &mut self.report;
-        report.components = topology.components().1;
-        report.boundary_edges = topology.boundary_edges().count();
-        report.boundary_loops = loops.len();
         if turned.to_agree > 0 {
             report.repairs.push(Repair::WindingTurned { triangles: turned.to_agree });
         }
+        if coincident > 0 {
+            report.remarks.push(Remark::Coincident { vertices: coincident });
+        }
+        if turned.one_sided > 0 {
+            report.remarks.push(Remark::OneSided { patches: turned.one_sided });
+        }
+        self.look();
+    }
+
+    /// Drops triangles, as far as not all are, the vertices that only they had, and the faces of which nothing is left.
+    pub(crate) fn drop_triangles(&mut self, drop: &[bool]) {
+        let Some(first) = drop.iter().position(|&drop| drop) else { return };
+        let (mesh, source) = (&mut self.mesh, &mut self.source);
+        let first = source.faces[self.face[first] as usize].number as usize + 1;
+        retain(&mut mesh.triangles, |t| !drop[t]);
+        retain(&mut mesh.triangle_group, |t| !drop[t]);
+        retain(&mut self.texture, |t| !drop[t]);
+        let mut left = vec![true; source.faces.len()];
+        (0..drop.len()).filter(|&t| drop[t]).for_each(|t| left[self.face[t] as usize] = false);
+        (0..drop.len()).filter(|&t| !drop[t]).for_each(|t| left[self.face[t] as usize] = true);
+        retain(&mut self.face, |t| !drop[t]);
+        let mut number = vec![NONE; left.len()];
+        (0..).zip((0..left.len()).filter(|&f| left[f])).for_each(|(new, old)| number[old] = new);
+        self.face.iter_mut().for_each(|f| *f = number[*f as usize]);
+        retain(&mut source.faces, |f| left[f]);
+        let mut number = vec![NONE; mesh.positions.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| number[v as usize] = 0);
+        (0..).zip(number.iter_mut().filter(|n| **n == 0)).for_each(|(new, n)| *n = new);
+        retain(&mut mesh.positions, |v| number[v] != NONE);
+        mesh.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
+        source.mesh_vertex.iter_mut().filter(|v| **v != NONE).for_each(|v| *v = number[*v as usize]);
+        let triangles = drop.iter().filter(|&&drop| drop).count();
+        self.report.repairs.push(Repair::NoAreaDropped { triangles, first });
+        self.look();
+    }
+
+    /// Notes what the topology shows.
+    fn look(&mut self) {
+        let topology = Topology::new(&self.mesh);
         let findings = Findings::new(&self.mesh, &topology);
+        let report = &mut self.report;
+        report.vertices = self.mesh.vertex_count();
+        report.triangles = self.mesh.triangles.len();
+        report.components = topology.components().1;
+        report.boundary_edges = topology.boundary_edges().count();
+        report.boundary_loops = topology.boundary_loops().len();
+        let seen_here =
+            |r: &Remark| matches!(r, Remark::NonManifold { .. } | Remark::Pinched { .. } | Remark::NoArea { .. });
+        report.remarks.retain(|remark| !seen_here(remark));
         let mut note = |count: usize, remark: Remark| {
             if count > 0 {
                 report.remarks.push(remark);
             }
         };
-        note(coincident, Remark::Coincident { vertices: coincident });
         note(findings.non_manifold_edges, Remark::NonManifold { edges: findings.non_manifold_edges });
         note(findings.pinched_vertices, Remark::Pinched { vertices: findings.pinched_vertices });
         note(findings.no_area, Remark::NoArea { triangles: findings.no_area });
-        note(turned.one_sided, Remark::OneSided { patches: turned.one_sided });
     }
 
     /// Turns one triangle round, its texture coordinates with it.

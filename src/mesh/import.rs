@@ -57,6 +57,8 @@ pub struct Imported {
     pub source: ObjSource,
     /// Texture coordinates of each triangle's corners; `None` for triangles without.
     pub texture: Vec<Option<[DVec2; 3]>>,
+    /// Face of the file, by its place in the source, behind each triangle.
+    pub(super) face: Vec<u32>,
 }
 
 impl Imported {
@@ -244,7 +246,7 @@ fn build(
         textures: scan.textures,
         mesh_vertex: draft.mesh_vertex,
     };
-    let mut imported = Imported { mesh, report, source, texture };
+    let mut imported = Imported { mesh, report, source, texture, face: draft.face };
     imported.make_agree(draft.coincident);
     Ok(imported)
 }

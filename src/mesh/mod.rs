@@ -125,3 +125,9 @@ fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
     let first = *points.first()?;
     Some(points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p))))
 }
+
+/// Keeps the elements of a list whose places `keep` names.
+pub(crate) fn retain<T>(list: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
+    let mut place = 0..;
+    list.retain(|_| place.next().is_some_and(&keep));
+}

@@ -17,6 +17,8 @@ pub enum Repair {
     Welded { vertices: usize },
     /// Triangles that name a vertex twice were dropped.
     DegenerateDropped { triangles: usize },
+    /// Triangles without area in the rest shape were dropped; `first` is the file's face, from 1, of the first.
+    NoAreaDropped { triangles: usize, first: usize },
     /// Triangles of the same three vertices as an earlier one were dropped.
     DuplicatesDropped { triangles: usize },
     /// Vertices that no face uses were dropped.
@@ -38,6 +40,9 @@ impl fmt::Display for Repair {
             Self::Welded { vertices } => write!(f, "joined {vertices} vertices to another at the same place, as asked"),
             Self::DegenerateDropped { triangles } => {
                 write!(f, "dropped {triangles} triangles that name the same vertex twice")
+            }
+            Self::NoAreaDropped { triangles, first } => {
+                write!(f, "dropped {triangles} triangles that have no area at rest, the first of face {first}")
             }
             Self::DuplicatesDropped { triangles } => {
                 write!(f, "dropped {triangles} triangles that were there already")

@@ -69,7 +69,12 @@ pub struct RestShape {
 impl RestShape {
     /// The mesh as it stands, at rest: own edges, warp along gravity.
     pub fn from_edges(mesh: &TriMesh) -> Result<Self, RestError> {
-        Self { corners: (0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect() }.checked()
+        Self::edges_of(mesh).checked()
+    }
+
+    /// [`from_edges`](Self::from_edges), triangles without area and all.
+    pub(crate) fn edges_of(mesh: &TriMesh) -> Self {
+        Self { corners: (0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect() }
     }
 
     /// A second mesh of the same vertices and triangles, at rest; warp along gravity in that mesh.
@@ -99,6 +104,15 @@ impl RestShape {
         texture: &[Option<[DVec2; 3]>],
         metres_per_unit: f64,
     ) -> Result<Self, RestError> {
+        Self::texture_of(mesh, texture, metres_per_unit)?.checked()
+    }
+
+    /// [`from_texture`](Self::from_texture), triangles without area and all.
+    pub(crate) fn texture_of(
+        mesh: &TriMesh,
+        texture: &[Option<[DVec2; 3]>],
+        metres_per_unit: f64,
+    ) -> Result<Self, RestError> {
         let of = mesh.triangles.len();
         let known = texture.iter().take(of).filter(|corners| corners.is_some()).count();
         if known < of {
@@ -109,7 +123,7 @@ impl RestShape {
             let mirrored = (b - a).perp_dot(c - a) < 0.0;
             [a, b, c].map(|p| if mirrored { DVec2::new(-p.x, p.y) } else { p })
         });
-        let rest = Self { corners: corners.collect() }.checked()?;
+        let rest = Self { corners: corners.collect() };
         let ratio = rest.areas().iter().sum::<f64>() / mesh.triangle_areas().iter().sum::<f64>();
         if !METRIC_AREA_RATIO.contains(&ratio) {
             return Err(RestError::NotMetric { metres_per_unit, ratio });
@@ -123,15 +137,20 @@ impl RestShape {
         self.corners.iter().map(|[a, b, c]| 0.5 * (b - a).perp_dot(c - a)).collect()
     }
 
-    fn checked(self) -> Result<Self, RestError> {
-        let bad = |&[a, b, c]: &[DVec2; 3]| {
+    /// Which triangles have no area.
+    pub(crate) fn without_area(&self) -> Vec<bool> {
+        let flat = |&[a, b, c]: &[DVec2; 3]| {
             let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
             let area = (b - a).perp_dot(c - a);
             area.is_nan() || area <= FLAT * longest
         };
-        let mut flat = self.corners.iter().enumerate().filter(|(_, corners)| bad(corners)).map(|(t, _)| t);
-        match flat.next() {
-            Some(first) => Err(RestError::NoArea { count: 1 + flat.count(), first }),
+        self.corners.iter().map(flat).collect()
+    }
+
+    pub(crate) fn checked(self) -> Result<Self, RestError> {
+        let flat = self.without_area();
+        match flat.iter().position(|&flat| flat) {
+            Some(first) => Err(RestError::NoArea { count: flat.iter().filter(|&&flat| flat).count(), first }),
             None => Ok(self),
         }
     }

@@ -4,6 +4,20 @@
 
 use super::{Extent, GapRule, Level, METRES_PER_CM, RangeTable, TableError};
 
+/// Levels that a made table can have: more than any garment fills, few enough to make at once.
+pub(crate) const MOST_LEVELS: usize = 10_000;
+
+fn check_count(count: usize, least: usize) -> Result<(), TableError> {
+    if (least..=MOST_LEVELS).contains(&count) {
+        return Ok(());
+    }
+    let (what, expected) = match least {
+        3 => ("the number of levels of a geometric table", "at least 3 and at most 10000"),
+        _ => ("the number of levels", "at least 1 and at most 10000"),
+    };
+    Err(TableError::value(what, count, expected))
+}
+
 impl RangeTable {
     /// The same table with every bound times `factor`; an open end stays open.
     ///
@@ -24,15 +38,12 @@ impl RangeTable {
     /// extents that its distances had.
     ///
     /// # Errors
-    /// [`TableError::Value`] for no levels, or for more where no finite level is left to split.
+    /// [`TableError::Value`] for none or over ten thousand, or for more than one where no finite level is left to split.
     pub fn with_level_count(&self, count: usize) -> Result<Self, TableError> {
         let levels = self.effective_levels();
         let mut bounds: Vec<f64> = levels.iter().map(|l| l.lower_cm).collect();
         bounds.extend(levels.last().map(|l| l.upper_cm));
-        let refuse = |expected| TableError::value("the number of levels", count, expected);
-        if count == 0 {
-            return Err(refuse("at least 1"));
-        }
+        check_count(count, 1)?;
         let from = levels.len();
         if count < from {
             // Rank i of the new table is rank i·from/count of the old one, rounded; first and last stay.
@@ -45,7 +56,13 @@ impl RangeTable {
                 _ => Some((i, w[1] - w[0])),
             };
             let found = bounds.windows(2).enumerate().fold(None, widest);
-            let (i, width) = found.ok_or_else(|| refuse("1, because the only level is open and cannot be halved"))?;
+            let (i, width) = found.ok_or_else(|| {
+                TableError::value(
+                    "the number of levels",
+                    count,
+                    "1, because the only level is open and cannot be halved",
+                )
+            })?;
             bounds.insert(i + 1, bounds[i] + 0.5 * width);
         }
         let verb = if count < from { "merged" } else { "split" };
@@ -64,9 +81,7 @@ impl RangeTable {
     /// # Errors
     /// [`TableError::Value`] for no levels or a sample without a finite distance.
     pub fn quantiles(distances_m: &[f64], count: usize) -> Result<Self, TableError> {
-        if count == 0 {
-            return Err(TableError::value("the number of levels", 0, "at least 1"));
-        }
+        check_count(count, 1)?;
         let inner = quantile_bounds_cm(distances_m, count);
         if !distances_m.iter().any(|d| d.is_finite()) {
             return Err(TableError::value("the sample of a quantile table", "no finite distance", "at least one"));
@@ -83,9 +98,7 @@ impl RangeTable {
     /// # Errors
     /// [`TableError::Value`] for fewer than three levels or bounds that do not grow.
     pub fn geometric(first_cm: f64, last_cm: f64, count: usize) -> Result<Self, TableError> {
-        if count < 3 {
-            return Err(TableError::value("the number of levels of a geometric table", count, "at least 3"));
-        }
+        check_count(count, 3)?;
         if !(first_cm > 0.0 && last_cm > first_cm && last_cm.is_finite()) {
             let found = format!("{first_cm} to {last_cm}");
             let expected = "0 < first < last, in centimetres";

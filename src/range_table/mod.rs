@@ -23,6 +23,7 @@ use std::fmt;
 
 pub use error::{BoundProblem, TableError};
 pub use extent::Extent;
+pub(crate) use families::MOST_LEVELS;
 pub use rule::TableRule;
 
 /// Metres in a centimetre: tables are written in centimetres, everything else is metres.

@@ -76,7 +76,7 @@ impl Serialize for Cm {
 impl<'de> Deserialize<'de> for Cm {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
-        #[serde(untagged)]
+        #[serde(untagged, expecting = "expected centimetres or \"inf\"")]
         enum Either {
             Number(f64),
             Word(String),

@@ -10,9 +10,8 @@ use crate::files::{names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::report::MeshReport;
-use crate::mesh::{MeshError, RestShape, TriMesh};
-use crate::shapes::body::dress_form;
-use crate::shapes::garment::garment;
+use crate::mesh::{MeshError, RestShape, TriMesh, retain};
+use crate::shapes::MeshCache;
 
 /// A scene with its origin.
 #[derive(Debug, Clone)]
@@ -44,8 +43,22 @@ impl SceneSpec {
     /// # Errors
     /// [`SceneError`] names the file, its line or the name, and what to do.
     pub fn load(&self) -> Result<Loaded, SceneError> {
-        let (body, of_body) = self.load_body()?;
-        let unplaced = self.load_garment(&body, of_body.as_ref())?;
+        self.load_with(&MeshCache::default())
+    }
+
+    /// [`load`](Self::load) with the built-in form and garments taken from `meshes` where they are there.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load_with(&self, meshes: &MeshCache) -> Result<Loaded, SceneError> {
+        self.check_names()?;
+        // What is made is cut for the form's measurements, not for its mesh: both at once.
+        let (body, made) = rayon::join(|| self.load_body(meshes), || self.make_garment(meshes));
+        let (body, of_body) = body?;
+        let unplaced = match made {
+            Some(made) => made?,
+            None => self.load_garment(&body, of_body.as_ref())?,
+        };
         let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
         scene.held = match &self.hold {
@@ -63,12 +76,11 @@ impl SceneSpec {
         })
     }
 
-    fn load_body(&self) -> Result<(Body, Option<Imported>), SceneError> {
-        self.check_names()?;
+    fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
         let new = if self.open_body { Body::new_open } else { Body::new };
         if !self.body_is_a_mesh() {
             let of_numbers = !names_a_file(&self.body);
-            let form = dress_form(&self.form()?).map_err(|source| match of_numbers {
+            let form = meshes.dress_form(&self.form()?).map_err(|source| match of_numbers {
                 true => SceneError::Measurements(source),
                 false => SceneError::in_file(&self.body)(source),
             })?;
@@ -78,34 +90,44 @@ impl SceneSpec {
         Ok((new(&imported.mesh)?, Some(imported)))
     }
 
-    fn load_garment(&self, body: &Body, of_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
+    /// A garment that is no mesh from a file; `None` where it is one.
+    fn make_garment(&self, meshes: &MeshCache) -> Option<Result<Unplaced, SceneError>> {
         if Path::new(&self.garment).extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
-            let beside = match (of_body, body.mesh().bounds()) {
-                (Some(body), _) => Beside::File(body.frame()),
-                (None, Some((low, high))) => Beside::Bounds(low, high),
-                (None, None) => return Err(crate::distance::DistanceError::Empty.into()),
-            };
-            let options = self.import_options(self.garment_group.as_ref());
-            let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
-            imported.turn_outward(&facing_body(&imported.mesh, body));
-            let rest = self.imported_rest(&imported)?;
-            return Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) });
+            return None;
         }
-        if of_body.is_some() {
-            return Err(SceneError::NotCutForIt { body: self.body.clone() });
-        }
-        let (spec, vertices) = self.described()?;
-        let made = garment(&spec, &self.form()?, vertices)?;
-        Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, imported: None })
+        let make = || {
+            if self.body_is_a_mesh() {
+                return Err(SceneError::NotCutForIt { body: self.body.clone() });
+            }
+            let (spec, vertices) = self.described()?;
+            let made = meshes.garment(&spec, &self.form()?, vertices)?;
+            Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, imported: None })
+        };
+        Some(make())
     }
 
-    fn imported_rest(&self, imported: &Imported) -> Result<RestShape, SceneError> {
+    fn load_garment(&self, body: &Body, of_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
+        let beside = match (of_body, body.mesh().bounds()) {
+            (Some(body), _) => Beside::File(body.frame()),
+            (None, Some((low, high))) => Beside::Bounds(low, high),
+            (None, None) => return Err(crate::distance::DistanceError::Empty.into()),
+        };
+        let options = self.import_options(self.garment_group.as_ref());
+        let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
+        imported.turn_outward(&facing_body(&imported.mesh, body));
+        let rest = self.imported_rest(&mut imported)?;
+        Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) })
+    }
+
+    /// The rest shape of a garment, which loses the triangles that have no area in it.
+    fn imported_rest(&self, imported: &mut Imported) -> Result<RestShape, SceneError> {
         let about = SceneError::about;
-        Ok(match self.rest.as_str() {
-            "own" => RestShape::from_edges(&imported.mesh).map_err(about(&self.garment))?,
+        let mut name = self.garment.as_str();
+        let mut rest = match self.rest.as_str() {
+            "own" => RestShape::edges_of(&imported.mesh),
             "texture" => {
-                let rest = RestShape::from_texture(&imported.mesh, &imported.texture, 1.0);
-                rest.map_err(about(&self.garment))?
+                let rest = RestShape::texture_of(&imported.mesh, &imported.texture, 1.0);
+                rest.map_err(about(name))?
             }
             file => {
                 let frame = imported.frame();
@@ -116,9 +138,17 @@ impl SceneSpec {
                 };
                 let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
                 let shape = imported.in_the_shape_of(&other)?;
-                RestShape::from_mesh(&imported.mesh, &shape).map_err(about(file))?
+                name = file;
+                RestShape::edges_of(&shape)
             }
-        })
+        };
+        let flat = rest.without_area();
+        if flat.iter().all(|&flat| flat) {
+            return rest.checked().map_err(about(name));
+        }
+        imported.drop_triangles(&flat);
+        retain(&mut rest.corners, |t| !flat[t]);
+        Ok(rest)
     }
 }
 

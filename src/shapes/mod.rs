@@ -6,6 +6,7 @@
 
 mod anatomy;
 pub mod body;
+mod cache;
 mod contour;
 mod cut;
 mod fitting;
@@ -19,6 +20,7 @@ mod remesh;
 mod solid;
 
 pub use body::dress_form;
+pub use cache::MeshCache;
 pub use garment::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment, garment};
 pub use measures::BodySpec;
 pub use remesh::Density;

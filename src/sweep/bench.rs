@@ -19,7 +19,9 @@ use crate::drape::{Drape, StageTimes};
 use crate::figures::Figures;
 use crate::job::Measured;
 use crate::mechanics::refine::{Step, Stop};
+use crate::said::said;
 use crate::scene::Loaded;
+use crate::shapes::MeshCache;
 
 /// Why a point has no result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -36,17 +38,7 @@ impl PointError {
     /// A failure in the words of an error and of all that caused it.
     #[must_use]
     pub fn failed(error: &(dyn Error + 'static)) -> Self {
-        let mut text = error.to_string();
-        let mut cause = error.source();
-        while let Some(error) = cause {
-            let said = error.to_string();
-            // Some errors repeat their cause in their own message.
-            if !text.contains(&said) {
-                text = format!("{text}: {said}");
-            }
-            cause = error.source();
-        }
-        Self::Failed(text)
+        Self::Failed(said(error, ": "))
     }
 }
 
@@ -119,6 +111,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
 /// Drapes and measures points. Called from several threads at once where there are several jobs.
 pub struct Bench<'a> {
     cache: Option<ReferenceCache>,
+    meshes: MeshCache,
     stop: &'a AtomicBool,
     scenes: Mutex<BTreeMap<String, Arc<Loaded>>>,
 }
@@ -127,7 +120,13 @@ impl<'a> Bench<'a> {
     /// A bench that keeps references in `cache`, if there is one, and leaves its work once `stop` is set.
     #[must_use]
     pub fn new(cache: Option<ReferenceCache>, stop: &'a AtomicBool) -> Self {
-        Self { cache, stop, scenes: Mutex::default() }
+        Self { cache, meshes: MeshCache::default(), stop, scenes: Mutex::default() }
+    }
+
+    /// The same, with made meshes in `meshes`.
+    #[must_use]
+    pub fn with_meshes(self, meshes: MeshCache) -> Self {
+        Self { meshes, ..self }
     }
 
     /// The scene of a point. Others wait while one is made: they most likely want the same.
@@ -137,7 +136,7 @@ impl<'a> Bench<'a> {
         if let Some(loaded) = made.get(&id) {
             return Ok(loaded.clone());
         }
-        let loaded = Arc::new(point.job.scene.load().map_err(|e| PointError::failed(&e))?);
+        let loaded = Arc::new(point.job.scene.load_with(&self.meshes).map_err(|e| PointError::failed(&e))?);
         made.insert(id, loaded.clone());
         Ok(loaded)
     }

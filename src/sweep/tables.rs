@@ -20,7 +20,7 @@ use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
 use crate::files::names_a_file;
-use crate::range_table::{RangeTable, TABLE_3, TableError, TableRule};
+use crate::range_table::{MOST_LEVELS, RangeTable, TABLE_3, TableError, TableRule};
 
 /// Default ends of a geometric table, cm: the smallest bounds of Table 3 are about 0.1, its largest is 11.
 const GEOMETRIC_CM: (f64, f64) = (0.1, 11.0);
@@ -134,9 +134,12 @@ fn list(value: &Value) -> &[Value] {
 }
 
 fn counts(source: Source<'_>, entry: &At, value: &Value) -> Result<Vec<usize>, PlanError> {
-    let count = |v: &Value| v.as_integer().and_then(|n| usize::try_from(n).ok()).filter(|n| *n > 0);
+    let count =
+        |v: &Value| v.as_integer().and_then(|n| usize::try_from(n).ok()).filter(|n| (1..=MOST_LEVELS).contains(n));
     let counts: Option<Vec<usize>> = list(value).iter().map(count).collect();
-    counts.filter(|c| !c.is_empty()).ok_or_else(|| source.wrong(entry, "table", "numbers of levels, at least 1 each"))
+    counts
+        .filter(|c| !c.is_empty())
+        .ok_or_else(|| source.wrong(entry, "table", "numbers of levels, at least 1 and at most 10000 each"))
 }
 
 fn factors(source: Source<'_>, entry: &At, value: &Value) -> Result<Vec<f64>, PlanError> {

@@ -198,6 +198,7 @@ fn bad_files_are_told_where_what_and_what_to_do() {
             "s.toml:3: table: the number of levels of a geometric table: found 2",
             "at least 3",
         ),
+        (format!("{point}table = {{ geometric = 4294967296 }}"), "s.toml:3: table: found", "at most 10000"),
         (format!("{point}table = \"no/such.toml\""), "s.toml:3: no/such.toml: cannot be read", "folder"),
         (format!("{point}garment = \"no.obj\""), "s.toml:3: no.obj: cannot be read", "folder"),
         (format!("{point}garment = \"flared-skirt@900\"\nsize = 800"), "s.toml:4: size: found 800", "skirt@900"),

@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use partwise::accuracy::reference::ReferenceCache;
+use partwise::shapes::MeshCache;
 use partwise::sweep::{Bench, Point, PointError, Row};
 
 use super::store::{KeptPoint, PointStore};
@@ -22,7 +23,7 @@ pub(crate) struct KeepingBench<'a> {
 impl<'a> KeepingBench<'a> {
     /// A bench that keeps its points in `store` and its references in `cache`.
     pub(crate) fn new(store: &'a PointStore, cache: Option<ReferenceCache>) -> Self {
-        let bench = Bench::new(cache, interrupt::flag());
+        let bench = Bench::new(cache, interrupt::flag()).with_meshes(MeshCache::in_user_cache());
         Self { bench, store, broken: Mutex::new(None), keeping_us: AtomicU64::new(0) }
     }
 

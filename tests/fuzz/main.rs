@@ -1,0 +1,121 @@
+//! Mutated input through every reader of the library: it is taken or refused, in bounded time and in plain words.
+//!
+//! `PARTWISE_FUZZ_CASES` sets how many inputs each reader gets; without it a few seconds' worth. An input that shows
+//! something wrong is shrunk and kept in `tests/fuzz/corpus/`, whose files are tried first, and mutated, ever after.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test fails by panicking, and tells counts"
+)]
+
+mod meshes;
+mod mutate;
+mod readers;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
+
+use readers::Said;
+
+/// What one input may take: far more than any does, on a machine that is busy with other things.
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// What came of an input: a message where it was refused; or what is wrong.
+type Reader = dyn Fn(&str) -> Result<Said, String> + Send + Sync;
+
+/// Runs one input and judges what the reader says.
+fn judge(reader: &Reader, text: &str) -> Result<Said, String> {
+    let began = Instant::now();
+    let said = catch_unwind(AssertUnwindSafe(|| reader(text))).map_err(|_| "it panicked".to_owned())??;
+    if began.elapsed() > LIMIT {
+        return Err(format!("it took {:?}", began.elapsed()));
+    }
+    if let Said::Refused(message) = &said {
+        if message.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
+            return Err(format!("control characters in the message: {message:?}"));
+        }
+        if message.len() > 5_000 {
+            return Err(format!("a message of {} bytes", message.len()));
+        }
+        if !readers::TELLING.iter().any(|word| message.contains(word)) {
+            return Err(format!("a message that tells nothing: {message:?}"));
+        }
+    }
+    Ok(said)
+}
+
+/// Gives `reader` the seeds, what was found before, and so many mutations of both for every one that is due.
+fn fuzz(
+    class: &'static str,
+    share: f64,
+    seeds: Vec<String>,
+    reader: impl Fn(&str) -> Result<Said, String> + Send + Sync + 'static,
+) {
+    let cases = std::env::var("PARTWISE_FUZZ_CASES").ok().map_or(300, |text| text.parse::<u32>().unwrap());
+    let cases = ((f64::from(cases) * share) as u32).max(20);
+    let corpus = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus").join(class);
+    let mut found: Vec<PathBuf> =
+        fs::read_dir(&corpus).map_or_else(|_| Vec::new(), |f| f.map(|e| e.unwrap().path()).collect());
+    found.sort();
+    let mut seeds = seeds;
+    seeds.extend(found.iter().map(|path| fs::read_to_string(path).unwrap()));
+    for seed in &seeds {
+        if let Err(wrong) = judge(&reader, seed) {
+            panic!("{class}: {wrong}, of a seed:\n{seed}");
+        }
+    }
+    // What is being read, for who waits: an endless loop is told by its input.
+    let current = Arc::new(Mutex::new((Instant::now(), String::new())));
+    let (told, of_thread) = (current.clone(), seeds.clone());
+    let worker = std::thread::spawn(move || {
+        let (seeds, mut counts) = (of_thread, BTreeMap::<&str, usize>::new());
+        let input = |(seed, changes): &(u32, Vec<mutate::Mutation>)| {
+            let start = seeds[*seed as usize % seeds.len()].clone();
+            changes.iter().fold(start, |text, &change| mutate::mutate(&text, &seeds, change))
+        };
+        let config = Config { cases, failure_persistence: None, max_shrink_iters: 2_000, ..Config::default() };
+        let mut seed = [7; 32];
+        seed[..class.len()].copy_from_slice(class.as_bytes());
+        let mut runner = TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &seed));
+        let counted = Mutex::new(&mut counts);
+        let outcome = runner.run(&mutate::mutated(), |case| {
+            let text = input(&case);
+            *told.lock().unwrap() = (Instant::now(), text.clone());
+            let said = judge(&reader, &text).map_err(TestCaseError::fail)?;
+            *counted.lock().unwrap().entry(said.name()).or_default() += 1;
+            Ok(())
+        });
+        (
+            outcome.map_err(|error| match error {
+                TestError::Fail(reason, case) => (reason.to_string(), input(&case)),
+                TestError::Abort(reason) => (reason.to_string(), String::new()),
+            }),
+            counts,
+        )
+    });
+    while !worker.is_finished() {
+        std::thread::sleep(Duration::from_millis(20));
+        let (since, text) = current.lock().unwrap().clone();
+        assert!(
+            since.elapsed() < 3 * LIMIT || text.is_empty(),
+            "{class}: still at work after {:?} on:\n{text}",
+            since.elapsed()
+        );
+    }
+    let (outcome, counts) = worker.join().unwrap();
+    eprintln!("{class}: {counts:?}");
+    if let Err((reason, text)) = outcome {
+        let name = blake3::hash(text.as_bytes()).to_hex();
+        fs::create_dir_all(&corpus).unwrap();
+        fs::write(corpus.join(&name[..12]), &text).unwrap();
+        panic!("{class}: {reason}, kept as tests/fuzz/corpus/{class}/{}:\n{text}", &name[..12]);
+    }
+}

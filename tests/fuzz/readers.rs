@@ -1,0 +1,199 @@
+//! The readers, what they are given to begin with, and what must hold of what they take.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use partwise::drape::Refine;
+use partwise::fabric::{self, Fabric};
+use partwise::range_table::RangeTable;
+use partwise::said::said;
+use partwise::shapes::{BUILT_IN, BodySpec, GarmentSpec};
+use partwise::sweep::Plan;
+use partwise::{Job, SceneSpec};
+
+use super::fuzz;
+
+/// What became of an input.
+pub(crate) enum Said {
+    Taken,
+    Refused(String),
+}
+
+impl Said {
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Taken => "taken",
+            Self::Refused(_) => "refused",
+        }
+    }
+}
+
+/// Words by which a message says what it found or expected; the last are the parsers' own, of TOML and JSON.
+pub(crate) const TELLING: &[&str] = &[
+    "expected",
+    "must be",
+    "found",
+    "ask for",
+    "give ",
+    "needs",
+    "let it ",
+    "write ",
+    "there is no",
+    "cm; a body's is",
+    "a sweep file has",
+    "missing field",
+    "duplicate",
+    "invalid",
+    "unknown",
+    "EOF while",
+    "trailing",
+    "remove ",
+    "overflowed",
+    "out of range",
+    "cannot be read",
+    "are missing",
+];
+
+pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Said, String> {
+    Ok(Said::Refused(said(error, ": ")))
+}
+
+pub(crate) fn check(holds: bool, what: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(format!("taken, but {what}")) }
+}
+
+fn assets(folder: &str) -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(folder);
+    let mut paths: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    paths.sort();
+    paths.iter().map(|path| fs::read_to_string(path).unwrap()).collect()
+}
+
+#[test]
+fn range_tables() {
+    let mut seeds = assets("tables");
+    seeds.extend(assets("tuned"));
+    fuzz("range-table", 1.0, seeds, |text| {
+        let table = match RangeTable::parse(text, "input.toml") {
+            Ok(table) => table,
+            Err(e) => return refused(&e),
+        };
+        check(table.levels.iter().all(|l| l.lower_cm.is_finite() && !l.upper_cm.is_nan()), "a bound is no number")?;
+        let distances: Vec<f64> = (0..200).map(|i| 1e-3 * f64::from(i)).collect();
+        let levels = table.assign(&distances).level_of_vertex;
+        check(levels.len() == distances.len(), "levels do not match distances")?;
+        let again = RangeTable::parse(&table.to_toml(), "again").map_err(|e| format!("written and refused: {e}"))?;
+        check(again == table, "it reads back as another")?;
+        Ok(Said::Taken)
+    });
+}
+
+#[test]
+fn fabrics() {
+    fuzz("fabric", 1.0, assets("fabrics"), |text| match Fabric::parse(text, "input.toml") {
+        Err(e) => refused(&e),
+        Ok(f) => {
+            let numbers =
+                [f.density_kg_per_m2, f.thickness_m, f.stretch_weft_n_per_m, f.stretch_warp_n_per_m, f.shear_n_per_m];
+            check(numbers.iter().chain(&f.bending_nm).all(|x| x.is_finite() && *x > 0.0), "a constant is not above 0")?;
+            check(f.poisson.is_finite() && f.friction.is_finite() && f.friction >= 0.0, "a ratio is no number")?;
+            Ok(Said::Taken)
+        }
+    });
+}
+
+#[test]
+fn garments() {
+    fuzz("garment", 1.0, assets("garments"), |text| match GarmentSpec::from_toml(text) {
+        Err(e) => refused(&e),
+        Ok(spec) => {
+            let again = toml::from_str::<GarmentSpec>(&toml::to_string(&spec).map_err(|e| e.to_string())?);
+            check(again.is_ok_and(|again| again == spec), "it reads back as another")?;
+            Ok(Said::Taken)
+        }
+    });
+}
+
+#[test]
+fn bodies() {
+    let mut seeds = assets("bodies");
+    seeds.push(toml::to_string(&BodySpec::default()).unwrap());
+    fuzz("body", 1.0, seeds, |text| {
+        let spec = match BodySpec::from_toml(text) {
+            Ok(spec) => spec,
+            Err(e) => return refused(&e),
+        };
+        match spec.measures() {
+            Err(e) => refused(&e),
+            Ok(m) => {
+                check(
+                    [m.stature, m.bust, m.waist, m.hip, m.crotch].iter().all(|x| x.is_finite() && *x > 0.0),
+                    "no length",
+                )?;
+                Ok(Said::Taken)
+            }
+        }
+    });
+}
+
+#[test]
+fn made_garments_on_made_bodies() {
+    // Any spec that is taken makes a mesh, or says why not: a quarter of a second each.
+    let body = toml::to_string(&BodySpec::default()).unwrap();
+    let seeds = assets("garments").into_iter().map(|garment| format!("{garment}\n=====\n{body}")).collect();
+    fuzz("made", 1.0 / 3000.0, seeds, |text| {
+        let (garment, body) = text.split_once("\n=====\n").unwrap_or((text, ""));
+        let made = GarmentSpec::from_toml(garment).and_then(|spec| {
+            let body = BodySpec::from_toml(body)?;
+            partwise::shapes::garment(&spec, &body, Some(600))
+        });
+        match made {
+            Err(e) => refused(&e),
+            Ok(made) => {
+                check(made.mesh.vertex_count() <= 600, "it has more vertices than asked for")?;
+                check(made.mesh.positions.iter().all(|p| p.is_finite()), "a position is no number")?;
+                check(made.rest.areas().iter().all(|a| *a > 0.0), "a triangle has no area at rest")?;
+                Ok(Said::Taken)
+            }
+        }
+    });
+}
+
+#[test]
+fn sweep_files() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/sweeps");
+    fuzz("sweep", 0.2, assets("sweeps"), move |text| match Plan::parse(text, "input.toml", &folder, &Job::preview()) {
+        Err(e) => refused(&e),
+        Ok(plan) => {
+            check(!plan.points.is_empty() && plan.repeats > 0, "it has no points")?;
+            check(plan.points.iter().enumerate().all(|(i, point)| point.index == i), "points are not in order")?;
+            Ok(Said::Taken)
+        }
+    });
+}
+
+#[test]
+fn jobs() {
+    let mut other = Job::preview();
+    other.settings.refine = Refine::Converged;
+    other.settings.table = partwise::range_table::TableRule::Quantile { name: "q".to_owned(), levels: 5 };
+    let seeds = [Job::default(), Job::preview(), other].map(|job| serde_json::to_string_pretty(&job).unwrap());
+    fuzz("job", 1.0, seeds.to_vec(), |text| match serde_json::from_str::<Job>(text) {
+        Err(e) => refused(&e),
+        Ok(job) => {
+            let again = serde_json::to_string(&job).map_err(|e| e.to_string())?;
+            check(serde_json::from_str::<Job>(&again).is_ok_and(|again| again == job), "it reads back as another")?;
+            Ok(Said::Taken)
+        }
+    });
+}
+
+#[test]
+fn names() {
+    let seeds = BUILT_IN.iter().map(|name| format!("{name}@900")).chain(fabric::BUILT_IN.map(str::to_owned)).collect();
+    fuzz("name", 0.2, seeds, |text| match SceneSpec::new("form", text.replace(['/', '\\', '.'], "")).check_names() {
+        Err(e) => refused(&e),
+        Ok(()) => Ok(Said::Taken),
+    });
+}
