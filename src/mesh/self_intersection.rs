@@ -1,7 +1,7 @@
 //! Which triangles of a mesh cross each other, or those of another mesh: all pairs, exactly.
 //!
 //! Candidates come from parry3d's bounding volume hierarchy, box against box, one triangle a task; each is decided by the exact
-//! test of [`triangle_crossing`](super::triangle_crossing). Pairs are sorted, so the list is the same on any number of threads.
+//! test of `triangle_crossing`. Pairs are sorted, so the list is the same on any number of threads.
 
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};

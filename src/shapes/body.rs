@@ -1,6 +1,6 @@
 //! The dress form as a mesh.
 //!
-//! The solid of [`anatomy`](super::anatomy) is contoured, remeshed to triangles of even shape that are smaller where
+//! The solid of `anatomy` is contoured, remeshed to triangles of even shape that are smaller where
 //! limbs are thin, and its girths are corrected until those of the mesh, measured by slicing it, are what was asked.
 //! The figure stands on z = 0, looks along −y, its left is +x. Lengths in metres.
 
