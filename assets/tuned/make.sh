@@ -1,6 +1,7 @@
 #!/bin/sh
 # Tuned tables and their figures: each of the five garments by itself, by affine maps and, as the paper asks it, by translations
-# and levels alone; one table for three with two held out, twice; one for four with one held out, five times. Prints the figures as one table. Everything is computed anew, reference drapes too; the
+# and levels alone; one table for four with the fifth left out, five times. Takes an hour or more on two cores. Prints the figures as one
+# table. Everything is computed anew, reference drapes too; the
 # fronts are large and left out. Needs `partwise` on the path.
 set -e
 cd "$(dirname "$0")/.."

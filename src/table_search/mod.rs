@@ -18,7 +18,7 @@
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | c(a, b, e) | PARTs of level [a, b) cut to extent e, over all garments | – |
-//! | v(a, b, e) | their share of the squared representable error, Σ over garments of weight/vertices · e (`accuracy::moments`) | m² |
+//! | v(a, b, e) | their share of the squared representable error, Σ over garments of weight/vertices · what its motion leaves of each PART | m² |
 //! | E(b, p) | least squared error of the vertices below b with p PARTs | m² |
 //!
 //! Source: own; segmentation by dynamic programming goes back to Bellman 1961, "On the approximation of curves by line segments

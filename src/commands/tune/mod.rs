@@ -76,7 +76,7 @@ pub(crate) struct TuneArgs {
     #[arg(long, value_name = "N", help_heading = "Search")]
     max_parts: Option<usize>,
     /// Widths (along the weft) a level may be cut to [default: 30 from 4 to 80, and not to be cut is open to it too;
-    /// for several garments together 17 from 6 to 24]
+    /// for several garments together 11 from 6 to 16]
     #[arg(long, value_name = "CM[,CM...]", value_delimiter = ',', help_heading = "Search")]
     extents: Vec<f64>,
     /// Heights of pieces (along the warp) over their widths; 1 alone keeps them as wide as tall [default: 0.5, 1, 2, 4; for
