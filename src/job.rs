@@ -136,9 +136,7 @@ impl Job {
                 (found.canonical.positions.clone(), Some(found.clone()), found.warnings)
             }
         };
-        let mut held = vec![false; reference.len()];
-        scene.held.iter().for_each(|&v| held[v as usize] = true);
-        let best = representable(&scene.topology, &drape.parts, &held, &scene.garment.positions, &reference);
+        let best = representable(&scene.topology, &drape.parts, &scene.is_held(), &scene.garment.positions, &reference);
         let affine = Some(best.blended_affine_rms_mm).filter(|mm| mm.is_finite());
         let mut figures = Figures {
             canonical_rms_mm: Some(accuracy::rms_mm(&drape.positions, &reference)),

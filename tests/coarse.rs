@@ -5,8 +5,11 @@
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};
+use partwise::drape::unobserved;
+use partwise::job::{Against, Job};
 use partwise::mesh::coarse::Coarse;
 use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::range_table::TableRule;
 
 /// An open tube of this radius and height, m, its rows shifted against each other.
 fn tube(radius: f64, height: f64, around: usize, rows: usize) -> TriMesh {
@@ -114,4 +117,21 @@ fn what_is_no_manifold_or_far_from_its_rest_shape_has_none() {
     three.triangles.push([0, 1, 300]);
     let rest = RestShape::from_edges(&three).unwrap();
     assert!(Coarse::new(&three, &rest, 400).is_none(), "three triangles at an edge");
+}
+
+#[test]
+fn a_preview_that_begins_on_it_hangs_as_its_parts_can_whatever_the_threads() {
+    // 425 vertices on the coarse cloth, for three rings.
+    let mut job = Job { accuracy: Against::Own, ..Job::preview() };
+    job.scene.garment = "flared-skirt@1700".to_owned();
+    job.settings.table = TableRule::Quantile { name: "3 quantile levels".to_owned(), levels: 3 };
+    let input = job.scene.load().unwrap();
+    let drape = || job.drape(&input.scene, &mut unobserved).unwrap();
+    let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(drape);
+    let (one, two) = (on(1), on(2));
+    assert_eq!(one.positions, two.positions);
+    assert!(one.parts.len() <= 10 && one.warnings.is_empty(), "{} PARTs, {:?}", one.parts.len(), one.warnings);
+    let figures = job.measure(&input.scene, &one, None, &mut unobserved).unwrap().figures;
+    let (error, bound) = (figures.rms_mm.unwrap(), figures.own_affine_rms_mm.unwrap());
+    assert!(figures.penetrating_vertices == 0 && error <= 1.5 * bound + 3.0, "{error} mm, the bound is {bound} mm");
 }

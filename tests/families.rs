@@ -272,7 +272,7 @@ fn a_sample_comes_to_rest() {
 }
 
 #[test]
-#[ignore = "hours: `cargo test --release --test families -- --ignored --nocapture`"]
+#[ignore = "hours, and garments with slivers do not all rest yet: `cargo test --release --test families -- --ignored --nocapture`"]
 fn all_come_to_rest() {
     let ends = family([60, 250, 1_000, 4_000, 10_000].into_iter().flat_map(|vertices| {
         (0..PAIRS.len()).flat_map(move |pair| {

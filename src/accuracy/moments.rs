@@ -24,6 +24,7 @@ use std::ops::{AddAssign, SubAssign};
 use glam::{DMat3, DVec3};
 
 use crate::mechanics::coupled::Motion;
+use crate::mechanics::energy::membrane::outer;
 
 /// Ridge relative to Σ|d|²: it leaves the direction across a flat piece undetermined at no cost to the others.
 const RIDGE: f64 = 1e-9;
@@ -105,11 +106,6 @@ impl Moments {
         // Of a piece without extent nothing is left but rounding.
         if held.is_finite() { (spread - held).clamp(0.0, spread) } else { spread }
     }
-}
-
-/// a bᵀ.
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 #[cfg(test)]

@@ -76,10 +76,8 @@ impl Level {
             return None;
         }
         let coarse = Coarse::new(mesh, rest, count)?;
-        let held = match above {
-            None => coarse.kept(&scene.held),
-            Some(above) => (0u32..).zip(coarse.restrict(&above.cloth.held)).filter(|h| h.1).map(|h| h.0).collect(),
-        };
+        let held = above.map_or_else(|| scene.is_held(), |above| above.cloth.held.clone());
+        let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
         let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabric, &held).ok()?;
         Some(Self { coarse, cloth })
     }

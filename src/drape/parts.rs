@@ -92,8 +92,8 @@ fn couple(
 /// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
 const ENOUGH: usize = 8;
 
-/// Edges of a fold's width that a cloth needs to make folds: with half of them a knit skirt in PARTs of 14 cm ends 40 mm from its
-/// rest instead of 20.
+/// Edges of a fold's width that a cloth needs to make folds: a knit skirt of 4,000 vertices in PARTs of 14 cm ends 20 mm from its rest, and
+/// 40 where it starts on a quarter of them.
 const EDGES_A_FOLD: f64 = 8.0;
 
 /// Share of the garment in PARTs that make folds from which these count.

@@ -87,12 +87,6 @@ impl Coarse {
         self.vertices.iter().map(|&v| fine[v as usize]).collect()
     }
 
-    /// The coarse numbers of those fine vertices that are left, ascending.
-    #[must_use]
-    pub fn kept(&self, fine: &[u32]) -> Vec<u32> {
-        (0u32..).zip(&self.vertices).filter(|(_, v)| fine.contains(v)).map(|(new, _)| new).collect()
-    }
-
     /// Where the fine vertices go from `from` (m) when the coarse ones go to `to` (m).
     #[must_use]
     pub fn prolong(&self, from: &[DVec3], to: &[DVec3]) -> Vec<DVec3> {

@@ -60,6 +60,19 @@ impl Scene {
         Ok((Self { body, garment, topology, rest, held: Vec::new() }, report))
     }
 
+    /// Whether each garment vertex is held.
+    #[must_use]
+    pub fn is_held(&self) -> Vec<bool> {
+        let mut held = vec![false; self.garment.vertex_count()];
+        for &v in &self.held {
+            // One that does not exist is the cloth's to refuse.
+            if let Some(held) = held.get_mut(v as usize) {
+                *held = true;
+            }
+        }
+        held
+    }
+
     /// Unsigned distance of each garment vertex to the body, m: equation (1) takes it without its sign, as a vertex inside is
     /// as far from the surface as one outside.
     #[must_use]
