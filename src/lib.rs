@@ -37,6 +37,7 @@
 
 pub mod accuracy;
 pub mod assess;
+pub mod certificate;
 pub mod distance;
 pub mod drape;
 pub mod fabric;

@@ -1,8 +1,11 @@
-//! `partwise check`: the health of a body and a garment, and how they lie about each other, without draping.
+//! `partwise check`: the health of a body and a garment, and how they lie about each other, without draping; on request whether the
+//! garment, a draped one, is at rest.
 
 use clap::Args;
 use comfy_table::{Table, presets};
 use partwise::SceneSpec;
+use partwise::certificate::{Certificate, certify};
+use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
 use serde::Serialize;
@@ -22,6 +25,13 @@ pub(crate) struct CheckArgs {
     garment_file: Option<String>,
     #[command(flatten)]
     input: InputArgs,
+    /// Certify that the garment, one that was draped and exported, is at rest: forces, curvature, contact and strain, from its
+    /// positions alone. Give the undraped one as --rest, and the --fabric it was draped in; exit code 1 where a line fails
+    #[arg(long, help_heading = "Certificate")]
+    certificate: bool,
+    /// Fabric it was draped in: a name or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC, help_heading = "Certificate")]
+    fabric: String,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
@@ -34,6 +44,8 @@ struct Report {
     fit: Placement,
     notes: Vec<String>,
     verdict: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<Certificate>,
 }
 
 /// What of it all is in the way of a drape.
@@ -67,10 +79,15 @@ impl CheckArgs {
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
         let verdict = verdict(&body, &garment, &fit);
-        let report = Report { body, garment, fit, notes: loaded.notes(), verdict };
+        let certificate = if self.certificate {
+            Some(certify(scene, &Fabric::by_name(&self.fabric)?, &scene.garment.positions)?)
+        } else {
+            None
+        };
+        let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
         if self.format == Format::Json {
             console::result(&serde_json::to_string(&report)?);
-            return Ok(());
+            return verified(report.certificate.as_ref());
         }
         for note in &report.notes {
             console::note(note);
@@ -84,6 +101,37 @@ impl CheckArgs {
             table.add_row([name.to_owned(), String::new(), value]);
         }
         console::result(&format!("{table}\nverdict: {}", report.verdict));
-        Ok(())
+        if let Some(certificate) = &report.certificate {
+            console::result(&text(certificate));
+        }
+        verified(report.certificate.as_ref())
     }
+}
+
+/// A certificate for people.
+fn text(certificate: &Certificate) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["certificate", "", "found", "limit", "", ""]);
+    for f in &certificate.findings {
+        let number =
+            |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };
+        let found = if f.passes { "passes" } else { "FAILS" };
+        table.add_row([
+            f.name.to_owned(),
+            found.to_owned(),
+            number(f.value),
+            number(f.limit),
+            f.unit.to_owned(),
+            f.remark.clone(),
+        ]);
+    }
+    let verdict = if certificate.passes { "a drape at rest" } else { "not certified" };
+    format!("{table}\n{verdict}")
+}
+
+/// Ends with 1 where a line fails.
+fn verified(certificate: Option<&Certificate>) -> anyhow::Result<()> {
+    let failed = certificate.map_or(0, |c| c.findings.iter().filter(|f| !f.passes).count());
+    anyhow::ensure!(failed == 0, "not certified: {failed} lines of the certificate fail");
+    Ok(())
 }

@@ -132,6 +132,30 @@ impl Solver {
         self.double.solve(&self.symbolic, x);
         Ok(())
     }
+
+    /// Solves once more with the matrix of the last [`solve`](Self::solve), whose factor is kept; where single precision does not do for
+    /// this right side, it is factorised in double.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn solve_again(
+        &mut self,
+        pattern: &Pattern,
+        blocks: &[DMat3],
+        diagonal: &[f64],
+        x: &mut [DVec3],
+    ) -> Result<(), SolveError> {
+        if let Some(single) = &mut self.single {
+            if mended(single, &self.symbolic, pattern, blocks, diagonal, x) {
+                return Ok(());
+            }
+            self.single = None;
+            let shape = Shape { symbolic: &self.symbolic, starts: &self.starts, rows: &self.rows };
+            self.double.factorise(shape, pattern, blocks, diagonal)?;
+        }
+        self.double.solve(&self.symbolic, x);
+        Ok(())
+    }
 }
 
 /// Solves with a factor in single precision and mends the solution; where that fails, `x` is left as it was.

@@ -1,0 +1,176 @@
+//! The certificate: a cloth that lies on a table has one, and each of its lines fails for a garment made to fail it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use glam::{DMat3, DVec3};
+use partwise::Scene;
+use partwise::certificate::{Certificate, CertifyError, certify};
+use partwise::distance::Body;
+use partwise::fabric::Fabric;
+use partwise::mechanics::energy::Cloth;
+use partwise::mesh::{RestShape, Topology, TriMesh};
+
+/// Squares along each side of the cloth, and the length of one, m.
+const SQUARES: u32 = 8;
+const SIDE: f64 = 0.02;
+
+/// A box of these half sizes with its top at z = 0, turned by `turn` about the origin.
+fn table(half: f64, turn: DMat3) -> TriMesh {
+    let corner = |i: usize| DVec3::new(half * sign(i), half * sign(i >> 1), if i >> 2 & 1 == 1 { 0.0 } else { -1.0 });
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh::new((0..8).map(|i| turn * corner(i)).collect(), triangles)
+}
+
+fn sign(bit: usize) -> f64 {
+    if bit & 1 == 1 { 1.0 } else { -1.0 }
+}
+
+/// A square cloth in the plane z = 0 about the origin.
+fn sheet() -> TriMesh {
+    let n = SQUARES + 1;
+    let middle = 0.5 * f64::from(SQUARES);
+    let at = |i: u32| DVec3::new(f64::from(i % n) - middle, f64::from(i / n) - middle, 0.0) * SIDE;
+    let squares = (0..n * n).filter(|i| i % n < SQUARES && i / n < SQUARES);
+    let triangles = squares.flat_map(|i| [[i, i + 1, i + n + 1], [i, i + n + 1, i + n]]).collect();
+    TriMesh::new((0..n * n).map(at).collect(), triangles)
+}
+
+fn jersey() -> Fabric {
+    Fabric::by_name("jersey").unwrap()
+}
+
+fn scene(body: &TriMesh, garment: TriMesh) -> Scene {
+    let rest = RestShape::from_edges(&garment).unwrap();
+    let topology = Topology::new(&garment);
+    Scene { body: Body::new(body).unwrap(), garment, topology, rest, held: Vec::new() }
+}
+
+/// The distance that the cloth keeps from what it lies on, m.
+fn offset(scene: &Scene) -> f64 {
+    Cloth::new(&scene.garment, &scene.topology, &scene.rest, &jersey(), &scene.held).unwrap().offset
+}
+
+fn certified(scene: &Scene, x: &[DVec3]) -> Certificate {
+    certify(scene, &jersey(), x).unwrap()
+}
+
+/// The cloth on a table, at rest: where each of the others starts from.
+fn lying() -> (Scene, Vec<DVec3>) {
+    let scene = scene(&table(1.0, DMat3::IDENTITY), sheet());
+    let up = DVec3::Z * offset(&scene);
+    let x = scene.garment.positions.iter().map(|x| *x + up).collect();
+    (scene, x)
+}
+
+#[track_caller]
+fn fails(certificate: &Certificate, line: &str) {
+    let finding = certificate.finding(line).unwrap();
+    assert!(!finding.passes && !certificate.passes, "{finding:?}");
+}
+
+#[test]
+fn a_cloth_on_a_table_passes_every_line() {
+    let (scene, x) = lying();
+    let certificate = certified(&scene, &x);
+    assert!(certificate.passes, "{:#?}", certificate.findings);
+    assert_eq!(certificate.findings.len(), 10);
+    let carried = &certificate.finding("forces add up").unwrap().remark;
+    assert!(carried.contains("the body carries 100.0 %"), "{carried}");
+}
+
+#[test]
+fn in_the_air_nothing_holds_it() {
+    let (scene, x) = lying();
+    let x: Vec<DVec3> = x.iter().map(|x| *x + DVec3::Z * 0.05).collect();
+    let certificate = certified(&scene, &x);
+    for line in ["residual", "forces add up", "still moving", "distance to rest"] {
+        fails(&certificate, line);
+    }
+    // One unit of weight on n vertices, about alike.
+    let residual = certificate.finding("residual").unwrap().value;
+    let alike = 1.0 / f64::from(SQUARES + 1);
+    assert!(residual > alike && residual < 1.2 * alike, "{residual}");
+    assert!((certificate.finding("forces add up").unwrap().value - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn on_a_slope_steeper_than_its_friction_it_slides() {
+    let steepest = jersey().friction.atan();
+    for (angle, slides) in [(steepest - 0.02, false), (steepest + 0.02, true)] {
+        let turn = DMat3::from_rotation_y(angle);
+        let mut scene = scene(&table(1.0, turn), sheet());
+        let up = DVec3::Z * offset(&scene);
+        let x: Vec<DVec3> = scene.garment.positions.iter().map(|x| turn * (*x + up)).collect();
+        scene.garment = scene.garment.with_positions(x.clone());
+        let certificate = certified(&scene, &x);
+        let friction = certificate.finding("friction").unwrap();
+        assert_eq!(friction.passes, !slides, "{angle}: {friction:?}");
+    }
+}
+
+#[test]
+fn compressed_between_two_held_edges_it_would_buckle() {
+    let (mut scene, _) = lying();
+    let half = 0.5 * f64::from(SQUARES) * SIDE;
+    let on_edge = |x: &DVec3| x.x.abs() > half - 1e-9;
+    scene.held = (0u32..).zip(&scene.garment.positions).filter(|(_, x)| on_edge(x)).map(|(v, _)| v).collect();
+    let squeezed = |by: f64| -> Vec<DVec3> {
+        scene.garment.positions.iter().map(|x| DVec3::new(x.x * (1.0 - by), x.y, 0.1)).collect()
+    };
+    let finding = |by| certified(&scene, &squeezed(by)).finding("lowest curvature").unwrap().clone();
+    let flat = finding(0.0);
+    assert!(flat.passes && flat.value > 0.0, "{flat:?}");
+    let squeezed = finding(0.05);
+    assert!(!squeezed.passes && squeezed.remark.contains("ways out"), "{squeezed:?}");
+}
+
+#[test]
+fn a_vertex_in_the_table_is_inside_and_its_triangles_cross() {
+    let (scene, mut x) = lying();
+    x[40].z = -0.005;
+    let certificate = certified(&scene, &x);
+    fails(&certificate, "inside the body");
+    fails(&certificate, "skin through cloth");
+    assert_eq!(certificate.finding("inside the body").unwrap().value, 1.0);
+}
+
+#[test]
+fn a_column_through_a_triangle_shows_without_a_vertex_inside() {
+    let column = table(0.002, DMat3::IDENTITY);
+    let column = column.with_positions(column.positions.iter().map(|x| *x + DVec3::new(0.01, 0.005, 0.0)).collect());
+    let scene = scene(&column, sheet());
+    let x: Vec<DVec3> = scene.garment.positions.iter().map(|x| *x - DVec3::Z * 0.01).collect();
+    let certificate = certified(&scene, &x);
+    fails(&certificate, "skin through cloth");
+    assert!(certificate.finding("inside the body").unwrap().passes);
+}
+
+#[test]
+fn a_corner_folded_through_the_cloth_crosses_it() {
+    let (scene, mut x) = lying();
+    // The corner's neighbours are lifted, and it is stuck through the middle of the cloth.
+    for (v, up) in [(0, -0.005), (1, 0.01), (9, 0.01), (10, 0.01)] {
+        x[v] = x[40] + DVec3::new(0.3 * SIDE, 0.2 * SIDE + v as f64 * 1e-4, up);
+    }
+    fails(&certified(&scene, &x), "cloth through cloth");
+}
+
+#[test]
+fn stretched_by_sixty_percent_it_tears() {
+    let (scene, x) = lying();
+    let x: Vec<DVec3> = x.iter().map(|x| DVec3::new(1.6 * x.x, x.y, x.z)).collect();
+    let certificate = certified(&scene, &x);
+    fails(&certificate, "largest strain");
+    assert!((certificate.finding("largest strain").unwrap().value - 60.0).abs() < 1e-6);
+}
+
+#[test]
+fn what_is_no_garment_is_refused() {
+    let (scene, mut x) = lying();
+    x[7].y = f64::NAN;
+    let said = certify(&scene, &jersey(), &x).unwrap_err();
+    assert!(matches!(said, CertifyError::NotFinite { vertex: 7 }) && said.to_string().contains("number 8"), "{said}");
+    x.pop();
+    assert!(matches!(certify(&scene, &jersey(), &x), Err(CertifyError::Count { found: 80, expected: 81 })));
+}
