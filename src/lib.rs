@@ -43,6 +43,8 @@ pub mod fabric;
 pub mod figures;
 pub mod files;
 pub mod job;
+#[cfg(feature = "viewer")]
+pub mod live;
 pub mod mechanics;
 pub mod mesh;
 pub mod parts;

@@ -153,7 +153,7 @@ fn an_edit_during_a_step_interrupts_the_work_and_results_keep_their_state() {
     let (session, mut workshop) = settled(true);
     let seen: Arc<Mutex<Vec<(u64, u64)>>> = Arc::default();
     let (handle, log, edits) = (session.clone(), Arc::clone(&seen), AtomicUsize::new(0));
-    session.listen(move || {
+    session.listen(move |_| {
         let now = handle.snapshot();
         if let Some(preview) = &now.preview {
             log.lock().unwrap().push((now.state, preview.state));

@@ -21,6 +21,7 @@
 mod desk;
 mod edit;
 mod history;
+mod pins;
 mod presets;
 mod results;
 mod workshop;
@@ -37,8 +38,8 @@ pub use workshop::Workshop;
 
 use crate::job::Job;
 
-/// Called whenever something became known.
-type Listener = Arc<dyn Fn() + Send + Sync>;
+/// Called with the serial number of what became known.
+type Listener = Arc<dyn Fn(u64) + Send + Sync>;
 
 /// A handle to the session; clones are the same session.
 #[derive(Clone)]
@@ -89,10 +90,8 @@ impl Session {
     /// # Errors
     /// As there.
     pub fn submit_job(&self, job: Job) -> Result<u64, EditError> {
-        self.change(|desk| {
-            job.scene.check_names()?;
-            desk.take(job, None)
-        })
+        check(&job)?;
+        self.change(|desk| desk.take(job, None))
     }
 
     /// Hands in a whole job whose files hold something else than before: body and garment are read again.
@@ -100,10 +99,8 @@ impl Session {
     /// # Errors
     /// As [`submit`](Self::submit).
     pub fn reload(&self, job: Job) -> Result<u64, EditError> {
-        self.change(|desk| {
-            job.scene.check_names()?;
-            desk.take_anew(job)
-        })
+        check(&job)?;
+        self.change(|desk| desk.take_anew(job))
     }
 
     /// Takes the last step back.
@@ -150,8 +147,9 @@ impl Session {
         waited.unwrap_or_else(PoisonError::into_inner).0.view.clone()
     }
 
-    /// Has `listener` called whenever something became known, on the thread that found it; it must be quick.
-    pub fn listen(&self, listener: impl Fn() + Send + Sync + 'static) {
+    /// Has `listener` called with its serial number whenever something became known, on the thread that found it; it must be
+    /// quick.
+    pub fn listen(&self, listener: impl Fn(u64) + Send + Sync + 'static) {
         self.0.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::new(listener));
     }
 
@@ -159,7 +157,7 @@ impl Session {
     pub fn close(&self) {
         self.0.closed.store(true, Ordering::SeqCst);
         self.0.changed.notify_all();
-        self.tell();
+        self.tell(u64::MAX);
     }
 
     /// Whether it was ended.
@@ -194,9 +192,10 @@ impl Session {
         desk.view.serial += 1;
         (desk.view.undo, desk.view.redo) = desk.steps();
         self.0.newest.store(desk.view.state, Ordering::SeqCst);
+        let serial = desk.view.serial;
         drop(desk);
         self.0.changed.notify_all();
-        self.tell();
+        self.tell(serial);
         Ok(done)
     }
 
@@ -207,9 +206,15 @@ impl Session {
         done.unwrap_or_default();
     }
 
-    fn tell(&self) {
+    fn tell(&self, serial: u64) {
         // A listener may hand in an edit, and tell others in turn.
         let listeners = self.0.listeners.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        listeners.iter().for_each(|listener| listener());
+        listeners.iter().for_each(|listener| listener(serial));
     }
+}
+
+/// Whether a whole job can be used, as far as can be told before it is tried.
+fn check(job: &Job) -> Result<(), EditError> {
+    job.scene.check_names()?;
+    Ok(job.settings.fabric.check("settings.fabric")?)
 }
