@@ -114,7 +114,8 @@ impl Fabric {
         Ok(fabric)
     }
 
-    fn check(&self, file: &str) -> Result<(), FabricError> {
+    /// Whether every constant can be used; `file` is named in errors.
+    pub(crate) fn check(&self, file: &str) -> Result<(), FabricError> {
         let positive = [
             ("density_kg_per_m2", self.density_kg_per_m2),
             ("thickness_m", self.thickness_m),

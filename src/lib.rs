@@ -33,7 +33,7 @@
 //! [`mesh`] → [`distance`] → [`scene`] → [`parts`] → [`mechanics`] → [`drape()`](drape::drape) → [`job`] → `record` →
 //! the command line. [`shapes`] makes the built-in body and garments, [`range_table`] and [`fabric`] hold the two
 //! inputs a user tunes, [`accuracy`] measures a result against a reference, [`figures`] are what everybody reads of it,
-//! [`sweep`] runs jobs by the hundred. Only `record` knows Rerun; only the binary knows clap.
+//! [`sweep`] runs jobs by the hundred, [`session`] keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
 
 pub mod accuracy;
 pub mod assess;
@@ -44,6 +44,8 @@ pub mod fabric;
 pub mod figures;
 pub mod files;
 pub mod job;
+#[cfg(feature = "viewer")]
+pub mod live;
 pub mod mechanics;
 pub mod mesh;
 pub mod parts;
@@ -54,6 +56,7 @@ pub mod record;
 pub mod said;
 pub mod scene;
 pub mod sealed;
+pub mod session;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;

@@ -35,7 +35,7 @@ fn an_unwritable_path_is_the_users_mistake_and_names_the_file() {
 fn a_port_in_use_is_named_and_no_file_is_begun() {
     let folder = tempfile::tempdir().unwrap();
     let (_listener, port) = taken_port();
-    let serve = |web_port, grpc_port| Sink::Serve { web_port, grpc_port };
+    let serve = |web_port, grpc_port| Sink::Serve { web_port, grpc_port, history_bytes: 1 << 28 };
     for (sink, option) in [(serve(Some(port), None), "--web-port"), (serve(None, Some(port)), "--grpc-port")] {
         let error = refused(vec![Sink::File(folder.path().join("x.rrd")), sink]);
         assert!(matches!(error, RecordError::PortInUse { .. }), "{error}");

@@ -286,7 +286,7 @@ fn a_step_that_does_not_fit_the_garment_is_refused() {
 fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.rrd");
-    let serve = Sink::Serve { web_port: None, grpc_port: None };
+    let serve = Sink::Serve { web_port: None, grpc_port: None, history_bytes: 1 << 28 };
     let mut both = options(&path, Layout { follow: true, ..Layout::default() });
     both.sinks.push(serve);
     let mut recorder = Recorder::open(both).unwrap();

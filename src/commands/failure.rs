@@ -5,11 +5,13 @@ use std::process::ExitCode;
 
 use partwise::fabric::FabricError;
 use partwise::files::Unreadable;
+use partwise::live::LiveError;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
 use partwise::scene::SceneError;
+use partwise::session::EditError;
 use partwise::shapes::ShapeError;
 use partwise::sweep::{MergeError, PlanError, StoreError};
 use partwise::table_search::SearchError;
@@ -43,6 +45,8 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<FabricError>()
         || cause.is::<ShapeError>()
         || cause.is::<PaperError>()
+        || cause.is::<EditError>()
+        || cause.downcast_ref::<LiveError>().is_some_and(|error| !matches!(error, LiveError::Server(_)))
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
         || cause.downcast_ref::<StoreError>().is_some_and(store)

@@ -75,10 +75,14 @@ impl InputArgs {
         })
     }
 
+    /// Where built-in meshes are kept.
+    pub(crate) fn meshes(&self) -> MeshCache {
+        if self.no_cache { MeshCache::default() } else { MeshCache::in_user_cache() }
+    }
+
     /// Loads a scene of these flags, saying where measurements that make no body were given.
     pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
-        let meshes = if self.no_cache { MeshCache::default() } else { MeshCache::in_user_cache() };
-        spec.load_with(&meshes).map_err(|error| match error {
+        spec.load_with(&self.meshes()).map_err(|error| match error {
             SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
             other => other.into(),
         })

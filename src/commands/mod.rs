@@ -8,11 +8,13 @@ mod cusick;
 mod failure;
 mod inputs;
 mod interrupt;
+mod live;
 mod measurements;
 mod merge;
 mod readings;
 mod run;
 mod sinks;
+mod solved;
 mod stages;
 mod summary;
 mod sweep;
@@ -41,6 +43,7 @@ Examples:
   partwise view recordings/low-cut-dress.rrd      look at it in a browser
   partwise --garment flared-skirt@3613 --spawn    another garment and size, straight into the native viewer
   partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and said
+  partwise live                                   a page: drag the bounds, the garment follows
   partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
   partwise --format json --threads 1              one JSON object on stdout, for scripts
 
@@ -66,6 +69,9 @@ struct Cli {
 enum Command {
     /// Drape one garment and record every stage (the default)
     Run(Box<run::RunArgs>),
+    /// Serve a page to turn the dial on, and the same by HTTP
+    #[command(long_about = live::LONG_ABOUT, after_long_help = live::HTTP)]
+    Live(Box<live::LiveArgs>),
     /// Report the health of a body and a garment, and how they lie about each other, without draping
     Check(Box<check::CheckArgs>),
     /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
@@ -93,6 +99,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
+        Some(Command::Live(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
         Some(Command::Cusick(args)) => args.execute(),
         Some(Command::Sweep(args)) => args.execute(),

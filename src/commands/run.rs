@@ -1,25 +1,22 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
-mod recording;
+mod watching;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use glam::DVec3;
 use partwise::Job;
-use partwise::drape::Drape;
-use partwise::job::{Against, Measured};
-use partwise::record::{Layout, RecordOptions, Recorder};
-use partwise::scene::Loaded;
+use partwise::job::Against;
+use partwise::record::Recorder;
 
 use super::inputs::InputArgs;
 use super::sinks::SinkArgs;
+use super::solved::{Snapshot, Solved};
 use super::stages::StageArgs;
 use super::summary::{Summary, ms};
-use super::watch::FileWatch;
 use super::work::{cache, refining, use_threads};
-use super::{console, failure::UserError, interrupt};
+use super::{console, interrupt};
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -65,24 +62,6 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
-/// A garment through every stage.
-struct Solved {
-    job: Job,
-    loaded: Loaded,
-    drape: Drape,
-    measured: Measured,
-    snapshots: Vec<Snapshot>,
-    summary: Summary,
-}
-
-/// The cloth at one of the solver's steps; the mesh every so often.
-struct Snapshot {
-    iteration: usize,
-    energy: f64,
-    residual_over_weight: f64,
-    positions: Option<Vec<DVec3>>,
-}
-
 /// The recording gets the mesh at every so many steps: enough to see it settle, a few megabytes at most.
 const MESH_EVERY: usize = 8;
 
@@ -91,24 +70,20 @@ impl RunArgs {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
         interrupt::listen_at_once();
-        let start = Instant::now();
-        let mut solved = self.solve(self.job()?, start, None)?;
-        let mut recorder = Recorder::open(self.record_options(&solved))?;
-        solved.record(&mut recorder, 0, self.records_iterations())?;
-        if let Some(path) = &self.export {
-            solved.loaded.write(path, &solved.drape.positions)?;
-            solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
+        if self.watch {
+            return self.keep_watching();
         }
-        if self.watch || self.sinks.serve {
+        let start = Instant::now();
+        let mut solved = self.solve(self.job()?, start)?;
+        let mut recorder = Recorder::open(solved.record_options(&self.sinks, !self.no_iterations, false))?;
+        solved.record(&mut recorder, 0, !self.no_iterations)?;
+        self.export(&mut solved)?;
+        if self.sinks.serve {
             self.print(&solved)?;
             if let Some(url) = recorder.web_url() {
                 console::note(&format!("look at it: {url}"));
             }
-            if self.watch {
-                self.keep_watching(&mut recorder, solved)?;
-            } else {
-                interrupt::wait();
-            }
+            interrupt::wait();
             if let Some(path) = recorder.finish()?.path {
                 console::note(&format!("recording: {}", path.display()));
             }
@@ -123,24 +98,12 @@ impl RunArgs {
         Ok(())
     }
 
-    fn record_options(&self, solved: &Solved) -> RecordOptions {
-        let overlays = solved.overlays();
-        let of_cloth = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
-        RecordOptions {
-            sinks: self.sinks.sinks(&solved.loaded.garment_name),
-            name: solved.loaded.garment_name.clone(),
-            layout: Layout {
-                several_tables: self.watch,
-                follow: self.watch,
-                iterations: self.records_iterations() && solved.snapshots.len() > 1,
-                error: solved.measured.assessment.is_some(),
-                wrinkles: solved.measured.assessment.is_some(),
-                fit: of_cloth.map(str::to_owned).collect(),
-                ..Layout::default()
-            },
-            replaceable: self.watch,
-            front: self.sinks.seen_from.direction(),
+    fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
+        if let Some(path) = &self.export {
+            solved.loaded.write(path, &solved.drape.positions)?;
+            solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
         }
+        Ok(())
     }
 
     /// The job that the flags ask for, its small files read.
@@ -150,9 +113,9 @@ impl RunArgs {
         Ok(Job { scene: self.input.spec()?, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
 
-    /// Runs every stage of a job; `kept` saves reading body and garment again.
-    fn solve(&self, mut job: Job, start: Instant, kept: Option<Loaded>) -> anyhow::Result<Solved> {
-        let loaded = kept.map_or_else(|| self.input.load(&job.scene), Ok)?;
+    /// Runs every stage of a job.
+    fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
+        let loaded = self.input.load(&job.scene)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
         let mut snapshots = Vec::new();
@@ -179,10 +142,6 @@ impl RunArgs {
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 
-    fn records_iterations(&self) -> bool {
-        !self.watch && !self.no_iterations
-    }
-
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
         for warning in &solved.summary.warnings {
             console::warning(warning);
@@ -193,51 +152,6 @@ impl RunArgs {
         match self.format {
             Format::Text => console::result(&solved.summary.text()),
             Format::Json => console::result(&solved.summary.json()?),
-        }
-        Ok(())
-    }
-
-    /// Streams a new step after each edit; an edit that does not read leaves the last good state on the page.
-    fn keep_watching(&self, recorder: &mut Recorder, solved: Solved) -> anyhow::Result<()> {
-        let of_meshes: Vec<PathBuf> =
-            solved.job.scene.files().into_iter().chain(self.input.measurements()).map(Path::to_path_buf).collect();
-        let files: Vec<PathBuf> =
-            of_meshes.iter().cloned().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
-        if files.is_empty() {
-            return Err(UserError::new(
-                "--watch has no file to watch: everything is built in. Give --table, --fabric, --body or --garment a file",
-            ));
-        }
-        let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
-        let mut watch = FileWatch::new(files)?;
-        console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
-        let mut index = 0;
-        let mut last = Some(solved.loaded);
-        while let Some(changed) = watch.changed() {
-            // Body and garment take a second to make; a new table need not wait for them.
-            let meshes_stand = changed.iter().all(|file| !of_meshes.contains(file));
-            let kept = last.take_if(|_| meshes_stand);
-            // A file that does not read is found before what is kept is used up.
-            let start = Instant::now();
-            let solved = match self.job() {
-                Ok(job) => self.solve(job, start, kept),
-                Err(error) => {
-                    last = kept;
-                    Err(error)
-                }
-            };
-            match solved {
-                Ok(mut solved) => {
-                    index += 1;
-                    solved.record(recorder, index, self.records_iterations())?;
-                    self.print(&solved)?;
-                    last = Some(solved.loaded);
-                }
-                Err(error) => {
-                    console::error(&error);
-                    recorder.notice(index, &format!("{error:#}"))?;
-                }
-            }
         }
         Ok(())
     }

@@ -10,9 +10,10 @@ use partwise::whole_file::same_place;
 use super::failure::UserError;
 
 /// Where the views of a recording look from when it opens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum SeenFrom {
     /// The wearer looks at you
+    #[default]
     Front,
     /// The wearer's left
     Side,
@@ -32,7 +33,7 @@ impl SeenFrom {
 }
 
 /// The sinks of a recording; several at once are fine.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Recording")]
 pub(crate) struct SinkArgs {
     /// Write the recording to this file [default: recordings/GARMENT.rrd]
@@ -59,6 +60,9 @@ pub(crate) struct SinkArgs {
     /// Port the served page reads the data from [default: any free one]
     #[arg(long, value_name = "PORT")]
     pub(crate) grpc_port: Option<u16>,
+    /// Megabytes of steps kept for pages that open later; beyond it the oldest go first
+    #[arg(long, value_name = "MB", default_value_t = 256)]
+    pub(crate) history: u64,
 }
 
 impl SinkArgs {
@@ -96,7 +100,8 @@ impl SinkArgs {
             sinks.push(Sink::Connect(url.clone()));
         }
         if self.serve {
-            sinks.push(Sink::Serve { web_port: self.web_port, grpc_port: self.grpc_port });
+            let history_bytes = self.history.saturating_mul(1 << 20);
+            sinks.push(Sink::Serve { web_port: self.web_port, grpc_port: self.grpc_port, history_bytes });
         }
         sinks
     }

@@ -21,21 +21,21 @@ const LEAST_VERTICES: usize = 400;
 
 /// A coarser garment.
 #[derive(Debug)]
-pub(super) struct Level {
+pub(crate) struct Level {
     coarse: Coarse,
     cloth: Cloth,
 }
 
 /// The full garment's cloth and the coarser ones, fine to coarse.
 #[derive(Debug)]
-pub(super) struct Levels {
-    pub(super) cloth: Cloth,
+pub(crate) struct Levels {
+    pub(crate) cloth: Cloth,
     pub(super) coarser: Vec<Level>,
 }
 
 impl Levels {
     /// The cloth of `scene`, and as many coarser ones as there are.
-    pub(super) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
+    pub(crate) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
         let Scene { garment, topology, rest, held, .. } = scene;
         let (cloth, coarser) = rayon::join(
             || Cloth::new(garment, topology, rest, fabric, held),

@@ -6,6 +6,7 @@
 mod error;
 mod levels;
 mod parts;
+mod pieces;
 mod settings;
 
 use std::ops::ControlFlow;
@@ -14,17 +15,16 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::distance::SurfacePoint;
-use crate::mechanics::energy::{Cloth, Contacts};
-use crate::mechanics::fit::{Fit, fit};
-use crate::mechanics::folds::{Folds, folds};
-use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
-use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::mechanics::fit::Fit;
+use crate::mechanics::folds::Folds;
+use crate::mechanics::refine::{self, Observer, Stop};
 use crate::parts::Parts;
 use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
-use levels::Levels;
-use parts::{approach, stage_one, stage_two};
+pub(crate) use levels::Levels;
+pub(crate) use parts::{StageTwo, approach, stage_one, stage_two, told};
+pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
 /// How long each stage took.
@@ -128,12 +128,10 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let StageTimes { distance: distance_time, segment: segment_time, .. } = &mut times;
     let (first, cloth) = rayon::join(
         || -> Result<_, DrapeError> {
-            let surface = timed(distance_time, || scene.body.nearest_all(&scene.garment.positions));
-            // Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
-            let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance.abs()).collect();
-            let table = settings.table.resolve(&distance)?;
-            let parts = timed(segment_time, || stage_one(scene, settings.min_part, &table, &distance));
-            Ok((surface, distance, table, parts))
+            let ground = timed(distance_time, || Distances::of(scene));
+            let table = settings.table.resolve(&ground.unsigned_m)?;
+            let parts = timed(segment_time, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
+            Ok((ground, table, parts))
         },
         || {
             let began = Instant::now();
@@ -141,107 +139,31 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
             cloth.map(|cloth| (cloth, began.elapsed()))
         },
     );
-    let (surface, distance, table, parts) = first?;
+    let (ground, table, parts) = first?;
     let (cloth, cloth_time) = cloth?;
-    let mut warnings = unassigned_warning(&parts);
     let level_part_count = parts.len();
-    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &surface, parts, cloth.as_ref()));
+    let on = || ControlFlow::Continue(());
+    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &ground.surface, parts, cloth.as_ref(), &on));
     times.mechanics += cloth_time;
     let stage = stage?;
-    warnings.extend(stage.warnings);
-    let preview_folds = match settings.model {
-        Model::Coupled(_) => cloth.as_ref().map(|levels| folds(&levels.cloth, &stage.positions)),
-        Model::Paper(_) => None,
+    let folds = folds_of(settings, cloth.as_ref(), &stage);
+    let state = match &cloth {
+        None => None,
+        Some(levels) => {
+            let refined = timed(&mut times.refine, || {
+                let start = approach(scene, settings, levels, &stage.parts, &stage.positions, &on);
+                refine_from(scene, settings, &levels.cloth, start, observer)
+            })?;
+            Some(settled(scene, settings, &levels.cloth, refined))
+        }
     };
-    let refined =
-        timed(&mut times.refine, || refine_further(scene, settings, cloth, &stage.parts, &stage.positions, observer))?;
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
-    let (positions, state) = match refined {
-        None => (stage.positions.clone(), None),
-        Some((cloth, refined)) => {
-            let contacts = met(&cloth, scene, settings.refine, &refined.positions);
-            let fit = fit(&cloth, contacts, &refined.positions, refined.contact_stiffness);
-            let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
-            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
-        }
-    };
-    warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-    if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
-        && positions.iter().all(|x| x.z < low.z)
-    {
-        warnings.push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
-    }
-    let inside =
-        scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
-    let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
-    let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
-    times.total = began.elapsed();
-    Ok(Drape {
-        surface,
-        distance,
-        table,
-        parts: stage.parts,
-        level_part_count,
-        outcomes: stage.outcomes,
-        preview: stage.positions,
-        folds: preview_folds,
-        state,
-        self_intersecting_pairs,
-        positions,
-        penetrating_vertices,
-        penetration,
-        times,
-        warnings,
-    })
-}
-
-/// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
-fn refine_further(
-    scene: &Scene,
-    settings: &Settings,
-    levels: Option<Levels>,
-    parts: &Parts,
-    start: &[DVec3],
-    observer: Observer<'_>,
-) -> Result<Option<(Cloth, Refined)>, DrapeError> {
-    let Some(levels) = levels else { return Ok(None) };
-    let max_steps = match settings.refine {
-        Refine::Steps(n) => Some(n),
-        Refine::Converged => None,
-    };
-    let start = approach(scene, settings, &levels, parts, start);
-    let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
-    let contacts = met(&levels.cloth, scene, settings.refine, &start);
-    let refined = refine::refine_with(&levels.cloth, contacts, start, &options, &mut |step| {
-        // What has fallen past the feet meets nothing any more, and would fall for ever.
-        if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
-    })?;
-    Ok(Some((levels.cloth, refined)))
-}
-
-/// What the cloth meets at `x`: by planes where no step is taken, which need no more.
-fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, x: &[DVec3]) -> Contacts<'b> {
-    if refine == Refine::Steps(0) { cloth.contacts_by_planes(&scene.body, x) } else { cloth.contacts(&scene.body, x) }
-}
-
-fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
-    let unsettled = asked == Refine::Converged && matches!(state.stop, Stop::Stalled | Stop::StepsDone);
-    unsettled.then(|| {
-        format!(
-            "the drape has not settled: after {} steps the residual is {:.1e} of the weight, expected under 1e-3",
-            state.steps, state.residual_over_weight
-        )
-    })
-}
-
-fn unassigned_warning(parts: &Parts) -> Vec<String> {
-    if parts.unassigned == 0 {
-        return Vec::new();
-    }
-    vec![format!("{} vertices lie in no level of the range table: widen its first or last row", parts.unassigned)]
+    let made = Made { ground, table, level_part_count, stage, folds, state };
+    let mut drape = made.judged(scene, settings, times);
+    drape.times.total = began.elapsed();
+    Ok(drape)
 }
 
 fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {

@@ -1,5 +1,7 @@
 //! Stages one and two, and the way from there to full resolution: everything of a drape that moves by PARTs.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 
 use super::levels::{Level, Levels};
@@ -13,26 +15,32 @@ use crate::range_table::RangeTable;
 use crate::scene::Scene;
 
 /// What stage two leaves.
-pub(super) struct StageTwo {
-    pub(super) parts: Parts,
-    pub(super) outcomes: Vec<PartOutcome>,
-    pub(super) positions: Vec<DVec3>,
-    pub(super) warnings: Vec<String>,
+#[derive(Debug, Clone)]
+pub(crate) struct StageTwo {
+    pub(crate) parts: Parts,
+    pub(crate) outcomes: Vec<PartOutcome>,
+    pub(crate) positions: Vec<DVec3>,
+    pub(crate) warnings: Vec<String>,
 }
 
+/// Asked between steps whether to go on.
+pub(crate) type Asked<'a> = &'a (dyn Fn() -> ControlFlow<()> + Sync);
+
 /// Stage one: the PARTs that the range table makes.
-pub(super) fn stage_one(scene: &Scene, min_part: usize, table: &RangeTable, distance: &[f64]) -> Parts {
+pub(crate) fn stage_one(scene: &Scene, min_part: usize, table: &RangeTable, distance: &[f64]) -> Parts {
     let parts = segment(&scene.topology, distance, table);
     let joined = if min_part > 1 { parts.join_small(&scene.topology, &scene.garment, min_part) } else { parts };
     joined.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
 }
 
-pub(super) fn stage_two(
+/// Stage two: what the PARTs do; where `asked` breaks off, the coupled model ends in [`CoupledError::Interrupted`].
+pub(crate) fn stage_two(
     scene: &Scene,
     settings: &Settings,
     surface: &[SurfacePoint],
     parts: Parts,
     levels: Option<&Levels>,
+    asked: Asked<'_>,
 ) -> Result<StageTwo, DrapeError> {
     let Scene { garment: mesh, topology, body, .. } = scene;
     let fabric = &settings.fabric;
@@ -40,7 +48,7 @@ pub(super) fn stage_two(
         Model::Coupled(options) => {
             let made = if levels.is_none() { Some(Levels::new(scene, fabric)?) } else { None };
             let Some(levels) = levels.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
-            couple(scene, fabric, levels, parts, options)
+            couple(scene, fabric, levels, parts, options, asked)
         }
         Model::Paper(options) => {
             let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
@@ -63,6 +71,7 @@ fn couple(
     levels: &Levels,
     parts: Parts,
     options: &CoupledOptions,
+    asked: Asked<'_>,
 ) -> Result<StageTwo, DrapeError> {
     let Scene { garment: mesh, topology, .. } = scene;
     let placed = &mesh.positions;
@@ -71,13 +80,8 @@ fn couple(
     let uncut = [f64::INFINITY];
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
-        let result = through_levels(scene, fabric, levels, &stage.parts, &stage.positions, options)?;
-        let outcome = |p: &coupled::PartResult| PartOutcome {
-            force_n: p.reaction,
-            displacement: p.displacement,
-            contact: p.in_contact,
-        };
-        stage.outcomes = result.parts.iter().map(outcome).collect();
+        let result = through_levels(scene, fabric, levels, &stage.parts, &stage.positions, options, asked)?;
+        stage.outcomes = result.parts.iter().map(told).collect();
         stage.positions = result.positions;
         stage.warnings.extend(result.warnings);
     }
@@ -87,6 +91,11 @@ fn couple(
         outcome.displacement = moved.sum::<DVec3>() / part.vertices.len() as f64;
     }
     Ok(stage)
+}
+
+/// What a solve says of a PART.
+pub(crate) fn told(p: &coupled::PartResult) -> PartOutcome {
+    PartOutcome { force_n: p.reaction, displacement: p.displacement, contact: p.in_contact }
 }
 
 /// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
@@ -110,6 +119,7 @@ fn through_levels(
     parts: &Parts,
     start: &[DVec3],
     options: &CoupledOptions,
+    asked: Asked<'_>,
 ) -> Result<CoupledResult, CoupledError> {
     let folding = Folding::of(&scene.garment, parts, fabric);
     let enough = |level: &&Level| {
@@ -121,17 +131,17 @@ fn through_levels(
     for number in (1..=coarsest).rev() {
         let level = &levels.coarser[number - 1];
         let parts = levels.parts(number, parts);
-        let solved =
-            coupled::solve(&level.garment(fabric), &scene.body, &parts, &levels.restrict(number, &x), options)?;
+        let (garment, start) = (level.garment(fabric), levels.restrict(number, &x));
+        let solved = coupled::solve_before(&garment, &scene.body, &parts, &start, options, &mut |_| asked())?;
         x = levels.prolong(number, &x, solved.positions);
     }
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth, fabric };
     if coarsest == 0 {
-        return coupled::solve(&garment, &scene.body, parts, &x, options);
+        return coupled::solve_before(&garment, &scene.body, parts, &x, options, &mut |_| asked());
     }
     let max_steps = options.max_steps.min(STEPS_AFTER_COARSE);
-    let mut solved =
-        coupled::solve(&garment, &scene.body, parts, &x, &CoupledOptions { max_steps, ..options.clone() })?;
+    let fewer = CoupledOptions { max_steps, ..options.clone() };
+    let mut solved = coupled::solve_before(&garment, &scene.body, parts, &x, &fewer, &mut |_| asked())?;
     // That they go on moving after so few steps is meant.
     solved.warnings.clear();
     Ok(solved)
@@ -146,12 +156,13 @@ const APPROACH_EXTENT: f64 = 0.12;
 const APPROACH_STEPS: usize = 10;
 
 /// The same model once more, by finer PARTs, from where stage two ended; where that fails, nothing is lost.
-pub(super) fn approach(
+pub(crate) fn approach(
     scene: &Scene,
     settings: &Settings,
     levels: &Levels,
     parts: &Parts,
     start: &[DVec3],
+    asked: Asked<'_>,
 ) -> Vec<DVec3> {
     let Model::Coupled(options) = &settings.model else { return start.to_vec() };
     let Scene { garment: mesh, topology, body, .. } = scene;
@@ -161,5 +172,6 @@ pub(super) fn approach(
     }
     let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
     let garment = Garment { mesh, topology, cloth: &levels.cloth, fabric: &settings.fabric };
-    coupled::solve(&garment, body, &finer, start, &options).map_or_else(|_| start.to_vec(), |result| result.positions)
+    let solved = coupled::solve_before(&garment, body, &finer, start, &options, &mut |_| asked());
+    solved.map_or_else(|_| start.to_vec(), |result| result.positions)
 }

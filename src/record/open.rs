@@ -245,7 +245,7 @@ fn not_taken(error: impl std::fmt::Display) -> RecordError {
 
 /// The viewer keeps one layout for each application: under one name, a recording opened later would rearrange the views of
 /// those before, and leave some blank.
-fn application(name: &str) -> ApplicationId {
+pub(super) fn application(name: &str) -> ApplicationId {
     let pieces = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|piece| !piece.is_empty());
     let mut id = std::iter::once("partwise").chain(pieces).collect::<Vec<_>>().join("-");
     id.truncate(LONGEST_ID);

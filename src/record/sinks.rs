@@ -26,8 +26,8 @@ use crate::whole_file::WholeFile;
 const ANSWER: Duration = Duration::from_secs(3);
 /// Port of a spawned native viewer: Rerun's own default.
 const VIEWER_PORT: u16 = 9876;
-/// History a server keeps for viewers that connect late; beyond it the oldest steps go first, static data never.
-const HISTORY_BYTES: u64 = 1 << 30;
+/// History a server of a recording from disk keeps: it holds the recording whole.
+pub(super) const WHOLE_HISTORY: u64 = 1 << 30;
 
 /// One place a recording goes to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,6 +44,8 @@ pub enum Sink {
         web_port: Option<u16>,
         /// Port of the data.
         grpc_port: Option<u16>,
+        /// History kept for viewers that connect late; beyond it the oldest steps go first, static data never.
+        history_bytes: u64,
     },
 }
 
@@ -80,10 +82,10 @@ impl OpenSinks {
             }
             Sink::Spawn => self.sinks.push(Box::new(spawn()?)),
             Sink::Connect(url) => self.sinks.push(Box::new(connect(url)?)),
-            Sink::Serve { web_port, grpc_port } => {
+            Sink::Serve { web_port, grpc_port, history_bytes } => {
                 // The page first: its port is checked before a server thread runs.
                 let web_port = free_port(*web_port, "--web-port")?;
-                let (sink, grpc_port) = serve(*grpc_port)?;
+                let (sink, grpc_port) = serve(*grpc_port, *history_bytes)?;
                 self.sinks.push(Box::new(sink));
                 self.web = Some(WebViewer::start(web_port, grpc_port)?);
             }
@@ -149,10 +151,10 @@ fn greet(mut stream: TcpStream) -> std::io::Result<()> {
     if answer[3] == SETTINGS { Ok(()) } else { Err(std::io::Error::other("it speaks something else")) }
 }
 
-/// Starts the server that viewers fetch the recording from.
-pub(crate) fn serve(port: Option<u16>) -> Result<(GrpcServerSink, u16), RecordError> {
+/// Starts the server that viewers fetch the recording from; beyond so many bytes it forgets the oldest.
+pub(crate) fn serve(port: Option<u16>, history_bytes: u64) -> Result<(GrpcServerSink, u16), RecordError> {
     let port = free_port(port, "--grpc-port")?;
-    let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(HISTORY_BYTES), ..ServerOptions::default() };
+    let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(history_bytes), ..ServerOptions::default() };
     let failed = |reason: String| RecordError::Server { what: "the recording", port, reason };
     let sink = GrpcServerSink::new("127.0.0.1", port, options).map_err(|e| failed(e.to_string()))?;
     // A server that could not bind ends its thread without a word; the first flush finds out.

@@ -9,6 +9,7 @@ use rerun::{AnyValues, Arrows3D, Color, ComponentIdentifier, Scalars, SeriesLine
 use super::colour_map::{ColourMap, Range};
 use super::colours::{self, colour_parts};
 use super::error::RecordError;
+use super::eye::Eye;
 use super::legend::Legend;
 use super::meshes::{self, single};
 use super::panel::Panel;
@@ -23,7 +24,7 @@ const MANY_ARROWS: f64 = 150.0;
 /// Values above this quantile share the last colour.
 pub(super) const QUANTILE: f64 = 0.99;
 /// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
-const FORCE_QUANTILE: f64 = 0.95;
+pub(super) const FORCE_QUANTILE: f64 = 0.95;
 
 /// A value per vertex of the draped garment.
 #[derive(Debug, Clone, Copy)]
@@ -144,19 +145,31 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     arrows(open, step, range.high / factor)
 }
 
-/// One arrow per PART, from its vertex nearest the eye's side of its middle: the centroid of a ring lies inside the body.
 fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError> {
-    let toward = open.eye.toward;
-    let parts = step.part_force_n.len();
+    let arrows = part_arrows(&open.eye, &open.garment.positions, step.part_of_vertex, step.part_force_n, full);
+    open.log(paths::FORCE_ARROWS, &arrows)
+}
+
+/// One arrow per PART, from its vertex nearest the eye's side of its middle: the centroid of a ring lies inside the body. A force of `full`
+/// is as long as an arrow should be.
+pub(super) fn part_arrows(
+    eye: &Eye,
+    placed: &[DVec3],
+    part_of_vertex: &[u32],
+    part_force_n: &[DVec3],
+    full: f64,
+) -> Arrows3D {
+    let toward = eye.toward;
+    let parts = part_force_n.len();
     let mut sum = vec![(DVec3::ZERO, 0.0, f64::NEG_INFINITY); parts];
-    for (&p, &x) in step.part_of_vertex.iter().zip(&open.garment.positions) {
+    for (&p, &x) in part_of_vertex.iter().zip(placed) {
         let (total, count, front) = &mut sum[p as usize];
         *total += x;
         *count += 1.0;
         *front = front.max(x.dot(toward));
     }
     let mut best = vec![(f64::INFINITY, DVec3::ZERO); parts];
-    for (&p, &x) in step.part_of_vertex.iter().zip(&open.garment.positions) {
+    for (&p, &x) in part_of_vertex.iter().zip(placed) {
         let (total, count, front) = sum[p as usize];
         let middle = total / count;
         let wanted = middle + toward * (front - middle.dot(toward));
@@ -165,21 +178,20 @@ fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError
             best[p as usize] = (off, x);
         }
     }
-    let height = 2.0 * open.eye.half_height;
+    let height = 2.0 * eye.half_height;
     // Hundreds of arrows would hide the garment: the more, the smaller.
     let small = (MANY_ARROWS / parts as f64).sqrt().clamp(0.4, 1.0);
     let longest = LONGEST_ARROW * height * small;
     // Off the surface by a hair, so that an arrow along the cloth is not half sunk in it.
     let origins = best.iter().map(|(_, x)| single(*x + 0.035 * height * toward));
-    let vectors = step.part_force_n.iter().map(|f| {
+    let vectors = part_force_n.iter().map(|f| {
         let length = (f.length() / full).min(1.25) * longest;
         single(f.normalize_or_zero() * length)
     });
-    let arrows = Arrows3D::from_vectors(vectors)
+    Arrows3D::from_vectors(vectors)
         .with_origins(origins)
         .with_radii([(0.0045 * height * small) as f32])
-        .with_colors([Color::from_rgb(238, 240, 243)]);
-    open.log(paths::FORCE_ARROWS, &arrows)
+        .with_colors([Color::from_rgb(238, 240, 243)])
 }
 
 fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {

@@ -11,7 +11,7 @@ use rerun::sink::LogSink as _;
 
 use super::error::RecordError;
 use super::page::Page;
-use super::sinks::{free_port, serve};
+use super::sinks::{WHOLE_HISTORY, free_port, serve};
 
 /// A page that shows a recording; it is served for as long as this lives.
 pub struct WebViewer {
@@ -66,7 +66,7 @@ pub fn check_file(path: &Path) -> Result<(), RecordError> {
 pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) -> Result<Served, RecordError> {
     let messages = read(path)?;
     let web_port = free_port(web_port, "--web-port")?;
-    let (data, grpc_port) = serve(grpc_port)?;
+    let (data, grpc_port) = serve(grpc_port, WHOLE_HISTORY)?;
     data.send_all(messages);
     let viewer = WebViewer::start(web_port, grpc_port)?;
     Ok(Served { viewer, _data: data })

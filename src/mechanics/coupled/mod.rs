@@ -27,6 +27,7 @@ mod slack;
 mod sums;
 mod weights;
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -72,6 +73,9 @@ pub struct Garment<'a> {
     pub fabric: &'a Fabric,
 }
 
+/// Told of the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
+pub type Onlooker<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
+
 /// Solves the PARTs together from the vertex positions `start`.
 ///
 /// # Errors
@@ -82,6 +86,21 @@ pub fn solve(
     parts: &Parts,
     start: &[DVec3],
     options: &CoupledOptions,
+) -> Result<CoupledResult, CoupledError> {
+    solve_before(garment, body, parts, start, options, &mut |_| ControlFlow::Continue(()))
+}
+
+/// [`solve`] before an onlooker.
+///
+/// # Errors
+/// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
+pub fn solve_before(
+    garment: &Garment<'_>,
+    body: &Body,
+    parts: &Parts,
+    start: &[DVec3],
+    options: &CoupledOptions,
+    onlooker: Onlooker<'_>,
 ) -> Result<CoupledResult, CoupledError> {
     let Garment { mesh, topology, cloth, fabric } = *garment;
     check("the list of start positions", start.len(), mesh.vertex_count())?;
@@ -100,7 +119,7 @@ pub fn solve(
     let began = Instant::now();
     let contacts = soft.contacts_by_planes(body, start);
     let mut descent = Descent::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
-    let history = settle(&mut descent, &mut tangent, options)?;
+    let history = settle(&mut descent, &mut tangent, options, onlooker)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
     let mut positions = descent.x;
@@ -135,6 +154,7 @@ fn settle(
     descent: &mut Descent<'_, '_>,
     tangent: &mut Reduced,
     options: &CoupledOptions,
+    onlooker: Onlooker<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
     let pace =
         Pace { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
@@ -142,6 +162,9 @@ fn settle(
     for iteration in 1..=options.max_steps {
         let advance = descent.advance(tangent, pace)?;
         history.push(descent.record(iteration, Some(advance), true));
+        if onlooker(&descent.x).is_break() {
+            return Err(CoupledError::Interrupted);
+        }
         let still = advance.accepted && advance.step_length >= 1.0 && advance.largest_move_m < options.least_move_m;
         if still && descent.damping <= FREE_DAMPING || !advance.accepted && descent.damping >= DAMPING[1] {
             break;

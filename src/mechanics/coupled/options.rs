@@ -31,6 +31,9 @@ pub enum CoupledError {
     /// The motions cannot be solved.
     #[error("the motions of the PARTs: {0}")]
     Solve(#[from] SolveError),
+    /// The caller stopped it.
+    #[error("interrupted while the PARTs moved")]
+    Interrupted,
 }
 
 /// How a PART moves.

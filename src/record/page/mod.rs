@@ -97,17 +97,7 @@ struct Files {
 
 impl Files {
     fn new(recording: &str) -> Result<Self, String> {
-        static VIEWER: OnceLock<WebViewerData> = OnceLock::new();
-        let viewer = match VIEWER.get() {
-            Some(viewer) => viewer,
-            None => {
-                let loaded = WebViewerData::load(None).map_err(|e| e.to_string())?;
-                VIEWER.get_or_init(|| loaded)
-            }
-        };
-        // A second of work that a fast connection need not wait for: until it is done the program goes out as it is.
-        std::thread::spawn(|| packed(viewer.viewer_wasm()));
-        Ok(Self { index: INDEX.replace("{recording}", recording).into(), viewer })
+        Ok(Self { index: INDEX.replace("{recording}", recording).into(), viewer: viewer()? })
     }
 
     fn answer<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
@@ -127,22 +117,73 @@ impl Files {
     }
 
     fn program<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
-        let wasm = self.viewer.viewer_wasm();
-        let takes_gzip = request
-            .headers()
-            .get(header::ACCEPT_ENCODING)
-            .and_then(|value| value.to_str().ok())
-            .is_some_and(|value| value.split(',').any(|name| name.trim().starts_with("gzip")));
-        let packed = PACKED.get().filter(|_| takes_gzip);
-        let bytes = packed.cloned().unwrap_or_else(|| Bytes::from_static(wasm));
+        let Bundled { bytes, packed, whole, .. } = program(self.viewer, takes_gzip(request.headers()));
         let mut response = response(StatusCode::OK, "application/wasm", bytes);
-        if packed.is_some() {
+        if packed {
             response.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
         }
         // The page shows how much has come, and sees unpacked bytes only.
-        response.headers_mut().insert("rerun-final-length", wasm.len().into());
+        response.headers_mut().insert("rerun-final-length", whole.into());
         response
     }
+}
+
+/// Whether who asks unpacks what comes packed.
+pub(crate) fn takes_gzip(headers: &header::HeaderMap) -> bool {
+    let accepted = headers.get(header::ACCEPT_ENCODING).and_then(|value| value.to_str().ok());
+    accepted.is_some_and(|value| value.split(',').any(|name| name.trim().starts_with("gzip")))
+}
+
+/// A file of the bundled viewer, for a page around it.
+#[derive(Debug, Clone)]
+pub struct Bundled {
+    /// Its media type.
+    pub kind: &'static str,
+    /// Its bytes, or these packed.
+    pub bytes: Bytes,
+    /// Whether they are packed (gzip).
+    pub packed: bool,
+    /// How many there are unpacked.
+    pub whole: usize,
+}
+
+/// The viewer's file at this path (`/re_viewer.js`, `/re_viewer_bg.wasm`, `/favicon.ico`); none elsewhere, or where this
+/// program was built without the viewer.
+#[must_use]
+pub fn bundled(path: &str, packed: bool) -> Option<Bundled> {
+    let viewer = viewer().ok()?;
+    let plain = |kind, bytes: &'static [u8]| Bundled {
+        kind,
+        bytes: Bytes::from_static(bytes),
+        packed: false,
+        whole: bytes.len(),
+    };
+    match path {
+        "/re_viewer.js" => Some(plain("text/javascript", viewer.viewer_js())),
+        "/re_viewer_bg.wasm" => Some(program(viewer, packed)),
+        "/favicon.ico" => Some(plain("image/x-icon", viewer.favicon())),
+        _ => None,
+    }
+}
+
+fn program(viewer: &'static WebViewerData, takes_gzip: bool) -> Bundled {
+    let wasm = viewer.viewer_wasm();
+    let packed = PACKED.get().filter(|_| takes_gzip);
+    let bytes = packed.cloned().unwrap_or_else(|| Bytes::from_static(wasm));
+    Bundled { kind: "application/wasm", bytes, packed: packed.is_some(), whole: wasm.len() }
+}
+
+/// The viewer's files.
+fn viewer() -> Result<&'static WebViewerData, String> {
+    static VIEWER: OnceLock<WebViewerData> = OnceLock::new();
+    if let Some(viewer) = VIEWER.get() {
+        return Ok(viewer);
+    }
+    let loaded = WebViewerData::load(None).map_err(|e| e.to_string())?;
+    let viewer = VIEWER.get_or_init(|| loaded);
+    // A second of work that a fast connection need not wait for: until it is done the program goes out as it is.
+    std::thread::spawn(|| packed(viewer.viewer_wasm()));
+    Ok(viewer)
 }
 
 static PACKED: OnceLock<Bytes> = OnceLock::new();

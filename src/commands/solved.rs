@@ -1,15 +1,69 @@
-//! One garment's drape in a recording: a step with all its stages, its fit and folds, and the solver's steps.
+//! A garment through every stage, ready to be told and recorded: a step with all its stages, its fit and folds, and the
+//! solver's steps.
 
 use std::time::Instant;
 
 use glam::DVec3;
-use partwise::record::{FoldView, Overlay, Recorder, StepView, WrinkleView};
+use partwise::Job;
+use partwise::drape::Drape;
+use partwise::job::Measured;
+use partwise::record::{FoldView, Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::scene::Loaded;
+use partwise::session::Finished;
 
-use super::{Solved, ms};
+use super::sinks::SinkArgs;
+use super::summary::{Summary, ms};
+
+/// A garment through every stage.
+pub(super) struct Solved {
+    pub(super) job: Job,
+    pub(super) loaded: Loaded,
+    pub(super) drape: Drape,
+    pub(super) measured: Measured,
+    pub(super) snapshots: Vec<Snapshot>,
+    pub(super) summary: Summary,
+}
+
+/// The cloth at one of the solver's steps; the mesh every so often.
+pub(super) struct Snapshot {
+    pub(super) iteration: usize,
+    pub(super) energy: f64,
+    pub(super) residual_over_weight: f64,
+    pub(super) positions: Option<Vec<DVec3>>,
+}
 
 impl Solved {
+    /// A state of a session, and what was measured of it.
+    pub(super) fn of_session(job: Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
+        let (loaded, drape) = (finished.ground.loaded.clone(), finished.drape.clone());
+        let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
+        summary.timings_ms.insert("load", finished.ground.load_ms);
+        Ok(Self { job, loaded, drape, measured, snapshots: Vec::new(), summary })
+    }
+
+    /// How to record it; `live` where more steps follow, whose meshes may be others.
+    pub(super) fn record_options(&self, sinks: &SinkArgs, iterations: bool, live: bool) -> RecordOptions {
+        let overlays = self.overlays();
+        let of_cloth = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
+        RecordOptions {
+            sinks: sinks.sinks(&self.loaded.garment_name),
+            name: self.loaded.garment_name.clone(),
+            layout: Layout {
+                several_tables: live,
+                follow: live,
+                iterations: iterations && self.snapshots.len() > 1,
+                error: self.measured.assessment.is_some(),
+                wrinkles: self.measured.assessment.is_some(),
+                fit: of_cloth.map(str::to_owned).collect(),
+                ..Layout::default()
+            },
+            replaceable: live,
+            front: sinks.seen_from.direction(),
+        }
+    }
+
     /// What is shown on the draped garment: fit, and the error where it was measured.
-    pub(super) fn overlays(&self) -> Vec<Overlay<'_>> {
+    fn overlays(&self) -> Vec<Overlay<'_>> {
         let mut overlays = Vec::new();
         if let Some(state) = &self.drape.state {
             overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });

@@ -1,0 +1,188 @@
+//! `partwise live`: a page with the dial beside the viewer, and the same by HTTP for scripts.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use clap::Args;
+use partwise::Job;
+use partwise::job::Against;
+use partwise::live::{LiveOptions, LiveServer, random_token};
+use partwise::record::{RecordSummary, Recorder};
+use partwise::session::{Session, Workshop};
+
+use super::inputs::InputArgs;
+use super::sinks::{SeenFrom, SinkArgs};
+use super::solved::Solved;
+use super::stages::StageArgs;
+use super::work::use_threads;
+use super::{console, interrupt};
+
+/// How long to wait for news before Ctrl-C is looked at.
+const GLANCE: Duration = Duration::from_millis(100);
+
+pub(crate) const LONG_ABOUT: &str = "\
+Serves a page: the Rerun viewer in the middle, the range table beside it. Drag a bound, change the fabric, a measurement or \
+the garment, and PARTs, forces and drape follow; let go, and the drape comes to rest.
+
+The same by HTTP, for scripts and editors.";
+
+pub(crate) const HTTP: &str = include_str!("../../assets/live/http.md");
+
+/// Arguments of `live`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LiveArgs {
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    stages: StageArgs,
+    /// Port of the page; 0 takes any free one
+    #[arg(long, value_name = "PORT", default_value_t = 0, help_heading = "Page")]
+    port: u16,
+    /// Address to listen on; others than this machine's own need a token, which is made and printed
+    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]
+    bind: IpAddr,
+    /// A name of this machine that browsers may use besides its address
+    #[arg(long, value_name = "NAME", help_heading = "Page")]
+    host: Option<String>,
+    /// Token for control, 16 characters at least [default: made anew where --bind needs one]
+    #[arg(long, value_name = "TOKEN", env = "PARTWISE_TOKEN", hide_env_values = true, help_heading = "Page")]
+    token: Option<String>,
+    /// Begin every drape at the undraped garment, as `run` does: slower, and the same bits
+    #[arg(long, help_heading = "Stages")]
+    cold: bool,
+    /// Keep the session as a timeline of its edits, for `partwise view`
+    #[arg(long, value_name = "FILE.rrd", help_heading = "Recording")]
+    record: Option<PathBuf>,
+    /// Send the same to a viewer that is already running, e.g. rerun+http://127.0.0.1:9876/proxy
+    #[arg(long, value_name = "URL", help_heading = "Recording")]
+    connect: Option<String>,
+    /// Where the views look from
+    #[arg(long, value_enum, default_value_t = SeenFrom::Front, help_heading = "Page")]
+    seen_from: SeenFrom,
+    /// Worker threads; results do not depend on it [default: one per core]
+    #[arg(long, value_name = "N", help_heading = "Page")]
+    threads: Option<usize>,
+}
+
+impl LiveArgs {
+    /// Serves until Ctrl-C.
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        use_threads(self.threads)?;
+        interrupt::listen();
+        let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
+        job.scene.check_names()?;
+        let session = Session::new(job.clone(), !self.cold);
+        let options = self.options(&job)?;
+        let server = LiveServer::start(&session, &options)?;
+        self.print(server.address(), &options);
+        let worker = {
+            let (session, mut workshop) = (session.clone(), Workshop::new(self.input.meshes()));
+            std::thread::spawn(move || session.work(&mut workshop))
+        };
+        let recorder = self.record(&session);
+        while !interrupt::requested() && !worker.is_finished() {
+            std::thread::sleep(GLANCE);
+        }
+        session.close();
+        drop(server);
+        let worked = worker.join();
+        let recorded = recorder.map(JoinHandle::join);
+        if worked.is_err() || matches!(recorded, Some(Err(_))) {
+            anyhow::bail!("the session broke off; this is a mistake of the program");
+        }
+        if let Some(Ok(summary)) = recorded
+            && let Some(path) = summary?.path
+        {
+            console::note(&format!("recording: {}", path.display()));
+        }
+        Ok(())
+    }
+
+    fn options(&self, job: &Job) -> anyhow::Result<LiveOptions> {
+        let far = !self.bind.is_loopback();
+        let control = match &self.token {
+            Some(token) => Some(token.clone()),
+            None if far => Some(random_token()?),
+            None => None,
+        };
+        let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
+        let files = job.scene.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
+        Ok(LiveOptions {
+            address: SocketAddr::new(self.bind, self.port),
+            host: self.host.clone(),
+            control,
+            onlooker,
+            files,
+            name: format!("live {}", job.scene.garment_name()),
+            front: self.seen_from.direction(),
+        })
+    }
+
+    fn print(&self, address: SocketAddr, options: &LiveOptions) {
+        let name = match &self.host {
+            Some(name) => format!("{name}:{}", address.port()),
+            None => address.to_string(),
+        };
+        match &options.control {
+            None => console::result(&format!("http://{name}/")),
+            Some(control) => {
+                console::result(&format!("http://{name}/?token={control}"));
+                if let Some(onlooker) = &options.onlooker {
+                    console::note(&format!("to look on only: http://{name}/?token={onlooker}"));
+                }
+            }
+        }
+        console::note("open this address in a browser, or see `partwise live --help` for curl; Ctrl-C ends");
+        if address.ip().is_unspecified() {
+            console::note("0.0.0.0 is every address of this machine: others need one of these instead");
+        }
+    }
+
+    /// Records every state that is finished, on a thread of its own: a viewer that reads slowly makes it skip some.
+    fn record(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
+        if self.record.is_none() && self.connect.is_none() {
+            return None;
+        }
+        let sinks = SinkArgs {
+            save: self.record.clone(),
+            no_save: self.record.is_none(),
+            connect: self.connect.clone(),
+            seen_from: self.seen_from,
+            ..SinkArgs::default()
+        };
+        let session = session.clone();
+        Some(std::thread::spawn(move || {
+            let recorded = follow(&session, &sinks);
+            if let Err(error) = &recorded {
+                console::error(error);
+                console::note("the session goes on without the recording");
+            }
+            recorded
+        }))
+    }
+}
+
+/// Records what is finished until the session is closed.
+fn follow(session: &Session, sinks: &SinkArgs) -> anyhow::Result<RecordSummary> {
+    let mut recorder: Option<Recorder> = None;
+    let (mut serial, mut last, mut index) = (0, 0, 0);
+    while !session.is_closed() {
+        let now = session.newer_than(serial, GLANCE);
+        serial = now.serial;
+        let Some(finished) = now.finished.as_ref().filter(|f| f.state > last && f.state == now.state) else { continue };
+        last = finished.state;
+        let job = Job { accuracy: Against::None, ..(*now.job).clone() };
+        let measured =
+            job.measure(&finished.ground.loaded.scene, &finished.drape, None, &mut partwise::drape::unobserved)?;
+        let mut solved = Solved::of_session(job, finished, measured)?;
+        let recorder = match &mut recorder {
+            Some(recorder) => recorder,
+            none => none.insert(Recorder::open(solved.record_options(sinks, false, true))?),
+        };
+        solved.record(recorder, index, false)?;
+        index += 1;
+    }
+    Ok(recorder.map(Recorder::finish).transpose()?.unwrap_or_default())
+}

@@ -1,0 +1,143 @@
+//! The pieces that a drape is made of, for [`drape()`](super::drape) and for whoever makes them one at a time.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::{ClothState, Drape, DrapeError, Levels, Model, Refine, Settings, StageTimes, StageTwo};
+use crate::distance::SurfacePoint;
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::fit::fit;
+use crate::mechanics::folds::{Folds, folds};
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
+use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::parts::Parts;
+use crate::range_table::RangeTable;
+use crate::scene::Scene;
+
+/// How far the garment as placed is from the body.
+#[derive(Debug, Clone)]
+pub(crate) struct Distances {
+    /// Closest points on the body.
+    pub(crate) surface: Vec<SurfacePoint>,
+    /// Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
+    pub(crate) unsigned_m: Vec<f64>,
+}
+
+impl Distances {
+    pub(crate) fn of(scene: &Scene) -> Self {
+        let surface = scene.body.nearest_all(&scene.garment.positions);
+        Self { unsigned_m: surface.iter().map(|s| s.signed_distance.abs()).collect(), surface }
+    }
+}
+
+/// Cloth that the PARTs have no room for; the coupled model's alone.
+pub(crate) fn folds_of(settings: &Settings, levels: Option<&Levels>, stage: &StageTwo) -> Option<Folds> {
+    match settings.model {
+        Model::Coupled(_) => levels.map(|levels| folds(&levels.cloth, &stage.positions)),
+        Model::Paper(_) => None,
+    }
+}
+
+/// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
+pub(crate) fn refine_from(
+    scene: &Scene,
+    settings: &Settings,
+    cloth: &Cloth,
+    start: Vec<DVec3>,
+    observer: Observer<'_>,
+) -> Result<Refined, DrapeError> {
+    let max_steps = match settings.refine {
+        Refine::Steps(n) => Some(n),
+        Refine::Converged => None,
+    };
+    let options = RefineOptions { max_steps, ..RefineOptions::default() };
+    let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
+    let contacts = met(cloth, scene, settings.refine, &start);
+    let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
+        // What has fallen past the feet meets nothing any more, and would fall for ever.
+        if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
+    })?;
+    Ok(refined)
+}
+
+/// Where the steps ended, and how the cloth fits there.
+pub(crate) fn settled(scene: &Scene, settings: &Settings, cloth: &Cloth, refined: Refined) -> (Vec<DVec3>, ClothState) {
+    let contacts = met(cloth, scene, settings.refine, &refined.positions);
+    let fit = fit(cloth, contacts, &refined.positions, refined.contact_stiffness);
+    let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
+    (positions, ClothState { energy, residual_over_weight, steps, stop, history, fit })
+}
+
+/// All that a drape is made of.
+pub(crate) struct Made {
+    pub(crate) ground: Distances,
+    pub(crate) table: RangeTable,
+    pub(crate) level_part_count: usize,
+    pub(crate) stage: StageTwo,
+    pub(crate) folds: Option<Folds>,
+    pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
+}
+
+impl Made {
+    /// The drape, with what must be looked for in it.
+    pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
+        let Self { ground, table, level_part_count, stage, folds, state } = self;
+        let mut warnings = unassigned_warning(&stage.parts);
+        warnings.extend(stage.warnings);
+        let (positions, state) = match state {
+            None => (stage.positions.clone(), None),
+            Some((positions, state)) => (positions, Some(state)),
+        };
+        warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+        if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
+            && positions.iter().all(|x| x.z < low.z)
+        {
+            warnings
+                .push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
+        }
+        let inside =
+            scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
+        let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
+        let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
+        Drape {
+            surface: ground.surface,
+            distance: ground.unsigned_m,
+            table,
+            parts: stage.parts,
+            level_part_count,
+            outcomes: stage.outcomes,
+            preview: stage.positions,
+            folds,
+            state,
+            self_intersecting_pairs,
+            positions,
+            penetrating_vertices,
+            penetration,
+            times,
+            warnings,
+        }
+    }
+}
+
+/// What the cloth meets at `x`: by planes where no step is taken, which need no more.
+fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, x: &[DVec3]) -> Contacts<'b> {
+    if refine == Refine::Steps(0) { cloth.contacts_by_planes(&scene.body, x) } else { cloth.contacts(&scene.body, x) }
+}
+
+fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
+    let unsettled = asked == Refine::Converged && matches!(state.stop, Stop::Stalled | Stop::StepsDone);
+    unsettled.then(|| {
+        format!(
+            "the drape has not settled: after {} steps the residual is {:.1e} of the weight, expected under 1e-3",
+            state.steps, state.residual_over_weight
+        )
+    })
+}
+
+fn unassigned_warning(parts: &Parts) -> Vec<String> {
+    if parts.unassigned == 0 {
+        return Vec::new();
+    }
+    vec![format!("{} vertices lie in no level of the range table: widen its first or last row", parts.unassigned)]
+}

@@ -1,0 +1,91 @@
+//! The garment of a snapshot: as OBJ, and PART by PART.
+
+use glam::DVec3;
+use hyper::body::Bytes;
+use hyper::{StatusCode, Uri};
+use serde_json::{Value, json};
+
+use super::access::{Refused, query};
+use crate::parts::UNASSIGNED;
+use crate::session::{Ground, Snapshot};
+
+/// The garment as OBJ: `of=rest` (without it the newest there is), `of=preview`, or `pin=ID`.
+pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Bytes, Refused> {
+    let none = |what: &str| (StatusCode::CONFLICT, format!("no {what} yet; wait for the event that tells of it"));
+    let rest = snapshot.rest.as_ref().map(|rest| (&rest.ground, &rest.positions));
+    let preview = snapshot.preview.as_ref().map(|preview| (&preview.ground, &preview.positions));
+    let (ground, positions) = match (query(uri, "pin"), query(uri, "of")) {
+        (Some(id), _) => {
+            let pin = snapshot.pins.iter().find(|pin| pin.id.to_string() == id);
+            let pin = pin.ok_or_else(|| (StatusCode::NOT_FOUND, format!("found pin={id}, expected a pin there is")))?;
+            (&pin.ground, &pin.positions)
+        }
+        (None, None) => rest.or(preview).ok_or_else(|| none("drape"))?,
+        (None, Some("rest")) => rest.ok_or_else(|| none("drape at rest"))?,
+        (None, Some("preview")) => preview.ok_or_else(|| none("preview"))?,
+        (None, Some(of)) => return Err((StatusCode::BAD_REQUEST, format!("found of={of}, expected rest or preview"))),
+    };
+    let failed = |e: &dyn std::fmt::Display| (StatusCode::INTERNAL_SERVER_ERROR, format!("cannot write it: {e}"));
+    let folder = tempfile::tempdir().map_err(|e| failed(&e))?;
+    let path = folder.path().join("drape.obj");
+    ground.loaded.write(&path, positions).map_err(|e| failed(&e))?;
+    std::fs::read(&path).map(Bytes::from).map_err(|e| failed(&e))
+}
+
+/// A PART and what is known of it: `number=N`, or the one nearest a point, `at=x,y,z` on the garment `on=parts`, `preview` or
+/// `rest` (m).
+pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
+    let bad = |said: String| (StatusCode::BAD_REQUEST, said);
+    let found = snapshot.sectioned.as_ref();
+    let found =
+        found.ok_or_else(|| (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned()))?;
+    let ground: &Ground = &found.ground;
+    let of_this = |other: &Ground| other.generation == ground.generation;
+    let placed = &ground.loaded.scene.garment.positions;
+    let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.ground));
+    let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.ground)).map(|r| &*r.positions);
+    let number = if let Some(text) = query(uri, "number") {
+        text.parse().map_err(|_| bad(format!("found number={text}, expected a PART's number from 0")))?
+    } else {
+        let text = query(uri, "at").unwrap_or("");
+        let numbers: Vec<f64> =
+            text.split(',').filter_map(|t| t.parse().ok()).filter(|m: &f64| m.is_finite()).collect();
+        let &[x, y, z] = numbers.as_slice() else {
+            return Err(bad(format!("found at={text}, expected number=N, or three metres as in at=0.1,0,1.2")));
+        };
+        let on = match query(uri, "on") {
+            None | Some("parts") => placed,
+            Some("preview") => preview.map_or(placed, |preview| &*preview.positions),
+            Some("rest") => rest.unwrap_or(placed),
+            Some(other) => return Err(bad(format!("found on={other}, expected parts, preview or rest"))),
+        };
+        let point = DVec3::new(x, y, z);
+        let nearest =
+            on.iter().enumerate().min_by(|a, b| a.1.distance_squared(point).total_cmp(&b.1.distance_squared(point)));
+        nearest.map_or(UNASSIGNED, |(vertex, _)| found.parts.part_of_vertex[vertex])
+    };
+    let Some(part) = found.parts.parts.get(number as usize) else {
+        let said = format!("found no PART there, expected one of 0 to {}", found.parts.len().saturating_sub(1));
+        return Err((StatusCode::NOT_FOUND, said));
+    };
+    let mean = |to: &[DVec3]| {
+        let moved = part.vertices.iter().map(|&v| to[v as usize] - placed[v as usize]).sum::<DVec3>();
+        1e3 * (moved / part.vertices.len() as f64)
+    };
+    let areas = ground.loaded.scene.garment.vertex_areas();
+    let level = found.table.effective_levels().get(part.level as usize).copied();
+    let force_n = found.force_n.get(number as usize);
+    Ok(json!({
+        "state": found.state,
+        "part": number,
+        "level": part.level,
+        "lower_cm": level.map(|l| l.lower_cm),
+        "upper_cm": level.map(|l| l.upper_cm).filter(|cm| cm.is_finite()),
+        "vertices": part.vertices.len(),
+        "area_cm2": 1e4 * part.vertices.iter().map(|&v| areas[v as usize]).sum::<f64>(),
+        "force_n": force_n.map(|f| f.to_array()),
+        "force_size_n": force_n.map(|f| f.length()),
+        "preview_displacement_mm": preview.map(|p| mean(&p.positions).to_array()),
+        "rest_displacement_mm": rest.map(|x| mean(x).to_array()),
+    }))
+}

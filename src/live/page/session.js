@@ -1,0 +1,107 @@
+// The session as the page sees it: the newest state by server-sent events, edits by PATCH, one on its way at a time.
+
+const given = new URLSearchParams(location.search).get("token");
+if (given !== null) {
+  // Out of the address, which is copied and shown; kept for a reload of this tab.
+  sessionStorage.setItem("token", given);
+  history.replaceState(null, "", location.pathname);
+}
+const token = sessionStorage.getItem("token");
+
+export function ask(path, options = {}) {
+  const headers = { ...options.headers };
+  if (token !== null) headers.Authorization = `Bearer ${token}`;
+  return fetch(path, { ...options, headers });
+}
+
+export class Session extends EventTarget {
+  state = null;
+  #waiting = null;
+  #busy = false;
+
+  // Tells of every state for as long as the page is open.
+  async follow() {
+    for (let wait = 250; ; wait = Math.min(2 * wait, 5000)) {
+      try {
+        const first = await ask("api/state");
+        if (!first.ok) throw new Error((await first.json()).error);
+        this.#take(await first.json());
+        this.dispatchEvent(new Event("connected"));
+        wait = 250;
+        await this.#events();
+      } catch (error) {
+        this.#tell("lost", error.message);
+      }
+      await new Promise((done) => setTimeout(done, wait));
+    }
+  }
+
+  async #events() {
+    const response = await ask("api/events");
+    if (!response.ok) throw new Error((await response.json()).error);
+    const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+    let text = "";
+    for (;;) {
+      const { value, done } = await reader.read();
+      if (done) return;
+      text += value;
+      const events = text.split("\n\n");
+      text = events.pop();
+      // Only the newest counts.
+      const newest = events.filter((e) => e.startsWith("event: state")).pop();
+      if (newest) this.#take(JSON.parse(newest.slice(newest.indexOf("data: ") + 6)));
+    }
+  }
+
+  #take(state) {
+    if (this.state && this.state.serial > state.serial && this.state.state >= state.state) return;
+    const trail = state.trail ?? this.#longer(state.trail_end);
+    const histogram = state.histogram ?? this.state?.histogram;
+    const may_steer = state.may_steer ?? this.state?.may_steer;
+    this.state = { ...state, trail, histogram, may_steer };
+    this.dispatchEvent(new Event("state"));
+  }
+
+  #longer(end) {
+    const trail = (this.state?.trail ?? []).filter((point) => point.state !== end?.state);
+    if (end) trail.push(end);
+    return trail.slice(-300);
+  }
+
+  // Hands in an edit; what is still waiting is joined with it, so that a drag never queues up.
+  edit(change, gesture) {
+    this.#waiting = { change: { ...this.#waiting?.change, ...change }, gesture };
+    if (!this.#busy) this.#send();
+  }
+
+  async #send() {
+    this.#busy = true;
+    while (this.#waiting) {
+      const { change, gesture } = this.#waiting;
+      this.#waiting = null;
+      const path = gesture === undefined ? "api/state" : `api/state?gesture=${gesture}`;
+      await this.send(path, "PATCH", JSON.stringify(change), "application/json");
+    }
+    this.#busy = false;
+  }
+
+  // A request that changes something, answered by the state or by a sentence.
+  async send(path, method, body, kind) {
+    try {
+      const response = await ask(path, { method, body, headers: kind ? { "Content-Type": kind } : {} });
+      const answer = await response.json();
+      if (response.ok) {
+        this.#take(answer);
+        this.#tell("accepted", "");
+      } else {
+        this.#tell("refused", answer.error);
+      }
+    } catch (error) {
+      this.#tell("lost", error.message);
+    }
+  }
+
+  #tell(what, sentence) {
+    this.dispatchEvent(new CustomEvent(what, { detail: sentence }));
+  }
+}

@@ -1,0 +1,182 @@
+//! What viewers are sent, encoded once for all of them on a thread of its own, while anybody looks.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use glam::DVec3;
+use hyper::body::Bytes;
+use tokio::sync::watch;
+
+use super::access::random_token;
+use crate::mesh::TriMesh;
+use crate::parts::Parts;
+use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
+use crate::session::{Session, Snapshot};
+
+/// How often is looked whether somebody has come.
+const GLANCE: Duration = Duration::from_millis(50);
+/// Between two encodings.
+const PACE: Duration = Duration::from_millis(33);
+
+/// The newest piece of each kind: layout and triangles, PARTs, preview, rest.
+type Slots = [Option<(u64, Bytes)>; 4];
+
+/// The pieces.
+pub(super) struct Pieces {
+    slots: Mutex<Slots>,
+    told: watch::Sender<u64>,
+    viewers: AtomicUsize,
+    stopped: AtomicBool,
+    broken: Mutex<Option<String>>,
+}
+
+/// A viewer, counted until it is dropped.
+pub(super) struct Attached(Arc<Pieces>);
+
+impl Drop for Attached {
+    fn drop(&mut self) {
+        self.0.viewers.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// What was encoded last; held, so that what is at the same place is the same.
+#[derive(Default)]
+struct Encoded {
+    base: Option<(u64, Vec<u64>)>,
+    parts: Option<(Arc<Parts>, Arc<Vec<DVec3>>)>,
+    preview: Option<Arc<Vec<DVec3>>>,
+    rest: Option<Arc<Vec<DVec3>>>,
+}
+
+impl Pieces {
+    pub(super) fn new() -> Self {
+        Self {
+            slots: Mutex::new(Slots::default()),
+            told: watch::channel(0).0,
+            viewers: AtomicUsize::new(0),
+            stopped: AtomicBool::new(false),
+            broken: Mutex::new(None),
+        }
+    }
+
+    pub(super) fn attach(self: &Arc<Self>) -> Attached {
+        self.viewers.fetch_add(1, Ordering::SeqCst);
+        Attached(Arc::clone(self))
+    }
+
+    pub(super) fn news(&self) -> watch::Receiver<u64> {
+        self.told.subscribe()
+    }
+
+    pub(super) fn stop(&self) {
+        self.stopped.store(true, Ordering::SeqCst);
+    }
+
+    /// Why there are no pieces, if so.
+    pub(super) fn broken(&self) -> Option<String> {
+        self.broken.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The pieces that are newer than those `known`; after another layout all of them.
+    pub(super) fn since(&self, known: &mut [u64; 4]) -> Vec<Bytes> {
+        let slots = self.slots().clone();
+        let number = |slot: &Option<(u64, Bytes)>| slot.as_ref().map_or(0, |(number, _)| *number);
+        if number(&slots[0]) != known[0] {
+            *known = [0; 4];
+        }
+        let mut newer = Vec::new();
+        for (slot, known) in slots.iter().zip(known) {
+            if let Some((number, bytes)) = slot.as_ref().filter(|(number, _)| number != known) {
+                *known = *number;
+                newer.push(bytes.clone());
+            }
+        }
+        newer
+    }
+
+    fn slots(&self) -> MutexGuard<'_, Slots> {
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Encodes what changes until the server stops.
+    pub(super) fn encode(&self, session: &Session, name: &str, front: DVec3) {
+        let made = self.keep_encoding(session, name, front);
+        *self.broken.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
+    }
+
+    fn keep_encoding(&self, session: &Session, name: &str, front: DVec3) -> Result<(), RecordError> {
+        // Pages tell one session from another by it.
+        let id = random_token().unwrap_or_default();
+        let mut encoder = LiveEncoder::new(name, &id, front)?;
+        let mut encoded = Encoded::default();
+        let (mut serial, mut number) = (0, 0);
+        while !self.stopped.load(Ordering::SeqCst) {
+            let wait = if self.viewers.load(Ordering::SeqCst) == 0 { Duration::ZERO } else { GLANCE };
+            let now = session.newer_than(serial, wait);
+            if self.viewers.load(Ordering::SeqCst) == 0 {
+                // Nobody looks: what is in the slots stays until somebody does.
+                std::thread::sleep(GLANCE);
+                continue;
+            }
+            serial = now.serial;
+            let made = encode(&mut encoder, &mut encoded, &now)?;
+            if made.iter().all(Option::is_none) {
+                continue;
+            }
+            let mut slots = self.slots();
+            if made[0].is_some() {
+                *slots = Slots::default();
+            }
+            for (slot, bytes) in slots.iter_mut().zip(made) {
+                if let Some(bytes) = bytes {
+                    number += 1;
+                    *slot = Some((number, bytes.into()));
+                }
+            }
+            drop(slots);
+            self.told.send_replace(number);
+            std::thread::sleep(PACE);
+        }
+        Ok(())
+    }
+}
+
+/// What is new since `encoded`.
+fn encode(
+    encoder: &mut LiveEncoder,
+    encoded: &mut Encoded,
+    now: &Snapshot,
+) -> Result<[Option<Vec<u8>>; 4], RecordError> {
+    let mut made = [None, None, None, None];
+    let Some(ground) = &now.ground else { return Ok(made) };
+    let (generation, scene) = (ground.generation, &ground.loaded.scene);
+    let base = Some((generation, now.pins.iter().map(|pin| pin.id).collect()));
+    if encoded.base != base {
+        let draped: Vec<TriMesh> =
+            now.pins.iter().map(|pin| pin.ground.loaded.scene.garment.with_positions(pin.positions.to_vec())).collect();
+        let pins: Vec<PinnedView<'_>> = (now.pins.iter().zip(&draped))
+            .map(|(pin, draped)| PinnedView { label: &pin.label, body: pin.ground.loaded.scene.body.mesh(), draped })
+            .collect();
+        made[0] = Some(encoder.base(scene.body.mesh(), &scene.garment, &pins)?);
+        *encoded = Encoded { base, ..Encoded::default() };
+    }
+    if let Some(found) = now.sectioned.as_ref().filter(|s| s.ground.generation == generation) {
+        let known = encoded.parts.as_ref();
+        if !known.is_some_and(|(p, f)| Arc::ptr_eq(p, &found.parts) && Arc::ptr_eq(f, &found.force_n)) {
+            made[1] = Some(encoder.parts(&found.parts.part_of_vertex, found.parts.len(), &found.force_n)?);
+            encoded.parts = Some((Arc::clone(&found.parts), Arc::clone(&found.force_n)));
+        }
+    }
+    let preview = now.preview.as_ref().filter(|p| p.ground.generation == generation).map(|p| &p.positions);
+    let rest = now.rest.as_ref().filter(|r| r.ground.generation == generation).map(|r| &r.positions);
+    for (slot, which, found, known) in
+        [(2, LiveShape::Preview, preview, &mut encoded.preview), (3, LiveShape::Rest, rest, &mut encoded.rest)]
+    {
+        if let Some(found) = found.filter(|found| !known.as_ref().is_some_and(|known| Arc::ptr_eq(known, found))) {
+            made[slot] = Some(encoder.shape(which, found)?);
+            *known = Some(Arc::clone(found));
+        }
+    }
+    Ok(made)
+}

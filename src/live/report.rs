@@ -1,0 +1,155 @@
+//! A snapshot of the session as JSON: what `GET /api/state` answers and every event tells.
+
+use serde_json::{Map, Value, json};
+
+use crate::drape::{Model, Settings};
+use crate::fabric;
+use crate::figures::LevelCount;
+use crate::job::Job;
+use crate::range_table::TableRule;
+use crate::session::{AtRest, Finished, Ground, Pin, Preview, Sectioned, Snapshot, preset_names};
+use crate::shapes;
+
+/// Bars of the histogram of distances.
+const BARS: usize = 80;
+
+/// The whole state.
+pub(super) fn state(snapshot: &Snapshot) -> Value {
+    let mut all = event(snapshot);
+    all["trail"] = json!(*snapshot.trail);
+    all["histogram"] = snapshot.ground.as_ref().map_or(Value::Null, |ground| histogram(ground.distance_m()));
+    all
+}
+
+/// What changes from moment to moment.
+pub(super) fn event(snapshot: &Snapshot) -> Value {
+    json!({
+        "state": snapshot.state,
+        "serial": snapshot.serial,
+        "idle": snapshot.idle,
+        "job": job(&snapshot.job),
+        "garment": snapshot.ground.as_deref().map(garment),
+        "parts": snapshot.sectioned.as_deref().map(sectioned),
+        "preview": snapshot.preview.as_deref().map(preview),
+        "rest": snapshot.rest.as_deref().map(rest),
+        "figures": snapshot.finished.as_deref().map(figures),
+        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": r.sentence, "back_to": r.back_to})),
+        "pins": snapshot.pins.iter().map(|p| pin(p)).collect::<Vec<_>>(),
+        "trail_end": snapshot.trail.last(),
+        "undo": snapshot.undo,
+        "redo": snapshot.redo,
+        "superseded": snapshot.superseded,
+    })
+}
+
+/// What can be chosen by name.
+pub(super) fn choices() -> Value {
+    json!({
+        "tables": preset_names(),
+        "fabrics": fabric::BUILT_IN,
+        "garments": shapes::garment::BUILT_IN,
+        "sizes": shapes::garment::TABLE_4_SIZES,
+    })
+}
+
+/// A job in the words of an edit.
+fn job(job: &Job) -> Value {
+    let Settings { table, min_part, model, refine, fabric } = &job.settings;
+    let table = match table {
+        TableRule::Rows(rows) => json!(rows),
+        TableRule::Quantile { levels, .. } => json!({ "quantile": levels }),
+    };
+    let built_in = fabric::BUILT_IN.contains(&fabric.name.as_str());
+    json!({
+        "body": job.scene.body,
+        "garment": job.scene.garment,
+        "measurements": measurements(job),
+        "table": table,
+        "fabric": if built_in { json!(fabric.name) } else { json!(fabric) },
+        "min_part": min_part,
+        "model": model.name(),
+        "max_extent_cm": model.extents_cm(),
+        "motion": match model { Model::Coupled(_) => json!(model.motion()), Model::Paper(_) => Value::Null },
+        "refine": refine,
+    })
+}
+
+/// Measurements by the names of an edit.
+fn measurements(job: &Job) -> Value {
+    let Ok(Value::Object(all)) = serde_json::to_value(&job.scene.measurements) else { return Value::Null };
+    let short = all.into_iter().map(|(name, cm)| (name.trim_end_matches("_cm").to_owned(), cm));
+    Value::Object(short.collect::<Map<_, _>>())
+}
+
+fn garment(ground: &Ground) -> Value {
+    let scene = &ground.loaded.scene;
+    json!({
+        "generation": ground.generation,
+        "name": ground.loaded.garment_name,
+        "body": ground.loaded.body_name,
+        "vertices": scene.garment.vertex_count(),
+        "triangles": scene.garment.triangles.len(),
+        "load_ms": ground.load_ms,
+        "notes": ground.loaded.notes(),
+        "warnings": ground.loaded.warnings(),
+    })
+}
+
+fn sectioned(found: &Sectioned) -> Value {
+    let strongest = found.force_n.iter().map(|f| f.length()).fold(0.0, f64::max);
+    json!({
+        "state": found.state,
+        "count": found.parts.len(),
+        "singletons": found.parts.singletons,
+        "unassigned": found.parts.unassigned,
+        "levels": LevelCount::all(&found.table, &found.parts),
+        "force_max_n": (!found.force_n.is_empty()).then_some(strongest),
+        "segment_ms": found.segment_ms,
+        "after_ms": found.after_ms,
+    })
+}
+
+fn preview(found: &Preview) -> Value {
+    json!({
+        "state": found.state, "warm": found.warm, "done": found.done, "count": found.parts.len(),
+        "ms": found.ms, "after_ms": found.after_ms,
+    })
+}
+
+fn rest(found: &AtRest) -> Value {
+    json!({
+        "state": found.state, "done": found.done, "kept": found.kept, "warm": found.warm,
+        "residual_over_weight": found.residual_over_weight, "steps": found.steps,
+        "ms": found.ms, "after_ms": found.after_ms,
+    })
+}
+
+fn figures(found: &Finished) -> Value {
+    let mut all = json!(found.figures);
+    all["state"] = json!(found.state);
+    all["preview_error_mm"] = json!(found.preview_error_mm);
+    all["bound_mm"] = json!(found.bound_mm);
+    all["warnings"] = json!([found.ground.loaded.warnings(), found.drape.warnings.clone()].concat());
+    all
+}
+
+fn pin(pin: &Pin) -> Value {
+    json!({
+        "id": pin.id, "label": pin.label, "state": pin.state, "numbers": pin.numbers,
+        "garment": pin.job.scene.garment, "fabric": pin.job.settings.fabric.name,
+        "table": pin.job.settings.table.name(),
+    })
+}
+
+/// How many vertices lie how far off, in bars that are equally wide over the root of the distance: near the body levels are
+/// thin.
+fn histogram(distance_m: &[f64]) -> Value {
+    let farthest_cm = 100.0 * distance_m.iter().fold(1e-6_f64, |a, &b| a.max(b));
+    let bars = BARS as f64;
+    let edges_cm: Vec<f64> = (0..=BARS).map(|i| farthest_cm * (i as f64 / bars).powi(2)).collect();
+    let mut counts = vec![0_usize; BARS];
+    for d in distance_m {
+        counts[((100.0 * d / farthest_cm).sqrt() * bars).min(bars - 1.0) as usize] += 1;
+    }
+    json!({ "edges_cm": edges_cm, "counts": counts })
+}

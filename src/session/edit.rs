@@ -1,0 +1,257 @@
+//! An edit: what somebody wants changed of a job, as plain data that reads from JSON; and the job that comes of it.
+
+use std::collections::BTreeMap;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use serde_json::Value;
+
+use super::presets;
+use crate::drape::{DrapeError, Model, Refine};
+use crate::fabric::{Fabric, FabricError};
+use crate::job::Job;
+use crate::mechanics::coupled::Motion;
+use crate::range_table::{GapRule, RangeTable, TableError, TableRule};
+use crate::scene::SceneError;
+use crate::shapes::ShapeError;
+
+/// Why an edit was refused: the session stays as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum EditError {
+    /// The range table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The fabric.
+    #[error(transparent)]
+    Fabric(#[from] FabricError),
+    /// Body or garment.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The measurements.
+    #[error(transparent)]
+    Measurements(#[from] ShapeError),
+    /// There is no drape.
+    #[error(transparent)]
+    Drape(#[from] DrapeError),
+    /// Any other value.
+    #[error("{what}: found {found}, expected {expected}")]
+    Value {
+        /// Which one.
+        what: &'static str,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
+}
+
+impl EditError {
+    pub(super) fn value(what: &'static str, found: impl ToString, expected: impl ToString) -> Self {
+        Self::Value { what, found: found.to_string(), expected: expected.to_string() }
+    }
+}
+
+/// The range table an edit asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TableEdit {
+    /// A preset (see [`preset_names`](super::preset_names)) or a TOML file.
+    Name(String),
+    /// Rows, or a rule that makes them.
+    Rule(TableRule),
+}
+
+impl<'de> Deserialize<'de> for TableEdit {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        const EXPECTED: &str =
+            "expected a preset's name, {\"levels\": [[lower, upper], ...]} or {\"quantile\": levels}";
+        let wrong = |found: &dyn std::fmt::Display| D::Error::custom(format!("table: {found}; {EXPECTED}"));
+        match Value::deserialize(from)? {
+            Value::String(name) => Ok(Self::Name(name)),
+            Value::Object(mut fields) => {
+                if let (Some(levels), 1) = (fields.get("quantile"), fields.len()) {
+                    let levels = levels.as_u64().and_then(|n| usize::try_from(n).ok());
+                    let levels = levels.ok_or_else(|| wrong(&format!("found quantile = {}", fields["quantile"])))?;
+                    return Ok(Self::Rule(TableRule::Quantile { name: format!("{levels} quantile levels"), levels }));
+                }
+                fields.entry("name").or_insert_with(|| "edited".into());
+                let table: RangeTable = serde_json::from_value(Value::Object(fields)).map_err(|e| wrong(&e))?;
+                Ok(Self::Rule(table.into()))
+            }
+            other => Err(wrong(&format!("found {other}"))),
+        }
+    }
+}
+
+/// The fabric an edit asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FabricEdit {
+    /// A built-in one or a TOML file.
+    Name(String),
+    /// All its constants.
+    Constants(Box<Fabric>),
+}
+
+impl<'de> Deserialize<'de> for FabricEdit {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        match Value::deserialize(from)? {
+            Value::String(name) => Ok(Self::Name(name)),
+            other => serde_json::from_value(other).map(Self::Constants).map_err(|e| {
+                D::Error::custom(format!("fabric: {e}; expected a built-in name or all constants of a fabric"))
+            }),
+        }
+    }
+}
+
+/// What is to change; whatever is left out stays.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Edit {
+    /// `form`, or a file.
+    pub body: Option<String>,
+    /// A built-in garment, `name` or `name@vertices`, or a file.
+    pub garment: Option<String>,
+    /// Measurements of the form by name, cm (`{"bust": 92}`).
+    pub measurements: Option<BTreeMap<String, f64>>,
+    /// The range table.
+    pub table: Option<TableEdit>,
+    /// Who takes a hole between two of its levels.
+    pub gap: Option<GapRule>,
+    /// The fabric.
+    pub fabric: Option<FabricEdit>,
+    /// PARTs with fewer vertices join a neighbour.
+    pub min_part: Option<usize>,
+    /// Extents PARTs are cut to, coarse to fine; none, or 0, for PARTs as the table makes them.
+    pub max_extent_cm: Option<Vec<f64>>,
+    /// `affine` or `translation`.
+    pub motion: Option<Motion>,
+    /// `coupled` or `paper`, with its defaults.
+    pub model: Option<String>,
+    /// `"converged"`, or `{"steps": n}` at full resolution.
+    pub refine: Option<Refine>,
+}
+
+impl Edit {
+    /// The names of files and built-in things in it: whoever takes edits from strangers looks at them first.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        let table = self.table.iter().filter_map(|t| if let TableEdit::Name(name) = t { Some(name) } else { None });
+        let fabric = self.fabric.iter().filter_map(|f| if let FabricEdit::Name(name) = f { Some(name) } else { None });
+        self.body.iter().chain(&self.garment).chain(table).chain(fabric).map(String::as_str).collect()
+    }
+
+    /// `job` with the edit.
+    ///
+    /// # Errors
+    /// [`EditError`] says what was found and expected.
+    pub fn applied(&self, job: &Job) -> Result<Job, EditError> {
+        let mut job = job.clone();
+        self.change_scene(&mut job)?;
+        let settings = &mut job.settings;
+        match &self.table {
+            None => {}
+            Some(TableEdit::Name(name)) => settings.table = presets::table(name)?.into(),
+            Some(TableEdit::Rule(rule)) => settings.table = rule.clone(),
+        }
+        if let (Some(gap), TableRule::Rows(table)) = (self.gap, &mut settings.table) {
+            table.gap = gap;
+            table.validate()?;
+        }
+        match &self.fabric {
+            None => {}
+            Some(FabricEdit::Name(name)) => settings.fabric = Fabric::by_name(name)?,
+            Some(FabricEdit::Constants(fabric)) => {
+                fabric.check("fabric")?;
+                settings.fabric = (**fabric).clone();
+            }
+        }
+        if let Some(min_part) = self.min_part {
+            settings.min_part = min_part.max(1);
+        }
+        if let Some(name) = &self.model {
+            let kept = (settings.model.extents_cm(), settings.model.motion());
+            let model =
+                Model::by_name(name).ok_or_else(|| EditError::value("model", name, "\"coupled\" or \"paper\""))?;
+            settings.model = model.with_extents_cm(&kept.0).with_motion(kept.1);
+        }
+        if let Some(extents) = &self.max_extent_cm {
+            let cuts: Vec<f64> = extents.iter().copied().filter(|cm| *cm != 0.0).collect();
+            if !cuts.is_sorted_by(|a, b| a > b) || cuts.iter().any(|cm| !cm.is_finite() || *cm < 0.0) {
+                let expected = "centimetres above 0 from coarse to fine, or 0 for PARTs as the table makes them";
+                return Err(EditError::value("max_extent_cm", format!("{extents:?}"), expected));
+            }
+            settings.model = settings.model.clone().with_extents_cm(&cuts);
+        }
+        if let Some(motion) = self.motion {
+            settings.model = settings.model.clone().with_motion(motion);
+        }
+        settings.refine = self.refine.unwrap_or(settings.refine);
+        Ok(job)
+    }
+
+    fn change_scene(&self, job: &mut Job) -> Result<(), EditError> {
+        let scene = &mut job.scene;
+        if let Some(body) = &self.body {
+            scene.body.clone_from(body);
+        }
+        if let Some(garment) = &self.garment {
+            scene.garment.clone_from(garment);
+        }
+        if self.body.is_some() || self.garment.is_some() {
+            scene.check_names()?;
+        }
+        let Some(changed) = &self.measurements else { return Ok(()) };
+        if scene.body != crate::scene::DRESS_FORM {
+            let expected = "body = \"form\", whose measurements these are";
+            return Err(EditError::value("measurements", format!("body = \"{}\"", scene.body), expected));
+        }
+        for (name, cm) in changed {
+            scene.measurements = scene.measurements.with(name.trim_end_matches("_cm"), *cm)?;
+        }
+        scene.measurements.measures()?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edit(json: &str) -> Result<Job, String> {
+        let edit: Edit = serde_json::from_str(json).map_err(|e| e.to_string())?;
+        edit.applied(&Job::default()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_left_out_stays() {
+        assert_eq!(edit("{}").unwrap(), Job::default());
+        let job = edit(r#"{"table": {"levels": [[0, 1.5], [1.5, "inf"]]}, "fabric": "denim", "max_extent_cm": [12]}"#);
+        let job = job.unwrap();
+        assert_eq!((job.settings.table.name(), job.settings.fabric.name.as_str()), ("edited", "denim"));
+        assert_eq!(job.settings.model.extents_cm(), [12.0]);
+        assert_eq!(job.scene, Job::default().scene);
+        let job = edit(r#"{"measurements": {"bust": 92}}"#).unwrap();
+        assert_eq!(job.scene.measurements.bust_cm, 92.0);
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_told_with_what_was_expected() {
+        for (json, words) in [
+            (r#"{"tabel": "table-3"}"#, "tabel"),
+            (r#"{"table": {"levels": [[0, 2], [1, 3]]}}"#, "row 2 starts at 1"),
+            (r#"{"table": {"levels": [[0, -2]]}}"#, "row 1"),
+            (r#"{"table": 7}"#, "expected a preset"),
+            (r#"{"table": "table-4"}"#, "table-3"),
+            (r#"{"fabric": "tweed"}"#, "denim"),
+            (r#"{"garment": "kimono"}"#, "flared-skirt"),
+            (r#"{"max_extent_cm": [6, 12]}"#, "coarse to fine"),
+            (r#"{"measurements": {"bust": 3}}"#, "bust"),
+            (r#"{"measurements": {"brain": 3}}"#, "brain"),
+            (r#"{"model": "finite"}"#, "coupled"),
+            (r#"{"min_part": -1}"#, "-1"),
+            (r#"{"body": "no-body"}"#, "no-body"),
+        ] {
+            let said = edit(json).unwrap_err();
+            assert!(said.contains(words), "{json}: {said}");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! What a session has found so far, piece by piece; every piece says which state it belongs to.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::drape::{ClothState, Distances, Drape, PartOutcome, Refine};
+use crate::fabric::Fabric;
+use crate::figures::Figures;
+use crate::job::Job;
+use crate::parts::Parts;
+use crate::range_table::RangeTable;
+use crate::scene::{Loaded, SceneSpec};
+
+/// Body and garment, and how far apart they are: what stays while tables and fabrics change.
+#[derive(Debug)]
+pub struct Ground {
+    /// Counts bodies and garments up from 1.
+    pub generation: u64,
+    /// What was loaded.
+    pub spec: SceneSpec,
+    /// The scene with its origin.
+    pub loaded: Loaded,
+    /// Milliseconds it took to load.
+    pub load_ms: f64,
+    pub(crate) distances: Distances,
+    pub(crate) distance_ms: f64,
+}
+
+impl Ground {
+    /// Unsigned distance of each garment vertex to the body before draping, m.
+    #[must_use]
+    pub fn distance_m(&self) -> &[f64] {
+        &self.distances.unsigned_m
+    }
+}
+
+/// Stage one of a state.
+#[derive(Debug, Clone)]
+pub struct Sectioned {
+    /// The state.
+    pub state: u64,
+    /// What was cut.
+    pub ground: Arc<Ground>,
+    /// The table, with the rows its rule made.
+    pub table: Arc<RangeTable>,
+    /// The PARTs.
+    pub parts: Arc<Parts>,
+    /// The body's reaction on each PART in the drape at hand, N; empty where there is none yet.
+    pub force_n: Arc<Vec<DVec3>>,
+    /// Milliseconds of the cut.
+    pub segment_ms: f64,
+    /// Milliseconds from the edit to here.
+    pub after_ms: f64,
+    pub(crate) min_part: usize,
+}
+
+/// Stage two of a state.
+#[derive(Debug, Clone)]
+pub struct Preview {
+    /// The state.
+    pub state: u64,
+    /// What was draped.
+    pub ground: Arc<Ground>,
+    /// Whether it went on from the preview before, in which case the two stages from the undraped garment are still to come.
+    pub warm: bool,
+    /// Whether its steps are done.
+    pub done: bool,
+    /// The PARTs that moved: those of stage one, or cut to the extent of the run.
+    pub parts: Arc<Parts>,
+    /// What each did; empty before the steps are done.
+    pub outcomes: Arc<Vec<PartOutcome>>,
+    /// The garment, m.
+    pub positions: Arc<Vec<DVec3>>,
+    /// Milliseconds of its steps.
+    pub ms: f64,
+    /// Milliseconds from the edit to here.
+    pub after_ms: f64,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// The garment at full resolution, on its way to rest or there.
+#[derive(Debug, Clone)]
+pub struct AtRest {
+    /// The state.
+    pub state: u64,
+    /// What was draped.
+    pub ground: Arc<Ground>,
+    /// Whether it is there.
+    pub done: bool,
+    /// Whether it is the drape of an earlier state, which the edit does not touch: where a cloth rests does not depend on the table.
+    pub kept: bool,
+    /// Whether it began at the drape before.
+    pub warm: bool,
+    /// The garment, m.
+    pub positions: Arc<Vec<DVec3>>,
+    /// ‖∇E‖ over the weight.
+    pub residual_over_weight: f64,
+    /// Steps at full resolution.
+    pub steps: usize,
+    /// Milliseconds of these.
+    pub ms: f64,
+    /// Milliseconds from the edit to here.
+    pub after_ms: f64,
+    pub(crate) reaction_n: Arc<Vec<DVec3>>,
+    pub(crate) told: Option<Arc<ClothState>>,
+    pub(crate) of: (Fabric, Refine),
+}
+
+/// A state with nothing left to compute.
+#[derive(Debug)]
+pub struct Finished {
+    /// The state.
+    pub state: u64,
+    /// What was draped.
+    pub ground: Arc<Ground>,
+    /// All of it.
+    pub drape: Drape,
+    /// Its figures.
+    pub figures: Figures,
+    /// RMS distance of the two stages alone from where the garment rests, mm, where it was refined.
+    pub preview_error_mm: Option<f64>,
+    /// What affine maps of these PARTs, blended over the seams, could hold that to, mm.
+    pub bound_mm: Option<f64>,
+}
+
+/// An edit that turned out to be impossible when it was tried.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The state it made.
+    pub state: u64,
+    /// Why it cannot be.
+    pub sentence: String,
+    /// The state that stands instead; none where there was no good one yet.
+    pub back_to: Option<u64>,
+}
+
+/// A state that was kept beside those after it.
+#[derive(Debug, Clone)]
+pub struct Pin {
+    /// Its number among the pins.
+    pub id: u64,
+    /// What it is called.
+    pub label: String,
+    /// The state it was.
+    pub state: u64,
+    /// Its job.
+    pub job: Arc<Job>,
+    /// Its drape: at rest where it had come to rest, else as previewed.
+    pub positions: Arc<Vec<DVec3>>,
+    /// What was draped.
+    pub ground: Arc<Ground>,
+    /// Its numbers.
+    pub numbers: TrailPoint,
+}
+
+/// The numbers of a state, for lines over the edits.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct TrailPoint {
+    /// The state.
+    pub state: u64,
+    /// Its PARTs.
+    pub parts: usize,
+    /// Milliseconds of stage one.
+    pub segment_ms: f64,
+    /// Milliseconds of stage two from the undraped garment.
+    pub two_stages_ms: Option<f64>,
+    /// Milliseconds at full resolution.
+    pub rest_ms: Option<f64>,
+    /// RMS distance of the two stages alone from where the garment rests, mm.
+    pub preview_error_mm: Option<f64>,
+    /// What affine maps of the PARTs could hold that to, mm.
+    pub bound_mm: Option<f64>,
+}
+
+/// All that is known at one moment.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// Grows with everything that becomes known.
+    pub serial: u64,
+    /// The newest state.
+    pub state: u64,
+    /// Its job.
+    pub job: Arc<Job>,
+    /// Whether there is nothing left to compute for it.
+    pub idle: bool,
+    /// The newest body and garment.
+    pub ground: Option<Arc<Ground>>,
+    /// The newest stage one.
+    pub sectioned: Option<Arc<Sectioned>>,
+    /// The newest stage two.
+    pub preview: Option<Arc<Preview>>,
+    /// The newest drape at full resolution.
+    pub rest: Option<Arc<AtRest>>,
+    /// The newest state that was finished.
+    pub finished: Option<Arc<Finished>>,
+    /// The last edit that could not be.
+    pub refused: Option<Arc<Refusal>>,
+    /// What was pinned, in order.
+    pub pins: Arc<Vec<Arc<Pin>>>,
+    /// The numbers of the last states, oldest first.
+    pub trail: Arc<Vec<TrailPoint>>,
+    /// Steps that can be taken back.
+    pub undo: usize,
+    /// Steps that can be taken on again.
+    pub redo: usize,
+    /// States that a newer edit overtook before they were finished.
+    pub superseded: u64,
+}

@@ -1,0 +1,148 @@
+//! The drape at rest, and the whole of a state with its figures.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use super::{Target, Workshop, ask};
+use crate::accuracy::{self, representable::representable};
+use crate::drape::{ClothState, Drape, Levels, Made, Refine, Settings, StageTimes, folds_of, refine_from, settled};
+use crate::figures::Figures;
+use crate::mechanics::coupled::Motion;
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::refine::Stop;
+use crate::scene::Scene;
+use crate::session::desk::ms_since;
+use crate::session::results::{AtRest, Finished, Sectioned};
+use crate::session::{EditError, Session};
+
+impl Workshop {
+    /// Steps at full resolution from `start`, shown step by step.
+    pub(super) fn settle(
+        &mut self,
+        session: &Session,
+        target: &Target,
+        sectioned: &Sectioned,
+        levels: &Levels,
+        start: Vec<DVec3>,
+        warm: bool,
+    ) -> Result<(), EditError> {
+        let began = Instant::now();
+        let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
+        let at = |positions: &[DVec3], residual: f64, steps: usize| AtRest {
+            state: target.state,
+            ground: Arc::clone(&sectioned.ground),
+            done: false,
+            kept: false,
+            warm,
+            positions: Arc::new(positions.to_vec()),
+            residual_over_weight: residual,
+            steps,
+            ms: ms_since(began),
+            after_ms: ms_since(target.accepted),
+            reaction_n: Arc::default(),
+            told: None,
+            of: (settings.fabric.clone(), settings.refine),
+        };
+        let refined = refine_from(scene, settings, &levels.cloth, start, &mut |step| {
+            if step.iteration > 0 {
+                let step = Arc::new(at(step.positions, step.residual_over_weight, step.iteration));
+                session.publish(target.state, |desk| desk.view.rest = Some(step));
+            }
+            ask(session, target.state)
+        });
+        let refined = refined?;
+        let generation = sectioned.ground.generation;
+        if refined.stop == Stop::Interrupted && session.overtaken(target.state) {
+            // A drape that falls off is interrupted too, and shown.
+            self.rest = Some((generation, Arc::new(refined.positions)));
+            return Ok(());
+        }
+        let took = began.elapsed();
+        let (positions, state) = settled(scene, settings, &levels.cloth, refined);
+        let rest = Arc::new(AtRest {
+            done: true,
+            reaction_n: Arc::new(reactions(&levels.cloth, &positions)),
+            ms: took.as_secs_f64() * 1e3,
+            told: Some(Arc::new(state.clone())),
+            ..at(&positions, state.residual_over_weight, state.steps)
+        });
+        self.rest = Some((generation, Arc::clone(&rest.positions)));
+        self.done.rested = Some(took);
+        session.publish(target.state, |desk| {
+            desk.add_to_trail(|point| point.rest_ms = Some(rest.ms));
+            desk.found_rest(rest);
+        });
+        Ok(())
+    }
+
+    /// The whole drape of the state, and its figures.
+    pub(super) fn finish(
+        &mut self,
+        session: &Session,
+        target: &Target,
+        sectioned: &Arc<Sectioned>,
+        levels: Option<&Levels>,
+    ) {
+        let Some((stage, took)) = self.done.two_stages.take() else { return };
+        let settings = &target.job.settings;
+        let ground = &sectioned.ground;
+        let scene = &ground.loaded.scene;
+        let ms = |ms: f64| Duration::from_secs_f64(1e-3 * ms);
+        let sewing = self.cloth.as_ref().map_or(Duration::ZERO, |sewn| sewn.took);
+        let mut times = StageTimes {
+            distance: ms(ground.distance_ms),
+            segment: ms(sectioned.segment_ms),
+            mechanics: took + sewing,
+            refine: self.done.rested.unwrap_or_default(),
+            total: Duration::ZERO,
+        };
+        times.total = times.distance + times.segment + times.mechanics + times.refine;
+        let state = target.rest.as_ref().and_then(|rest| {
+            let told: &ClothState = rest.told.as_deref()?;
+            Some((rest.positions.to_vec(), ClothState { steps: rest.steps, ..told.clone() }))
+        });
+        let made = Made {
+            ground: ground.distances.clone(),
+            table: (*sectioned.table).clone(),
+            level_part_count: sectioned.parts.len(),
+            folds: folds_of(settings, levels, &stage),
+            stage,
+            state,
+        };
+        let drape = made.judged(scene, settings, times);
+        let figures = Figures::of(scene, &drape);
+        let rested = target.rest.is_some() && settings.refine != Refine::Steps(0);
+        let preview_error_mm = rested.then(|| accuracy::rms_mm(&drape.preview, &drape.positions));
+        let bound_mm = rested.then(|| bound(settings, scene, &drape));
+        let bound_mm = bound_mm.filter(|mm| mm.is_finite());
+        let (state, ground) = (target.state, Arc::clone(ground));
+        let finished = Finished { state, ground, drape, figures, preview_error_mm, bound_mm };
+        self.done.finished = true;
+        session.publish(state, |desk| {
+            desk.add_to_trail(|point| {
+                (point.preview_error_mm, point.bound_mm) = (preview_error_mm, bound_mm);
+            });
+            desk.view.finished = Some(Arc::new(finished));
+            desk.finish();
+        });
+    }
+}
+
+/// What blended affine maps of the PARTs could hold the drape at rest to.
+fn bound(settings: &Settings, scene: &Scene, drape: &Drape) -> f64 {
+    let placed = &scene.garment.positions;
+    let best = representable(&scene.topology, &drape.parts, &scene.is_held(), placed, &drape.positions);
+    match settings.model.motion() {
+        Motion::Affine => best.blended_affine_rms_mm,
+        Motion::Translation => best.blended_translation_rms_mm,
+    }
+}
+
+/// Force of the body on each vertex where the cloth rests, N: what its weight and the cloth pull with, friction included.
+fn reactions(cloth: &Cloth, x: &[DVec3]) -> Vec<DVec3> {
+    let mut gradient = Vec::new();
+    cloth.gradient(x, &Contacts::none(), &mut gradient);
+    gradient.iter().zip(&cloth.held).map(|(g, held)| if *held { DVec3::ZERO } else { *g }).collect()
+}

@@ -1,0 +1,152 @@
+//! Body and garment, cloth, and the two stages: warm, and from the undraped garment.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::{Sewn, Target, Workshop, ask};
+use crate::drape::{Distances, DrapeError, Levels, stage_two, told};
+use crate::fabric::Fabric;
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment};
+use crate::session::desk::{ms_since, sums};
+use crate::session::results::{Ground, Preview, Sectioned};
+use crate::session::{EditError, Session};
+
+/// Steps of a preview that goes on from the one before.
+const WARM_STEPS: usize = 6;
+
+impl Workshop {
+    pub(super) fn load(&mut self, session: &Session, target: &Target) -> Result<(), EditError> {
+        let began = Instant::now();
+        let loaded = target.job.scene.load_with(&self.meshes)?;
+        let (load_ms, began) = (ms_since(began), Instant::now());
+        let distances = Distances::of(&loaded.scene);
+        self.generations += 1;
+        let ground = Arc::new(Ground {
+            generation: self.generations,
+            spec: target.job.scene.clone(),
+            loaded,
+            load_ms,
+            distance_ms: ms_since(began),
+            distances,
+        });
+        let mut found = Ok(());
+        session.publish(target.state, |desk| found = desk.found_ground(ground));
+        found
+    }
+
+    pub(super) fn sew(&mut self, sectioned: &Sectioned, fabric: &Fabric) -> Result<(), EditError> {
+        let began = Instant::now();
+        self.cloth = None;
+        let levels = Levels::new(&sectioned.ground.loaded.scene, fabric).map_err(DrapeError::from)?;
+        let (generation, fabric) = (sectioned.ground.generation, fabric.clone());
+        self.cloth = Some(Sewn { generation, fabric, levels: Arc::new(levels), took: began.elapsed() });
+        Ok(())
+    }
+
+    /// Stage two from the preview before, shown step by step.
+    pub(super) fn go_on(
+        &mut self,
+        session: &Session,
+        target: &Target,
+        sectioned: &Sectioned,
+        levels: &Levels,
+        options: &CoupledOptions,
+        start: &[DVec3],
+    ) -> Result<(), EditError> {
+        let began = Instant::now();
+        let scene = &sectioned.ground.loaded.scene;
+        let parts = match options.extents_m.last() {
+            None => Arc::clone(&sectioned.parts),
+            Some(&finest) => Arc::new(sectioned.parts.cut_to_extent(&scene.garment, &scene.topology, finest)),
+        };
+        let preview = |positions: &[DVec3]| Preview {
+            state: target.state,
+            ground: Arc::clone(&sectioned.ground),
+            warm: true,
+            done: false,
+            parts: Arc::clone(&parts),
+            outcomes: Arc::default(),
+            positions: Arc::new(positions.to_vec()),
+            ms: ms_since(began),
+            after_ms: ms_since(target.accepted),
+            warnings: Vec::new(),
+        };
+        let garment = Garment {
+            mesh: &scene.garment,
+            topology: &scene.topology,
+            cloth: &levels.cloth,
+            fabric: &target.job.settings.fabric,
+        };
+        let few = CoupledOptions { max_steps: WARM_STEPS, ..options.clone() };
+        let mut reached = start.to_vec();
+        let solved = coupled::solve_before(&garment, &scene.body, &parts, start, &few, &mut |x| {
+            reached.clear();
+            reached.extend_from_slice(x);
+            let step = Arc::new(preview(x));
+            session.publish(target.state, |desk| desk.view.preview = Some(step));
+            ask(session, target.state)
+        });
+        let generation = sectioned.ground.generation;
+        let mut solved = match solved {
+            Ok(solved) => solved,
+            Err(CoupledError::Interrupted) => {
+                self.preview = Some((generation, Arc::new(reached)));
+                return Ok(());
+            }
+            Err(error) => return Err(DrapeError::from(error).into()),
+        };
+        // The displacement of a PART counts from the garment as placed.
+        let placed = &scene.garment.positions;
+        let moved: Vec<DVec3> = solved.positions.iter().zip(placed).map(|(x, before)| *x - *before).collect();
+        for ((part, result), sum) in parts.parts.iter().zip(&mut solved.parts).zip(sums(&parts, &moved)) {
+            result.displacement = sum / part.vertices.len() as f64;
+        }
+        let outcomes = Arc::new(solved.parts.iter().map(told).collect());
+        let shown = Arc::new(Preview { done: true, outcomes, ..preview(&solved.positions) });
+        self.preview = Some((generation, Arc::clone(&shown.positions)));
+        session.publish(target.state, |desk| desk.view.preview = Some(shown));
+        Ok(())
+    }
+
+    /// Both stages from the undraped garment, as `run` does it.
+    pub(super) fn two_stages(
+        &mut self,
+        session: &Session,
+        target: &Target,
+        sectioned: &Sectioned,
+        levels: Option<&Levels>,
+    ) -> Result<(), EditError> {
+        let began = Instant::now();
+        let Ground { loaded, distances, .. } = &*sectioned.ground;
+        let parts = (*sectioned.parts).clone();
+        let asked = || ask(session, target.state);
+        let stage = stage_two(&loaded.scene, &target.job.settings, &distances.surface, parts, levels, &asked);
+        let stage = match stage {
+            Ok(stage) => stage,
+            Err(DrapeError::Coupled(CoupledError::Interrupted)) => return Ok(()),
+            Err(error) => return Err(error.into()),
+        };
+        let took = began.elapsed();
+        let preview = Arc::new(Preview {
+            state: target.state,
+            ground: Arc::clone(&sectioned.ground),
+            warm: false,
+            done: true,
+            parts: Arc::new(stage.parts.clone()),
+            outcomes: Arc::new(stage.outcomes.clone()),
+            positions: Arc::new(stage.positions.clone()),
+            ms: took.as_secs_f64() * 1e3,
+            after_ms: ms_since(target.accepted),
+            warnings: stage.warnings.clone(),
+        });
+        self.preview = Some((sectioned.ground.generation, Arc::clone(&preview.positions)));
+        self.done.two_stages = Some((stage, took));
+        session.publish(target.state, |desk| {
+            desk.add_to_trail(|point| point.two_stages_ms = Some(preview.ms));
+            desk.view.preview = Some(preview);
+        });
+        Ok(())
+    }
+}

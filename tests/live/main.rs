@@ -1,0 +1,283 @@
+//! The session over HTTP: edits, results, what viewers are sent, and every kind of bad input.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+mod client;
+
+use std::io::{BufReader, Write as _};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use client::{Live, answer, chunk, head, options};
+use partwise::live::{LiveError, LiveOptions, LiveServer};
+use partwise::session::Session;
+use serde_json::{Value, json};
+
+#[test]
+fn edits_answer_with_the_state_and_results_follow() {
+    let live = Live::start(&options());
+    let before = live.get("/api/state").1;
+    assert_eq!(
+        (before["state"].as_u64(), &before["idle"], &before["may_steer"]),
+        (Some(1), &json!(true), &json!(true))
+    );
+    assert_eq!(
+        before["histogram"]["counts"].as_array().unwrap().len() + 1,
+        before["histogram"]["edges_cm"].as_array().unwrap().len()
+    );
+    let (status, edited) = live.patch(r#"{"table": {"levels": [[0, 2], [2, "inf", 12]]}}"#);
+    assert_eq!((status, &edited["state"], &edited["parts"]["state"]), (200, &json!(2), &json!(2)));
+    // The answer can be handed in again.
+    let again = json!({"table": edited["job"]["table"], "measurements": edited["job"]["measurements"], "fabric": edited["job"]["fabric"]});
+    assert_eq!(live.patch(&again.to_string()).1["state"], 2);
+    let done = live.idle();
+    assert_eq!((&done["figures"]["state"], &done["rest"]["kept"]), (&json!(2), &json!(true)));
+    assert!(
+        done["figures"]["preview_error_mm"].as_f64().unwrap() > 0.0
+            && done["figures"]["bound_mm"].as_f64().unwrap() > 0.0
+    );
+    assert_eq!(live.ask("POST", "/api/undo", &[], "").1["job"]["table"], before["job"]["table"]);
+    assert_eq!(live.ask("POST", "/api/redo", &[], "").1["job"]["table"], edited["job"]["table"]);
+
+    let table = live.text("GET", "/api/table.toml", &[], "").1;
+    assert!(table.contains("[2.0, inf, 12.0]"), "{table}");
+    let toml = ["Content-Type: application/toml"];
+    assert_eq!(
+        live.ask("PATCH", "/api/state", &toml, &table.replace("2.0", "3.0")).1["job"]["table"]["levels"][0][1],
+        3.0
+    );
+    let job = live.text("GET", "/api/job.toml", &[], "").1;
+    live.patch(r#"{"fabric": "denim"}"#);
+    assert_eq!(live.ask("PATCH", "/api/state", &toml, &job).1["job"]["fabric"], "interlock");
+
+    live.idle();
+    let obj = live.text("GET", "/api/drape.obj", &[], "").1;
+    let vertices = done["garment"]["vertices"].as_u64().unwrap() as usize;
+    assert_eq!(obj.lines().filter(|line| line.starts_with("v ")).count(), vertices);
+    assert_ne!(live.text("GET", "/api/drape.obj?of=preview", &[], "").1, obj);
+    let part = live.get("/api/part?number=0").1;
+    assert!(part["level"] == 0 && part["vertices"].as_u64().unwrap() > 0 && part["area_cm2"].as_f64().unwrap() > 0.0);
+    assert!(part["force_size_n"].is_number() && part["rest_displacement_mm"][2].is_number());
+    let first = obj.lines().find(|line| line.starts_with("v ")).unwrap()[2..].replace(' ', ",");
+    let at = live.get(&format!("/api/part?on=rest&at={first}")).1;
+    let of_first = live.session.snapshot().sectioned.unwrap().parts.part_of_vertex[0];
+    assert_eq!(at["part"], of_first);
+
+    let pinned = live.ask("POST", "/api/pins", &["Content-Type: application/json"], r#"{"label": "as it was"}"#).1;
+    assert_eq!(pinned["pins"][0]["label"], "as it was");
+    assert_eq!(live.text("GET", "/api/drape.obj?pin=1", &[], "").1, obj);
+    assert_eq!(live.ask("DELETE", "/api/pins/1", &[], "").1["pins"], json!([]));
+    assert!(live.get("/api/choices").1["tables"].as_array().unwrap().contains(&json!("flared-skirt-levels")));
+}
+
+#[test]
+fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
+    let live = Live::start(&options());
+    let json = "Content-Type: application/json";
+    let deep = "[".repeat(100_000);
+    let cases: Vec<(&str, &str, Vec<&str>, &str, u16, &str)> = vec![
+        ("PATCH", "/api/state", vec![json], "{\"fabric\": ", 400, "line 1"),
+        ("PATCH", "/api/state", vec![json], "{\"max_extent_cm\": [NaN]}", 400, "line 1"),
+        ("PATCH", "/api/state", vec![json], "{\"max_extent_cm\": [-3]}", 422, "above 0"),
+        ("PATCH", "/api/state", vec![json], "{\"fabirc\": \"denim\"}", 400, "fabirc"),
+        ("PATCH", "/api/state", vec![json], "{\"table\": {\"levels\": [[0, 2], [1, 3]]}}", 400, "row 2 starts at 1"),
+        ("PATCH", "/api/state", vec![json], "{\"table\": {\"levels\": [[0, 1e999]]}}", 400, "number out of range"),
+        ("PATCH", "/api/state", vec![json], "{\"table\": {\"quantile\": 99999999}}", 422, "levels"),
+        ("PATCH", "/api/state", vec![json], "{\"measurements\": {\"waist\": 1e300}}", 422, "waist"),
+        ("PATCH", "/api/state", vec![json], "{\"garment\": \"kimono\"}", 422, "kimono"),
+        ("PATCH", "/api/state", vec![json], "{\"garment\": \"/etc/passwd.obj\"}", 403, "passwd"),
+        ("PATCH", "/api/state", vec![json], "{\"table\": \"/etc/shadow.toml\"}", 403, "shadow"),
+        ("PATCH", "/api/state", vec![json], "[]", 400, ""),
+        ("PATCH", "/api/state", vec![json], "\u{0}\u{ff}", 400, ""),
+        ("PATCH", "/api/state", vec![json], &deep, 400, ""),
+        ("PATCH", "/api/state?gesture=-1", vec![json], "{}", 400, "gesture"),
+        ("PATCH", "/api/state", vec!["Content-Type: text/plain"], "{}", 415, "application/json"),
+        ("PATCH", "/api/state", vec![], "{}", 415, "application/json"),
+        ("PATCH", "/api/state", vec!["Content-Type: application/toml"], "levels = [[0, 1]", 400, ""),
+        (
+            "PATCH",
+            "/api/state",
+            vec!["Content-Type: application/toml"],
+            "name = \"t\"\nunit = \"mm\"\nlevels = [[0, 1]]",
+            422,
+            "cm",
+        ),
+        (
+            "PATCH",
+            "/api/state",
+            vec!["Content-Type: application/toml"],
+            "[scene]\nbody = \"/root/x.obj\"",
+            403,
+            "x.obj",
+        ),
+        ("PATCH", "/api/state", vec![json, "Content-Length: 10485760"], "", 413, "1048576"),
+        ("PATCH", "/api/state", vec![json, "Content-Length: 99999999999"], "", 413, "1048576"),
+        ("PATCH", "/api/state", vec![json, "Origin: http://evil.example"], "{}", 403, "evil.example"),
+        ("GET", "/api/state", vec!["Origin: null"], "", 403, "null"),
+        ("GET", "/api/state", vec!["Host: evil.example"], "", 421, "evil.example"),
+        ("POST", "/api/state", vec![json], "{}", 405, "PATCH"),
+        ("DELETE", "/api/undo", vec![], "", 405, ""),
+        ("POST", "/api/undo", vec![], "", 422, "undo"),
+        ("DELETE", "/api/pins/7", vec![], "", 404, "pin"),
+        ("POST", "/api/pins", vec![], "{\"label\": 7}", 400, "label"),
+        ("GET", "/api/part?number=100000", vec![], "", 404, "PART"),
+        ("GET", "/api/part?at=0,0,nan", vec![], "", 400, "metres"),
+        ("GET", "/api/drape.obj?of=all", vec![], "", 400, "preview"),
+        ("GET", "/api/../../etc/passwd", vec![], "", 404, ""),
+        ("GET", "/nothing", vec![], "", 404, "nothing"),
+        ("PUT", "/", vec![], "", 405, "GET"),
+    ];
+    for (method, path, headers, body, status, words) in cases {
+        let (found, said) = live.ask(method, path, &headers, body);
+        let start: String = body.chars().take(80).collect();
+        assert_eq!(found, status, "{method} {path} {headers:?} {start}: {said}");
+        let sentence = said["error"].as_str().unwrap_or_else(|| panic!("{path}: {said}"));
+        assert!(sentence.contains(words) && sentence.len() < 2000, "{method} {path} {start}: {sentence}");
+    }
+    // A body that does not say how long it is.
+    let mut stream = live.open("PATCH", "/api/state", &[json.to_owned(), "Transfer-Encoding: chunked".to_owned()]);
+    for _ in 0..40 {
+        let _ = stream.write_all(format!("10000\r\n{}\r\n", " ".repeat(0x10000)).as_bytes());
+    }
+    assert_eq!(answer(&mut BufReader::new(stream)).0, 413);
+    // No request at all.
+    let mut stream = std::net::TcpStream::connect(live.address).unwrap();
+    stream.write_all(b"\x16\x03\x01\x02\x00 hello\r\n\r\n").unwrap();
+    assert_eq!(live.get("/api/state").1["state"], 1);
+    assert_eq!(live.patch(r#"{"fabric": "jersey"}"#).1["state"], 2);
+}
+
+#[test]
+fn elsewhere_a_token_steers_and_another_looks_on() {
+    let (control, onlooker) = ("c".repeat(32), "o".repeat(32));
+    let far = LiveOptions { control: Some(control.clone()), onlooker: Some(onlooker.clone()), ..options() };
+    let live = Live::start(&far);
+    let bearer = |token: &str| format!("Authorization: Bearer {token}");
+    let ask = |method: &str, path: &str, token: Option<&str>| {
+        let mut headers = vec!["Content-Type: application/json".to_owned()];
+        headers.extend(token.map(bearer));
+        live.ask(
+            method,
+            path,
+            &headers.iter().map(String::as_str).collect::<Vec<_>>(),
+            if method == "PATCH" { "{}" } else { "" },
+        )
+    };
+    for path in ["/api/state", "/api/events", "/api/stream", "/api/drape.obj", "/api/job.toml"] {
+        assert_eq!(ask("GET", path, None).0, 401, "{path}");
+        assert_eq!(ask("GET", path, Some("guess")).0, 401, "{path}");
+    }
+    assert_eq!(ask("GET", "/api/state", Some(&onlooker)).1["may_steer"], false);
+    for (method, path) in
+        [("PATCH", "/api/state"), ("POST", "/api/undo"), ("POST", "/api/pins"), ("DELETE", "/api/pins/1")]
+    {
+        assert_eq!(ask(method, path, Some(&onlooker)).0, 403, "{path}");
+    }
+    assert_eq!(ask("PATCH", "/api/state", Some(&control)).0, 200);
+    assert_eq!(live.get(&format!("/api/state?token={control}")).0, 200);
+    // The page itself tells nothing.
+    assert_eq!(live.text("GET", "/", &[], "").0, 200);
+    let open = LiveOptions { address: "0.0.0.0:0".parse().unwrap(), ..options() };
+    assert!(matches!(LiveServer::start(&live.session, &open), Err(LiveError::Open(_))));
+}
+
+#[test]
+fn a_port_in_use_is_told() {
+    let live = Live::start(&options());
+    let taken = LiveOptions { address: live.address, ..options() };
+    let error = LiveServer::start(&Session::new(partwise::Job::default(), true), &taken).err().unwrap();
+    assert!(error.to_string().contains("--port"), "{error}");
+    let port = live.address.port().to_string();
+    let ended = Command::new(env!("CARGO_BIN_EXE_partwise")).args(["live", "--port", &port]).output().unwrap();
+    assert_eq!(ended.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&ended.stderr).contains(&port));
+}
+
+#[test]
+fn events_tell_each_state_and_a_reader_that_never_reads_hinders_nobody() {
+    let live = Live::start(&options());
+    // These two never read a byte.
+    let _idle: Vec<_> = ["/api/events", "/api/stream"].map(|path| live.open("GET", path, &[])).into();
+    let mut events = BufReader::new(live.open("GET", "/api/events", &[]));
+    assert_eq!(head(&mut events).0, 200);
+    let mut next = || -> Value {
+        loop {
+            let text = String::from_utf8(chunk(&mut events)).unwrap();
+            if let Some(data) = text.strip_prefix("event: state\ndata: ") {
+                return serde_json::from_str(data).unwrap();
+            }
+        }
+    };
+    assert!(next()["histogram"].is_object(), "the first is the whole state");
+    for i in 0..30 {
+        live.patch(&format!(r#"{{"table": {{"levels": [[0, {}], [3, "inf"]]}}}}"#, 1.0 + 0.05 * f64::from(i)));
+    }
+    let began = Instant::now();
+    let mut seen = Vec::new();
+    let last = loop {
+        let event = next();
+        seen.push(event["state"].as_u64().unwrap());
+        if event["idle"] == true && event["state"] == 31 {
+            break event;
+        }
+        assert!(began.elapsed() < Duration::from_secs(60));
+    };
+    assert!(seen.is_sorted() && last["parts"]["state"] == 31 && last["figures"]["state"] == 31);
+    assert!(seen.len() as f64 <= 2.0 + began.elapsed().as_secs_f64() * 31.0, "{} events", seen.len());
+}
+
+#[test]
+fn a_viewer_gets_triangles_once_and_then_what_moved() {
+    let live = Live::start(&options());
+    let mut stream = BufReader::new(live.open("GET", "/api/stream", &[]));
+    assert_eq!(head(&mut stream).0, 200);
+    let mut bytes = Vec::new();
+    let mut next = || -> Vec<u8> {
+        loop {
+            if let Some(length) = bytes.first_chunk::<4>().map(|b| u32::from_le_bytes(*b) as usize)
+                && bytes.len() >= 4 + length
+            {
+                let piece: Vec<u8> = bytes.drain(..4 + length).skip(4).collect();
+                if !piece.is_empty() {
+                    return piece;
+                }
+                continue;
+            }
+            bytes.extend(chunk(&mut stream));
+        }
+    };
+    let first: Vec<Vec<u8>> = (0..4).map(|_| next()).collect();
+    assert!(first.iter().all(|piece| piece.starts_with(b"RRF2")), "whole recordings each");
+    live.patch(r#"{"table": {"levels": [[0, 2], [2, "inf"]]}}"#);
+    let parts = next();
+    assert!(parts.len() * 3 < first[0].len(), "{} bytes after {}", parts.len(), first[0].len());
+    // Who comes later gets the newest of all.
+    live.idle();
+    std::thread::sleep(Duration::from_millis(300));
+    let mut late = BufReader::new(live.open("GET", "/api/stream", &[]));
+    assert_eq!(head(&mut late).0, 200);
+    assert_eq!(u32::from_le_bytes(chunk(&mut late).try_into().unwrap()) as usize, first[0].len());
+    assert_eq!(chunk(&mut late), first[0]);
+}
+
+#[test]
+fn the_lines_of_the_documentation_run() {
+    let live = Live::start(&options());
+    let text = include_str!("../../assets/live/http.md").replace("\\\n", " ");
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| line.starts_with("curl ")).collect();
+    assert!(lines.len() >= 14, "{lines:?}");
+    for line in lines {
+        live.idle();
+        let mut shell = Command::new("sh");
+        shell
+            .args(["-c", &line.replacen("curl -s", "curl -sS --fail-with-body", 1)])
+            .env("BASE", format!("http://{}", live.address));
+        let ended = shell.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+        // 28: the time that events were asked for is over.
+        let fine = ended.status.success() || line.contains("--max-time") && ended.status.code() == Some(28);
+        let said = String::from_utf8_lossy(&ended.stdout);
+        assert!(fine && !said.is_empty(), "{line}: {} {said} {}", ended.status, String::from_utf8_lossy(&ended.stderr));
+    }
+    let done = live.idle();
+    assert_eq!(done["job"]["measurements"]["waist"], 76.0);
+}

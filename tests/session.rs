@@ -1,0 +1,264 @@
+//! The session as a state machine: what each edit computes anew and keeps, what overtakes what, what is refused. No socket, no
+//! thread but where one is the point.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use partwise::accuracy::rms_mm;
+use partwise::session::{Edit, Session, Snapshot, Workshop};
+use partwise::shapes::MeshCache;
+use partwise::{Job, SceneSpec, Settings, drape};
+
+/// A small garment, so that a whole drape takes a moment.
+const GARMENT: &str = "flared-skirt@900";
+
+fn job() -> Job {
+    Job { scene: SceneSpec::new("form", GARMENT), ..Job::default() }
+}
+
+fn edit(json: &str) -> Edit {
+    serde_json::from_str(json).unwrap()
+}
+
+/// A session with nothing left to do.
+fn settled(warm: bool) -> (Session, Workshop) {
+    let session = Session::new(job(), warm);
+    let mut workshop = Workshop::new(MeshCache::in_user_cache());
+    let done = work(&session, &mut workshop);
+    assert_eq!((done.state, done.finished.as_ref().unwrap().state), (1, 1));
+    (session, workshop)
+}
+
+/// Works until there is nothing left.
+fn work(session: &Session, workshop: &mut Workshop) -> Snapshot {
+    while workshop.advance(session) {}
+    let now = session.snapshot();
+    assert!(now.idle);
+    now
+}
+
+const TWO_LEVELS: &str = r#"{"table": {"levels": [[0, 2], [2, "inf"]]}}"#;
+
+#[test]
+fn a_bound_moves_parts_at_once_and_leaves_distances_cloth_and_rest() {
+    let (session, mut workshop) = settled(true);
+    let before = session.snapshot();
+    assert_eq!(session.submit(&edit(TWO_LEVELS), None).unwrap(), 2);
+    // Nobody has worked yet.
+    let at_once = session.snapshot();
+    let sectioned = at_once.sectioned.as_ref().unwrap();
+    assert_eq!((sectioned.state, at_once.finished.as_ref().unwrap().state), (2, 1));
+    assert!(sectioned.parts.len() < before.sectioned.as_ref().unwrap().parts.len());
+    assert!(Arc::ptr_eq(&sectioned.ground, before.ground.as_ref().unwrap()));
+    // The body carries the skirt, whichever way it is cut.
+    let total = |s: &Snapshot| s.sectioned.as_ref().unwrap().force_n.iter().map(|f| f.z).sum::<f64>();
+    assert_eq!(sectioned.force_n.len(), sectioned.parts.len());
+    let (rest, was) = (at_once.rest.as_ref().unwrap(), before.rest.as_ref().unwrap());
+    assert!(rest.kept && rest.state == 2 && Arc::ptr_eq(&rest.positions, &was.positions));
+    let done = work(&session, &mut workshop);
+    let finished = done.finished.as_ref().unwrap();
+    assert!(finished.state == 2 && Arc::ptr_eq(&finished.ground, before.ground.as_ref().unwrap()));
+    let preview = done.preview.as_ref().unwrap();
+    assert!(preview.state == 2 && !preview.warm && preview.done);
+    assert!((total(&done) - total(&at_once)).abs() < 1e-12);
+    assert!(finished.preview_error_mm.unwrap() > 0.1);
+    assert_eq!(done.trail.iter().map(|p| p.state).collect::<Vec<_>>(), [1, 2]);
+}
+
+#[test]
+fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
+    let (session, mut workshop) = settled(true);
+    let before = session.snapshot();
+    session.submit(&edit(r#"{"fabric": "ponte"}"#), None).unwrap();
+    let at_once = session.snapshot();
+    let parts = |s: &Snapshot| Arc::clone(&s.sectioned.as_ref().unwrap().parts);
+    assert!(Arc::ptr_eq(&parts(&at_once), &parts(&before)));
+    assert_eq!(at_once.rest.as_ref().unwrap().state, 1, "another fabric rests elsewhere");
+    let done = work(&session, &mut workshop);
+    let rest = done.rest.as_ref().unwrap();
+    assert!(rest.state == 2 && rest.warm && rest.done && rest.residual_over_weight < 1e-3);
+    assert_eq!(done.finished.as_ref().unwrap().figures.penetrating_vertices, 0);
+    assert!(rms_mm(&rest.positions, &before.rest.as_ref().unwrap().positions) > 0.1);
+}
+
+#[test]
+fn a_measurement_makes_another_form_and_fits_the_garment_to_it() {
+    let (session, mut workshop) = settled(true);
+    session.submit(&edit(r#"{"measurements": {"waist": 76}}"#), None).unwrap();
+    let done = work(&session, &mut workshop);
+    let ground = done.ground.as_ref().unwrap();
+    assert_eq!((ground.generation, ground.spec.measurements.waist_cm), (2, 76.0));
+    assert_eq!(done.finished.as_ref().unwrap().state, 2);
+}
+
+#[test]
+fn without_warm_starts_a_session_is_a_run_bit_for_bit() {
+    let (session, mut workshop) = settled(false);
+    for change in [TWO_LEVELS, r#"{"fabric": "denim"}"#, r#"{"max_extent_cm": [24, 12]}"#] {
+        session.submit(&edit(change), None).unwrap();
+        let done = work(&session, &mut workshop);
+        let scene = &done.ground.as_ref().unwrap().loaded.scene;
+        let run = drape::drape(scene, &done.job.settings, &mut drape::unobserved).unwrap();
+        let finished = done.finished.as_ref().unwrap();
+        assert_eq!(finished.drape.preview, run.preview, "{change}");
+        assert_eq!(finished.drape.positions, run.positions, "{change}");
+        assert_eq!(finished.drape.parts, run.parts, "{change}");
+        assert_eq!(finished.figures, partwise::figures::Figures::of(scene, &run), "{change}");
+    }
+}
+
+#[test]
+fn two_stages_are_those_of_a_run_after_any_number_of_warm_edits() {
+    let (session, mut workshop) = settled(true);
+    for bound in [1.0, 1.5, 3.0, 2.0] {
+        let change = edit(&format!(r#"{{"table": {{"levels": [[0, {bound}], [{bound}, "inf"]]}}}}"#));
+        session.submit(&change, None).unwrap();
+        workshop.advance(&session);
+    }
+    let done = work(&session, &mut workshop);
+    let scene = &done.ground.as_ref().unwrap().loaded.scene;
+    let settings = Settings { refine: drape::Refine::Steps(0), ..done.job.settings.clone() };
+    let run = drape::drape(scene, &settings, &mut drape::unobserved).unwrap();
+    assert_eq!(done.finished.as_ref().unwrap().drape.preview, run.preview);
+}
+
+#[test]
+fn a_newer_edit_overtakes_an_older_one() {
+    let (session, mut workshop) = settled(true);
+    for bound in [1.0, 1.5, 3.0] {
+        let change = edit(&format!(r#"{{"table": {{"levels": [[0, {bound}], [{bound}, "inf"]]}}}}"#));
+        session.submit(&change, Some(7)).unwrap();
+    }
+    session.submit(&edit(r#"{"fabric": "ponte"}"#), None).unwrap();
+    let done = work(&session, &mut workshop);
+    // No edit is lost: the last state has the last of each.
+    assert_eq!((done.state, done.superseded), (5, 3));
+    assert_eq!(done.finished.as_ref().unwrap().drape.table.levels[0].upper_cm, 3.0);
+    assert_eq!(done.job.settings.fabric.name, "ponte");
+    // The drag is one step back.
+    assert_eq!((done.undo, done.redo), (2, 0));
+    session.undo().unwrap();
+    session.undo().unwrap();
+    assert_eq!(*session.snapshot().job, job());
+    assert!(session.undo().unwrap_err().to_string().contains("undo"));
+    session.redo().unwrap();
+    assert_eq!(session.snapshot().sectioned.as_ref().unwrap().table.levels[0].upper_cm, 3.0);
+    assert_eq!(work(&session, &mut workshop).finished.as_ref().unwrap().state, 8);
+}
+
+#[test]
+fn an_edit_during_a_step_interrupts_the_work_and_results_keep_their_state() {
+    let (session, mut workshop) = settled(true);
+    let seen: Arc<Mutex<Vec<(u64, u64)>>> = Arc::default();
+    let (handle, log, edits) = (session.clone(), Arc::clone(&seen), AtomicUsize::new(0));
+    session.listen(move |_| {
+        let now = handle.snapshot();
+        if let Some(preview) = &now.preview {
+            log.lock().unwrap().push((now.state, preview.state));
+            // In the first step of the second state's preview comes the third.
+            if preview.state == 2 && edits.fetch_add(1, Ordering::SeqCst) == 0 {
+                handle.submit(&edit(r#"{"gap": "extend-upper"}"#), None).unwrap();
+            }
+        }
+    });
+    session.submit(&edit(r#"{"table": "flared-skirt-levels"}"#), None).unwrap();
+    let done = work(&session, &mut workshop);
+    let seen = seen.lock().unwrap();
+    let of_second = seen.iter().filter(|(_, preview)| *preview == 2).count();
+    // One step was shown, and shown again with what the third state made known before its own first step.
+    assert!(of_second >= 1 && seen.iter().all(|(state, preview)| preview <= state), "{seen:?}");
+    assert_eq!((done.state, done.preview.as_ref().unwrap().state), (done.finished.as_ref().unwrap().state, done.state));
+    assert!(done.superseded >= 1);
+}
+
+#[test]
+fn a_bad_edit_is_refused_and_the_last_good_state_stands() {
+    let (session, mut workshop) = settled(true);
+    for (change, words) in [
+        (r#"{"table": {"levels": [[90, 95]]}}"#, "none of the garment's vertices"),
+        (r#"{"garment": "kimono"}"#, "kimono"),
+        (r#"{"measurements": {"bust": 20}}"#, "bust"),
+        (r#"{"table": {"quantile": 0}}"#, "levels"),
+    ] {
+        let said = session.submit(&edit(change), None).unwrap_err().to_string();
+        assert!(said.contains(words), "{change}: {said}");
+        let now = session.snapshot();
+        assert!(now.state == 1 && now.idle && *now.job == job(), "{change}");
+    }
+    // What turns out only when it is tried: the file is not there.
+    assert_eq!(session.submit(&edit(r#"{"garment": "nowhere.obj"}"#), None).unwrap(), 2);
+    session.submit(&edit(TWO_LEVELS), None).unwrap();
+    let done = work(&session, &mut workshop);
+    let refused = done.refused.as_ref().unwrap();
+    assert!(refused.sentence.contains("nowhere.obj"), "{}", refused.sentence);
+    assert_eq!((refused.state, refused.back_to, done.finished.as_ref().unwrap().state), (3, Some(4), 4));
+    // The table that came with it stands, the garment does not, and neither does it come back by undo.
+    assert_eq!((done.job.scene.garment.as_str(), done.job.settings.table.name()), (GARMENT, "edited"));
+    session.undo().unwrap();
+    assert_eq!(session.snapshot().job.scene.garment, GARMENT);
+}
+
+#[test]
+fn files_that_are_read_again_and_are_broken_leave_what_was_read_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let form = folder.path().join("me.toml");
+    std::fs::write(&form, "waist_cm = 74\n").unwrap();
+    let job = Job { scene: SceneSpec::new(form.to_str().unwrap(), GARMENT), ..Job::default() };
+    let session = Session::new(job.clone(), true);
+    let mut workshop = Workshop::new(MeshCache::in_user_cache());
+    let before = work(&session, &mut workshop);
+    std::fs::write(&form, "waist_cm = 7\n").unwrap();
+    session.reload(job.clone()).unwrap();
+    let after = work(&session, &mut workshop);
+    assert!(after.refused.as_ref().unwrap().sentence.contains("me.toml"));
+    assert!(Arc::ptr_eq(after.ground.as_ref().unwrap(), before.ground.as_ref().unwrap()));
+    std::fs::write(&form, "waist_cm = 78\n").unwrap();
+    session.reload(job).unwrap();
+    let mended = work(&session, &mut workshop);
+    assert!(mended.refused.is_none() && mended.ground.as_ref().unwrap().generation == 2);
+}
+
+#[test]
+fn a_first_state_that_cannot_be_is_told_and_the_next_edit_mends_it() {
+    let session = Session::new(Job { scene: SceneSpec::new("form", "nowhere.obj"), ..Job::default() }, true);
+    let mut workshop = Workshop::new(MeshCache::in_user_cache());
+    let done = work(&session, &mut workshop);
+    assert_eq!(done.refused.as_ref().unwrap().back_to, None);
+    session.submit(&edit(&format!(r#"{{"garment": "{GARMENT}"}}"#)), None).unwrap();
+    assert!(work(&session, &mut workshop).finished.is_some());
+}
+
+#[test]
+fn what_is_pinned_stays_as_it_was() {
+    let (session, mut workshop) = settled(true);
+    let id = session.pin(Some("as it was".to_owned())).unwrap();
+    session.submit(&edit(r#"{"fabric": "ponte"}"#), None).unwrap();
+    assert!(session.pin(None).unwrap_err().to_string().contains("no drape"));
+    let done = work(&session, &mut workshop);
+    let pin = &done.pins[0];
+    assert_eq!(
+        (pin.id, pin.state, pin.label.as_str(), pin.job.settings.fabric.name.as_str()),
+        (id, 1, "as it was", "interlock")
+    );
+    assert!(pin.numbers.preview_error_mm.unwrap() > 0.0);
+    assert!(*pin.positions != *done.rest.as_ref().unwrap().positions);
+    assert!(session.unpin(id) && !session.unpin(id));
+}
+
+#[test]
+fn a_thread_works_until_the_session_is_closed() {
+    let session = Session::new(job(), true);
+    let worker = {
+        let session = session.clone();
+        std::thread::spawn(move || session.work(&mut Workshop::new(MeshCache::in_user_cache())))
+    };
+    let mut now = session.snapshot();
+    while !now.idle {
+        now = session.newer_than(now.serial, std::time::Duration::from_secs(60));
+    }
+    session.close();
+    worker.join().unwrap();
+    assert_eq!(now.finished.unwrap().state, 1);
+}
