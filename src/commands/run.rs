@@ -16,7 +16,7 @@ use partwise::scene::Loaded;
 use super::inputs::InputArgs;
 use super::sinks::SinkArgs;
 use super::stages::StageArgs;
-use super::summary::{Summary, ms};
+use super::summary::Summary;
 use super::watch::FileWatch;
 use super::work::{cache, refining, use_threads};
 use super::{console, failure::UserError, interrupt};
@@ -117,7 +117,7 @@ impl RunArgs {
             if let Some(path) = recorder.finish()?.path {
                 solved.summary.outputs.push(format!("recording: {}", path.display()));
             }
-            *solved.summary.timings_ms.entry("record").or_default() += ms(finished.elapsed());
+            solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
         Ok(())
@@ -173,9 +173,11 @@ impl RunArgs {
             job.accuracy = Against::None;
         }
         let what = format!("{name}: references");
+        let draped = Instant::now();
         let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.timings_ms.insert("load", ms(load));
+        summary.add_time("load", load);
+        summary.add_time("measure", draped.elapsed());
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::DVec3;
 use partwise::record::{FoldView, Overlay, Recorder, StepView, WrinkleView};
 
-use super::{Solved, ms};
+use super::Solved;
 
 impl Solved {
     /// What is shown on the draped garment: fit, and the error where it was measured.
@@ -69,7 +69,7 @@ impl Solved {
                 recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
             }
         }
-        self.summary.timings_ms.insert("record", ms(start.elapsed()));
+        self.summary.add_time("record", start.elapsed());
         Ok(())
     }
 }
