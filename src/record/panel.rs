@@ -37,15 +37,10 @@ impl Panel {
         if !self.title.is_empty() {
             line(&mut text, format_args!("## {}\n", self.title));
         }
-        let (short, long): (Vec<_>, Vec<_>) = self.facts.iter().partition(|(name, value)| fits(name, value));
-        two_columns(&mut text, "Drape", "", short.into_iter().map(|(k, v)| (k.as_str(), v.clone())));
-        for (name, value) in long {
-            line(&mut text, format_args!("**{name}:** {value}\n"));
-        }
         for warning in &self.warnings {
             line(&mut text, format_args!("> ⚠ {warning}\n"));
         }
-        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
+        // First, so that it is seen without scrolling in a window of 1280 × 800.
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             // Only tables with extents get a column for them.
@@ -61,6 +56,12 @@ impl Panel {
             }
             text.push('\n');
         }
+        let (short, long): (Vec<_>, Vec<_>) = self.facts.iter().partition(|(name, value)| fits(name, value));
+        two_columns(&mut text, "Drape", "", short.into_iter().map(|(k, v)| (k.as_str(), v.clone())));
+        for (name, value) in long {
+            line(&mut text, format_args!("**{name}:** {value}\n"));
+        }
+        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
         two_columns(&mut text, "Fabric", "", self.fabric.iter().map(|(k, v)| (k.as_str(), v.clone())));
         if !self.command_line.is_empty() {
             line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));

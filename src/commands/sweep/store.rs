@@ -90,6 +90,12 @@ impl KeptPoint {
         }
     }
 
+    /// Magnitude of the force on each vertex's PART, N.
+    pub(crate) fn force_of_vertex(&self) -> Vec<f64> {
+        let of = |&part: &u32| self.force_n.get(part as usize).map_or(0.0, |f| f.length());
+        self.part_of_vertex.iter().map(of).collect()
+    }
+
     /// Whether every index points at something, levels and PARTs add up, and the scene's id is one.
     fn is_sound(&self) -> bool {
         let parts = self.force_n.len();
