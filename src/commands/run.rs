@@ -5,6 +5,7 @@ mod recording;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use partwise::Job;
@@ -14,7 +15,7 @@ use partwise::record::{Layout, RecordOptions, Recorder};
 use partwise::scene::Loaded;
 
 use super::inputs::InputArgs;
-use super::sinks::SinkArgs;
+use super::sinks::{SinkArgs, obj_file};
 use super::stages::StageArgs;
 use super::summary::Summary;
 use super::watch::FileWatch;
@@ -55,7 +56,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
     /// Write the displaced garment as OBJ, with its original faces, groups and texture coordinates
-    #[arg(long, value_name = "FILE.obj", help_heading = "Output")]
+    #[arg(long, value_name = "FILE.obj", value_parser = PathBufValueParser::new().try_map(obj_file), help_heading = "Output")]
     export: Option<PathBuf>,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
