@@ -6,6 +6,7 @@
 //! equilibria, and an error under the spread says nothing. References are kept on disk under their content hash; see
 //! [`reference`](crate::accuracy::reference).
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -39,6 +40,11 @@ pub enum AssessError {
     /// The two cannot be compared.
     #[error(transparent)]
     Accuracy(#[from] AccuracyError),
+    /// Nothing keeps the garment on the body.
+    #[error(
+        "the garment falls off the body where it goes on to rest, so it has no reference; hold an edge of it (--hold)"
+    )]
+    Fallen,
     /// The caller stopped it.
     #[error("interrupted while a reference was refined")]
     Interrupted,
@@ -181,11 +187,20 @@ impl References<'_> {
             start,
             options: &format!("{solver:?}"),
         });
+        let floor = self.scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
         let mut compute = || {
             let began = Instant::now();
-            let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, observer)?;
+            let mut stopped = false;
+            let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, &mut |step| {
+                if step.positions.iter().all(|x| x.z < floor) {
+                    return ControlFlow::Break(());
+                }
+                let answer = observer(step);
+                stopped |= answer.is_break();
+                answer
+            })?;
             if refined.stop == Stop::Interrupted {
-                return Err(AssessError::Interrupted);
+                return Err(if stopped { AssessError::Interrupted } else { AssessError::Fallen });
             }
             Ok(Reference {
                 energy_j: refined.energy,

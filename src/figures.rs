@@ -3,20 +3,27 @@
 //! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
 //! reference drape is there where somebody asked for one.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
 use crate::drape::Drape;
+use crate::mesh::self_intersection::crossing_pairs;
 use crate::parts::Parts;
 use crate::quantile::nearest_rank;
 use crate::range_table::{Extent, METRES_PER_CM, RangeTable};
 use crate::scene::Scene;
 
+/// Strain above which a result is no garment that could be worn.
+const TORN: f64 = 0.5;
+/// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
+const SANK_MM: f64 = 100.0;
+
 /// One level of a range table on a garment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LevelCount {
-    /// Its number, from 0.
+    /// Its number, from 1, nearest the body.
     pub level: usize,
     /// Lower value, cm.
     pub lower_cm: f64,
@@ -37,8 +44,8 @@ impl LevelCount {
     pub fn all(table: &RangeTable, parts: &Parts) -> Vec<Self> {
         let levels = table.effective_levels();
         let mut counts: Vec<Self> = (levels.iter().enumerate())
-            .map(|(level, l)| Self {
-                level,
+            .map(|(index, l)| Self {
+                level: index + 1,
                 lower_cm: l.lower_cm,
                 upper_cm: l.upper_cm,
                 extent: l.extent,
@@ -93,8 +100,14 @@ pub struct Figures {
     pub penetrating_vertices: usize,
     /// How deep the deepest of them is, mm.
     pub penetration_mm: f64,
+    /// Pairs of a triangle of the garment and one of the body that cross: skin that shows between vertices that are outside.
+    #[serde(default)]
+    pub body_crossing_pairs: usize,
     /// Pairs of triangles of the garment that cross.
     pub self_intersecting_pairs: usize,
+    /// How far the garment's highest edge has sunk, mm; without an edge its highest tenth.
+    #[serde(default)]
+    pub top_sank_mm: f64,
     /// Energy, J.
     pub energy_j: Option<f64>,
     /// ‖∇E‖ over the garment's weight where the solver left it, friction as the cloth came to rest.
@@ -150,6 +163,12 @@ impl Figures {
             displacement_rms_mm: accuracy::rms_mm(&drape.positions, &scene.garment.positions),
             penetrating_vertices: drape.penetrating_vertices,
             penetration_mm: 1e3 * drape.penetration,
+            body_crossing_pairs: crossing_pairs(
+                &scene.garment.with_positions(drape.positions.clone()),
+                scene.body.mesh(),
+            )
+            .len(),
+            top_sank_mm: top_sank_mm(scene, &drape.positions),
             self_intersecting_pairs: drape.self_intersecting_pairs,
             energy_j: state.map(|s| s.energy),
             residual_over_weight: state.map(|s| s.residual_over_weight),
@@ -180,6 +199,15 @@ impl Figures {
         }
     }
 
+    /// How many PARTs there are, and how many of them the range table alone made where they were cut or joined after it.
+    #[must_use]
+    pub fn parts_text(&self) -> String {
+        match self.level_part_count {
+            by_levels if by_levels == self.part_count => format!("{} PARTs", self.part_count),
+            by_levels => format!("{} PARTs ({by_levels} by its levels, then cut to extents)", self.part_count),
+        }
+    }
+
     /// The figures in words: name and value.
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
@@ -203,7 +231,12 @@ impl Figures {
         let strain = self.strain_p95.zip(self.strain_max);
         add("strain", strain.map(|(p95, max)| format!("{:.1} % (P95), {:.1} % at most", 1e2 * p95, 1e2 * max)));
         add("pressure", self.pressure_max_kpa.map(|kpa| format!("{kpa:.2} kPa at most")));
-        add("inside the body", Some(format!("{} vertices", self.penetrating_vertices)));
+        let inside = match self.penetrating_vertices {
+            0 => "0 vertices".to_owned(),
+            n => format!("{n} vertices, up to {:.1} mm deep", self.penetration_mm),
+        };
+        add("inside the body", Some(inside));
+        add("skin through cloth", Some(format!("{} pairs of triangles", self.body_crossing_pairs)));
         add("cloth through cloth", Some(format!("{} pairs of triangles", self.self_intersecting_pairs)));
         add(
             "error",
@@ -236,6 +269,38 @@ impl Figures {
         found
     }
 
+    /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
+    #[must_use]
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        let mut found = Vec::new();
+        if self.top_sank_mm > SANK_MM && scene.held.is_empty() {
+            let groups = match scene.garment.groups.as_slice() {
+                [] => String::new(),
+                groups => format!(", or one of its groups: {}", groups.join(", ")),
+            };
+            found.push(format!(
+                "the garment has slid down: its highest edge sank by {:.0} cm, and nothing holds it; if it has a waistband, hold \
+                 that (--hold top{groups})",
+                0.1 * self.top_sank_mm
+            ));
+        }
+        if self.body_crossing_pairs > 0 {
+            found.push(format!(
+                "skin shows through the cloth: {} pairs of triangles of garment and body cross{}; contact is felt at vertices, so \
+                 a finer garment mesh mends it",
+                self.body_crossing_pairs,
+                if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
+            ));
+        }
+        if let Some(strain) = self.strain_max.filter(|strain| *strain > TORN) {
+            found.push(format!(
+                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
+                1e2 * strain
+            ));
+        }
+        found
+    }
+
     /// What a recording plots over its tables: leaf of `/numbers` and value.
     #[must_use]
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
@@ -257,4 +322,17 @@ impl Figures {
     pub fn error_mm(&self) -> Option<f64> {
         self.rms_mm.or(self.canonical_rms_mm)
     }
+}
+
+/// How far the highest edge, or the highest tenth of a garment without edges, is lower at `positions` (m) than as placed, mm.
+fn top_sank_mm(scene: &Scene, positions: &[DVec3]) -> f64 {
+    let placed = &scene.garment.positions;
+    let top = scene.edge("top").unwrap_or_else(|_| {
+        let mut highest: Vec<u32> = (0..placed.len() as u32).collect();
+        highest.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
+        highest.truncate(placed.len().div_ceil(10));
+        highest
+    });
+    let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
+    1e3 * sank / top.len().max(1) as f64
 }

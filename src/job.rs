@@ -122,10 +122,11 @@ impl Job {
         observer: Observer<'_>,
     ) -> Result<Measured, AssessError> {
         let figures = Figures::of(scene, drape);
+        let warnings = figures.warnings(scene);
         let options = AssessOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
-        let (reference, assessment, warnings) = match self.accuracy {
+        let (reference, assessment, of_reference) = match self.accuracy {
             Against::None => {
-                return Ok(Measured { figures, error_mm: Vec::new(), assessment: None, warnings: Vec::new() });
+                return Ok(Measured { figures, error_mm: Vec::new(), assessment: None, warnings });
             }
             Against::Canonical => {
                 let (reference, warnings) = canonical(scene, &self.settings.fabric, &options, observer)?;
@@ -151,7 +152,7 @@ impl Job {
             }
             None => accuracy::vertex_errors(&drape.positions, &reference).iter().map(|e| 1e3 * e).collect(),
         };
-        Ok(Measured { figures, error_mm, assessment, warnings })
+        Ok(Measured { figures, error_mm, assessment, warnings: [warnings, of_reference].concat() })
     }
 }
 

@@ -57,6 +57,31 @@ fn it_has_a_quarter_of_the_vertices_the_same_edges_of_cloth_and_no_slivers() {
 }
 
 #[test]
+fn a_mesh_so_full_of_holes_that_nothing_can_go_is_left_and_drapes() {
+    let mut mesh = tube(0.32, 0.6, 60, 33);
+    let mut t = 0;
+    mesh.triangles.retain(|_| {
+        t += 1;
+        t % 4 != 0
+    });
+    let rest = RestShape::from_edges(&mesh).unwrap();
+    assert!(Coarse::new(&mesh, &rest, mesh.vertex_count() / 4).is_none());
+    // Coarser and coarser garments are made until there is none: for ever, and without bound, if each were as fine as the last.
+    let job = Job::preview();
+    let body = tube(0.3, 0.6, 60, 33);
+    let mut closed = body.clone();
+    let (low, high) = (closed.positions.len() as u32, closed.positions.len() as u32 + 1);
+    closed.positions.extend([DVec3::ZERO, DVec3::Z * 0.6]);
+    let top = 32 * 60;
+    for (i, next) in (0..60).map(|i| (i, (i + 1) % 60)) {
+        closed.triangles.extend([[low, next, i], [high, top + i, top + next]]);
+    }
+    let scene = partwise::Scene::of_meshes(&closed, mesh).unwrap();
+    let found = job.drape(&scene, &mut unobserved).unwrap();
+    assert!(found.positions.iter().all(|p| p.is_finite()));
+}
+
+#[test]
 fn its_rest_shape_is_that_of_the_cloth_about_it() {
     // Cut wider than it stands by a tenth, and shorter by a twentieth.
     let mesh = tube(0.2, 0.6, 60, 33);

@@ -117,9 +117,13 @@ fn one_json_object_with_the_promised_keys() {
     ] {
         assert!(!report[key].is_null(), "{key} is missing: {report}");
     }
-    for stage in ["load", "distance", "segment", "mechanics", "record"] {
+    for stage in ["load", "distance", "segment", "mechanics", "other", "measure", "record"] {
         assert!(report["timings_ms"][stage].as_f64().unwrap() >= 0.0, "{stage}");
     }
+    let times = report["timings_ms"].as_object().unwrap();
+    let sum: f64 = times.iter().filter(|(name, _)| *name != "total").map(|(_, ms)| ms.as_f64().unwrap()).sum();
+    let total = times["total"].as_f64().unwrap();
+    assert!((sum - total).abs() < 1e-6 * total, "{times:?}");
     assert_eq!(report["vertices"], 169);
     assert_eq!(report["penetrating_vertices"], 0);
     let per_level: u64 = report["parts_per_level"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum();

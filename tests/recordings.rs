@@ -75,9 +75,16 @@ fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
     let contents = inspect::read(&path);
     assert_eq!(contents.recordings, 1);
-    let bars = ["distance", "force"].map(|of| [format!("/{of}/legend/bar"), format!("/{of}/legend/ticks")]);
+    let bars =
+        ["distance", "force"].map(|of| ["bar", "ticks"].map(|leaf| format!("{}/{of}/{leaf}", paths::STAGES_LEGEND)));
     let others = [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::FORCE_ARROWS];
-    let others = others.into_iter().chain([paths::DRAPE, paths::REPORT, "/numbers/part_count"]);
+    let others = others.into_iter().chain([
+        paths::DRAPE,
+        paths::REPORT,
+        paths::PART_DOTS,
+        "/numbers/part_count",
+        "/legend/stages/table",
+    ]);
     for wanted in others.chain(bars.as_flattened().iter().map(String::as_str)) {
         assert!(contents.entities.contains_key(wanted), "{wanted} is missing of {:?}", contents.entities.keys());
     }
@@ -136,7 +143,9 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
             let caption = format!("{} PARTs · {ms:.1} ms · {rms:.0} mm", solved.part_force_n.len());
             let (draped, part_of_vertex) = (&scene.draped, &solved.part_of_vertex);
             if i < 4 {
-                let chosen = Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, overlay: None };
+                let levels = &solved.panel.levels;
+                let chosen =
+                    Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, levels, overlay: None };
                 recorder.compare(&chosen).unwrap();
             }
             points.push(ScatterPoint { label: name, cost: ms, error_mm: rms, group: 0, named: true });
@@ -205,8 +214,11 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
     let error = recorder.wrinkles(&WrinkleView { curvature_per_m: &[], ..view }).unwrap_err();
     assert!(matches!(error, RecordError::Mismatch { .. }), "{error}");
     let contents = inspect::read(&recorder.finish().unwrap().path.unwrap());
-    for path in ["seams/lines", "seams/legend/bar", "curvature/garment", "curvature/legend/ticks"] {
-        assert!(contents.entities.contains_key(&format!("/wrinkles/{path}")), "{path}");
+    for path in ["/wrinkles/seams/lines", "/wrinkles/curvature/garment"] {
+        assert!(contents.entities.contains_key(path), "{path}");
+    }
+    for path in ["seams/bar", "curvature/ticks"] {
+        assert!(contents.entities.contains_key(&format!("{}/{path}", paths::WRINKLES_LEGEND)), "{path}");
     }
     for path in [paths::ENERGY, paths::RESIDUAL] {
         assert_eq!(contents.entities[path].rows, 40);
@@ -220,8 +232,9 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
     // A mesh at every fourth iteration, the step's, and the result at the last.
     assert_eq!(contents.entities[paths::DRAPE].rows, 10 + 1 + 1);
     for name in ["strain", "pressure"] {
-        for leaf in ["garment", "legend/bar", "legend/ticks"] {
-            assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT)), "{name} {leaf}");
+        assert!(contents.entities.contains_key(&format!("{}/{name}/garment", paths::FIT)), "{name}");
+        for leaf in ["bar", "ticks"] {
+            assert!(contents.entities.contains_key(&format!("{}/{name}/{leaf}", paths::FIT_LEGEND)), "{name} {leaf}");
         }
     }
 }

@@ -5,16 +5,17 @@ mod watching;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use partwise::Job;
 use partwise::job::Against;
 use partwise::record::Recorder;
 
 use super::inputs::InputArgs;
-use super::sinks::SinkArgs;
+use super::sinks::{SinkArgs, obj_file};
 use super::solved::{Snapshot, Solved};
 use super::stages::StageArgs;
-use super::summary::{Summary, ms};
+use super::summary::Summary;
 use super::work::{cache, refining, use_threads};
 use super::{console, interrupt};
 
@@ -52,7 +53,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
     /// Write the displaced garment as OBJ, with its original faces, groups and texture coordinates
-    #[arg(long, value_name = "FILE.obj", help_heading = "Output")]
+    #[arg(long, value_name = "FILE.obj", value_parser = PathBufValueParser::new().try_map(obj_file), help_heading = "Output")]
     export: Option<PathBuf>,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
@@ -92,7 +93,7 @@ impl RunArgs {
             if let Some(path) = recorder.finish()?.path {
                 solved.summary.outputs.push(format!("recording: {}", path.display()));
             }
-            *solved.summary.timings_ms.entry("record").or_default() += ms(finished.elapsed());
+            solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
         Ok(())
@@ -136,9 +137,11 @@ impl RunArgs {
             job.accuracy = Against::None;
         }
         let what = format!("{name}: references");
+        let draped = Instant::now();
         let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.timings_ms.insert("load", ms(load));
+        summary.add_time("load", load);
+        summary.add_time("measure", draped.elapsed());
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 

@@ -32,11 +32,21 @@ impl SeenFrom {
     }
 }
 
+/// Where a displaced garment goes: no other format is written, whatever the name says.
+pub(crate) fn obj_file(path: PathBuf) -> Result<PathBuf, String> {
+    match path.extension() {
+        Some(ending) if !ending.eq_ignore_ascii_case("obj") => {
+            Err(format!("found the ending `.{}`, expected `.obj`: garments are written as OBJ", ending.display()))
+        }
+        _ => Ok(path),
+    }
+}
+
 /// The sinks of a recording; several at once are fine.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Recording")]
 pub(crate) struct SinkArgs {
-    /// Write the recording to this file [default: recordings/GARMENT.rrd]
+    /// Write the recording to this file [default: GARMENT.rrd in recordings/, recordings/compare/ or the folder of the rows]
     #[arg(long, value_name = "FILE", conflicts_with = "no_save")]
     pub(crate) save: Option<PathBuf>,
     /// Write no recording file

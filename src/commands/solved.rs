@@ -1,7 +1,7 @@
 //! A garment through every stage, ready to be told and recorded: a step with all its stages, its fit and folds, and the
 //! solver's steps.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use partwise::Job;
@@ -12,7 +12,7 @@ use partwise::scene::Loaded;
 use partwise::session::Finished;
 
 use super::sinks::SinkArgs;
-use super::summary::{Summary, ms};
+use super::summary::Summary;
 
 /// A garment through every stage.
 pub(super) struct Solved {
@@ -37,7 +37,7 @@ impl Solved {
     pub(super) fn of_session(job: Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
         let (loaded, drape) = (finished.ground.loaded.clone(), finished.drape.clone());
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.timings_ms.insert("load", finished.ground.load_ms);
+        summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.ground.load_ms));
         Ok(Self { job, loaded, drape, measured, snapshots: Vec::new(), summary })
     }
 
@@ -123,7 +123,7 @@ impl Solved {
                 recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
             }
         }
-        self.summary.timings_ms.insert("record", ms(start.elapsed()));
+        self.summary.add_time("record", start.elapsed());
         Ok(())
     }
 }

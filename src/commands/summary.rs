@@ -36,18 +36,15 @@ pub(crate) struct Summary {
     levels: Vec<LevelCount>,
     /// Every figure against the own continuation, under `--accuracy`.
     accuracy: Option<Value>,
-    /// Milliseconds of `load`, `distance`, `segment`, `mechanics`, `refine`, `record`.
-    pub(crate) timings_ms: BTreeMap<&'static str, f64>,
+    /// Milliseconds of `load`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `record`, and `total`.
+    timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
     /// Where the recording went.
     pub(crate) outputs: Vec<String>,
 }
 
-/// Strain above which a result is no garment that could be worn.
-const TORN: f64 = 0.5;
-
 /// Milliseconds, for people.
-pub(crate) fn ms(duration: Duration) -> f64 {
+fn ms(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
@@ -62,14 +59,8 @@ impl Summary {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
-        let mut warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
-        if let Some(strain) = measured.figures.strain_max.filter(|strain| *strain > TORN) {
-            warnings.push(format!(
-                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
-                1e2 * strain
-            ));
-        }
-        Ok(Self {
+        let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
+        let summary = Self {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
             body: loaded.body_name.clone(),
@@ -84,15 +75,31 @@ impl Summary {
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
             accuracy,
-            timings_ms: BTreeMap::from([
-                ("distance", ms(drape.times.distance)),
-                ("segment", ms(drape.times.segment)),
-                ("mechanics", ms(drape.times.mechanics)),
-                ("refine", ms(drape.times.refine)),
-            ]),
+            timings_ms: BTreeMap::new(),
             warnings,
             outputs: Vec::new(),
-        })
+        };
+        let times = drape.times;
+        let stages = [
+            ("distance", times.distance),
+            ("segment", times.segment),
+            ("mechanics", times.mechanics),
+            ("refine", times.refine),
+            ("other", times.other()),
+        ];
+        Ok(stages.into_iter().fold(summary, |summary, (stage, time)| summary.with_time(stage, time)))
+    }
+
+    /// Adds time to a stage and to the total, which is the sum of all.
+    pub(crate) fn add_time(&mut self, stage: &'static str, time: Duration) {
+        for name in [stage, "total"] {
+            *self.timings_ms.entry(name).or_default() += ms(time);
+        }
+    }
+
+    fn with_time(mut self, stage: &'static str, time: Duration) -> Self {
+        self.add_time(stage, time);
+        self
     }
 
     /// One JSON object.
@@ -107,8 +114,12 @@ impl Summary {
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
         let _ = writeln!(
             out,
-            "{:<20}table {}: {} PARTs in {} levels, {} of them single vertices",
-            "stage one", self.table, figures.part_count, figures.levels, figures.singletons
+            "{:<20}table {}: {} in {} levels, {} of them single vertices",
+            "stage one",
+            self.table,
+            figures.parts_text(),
+            figures.levels,
+            figures.singletons
         );
         let _ = writeln!(
             out,
@@ -119,7 +130,7 @@ impl Summary {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let _ = writeln!(out, "\n{}", self.levels_table());
-        let order = ["load", "distance", "segment", "mechanics", "refine", "record"];
+        let order = ["load", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
         let times: Vec<String> =
             order.iter().filter_map(|stage| self.timings_ms.get(stage).map(|t| format!("{stage} {t:.1}"))).collect();
         let _ = writeln!(out, "milliseconds: {}", times.join(", "));
@@ -139,7 +150,7 @@ impl Summary {
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
             fabric: fabric_facts(fabric),
-            timings_ms: ["load", "distance", "segment", "mechanics", "refine"]
+            timings_ms: ["load", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
                 .iter()
                 .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))
                 .collect(),
@@ -153,7 +164,7 @@ impl Summary {
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
         for l in self.levels.iter().filter(|l| l.vertices > 0) {
-            let cells = [(l.level + 1).to_string(), bound(l.lower_cm), bound(l.upper_cm)];
+            let cells = [l.level.to_string(), bound(l.lower_cm), bound(l.upper_cm)];
             table.add_row(cells.into_iter().chain([l.parts.to_string(), l.vertices.to_string()]));
         }
         for column in table.column_iter_mut() {

@@ -43,6 +43,14 @@ pub struct StageTimes {
     pub total: Duration,
 }
 
+impl StageTimes {
+    /// What lies between the stages.
+    #[must_use]
+    pub fn other(self) -> Duration {
+        self.total.saturating_sub(self.distance + self.segment + self.mechanics + self.refine)
+    }
+}
+
 /// The outcome of stage two for one PART.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartOutcome {

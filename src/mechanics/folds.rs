@@ -33,7 +33,7 @@ pub struct Folds {
 pub fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut sum = vec![DMat3::ZERO; x.len()];
     let mut area = vec![0.0; x.len()];
-    for triangle in &cloth.triangles {
+    for triangle in cloth.triangles.iter().filter(|t| !t.sliver) {
         let (excess, across) = excess(triangle.deformation(x));
         let tensor =
             DMat3::from_cols(across * across.x, across * across.y, across * across.z) * (excess * triangle.area);

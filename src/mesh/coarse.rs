@@ -50,7 +50,7 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// About `count` of the vertices of `mesh`; `None` where it cannot be made coarser.
+    /// About `count` of the vertices of `mesh`; `None` where it cannot be made coarser, by half at least.
     #[must_use]
     pub fn new(mesh: &TriMesh, rest: &RestShape, count: usize) -> Option<Self> {
         let maps: Vec<Map> = mesh.triangles.par_iter().zip(&rest.corners).map(|(t, c)| Map::new(mesh, *t, c)).collect();
@@ -58,6 +58,10 @@ impl Coarse {
             return None;
         }
         let Decimated { mesh: coarse, vertices, onto } = decimate(mesh, count)?;
+        // One hardly coarser saves nothing, and who asks for coarser ones until there is none would never end.
+        if 2 * coarse.vertex_count() > mesh.vertex_count() {
+            return None;
+        }
         let topology = Topology::new(&coarse);
         let triangles_of = incidence(&coarse);
         // Who ended on a vertex is looked for in its triangles and those of its neighbours, each once.

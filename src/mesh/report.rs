@@ -74,6 +74,8 @@ pub enum Remark {
     OneSided { patches: usize },
     /// Triangles without area.
     NoArea { triangles: usize },
+    /// Triangles much longer than high.
+    Slivers { triangles: usize },
     /// The body has a boundary.
     Open { edges: usize, loops: usize },
     /// Points and lines, passed over.
@@ -96,6 +98,11 @@ impl fmt::Display for Remark {
                 write!(f, "{patches} patches have one side only; their winding was left as it is")
             }
             Self::NoArea { triangles } => write!(f, "{triangles} triangles have no area"),
+            Self::Slivers { triangles } => write!(
+                f,
+                "{triangles} triangles are slivers, less than a fiftieth of their longest side high; they bear loads as if they \
+                 were that high"
+            ),
             Self::Open { edges, loops } => write!(
                 f,
                 "the body is open: {edges} boundary edges in {loops} loops; inside and outside go by the normals alone, \

@@ -20,6 +20,9 @@ use super::TriMesh;
 /// A triangle whose height is less than this share of its longest edge has no usable shape: with f64 corners its
 /// strain would be rounding noise.
 const FLAT: f64 = 1e-6;
+/// A triangle whose height is less than this share of its longest side is a sliver, and bears loads as if it were that high: under
+/// half a millimetre in meshes of 2 cm.
+pub(crate) const SLIVER: f64 = 0.02;
 /// Texture coordinates are taken as metric if they hold between a quarter of and four times the area in space: cloth
 /// placed undraped is off by tens of percent, a 0-to-1 atlas by orders of magnitude.
 const METRIC_AREA_RATIO: std::ops::RangeInclusive<f64> = 0.25..=4.0;
@@ -147,6 +150,11 @@ impl RestShape {
         self.corners.iter().map(flat).collect()
     }
 
+    /// How many triangles are slivers.
+    pub(crate) fn slivers(&self) -> usize {
+        self.corners.iter().filter(|corners| raised(**corners).0).count()
+    }
+
     pub(crate) fn checked(self) -> Result<Self, RestError> {
         let flat = self.without_area();
         match flat.iter().position(|&flat| flat) {
@@ -154,6 +162,22 @@ impl RestShape {
             None => Ok(self),
         }
     }
+}
+
+/// Whether a flat triangle is a sliver, and its corners: those of a sliver with its longest side along the weft, a fiftieth of it high.
+pub(crate) fn raised(rest: [DVec2; 3]) -> (bool, [DVec2; 3]) {
+    let sides = [0, 1, 2].map(|i| rest[(i + 1) % 3].distance(rest[i]));
+    let i = (0..3).fold(0, |longest, i| if sides[i] > sides[longest] { i } else { longest });
+    let [a, b, c] = [0, 1, 2].map(|k| rest[(i + k) % 3]);
+    let double = (b - a).perp_dot(c - a);
+    if double.abs() >= SLIVER * sides[i] * sides[i] {
+        return (false, rest);
+    }
+    let foot = (c - a).dot((b - a) / sides[i]);
+    let mut higher = [DVec2::ZERO; 3];
+    higher[(i + 1) % 3] = DVec2::new(sides[i], 0.0);
+    higher[(i + 2) % 3] = DVec2::new(foot, SLIVER * sides[i] * double.signum());
+    (true, higher)
 }
 
 /// A triangle in its plane, its first corner at the origin, y along the upward direction.

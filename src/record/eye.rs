@@ -1,8 +1,7 @@
 //! Where the 3D views look from: the front, slightly above and to one side, with the whole garment in the view.
 //!
 //! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of what must be seen, m; a = width over
-//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + a quarter of the depth;
-//! h includes the colour bar under the hem.
+//! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + a quarter of the depth.
 //!
 //! Limits: the viewer's views have any shape; a is what the layout gives them in a window of 16:10.
 
@@ -20,26 +19,17 @@ const AZIMUTH_DEG: f64 = 18.0;
 const MARGIN: f64 = 1.14;
 /// A garment is widest near its middle depth: so much of half its depth the eye steps back for what is nearer.
 const BULGE: f64 = 0.5;
-/// Room for the colour bar and its numbers under the garment, relative to the larger of its half extents.
-const LEGEND_HEIGHT: f64 = 0.42;
-
-/// An eye and the directions of its picture.
+/// An eye and what it sees.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Eye {
     /// Where it stands, m.
     pub position: DVec3,
     /// What it looks at, m.
     pub target: DVec3,
-    /// Unit vector to the right in its picture.
-    pub right: DVec3,
-    /// Unit vector upwards in its picture.
-    pub up: DVec3,
-    /// Half the garment's width along `right`, m.
+    /// Half the garment's width in its picture, m.
     pub half_width: f64,
-    /// Half the garment's height along `up`, m.
+    /// Half the garment's height in its picture, m.
     pub half_height: f64,
-    /// Centre of the garment, m.
-    pub centre: DVec3,
     /// Unit vector from the garment to the eye.
     pub toward: DVec3,
     /// Half the garment's depth along `toward`, m.
@@ -72,23 +62,15 @@ impl Eye {
         let centre = right * middle((left_end, right_end)) + up * middle((low, high)) + toward * middle((back, near));
         let (half_width, half_height) = (0.5 * (right_end - left_end), 0.5 * (high - low));
         let half_depth = 0.5 * (near - back);
-        let target = centre - up * (0.5 * LEGEND_HEIGHT * half_height.max(half_width));
-        let position = target;
-        let eye = Self { position, target, right, up, half_width, half_height, centre, toward, half_depth };
+        let (target, position) = (centre, centre);
+        let eye = Self { position, target, half_width, half_height, toward, half_depth };
         Some(eye.through(aspect))
     }
 
     /// The same, as near as a view of this width over height allows.
     pub(crate) fn through(&self, aspect: f64) -> Self {
-        let legend = LEGEND_HEIGHT * self.half_height.max(self.half_width);
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
-        let fit = ((self.half_height + 0.5 * legend) / tan).max(self.half_width / (tan * aspect));
+        let fit = (self.half_height / tan).max(self.half_width / (tan * aspect));
         Self { position: self.target + self.toward * (MARGIN * fit + BULGE * self.half_depth), ..*self }
-    }
-
-    /// Length of a pixel in the plane of the garment's nearest point, m, in a view of this height.
-    pub(crate) fn pixel_m(&self, height_px: f64) -> f64 {
-        let off = (self.position - self.target).dot(self.toward) - self.half_depth;
-        2.0 * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan() * off / height_px
     }
 }

@@ -1,17 +1,15 @@
-//! The range table over the garment's distances: a histogram, each level in its own shade, and under it the levels themselves.
+//! The range table over the garment's distances: a histogram, each level in the hue of its PARTs, and under it the levels themselves.
 
 use rerun::{BarChart, Clear, Color};
 
-use super::colour_map::{ColourMap, Range};
+use super::colour_map::Range;
 use super::error::RecordError;
 use super::step::StepView;
-use super::{Open, paths};
+use super::{Open, colours, paths};
 use crate::figures::LevelCount;
 
 /// Bars of the distance histogram, about.
 const BINS: usize = 80;
-/// Every other level is darker by this factor: neighbours of nearly one hue are told apart.
-const DARKER: f64 = 0.62;
 /// Depth of the strip of levels below the bars, relative to the highest bar.
 const STRIP: f64 = 0.08;
 
@@ -35,10 +33,9 @@ fn bars(row: &LevelCount, distance_m: &[f64], widest: f64, end: f64) -> Vec<(f64
 pub(super) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let rows = &step.panel.levels;
     let end = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
+    let places = colours::places(rows);
     let shade = |level: usize| {
-        let shade = ColourMap::DISTANCE.at((level as f64 + 0.5) / rows.len() as f64);
-        let factor = if level.is_multiple_of(2) { 1.0 } else { DARKER };
-        let [r, g, b] = shade.map(|channel| (factor * f64::from(channel)).round() as u8);
+        let [r, g, b] = colours::shade(places[level], 0);
         Color::from_rgb(r, g, b)
     };
     let widest = end / BINS as f64;
@@ -55,7 +52,7 @@ pub(super) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordErro
             .with_color(shade(level));
         open.log(&format!("{}/{level:02}", paths::HISTOGRAM), &chart)?;
         let parts =
-            BarChart::new(vec![row.parts as f64]).with_abscissa(vec![level as f64 + 0.5]).with_color(shade(level));
+            BarChart::new(vec![row.parts as f64]).with_abscissa(vec![level as f64 + 1.0]).with_color(shade(level));
         open.log(&format!("{}/{level:02}", paths::LEVEL_PARTS), &parts)?;
     }
     for gone in rows.len()..open.levels {
@@ -74,7 +71,7 @@ mod tests {
     #[test]
     fn bars_tile_their_level_and_count_every_vertex_once() {
         let row = |lower_m: f64, upper_m: f64| LevelCount {
-            level: 0,
+            level: 1,
             lower_cm: 100.0 * lower_m,
             upper_cm: 100.0 * upper_m,
             vertices: 0,

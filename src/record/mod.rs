@@ -7,6 +7,7 @@ mod blueprint;
 mod colour_map;
 mod colours;
 mod compare;
+mod dots;
 mod error;
 mod eye;
 mod folds;
@@ -128,6 +129,14 @@ impl Recorder {
     /// The garment as loaded; with the first one the layout is sent.
     pub fn garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
         self.timed(|open| open.take_garment(index, garment))
+    }
+
+    /// Sets what the ends of a quantity's colour map stand for (`error` in mm, `force` in N), for a recording whose steps are known
+    /// beforehand; without it the first step's values do.
+    pub fn scale(&mut self, quantity: &str, range: Range) {
+        if let Some(open) = &self.open {
+            open.scale(quantity, || range);
+        }
     }
 
     /// One range table's result.

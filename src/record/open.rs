@@ -1,12 +1,13 @@
 //! The state of a recording that goes somewhere: its stream, what was logged already, and how to log more.
 
 use std::cell::{Cell, RefCell};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
-use super::blueprint::layout::{Layout, Tab};
+use super::blueprint::layout::Layout;
+use super::colour_map::Range;
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
@@ -31,8 +32,10 @@ pub(crate) struct Open {
     pub(super) cells: CellMesh,
     pub(super) eye: Eye,
     pub(super) distance: Vec<f64>,
-    pub(super) vertex_colour: Vec<u8>,
+    pub(super) vertex_shade: Vec<u8>,
     pub(super) levels: usize,
+    /// What the ends of each quantity's colour map stand for, from its first step on.
+    scales: RefCell<BTreeMap<String, Range>>,
     /// The displaced garment of the last step.
     pub(super) draped: Option<TriMesh>,
     /// The last iteration of the solver.
@@ -66,8 +69,9 @@ impl Open {
             cells: CellMesh::new(&TriMesh::default()),
             eye: Eye::default(),
             distance: Vec::new(),
-            vertex_colour: Vec::new(),
+            vertex_shade: Vec::new(),
             levels: 0,
+            scales: RefCell::default(),
             draped: None,
             last_iteration: None,
             report: String::new(),
@@ -83,9 +87,10 @@ impl Open {
         &self.options.layout
     }
 
-    /// Length of a pixel under the garment in the views of a tab, m.
-    pub(super) fn pixel_m(&self, tab: Tab) -> f64 {
-        self.layout().pixel_m(tab, &self.eye)
+    /// What the ends of a quantity's colour map stand for: as they were at its first step, or set before it, so that colours compare
+    /// from step to step.
+    pub(super) fn scale(&self, quantity: &str, first: impl FnOnce() -> Range) -> Range {
+        *self.scales.borrow_mut().entry(quantity.to_owned()).or_insert_with(first)
     }
 
     /// Sets the step and the stage of what is logged next. Where the solver's iterations come too, all stages are there from
@@ -154,7 +159,7 @@ impl Open {
         self.garment = garment.clone();
         self.cells = CellMesh::new(garment);
         self.distance.clear();
-        self.vertex_colour.clear();
+        self.vertex_shade.clear();
         self.seen.borrow_mut().clear();
         if let Some(eye) = Eye::on(garment, self.options.front, blueprint::layout::ASPECT) {
             self.eye = eye;

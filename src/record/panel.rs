@@ -37,15 +37,10 @@ impl Panel {
         if !self.title.is_empty() {
             line(&mut text, format_args!("## {}\n", self.title));
         }
-        let (short, long): (Vec<_>, Vec<_>) = self.facts.iter().partition(|(name, value)| fits(name, value));
-        two_columns(&mut text, "Drape", "", short.into_iter().map(|(k, v)| (k.as_str(), v.clone())));
-        for (name, value) in long {
-            line(&mut text, format_args!("**{name}:** {value}\n"));
-        }
         for warning in &self.warnings {
             line(&mut text, format_args!("> ⚠ {warning}\n"));
         }
-        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
+        // First, so that it is seen without scrolling in a window of 1280 × 800.
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             // Only tables with extents get a column for them.
@@ -53,14 +48,20 @@ impl Panel {
             let (head, rule) = if own { (" cut to, cm |", "--:|") } else { ("", "") };
             line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
             // An empty level says nothing; the others keep their numbers.
-            for (i, row) in self.levels.iter().enumerate().filter(|(_, row)| row.vertices > 0) {
-                let (level, range) = (i + 1, range_cm(row.lower_cm, row.upper_cm));
+            for row in self.levels.iter().filter(|row| row.vertices > 0) {
+                let (level, range) = (row.level, range_cm(row.lower_cm, row.upper_cm));
                 let extent = row.extent.map_or_else(String::new, |e| e.to_string());
                 let extent = if own { format!(" {extent} |") } else { String::new() };
                 line(&mut text, format_args!("| {level} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
         }
+        let (short, long): (Vec<_>, Vec<_>) = self.facts.iter().partition(|(name, value)| fits(name, value));
+        two_columns(&mut text, "Drape", "", short.into_iter().map(|(k, v)| (k.as_str(), v.clone())));
+        for (name, value) in long {
+            line(&mut text, format_args!("**{name}:** {value}\n"));
+        }
+        two_columns(&mut text, "Time", "ms", self.timings_ms.iter().map(|(k, v)| (k.as_str(), number(*v))));
         two_columns(&mut text, "Fabric", "", self.fabric.iter().map(|(k, v)| (k.as_str(), v.clone())));
         if !self.command_line.is_empty() {
             line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));
@@ -115,9 +116,9 @@ mod tests {
             title: "skirt on body".into(),
             table: "Table 3".into(),
             levels: vec![
-                LevelCount { level: 0, lower_cm: 0.0, upper_cm: 0.06, vertices: 4, parts: 2, extent: None },
-                LevelCount { level: 1, lower_cm: 0.06, upper_cm: 0.06, vertices: 0, parts: 0, extent: None },
-                LevelCount { level: 2, lower_cm: 0.06, upper_cm: f64::INFINITY, vertices: 9, parts: 1, extent: None },
+                LevelCount { level: 1, lower_cm: 0.0, upper_cm: 0.06, vertices: 4, parts: 2, extent: None },
+                LevelCount { level: 2, lower_cm: 0.06, upper_cm: 0.06, vertices: 0, parts: 0, extent: None },
+                LevelCount { level: 3, lower_cm: 0.06, upper_cm: f64::INFINITY, vertices: 9, parts: 1, extent: None },
             ],
             facts: vec![
                 ("model".into(), "coupled".into()),

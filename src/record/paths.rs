@@ -7,17 +7,16 @@
 //! | `/body` | Mesh3D | the body, as given | mesh file |
 //! | `/garment` | Mesh3D | the garment as loaded | mesh file |
 //! | `/distance/garment` | Mesh3D | distance to the body as colour | mesh file |
-//! | `/distance/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar, cm | mesh file |
 //! | `/parts/garment` | Mesh3D | colour per PART, each vertex showing its own cell | `table` |
 //! | `/force/garment` | Mesh3D | resultant per PART as colour | `table` |
 //! | `/force/arrows` | Arrows3D | one arrow per PART | `table` |
-//! | `/force/legend/bar`, `.../ticks` | Mesh3D, Points3D | its colour bar | `table` |
+//! | `/parts/dots` | Points3D | a dot per PART, which says what it is when hovered over | `table` |
 //! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
-//! | `/fit/<name>/garment`, `.../legend/...` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
+//! | `/fit/<name>/garment` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
 //! | `/fit/folds/lines` | LineStrips3D | directions of the folds that no PART shows | `table` |
-//! | `/wrinkles/seams/garment`, `.../lines`, `.../legend/...` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
-//! | `/wrinkles/curvature/garment`, `.../legend/...` | Mesh3D | mean curvature of the drape | `table` |
-//! | `/error/garment`, `/error/legend/...` | Mesh3D | distance to the reference drape | `table` |
+//! | `/wrinkles/seams/garment`, `.../lines` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
+//! | `/wrinkles/curvature/garment` | Mesh3D | mean curvature of the drape | `table` |
+//! | `/error/garment` | Mesh3D | distance to the reference drape | `table` |
 //! | `/report` | TextDocument | table, fabric, counts, timings, command line, versions | `table` |
 //! | `/levels/histogram/<level>` | BarChart | how many vertices lie how far off, split by level | `table` |
 //! | `/levels/parts/<level>` | BarChart | PARTs of each level | `table` |
@@ -25,7 +24,10 @@
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
 //! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
 //! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
-//! | `/compare/<slot>/garment`, `.../caption`, `.../caption/plate` | Mesh3D, Points3D | 2–6 chosen tables side by side | `table` |
+//! | `/compare/<slot>/garment` | Mesh3D | 2–6 chosen tables side by side | `table` |
+//! | `/legend/compare/<slot>` | Points2D | what each of them costs | `table` |
+//! | `/legend/stages/table` | Points2D | the table's name | `table` |
+//! | `/legend/<tab>/<name>/bar`, `.../ticks` | LineStrips2D, Points2D | colour bars of a tab, in one drawing | `table` |
 //! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
 
 #![allow(missing_docs, reason = "the table above says what lies at each path")]
@@ -33,11 +35,10 @@
 pub const BODY: &str = "/body";
 pub const GARMENT: &str = "/garment";
 pub const DISTANCE: &str = "/distance/garment";
-pub const DISTANCE_LEGEND: &str = "/distance/legend";
 pub const PARTS: &str = "/parts/garment";
+pub const PART_DOTS: &str = "/parts/dots";
 pub const FORCE: &str = "/force/garment";
 pub const FORCE_ARROWS: &str = "/force/arrows";
-pub const FORCE_LEGEND: &str = "/force/legend";
 pub const DRAPE: &str = "/drape/garment";
 pub const FIT: &str = "/fit";
 pub const SEAMS: &str = "/wrinkles/seams";
@@ -54,6 +55,10 @@ pub const RESIDUAL: &str = "/solver/residual";
 pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";
 pub const COMPARE: &str = "/compare";
 pub const SCATTER: &str = "/scatter";
+pub const STAGES_LEGEND: &str = "/legend/stages";
+pub const FIT_LEGEND: &str = "/legend/fit";
+pub const WRINKLES_LEGEND: &str = "/legend/wrinkles";
+pub const COMPARE_CAPTIONS: &str = "/legend/compare";
 
 /// One step per range table (or per reload under `--watch`).
 pub const TABLE: &str = "table";

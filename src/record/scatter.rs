@@ -7,7 +7,7 @@ use rerun::{Color, LineStrips2D, Points2D};
 use super::colours;
 use super::error::RecordError;
 use super::labels::{Labels, Rect};
-use super::legend::{TEXT, number};
+use super::legend::{number, texts};
 use super::meshes;
 use super::open::Open;
 use super::paths;
@@ -158,11 +158,6 @@ fn axes(open: &Open, costs: &Axis, errors: &Axis, cost: &str) -> Result<(), Reco
 /// The viewer's plane has y downwards.
 fn plane([x, y]: [f64; 2]) -> [f32; 2] {
     [x as f32, -y as f32]
-}
-
-/// Points with a text each, drawn as text alone.
-fn texts<S: Into<rerun::components::Text>>(places: Vec<[f32; 2]>, labels: Vec<S>) -> Points2D {
-    Points2D::new(places).with_labels(labels).with_radii([0.0]).with_colors([TEXT]).with_show_labels(true)
 }
 
 #[cfg(test)]

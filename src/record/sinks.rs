@@ -32,7 +32,7 @@ pub(super) const WHOLE_HISTORY: u64 = 1 << 30;
 /// One place a recording goes to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sink {
-    /// An `.rrd` file; missing folders are made.
+    /// An `.rrd` file; missing folders of a relative path are made.
     File(PathBuf),
     /// The native viewer, started if none listens on Rerun's port yet.
     Spawn,
@@ -96,7 +96,8 @@ impl OpenSinks {
 
 fn file(path: &Path) -> Result<Target, RecordError> {
     let unwritable = |source: std::io::Error| RecordError::Unwritable { path: path.to_owned(), source };
-    if let Some(folder) = path.parent() {
+    // Below where one works only: a slip in an absolute path would leave folders anywhere.
+    if let Some(folder) = path.parent().filter(|_| path.is_relative()) {
         std::fs::create_dir_all(folder).map_err(unwritable)?;
     }
     let file = WholeFile::create(path).map_err(unwritable)?;

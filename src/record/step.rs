@@ -10,10 +10,10 @@ use super::colour_map::{ColourMap, Range};
 use super::colours::{self, colour_parts};
 use super::error::RecordError;
 use super::eye::Eye;
-use super::legend::Legend;
+use super::legend::{Cell, Legend, caption};
 use super::meshes::{self, single};
 use super::panel::Panel;
-use super::{Open, Tab, levels, paths};
+use super::{Open, dots, levels, paths};
 use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
 
@@ -109,49 +109,48 @@ fn distance(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     step.distance_m.clone_into(&mut open.distance);
     open.at(step.index, 2);
     let cm: Vec<f64> = step.distance_m.iter().map(|d| 100.0 * d).collect();
-    let range = Range::to_quantile(cm.iter().copied(), QUANTILE);
+    let range = open.scale("distance", || Range::to_quantile(cm.iter().copied(), QUANTILE));
     let map = ColourMap::DISTANCE;
     open.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
     let open_end = cm.iter().any(|&d| d > range.high);
     let legend = Legend { title: "distance", unit: "cm", map, range, open_end };
-    legend.log(open, paths::DISTANCE_LEGEND, open.pixel_m(Tab::Stages))
+    legend.log(open, &format!("{}/distance", paths::STAGES_LEGEND), [0, 1])
 }
 
 fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at(step.index, 3);
-    let chosen =
-        colour_parts(step.part_of_vertex, step.part_force_n.len(), &open.garment.triangles, &open.vertex_colour);
-    let palette = colours::palette();
-    open.vertex_colour = step.part_of_vertex.iter().map(|&p| chosen[p as usize]).collect();
-    let mesh = open.cells.colours(|v| palette[open.vertex_colour[v as usize] as usize]);
-    open.log(paths::PARTS, &mesh)
+    let (count, levels) = (step.part_force_n.len(), &step.panel.levels);
+    let chosen = colour_parts(step.part_of_vertex, count, levels, &open.garment.triangles, &open.vertex_shade);
+    open.vertex_shade = step.part_of_vertex.iter().map(|&p| chosen.shade[p as usize]).collect();
+    let mesh = open.cells.colours(|v| chosen.colour[step.part_of_vertex[v as usize] as usize]);
+    open.log(paths::PARTS, &mesh)?;
+    dots::log(open, step, dots::told(step))?;
+    let named = format!("table: {}, {count} PARTs", step.panel.table);
+    caption(open, &format!("{}/table", paths::STAGES_LEGEND), &named, [0, 0])
 }
 
 fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at(step.index, 4);
-    let per_vertex =
-        |unit: f64| step.part_of_vertex.iter().map(move |&p| unit * step.part_force_n[p as usize].length());
-    let (factor, unit) =
-        if Range::to_quantile(per_vertex(1.0), FORCE_QUANTILE).high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
-    let magnitude: Vec<f64> = per_vertex(factor).collect();
-    let range = Range::to_quantile(magnitude.iter().copied(), FORCE_QUANTILE);
+    let force_n: Vec<f64> = step.part_of_vertex.iter().map(|&p| step.part_force_n[p as usize].length()).collect();
+    let scale = open.scale("force", || Range::to_quantile(force_n.iter().copied(), FORCE_QUANTILE));
+    let (factor, unit) = if scale.high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
     let map = ColourMap::FORCE;
-    let shades = map.colours(&magnitude, range);
+    let shades = map.colours(&force_n, scale);
     let mesh = open.cells.colours(|v| shades[v as usize]);
     open.log(paths::FORCE, &mesh)?;
-    let open_end = magnitude.iter().any(|&f| f > range.high);
+    let open_end = force_n.iter().any(|&f| f > scale.high);
+    let range = Range { low: factor * scale.low, high: factor * scale.high };
     let legend = Legend { title: "|F|", unit, map, range, open_end };
-    legend.log(open, paths::FORCE_LEGEND, open.pixel_m(Tab::Stages))?;
-    arrows(open, step, range.high / factor)
+    legend.log(open, &format!("{}/force", paths::STAGES_LEGEND), [0, 2])?;
+    arrows(open, step, scale.high)
 }
 
 fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError> {
     let arrows = part_arrows(&open.eye, &open.garment.positions, step.part_of_vertex, step.part_force_n, full);
-    open.log(paths::FORCE_ARROWS, &arrows)
+    open.log(paths::FORCE_ARROWS, &arrows.with_labels(dots::told(step)).with_show_labels(false))
 }
 
-/// One arrow per PART, from its vertex nearest the eye's side of its middle: the centroid of a ring lies inside the body. A force of `full`
-/// is as long as an arrow should be.
+/// One arrow per PART. A force of `full` is as long as an arrow should be.
 pub(super) fn part_arrows(
     eye: &Eye,
     placed: &[DVec3],
@@ -159,31 +158,14 @@ pub(super) fn part_arrows(
     part_force_n: &[DVec3],
     full: f64,
 ) -> Arrows3D {
-    let toward = eye.toward;
     let parts = part_force_n.len();
-    let mut sum = vec![(DVec3::ZERO, 0.0, f64::NEG_INFINITY); parts];
-    for (&p, &x) in part_of_vertex.iter().zip(placed) {
-        let (total, count, front) = &mut sum[p as usize];
-        *total += x;
-        *count += 1.0;
-        *front = front.max(x.dot(toward));
-    }
-    let mut best = vec![(f64::INFINITY, DVec3::ZERO); parts];
-    for (&p, &x) in part_of_vertex.iter().zip(placed) {
-        let (total, count, front) = sum[p as usize];
-        let middle = total / count;
-        let wanted = middle + toward * (front - middle.dot(toward));
-        let off = x.distance_squared(wanted);
-        if off < best[p as usize].0 {
-            best[p as usize] = (off, x);
-        }
-    }
     let height = 2.0 * eye.half_height;
     // Hundreds of arrows would hide the garment: the more, the smaller.
     let small = (MANY_ARROWS / parts as f64).sqrt().clamp(0.4, 1.0);
     let longest = LONGEST_ARROW * height * small;
     // Off the surface by a hair, so that an arrow along the cloth is not half sunk in it.
-    let origins = best.iter().map(|(_, x)| single(*x + 0.035 * height * toward));
+    let anchors = dots::anchors(eye, placed, part_of_vertex, parts);
+    let origins = anchors.into_iter().map(|x| single(x + 0.035 * height * eye.toward));
     let vectors = part_force_n.iter().map(|f| {
         let length = (f.length() / full).min(1.25) * longest;
         single(f.normalize_or_zero() * length)
@@ -200,35 +182,52 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.at_table(step.index, 5);
     open.log(paths::DRAPE, &meshes::shape(&draped))?;
     open.at(step.index, 6);
+    let bars = if open.layout().held { 2 } else { 3 };
+    let mut fit = 0;
     for overlay in step.overlays {
-        let (branch, pixel_m) = if overlay.name == "error" {
-            (paths::ERROR.to_owned(), open.pixel_m(Tab::Stages))
+        let (branch, legend, cell) = if overlay.name == "error" {
+            (paths::ERROR.to_owned(), format!("{}/error", paths::STAGES_LEGEND), [0, bars])
         } else {
-            (format!("{}/{}", paths::FIT, overlay.name), open.pixel_m(Tab::Fit))
+            fit += 1;
+            let [branch, legend] = [paths::FIT, paths::FIT_LEGEND].map(|of| format!("{of}/{}", overlay.name));
+            (branch, legend, [fit - 1, 0])
         };
-        self::overlay(open, &branch, &draped, overlay, pixel_m)?;
+        self::overlay(open, &branch, &draped, overlay, (&legend, cell))?;
     }
     open.draped = Some(draped);
     Ok(())
 }
 
-/// Values on the draped garment: `{branch}/garment` and `{branch}/legend`.
+/// The least that a colour map's upper end stands for: under it a small value would look like a large one.
+fn least(quantity: &str) -> f64 {
+    match quantity {
+        "error" => 10.0,
+        "strain" => 5.0,
+        "folds" => 10.0,
+        "pressure" => 0.1,
+        _ => 0.0,
+    }
+}
+
+/// Values on the draped garment: `{branch}/garment`, and a colour bar where `legend` says.
 pub(super) fn overlay(
     open: &Open,
     branch: &str,
     draped: &TriMesh,
     overlay: &Overlay<'_>,
-    pixel_m: f64,
+    (legend, cell): (&str, Cell),
 ) -> Result<(), RecordError> {
     let path = format!("{branch}/garment");
     open.triangles_once(&path)?;
-    let range = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
+    let range = open.scale(overlay.name, || {
+        let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
+        Range { high: own.high.max(least(overlay.name)), ..own }
+    });
     let map = ColourMap::ALARM;
     let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
     open.log(&path, &coloured)?;
     let open_end = overlay.values.iter().any(|&v| v > range.high);
-    let legend = Legend { title: overlay.name, unit: overlay.unit, map, range, open_end };
-    legend.log(open, &format!("{branch}/legend"), pixel_m)
+    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, legend, cell)
 }
 
 fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
@@ -258,12 +257,14 @@ fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log(paths::REPORT, &TextDocument::from_markdown(open.report.as_str()))
 }
 
-/// What a line is called: errors as in the terminal's tables (`own`, `canonical`, `representable`).
+/// What a line is called.
 fn name_of(leaf: &str) -> String {
-    let Some(error) = leaf.strip_prefix("error/") else { return leaf.replace('_', " ") };
-    match error.trim_end_matches("rms_mm").trim_end_matches('_') {
-        "" => "own".to_owned(),
-        kind => kind.to_owned(),
+    match leaf {
+        "error/rms_mm" => "to its own rest".to_owned(),
+        "error/canonical_rms_mm" => "to the canonical drape".to_owned(),
+        "error/representable_rms_mm" => "bound, one displacement a PART".to_owned(),
+        "error/representable_affine_rms_mm" => "bound, one affine map a PART".to_owned(),
+        other => other.trim_start_matches("error/").replace('_', " "),
     }
 }
 

@@ -12,7 +12,7 @@ use super::legend::Legend;
 use super::meshes::{self, single};
 use super::open::Open;
 use super::step::{Overlay, QUANTILE, overlay};
-use super::{Tab, colours, paths};
+use super::{colours, paths};
 use crate::mesh::TriMesh;
 
 /// The seams lie this far above the cloth, m: in it they would be half hidden.
@@ -38,22 +38,22 @@ pub(super) fn log(open: &Open, view: &WrinkleView<'_>) -> Result<(), RecordError
     RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
     let draped = open.garment.with_positions(view.draped.to_vec());
     open.at(view.index, 6);
-    let pixel_m = open.pixel_m(Tab::Wrinkles);
-    let curvature = Overlay { name: "mean curvature", unit: "1/m", values: view.curvature_per_m };
-    overlay(open, paths::CURVATURE, &draped, &curvature, pixel_m)?;
+    let curvature = Overlay { name: "curvature", unit: "1/m", values: view.curvature_per_m };
+    let legend = |name: &str| format!("{}/{name}", paths::WRINKLES_LEGEND);
+    overlay(open, paths::CURVATURE, &draped, &curvature, (&legend("curvature"), [1, 0]))?;
 
     let path = format!("{}/garment", paths::SEAMS);
     open.log_mesh(&path, &meshes::plain(&draped, colours::BODY))?;
     let values: Vec<f64> = view.jumps_mm.iter().map(|(_, jump)| *jump).collect();
-    let range = Range::to_quantile(values.iter().copied(), QUANTILE);
+    let range = open.scale("seams", || Range::to_quantile(values.iter().copied(), QUANTILE));
     let map = ColourMap::FORCE;
     let lines = LineStrips3D::new(borders(&draped, view.jumps_mm))
         .with_colors(meshes::rerun_colours(map.colours(&values, range)))
         .with_radii([Radius::new_ui_points(THICKNESS)]);
     open.log(&format!("{}/lines", paths::SEAMS), &lines)?;
     let open_end = values.iter().any(|&v| v > range.high);
-    let legend = Legend { title: "jump between PARTs", unit: "mm", map, range, open_end };
-    legend.log(open, &format!("{}/legend", paths::SEAMS), pixel_m)
+    let bar = Legend { title: "PART jump", unit: "mm", map, range, open_end };
+    bar.log(open, &legend("seams"), [0, 0])
 }
 
 /// For each joining edge the piece of the seam that crosses it.

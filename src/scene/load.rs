@@ -9,7 +9,7 @@ use crate::distance::Body;
 use crate::files::{names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::report::MeshReport;
+use crate::mesh::report::{MeshReport, Remark};
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
 use crate::shapes::MeshCache;
 
@@ -148,6 +148,10 @@ impl SceneSpec {
         }
         imported.drop_triangles(&flat);
         retain(&mut rest.corners, |t| !flat[t]);
+        let slivers = rest.slivers();
+        if slivers > 0 {
+            imported.report.remarks.push(Remark::Slivers { triangles: slivers });
+        }
         Ok(rest)
     }
 }

@@ -40,6 +40,13 @@ impl PointError {
     pub fn failed(error: &(dyn Error + 'static)) -> Self {
         Self::Failed(said(error, ": "))
     }
+
+    /// A garment that nothing keeps on the body.
+    fn fallen() -> Self {
+        Self::Failed(
+            "the garment has fallen off the body; hold an edge of it (--hold, in a sweep file `hold`)".to_owned(),
+        )
+    }
 }
 
 /// The outcome of one pass over a point.
@@ -176,7 +183,8 @@ impl<'a> Bench<'a> {
         let drape = point.job.drape(&loaded.scene, &mut |_: &Step<'_>| self.listen());
         let drape = drape.map_err(|e| PointError::failed(&e))?;
         if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
-            return Err(PointError::Interrupted);
+            // A garment that falls past the feet ends its own steps, not the sweep.
+            return Err(if self.listen().is_break() { PointError::Interrupted } else { PointError::fallen() });
         }
         let (times, result_hash) = (drape.times, result_hash(&drape.positions));
         Ok(Pass { value: (loaded, drape), times, result_hash })

@@ -26,6 +26,11 @@ pub struct Timing {
     pub time_mechanics_spread_ms: Option<f64>,
     pub time_refine_ms: f64,
     pub time_refine_spread_ms: Option<f64>,
+    /// What no stage counts: tables by rule, penetration and crossings told at the end.
+    #[serde(default)]
+    pub time_other_ms: f64,
+    #[serde(default)]
+    pub time_other_spread_ms: Option<f64>,
     pub time_total_ms: f64,
     pub time_total_spread_ms: Option<f64>,
 }
@@ -34,8 +39,8 @@ impl Timing {
     /// Of the repeats, warm-up passes left out.
     #[must_use]
     pub fn of(passes: &[StageTimes]) -> Self {
-        let stage = |pick: fn(&StageTimes) -> Duration| {
-            let ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(t).as_secs_f64()).collect();
+        let stage = |pick: fn(StageTimes) -> Duration| {
+            let ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(*t).as_secs_f64()).collect();
             let spread = || interpolated(&ms, 0.75) - interpolated(&ms, 0.25);
             (interpolated(&ms, 0.5), (ms.len() > 1).then(spread))
         };
@@ -43,6 +48,7 @@ impl Timing {
         let (time_segment_ms, time_segment_spread_ms) = stage(|t| t.segment);
         let (time_mechanics_ms, time_mechanics_spread_ms) = stage(|t| t.mechanics);
         let (time_refine_ms, time_refine_spread_ms) = stage(|t| t.refine);
+        let (time_other_ms, time_other_spread_ms) = stage(StageTimes::other);
         let (time_total_ms, time_total_spread_ms) = stage(|t| t.total);
         Self {
             time_distance_ms,
@@ -53,19 +59,23 @@ impl Timing {
             time_mechanics_spread_ms,
             time_refine_ms,
             time_refine_spread_ms,
+            time_other_ms,
+            time_other_spread_ms,
             time_total_ms,
             time_total_spread_ms,
         }
     }
 
-    /// The stages and their medians, ms.
+    /// The stages, what is beside them and the whole: medians, ms.
     #[must_use]
-    pub fn stages(&self) -> [(&'static str, f64); 4] {
+    pub fn stages(&self) -> [(&'static str, f64); 6] {
         [
             ("distance", self.time_distance_ms),
             ("segment", self.time_segment_ms),
             ("mechanics", self.time_mechanics_ms),
             ("refine", self.time_refine_ms),
+            ("other", self.time_other_ms),
+            ("total", self.time_total_ms),
         ]
     }
 }

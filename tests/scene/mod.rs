@@ -136,6 +136,13 @@ impl Scene {
                 }
             }
         }
+        // PARTs are numbered level by level.
+        let mut order: Vec<usize> = (0..part_level.len()).collect();
+        order.sort_by_key(|&p| part_level[p]);
+        let mut number = vec![0; order.len()];
+        (0..).zip(&order).for_each(|(new, &old)| number[old] = new);
+        part_of_vertex.iter_mut().for_each(|p| *p = number[*p as usize]);
+        part_level.sort_unstable();
         let areas = self.garment.vertex_areas();
         let normals = self.garment.vertex_normals();
         let mut part_force_n = vec![DVec3::ZERO; part_level.len()];
@@ -144,7 +151,7 @@ impl Scene {
             part_force_n[part as usize] += weight * (DVec3::NEG_Z + 12.0 * self.distance_m[v] * normals[v]);
         }
         let rows = (0..=bounds_cm.len()).map(|k| LevelCount {
-            level: k,
+            level: k + 1,
             lower_cm: if k == 0 { 0.0 } else { bounds_cm[k - 1] },
             upper_cm: bounds_cm.get(k).copied().unwrap_or(f64::INFINITY),
             vertices: levels.iter().filter(|&&l| l == k).count(),

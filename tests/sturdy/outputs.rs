@@ -67,3 +67,80 @@ fn links_are_written_through_and_planted_ones_left_alone() {
     assert!(fs::read_to_string(bench.path("kept.obj")).unwrap().contains("f 1 2 5"));
     assert!(bench.path("out.rrd").is_file());
 }
+
+#[test]
+fn what_is_written_is_what_the_name_says_and_where_one_works() {
+    let bench = Bench::new();
+    bench.drape(&["--no-save", "--export", "garment.fbx"]).with(2, &["--export", ".fbx", ".obj"]);
+    assert!(!bench.path("garment.fbx").exists());
+    let far = bench.path("not/there/x.rrd");
+    bench.drape(&["--save", far.to_str().unwrap()]).with(2, &["not/there/x.rrd", "No such file or directory"]);
+    assert!(!bench.path("not").exists(), "folders of an absolute path are not made");
+    bench.drape(&["--save", "new/folder/x.rrd"]).with(0, &[]);
+    assert!(bench.path("new/folder/x.rrd").is_file());
+}
+
+#[test]
+fn two_runs_at_once_on_one_output_and_one_cache_leave_one_whole_file_each() {
+    let bench = Bench::new();
+    let arguments = [&SCENE[..], &["--save", "one.rrd", "--export", "one.obj", "--accuracy"]].concat();
+    for _ in 0..4 {
+        let mut running: Vec<_> =
+            (0..3).map(|_| bench.command().args(&arguments).stderr(std::process::Stdio::null()).stdout(std::process::Stdio::null()).spawn().unwrap()).collect();
+        for child in &mut running {
+            assert!(child.wait().unwrap().success());
+        }
+        bench.run(&["view", "--check", "one.rrd"]).with(0, &[]);
+        assert_eq!(fs::read_to_string(bench.path("one.obj")).unwrap().matches("\nf ").count(), 4);
+        let names = bench.names();
+        assert!(!names.iter().any(|name| name.ends_with(".part")), "{names:?}");
+    }
+}
+
+#[test]
+fn a_poisoned_reference_is_computed_again_and_said() {
+    let bench = Bench::new();
+    let run = || bench.drape(&["--no-save", "--accuracy", "--cache", "kept", "--format", "json"]);
+    run().with(0, &[]);
+    let entries: Vec<_> = fs::read_dir(bench.path("kept")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert!(!entries.is_empty());
+    for poison in [&b"nothing of ours"[..], b"", &[0xff; 4000]] {
+        for entry in &entries {
+            fs::write(entry, poison).unwrap();
+        }
+        run().with(0, &["kept"]);
+        run().with(0, &[]);
+    }
+    // One that is truncated, and one that belongs to another reference.
+    let whole = fs::read(&entries[0]).unwrap();
+    fs::write(&entries[0], &whole[..whole.len() / 2]).unwrap();
+    run().with(0, &["kept"]);
+    if let [first, second, ..] = &entries[..] {
+        fs::copy(first, second).unwrap();
+        run().with(0, &["kept"]);
+    }
+}
+
+#[test]
+fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
+    let bench = Bench::new();
+    bench.write("sweep.toml", "name = \"s\"\n[base]\nbody = \"body.obj\"\ngarment = \"garment.obj\"\noptions = { unit = \"m\", up = \"z\" }\n[grid]\ntables = [\"table-3\", { quantile = 2 }]\n");
+    let program = env!("CARGO_BIN_EXE_partwise");
+    let scene = "--body body.obj --garment garment.obj";
+    for (blocks, arguments) in [
+        (0, "sweep sweep.toml --out full --no-save".to_owned()),
+        (16, "sweep sweep.toml --out part".to_owned()),
+        (8, format!("compare table-3 table-3 {scene} --accuracy none --repeats 1 --save full.rrd")),
+        (0, format!("tune {scene} --levels-only --max-parts 2 --out tuned")),
+        (1, "assets --vertices 200 --out assets".to_owned()),
+    ] {
+        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
+        let mut command = Command::new("sh");
+        let run = ended(command.current_dir(bench.0.path()).env("XDG_CACHE_HOME", bench.0.path()).arg("-c").arg(&script));
+        assert!(matches!(run.code, Some(1 | 2)), "{arguments}: {:?} {}", run.code, run.said);
+        assert!(run.said.contains("too large") && !run.said.contains("panicked"), "{arguments}: {}", run.said);
+        assert!(run.took < Duration::from_secs(90), "{arguments}: {:?}", run.took);
+        let left = Command::new("find").arg(bench.0.path()).args(["-name", "*.part"]).output().unwrap().stdout;
+        assert!(left.is_empty(), "{arguments}: {}", String::from_utf8_lossy(&left));
+    }
+}

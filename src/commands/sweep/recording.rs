@@ -7,13 +7,18 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use partwise::figures::Figures;
+use partwise::quantile::nearest_rank;
 use partwise::record::{
-    Chosen, Layout, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab, When,
+    Chosen, Layout, Overlay, Panel, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
+    When,
 };
 use partwise::sweep::{Row, Status, Timing};
 
 use super::chosen::{choose, error_mm, labels, total_ms};
 use super::store::{KeptPoint, PointStore};
+
+/// What the error's colours reach to at least, mm.
+const LEAST_ERROR_MM: f64 = 10.0;
 
 /// A recording to be made.
 pub(crate) struct Group<'a> {
@@ -82,6 +87,13 @@ pub(crate) fn record(
     };
     let name = format!("{}: {sweep}", group.name);
     let mut recorder = Recorder::open(RecordOptions { sinks, name, layout, ..RecordOptions::default() })?;
+    // One scale for all steps, which suits three quarters of them.
+    let points: Vec<KeptPoint> = rows.iter().filter_map(|row| store.point(&row.point)).collect();
+    let share = |of: fn(&KeptPoint) -> f64| Range::to_quantile(points.iter().map(of), 0.75);
+    let error = share(|point| nearest_rank(&point.error_mm, 0.99).max(LEAST_ERROR_MM));
+    recorder.scale("error", error);
+    recorder.scale("force", share(|point| nearest_rank(&point.force_of_vertex(), 0.95)));
+    drop(points);
     recorder.body(0, &scene.body)?;
     recorder.garment(0, &scene.garment)?;
     for (index, (row, label)) in (0..).zip(rows.iter().zip(&label)) {
@@ -112,6 +124,7 @@ pub(crate) fn record(
                 caption: &caption(rows[i]),
                 draped: &point.positions,
                 part_of_vertex: &point.part_of_vertex,
+                levels: &point.levels,
                 overlay: None,
             })?;
         }

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use super::single;
 
-const POINT: &Kind = b"PWPOINT4";
+const POINT: &Kind = b"PWPOINT5";
 const SCENE: &Kind = b"PWSCENE3";
 
 /// Body and garment as a recording shows them.
@@ -90,12 +90,18 @@ impl KeptPoint {
         }
     }
 
+    /// Magnitude of the force on each vertex's PART, N.
+    pub(crate) fn force_of_vertex(&self) -> Vec<f64> {
+        let of = |&part: &u32| self.force_n.get(part as usize).map_or(0.0, |f| f.length());
+        self.part_of_vertex.iter().map(of).collect()
+    }
+
     /// Whether every index points at something, levels and PARTs add up, and the scene's id is one.
     fn is_sound(&self) -> bool {
         let parts = self.force_n.len();
         let counted = self.levels.iter().try_fold(0_usize, |sum, level| sum.checked_add(level.parts));
         is_id(&self.scene)
-            && self.levels.iter().enumerate().all(|(i, level)| level.level == i)
+            && self.levels.iter().enumerate().all(|(i, level)| level.level == i + 1)
             && counted == Some(parts)
             && self.part_of_vertex.len() == self.positions.len()
             && self.part_of_vertex.iter().all(|&part| (part as usize) < parts || part == UNASSIGNED)

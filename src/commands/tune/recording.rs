@@ -115,6 +115,7 @@ fn slot(
         caption: &format!("{} PARTs · holds to {:.1} mm · model {model_mm:.1} mm", holds.parts, holds.rms_mm),
         draped: &held(garment, &parts)?,
         part_of_vertex: &parts.part_of_vertex,
+        levels: &LevelCount::all(shown.table, &parts),
         overlay: None,
     })?;
     Ok(())

@@ -120,9 +120,9 @@ impl Cloth {
             .map(|(triangle, (&v, &c))| Triangle::new(v, c).ok_or(EnergyError::Degenerate { triangle }))
             .collect::<Result<Vec<_>, _>>()?;
         let mut areas = vec![0.0; n];
-        for t in &triangles {
+        for (t, area) in triangles.iter().zip(rest.areas()) {
             for &v in &t.vertices {
-                areas[v as usize] += t.area / 3.0;
+                areas[v as usize] += area.abs() / 3.0;
             }
         }
         // A vertex of no triangle has no mass and nothing to balance: it keeps still.
@@ -177,10 +177,10 @@ impl Cloth {
         Some(Self { stiffness, ..self.clone() })
     }
 
-    /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle.
+    /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle; slivers keep none.
     #[must_use]
     pub fn with_slack(mut self, slack: &[f64]) -> Self {
-        for (t, &slack) in self.triangles.iter_mut().zip(slack) {
+        for (t, &slack) in self.triangles.iter_mut().zip(slack).filter(|(t, _)| !t.sliver) {
             t.slack = slack;
         }
         self.packs = TrianglePack::all(&self.triangles);

@@ -32,23 +32,31 @@
 //! √(2A), buckle at B π²/2A, and as long as the stress stays well under that the whole is positive for the bending's
 //! sake. It sees the soft directions in which cloth folds, where the positive one is stiff and creeps.
 //!
-//! Limits: constants are those at zero strain; a measured curve's stiffening is not followed.
+//! A sliver, of height h under ℓ/50 over its longest side ℓ, would be stiffer across than its neighbours by ℓ/h, and turn over when a
+//! corner moves by h: solvers end there. It counts as ℓ/50 high, with its longest side along the weft and r = 0, so that it
+//! bears what stretches it along, and across only what has opened it that far.
+//!
+//! Limits: constants are those at zero strain; a measured curve's stiffening is not followed. Slivers have no grain, no shear
+//! stiffness where they are closed, and may open by ℓ/50.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::fabric::Fabric;
+use crate::mesh::rest::raised;
 
 /// One triangle's rest data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
     /// Its vertices.
     pub vertices: [u32; 3],
-    /// Rest area A, m².
+    /// Rest area A, m²; of a sliver that of what it counts as, which is no mass.
     pub area: f64,
     /// Gradients b_i of the shape functions, 1/m.
     pub gradients: [DVec2; 3],
     /// Share r of the stiffness that is left under compression.
     pub slack: f64,
+    /// Whether it is a sliver, and counts as higher than it is.
+    pub sliver: bool,
 }
 
 /// Membrane stiffness, N/m.
@@ -146,13 +154,16 @@ impl Triangle {
         if !double.is_finite() || double.abs() <= 1e-12 * longest {
             return None;
         }
+        let (sliver, [a, b, c]) = raised(rest);
+        let double = (b - a).perp_dot(c - a);
         // ∇N_i is the opposite side turned by 90 degrees, over twice the signed area.
         let gradient = |p: DVec2, q: DVec2| (q - p).perp() / double;
         Some(Self {
             vertices,
             area: 0.5 * double.abs(),
             gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
-            slack: SLACK,
+            slack: if sliver { 0.0 } else { SLACK },
+            sliver,
         })
     }
 

@@ -1,6 +1,8 @@
-//! Which views there are, and where: the stages side by side with the report, the levels below, more in further tabs.
+//! Which views there are, and where: the stages side by side, levels and colour bars below, the report beside both; more in
+//! further tabs.
 
 use super::super::eye::Eye;
+use super::super::legend::visible;
 use super::super::paths;
 use super::super::scatter::VISIBLE;
 use super::view::View;
@@ -8,12 +10,12 @@ use super::{Node, TimePanel};
 
 /// Width over height of a tab in a window of 16:10, below the bars of the viewer.
 pub(crate) const ASPECT: f64 = 1.8;
-/// Height of a tab in a window of 1440 × 900, pixels: how large texts are beside what they stand by.
-const HEIGHT_PX: f64 = 795.0;
 /// Share of the first tab's height that the stages take; the levels below take the rest.
 const STAGE_HEIGHT: f64 = 0.75;
 /// Width of the text panel over that of a stage.
 const REPORT_OVER_STAGE: f32 = 1.25;
+/// Share of a tab's height that a row of colour bars takes: its title bar, the strip and the numbers.
+const BARS_HEIGHT: f32 = 0.1;
 
 /// What a recording will hold beyond the stages of one drape; each piece gets its views only if it is there.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -100,17 +102,11 @@ impl Layout {
                 let wide = if self.error { 5.0 } else { 4.0 } + f64::from(REPORT_OVER_STAGE);
                 ASPECT / (wide * STAGE_HEIGHT)
             }
-            Tab::SideBySide => ASPECT / self.compare.len() as f64,
-            Tab::Fit => ASPECT / self.fit.len() as f64,
-            Tab::Wrinkles => 0.5 * ASPECT,
+            Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
+            Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
+            Tab::Wrinkles => over_bars(0.5 * ASPECT),
             Tab::Solver => ASPECT / 3.0,
         })
-    }
-
-    /// Length of a pixel under the garment in the views of a tab, m.
-    pub(crate) fn pixel_m(&self, tab: Tab, eye: &Eye) -> f64 {
-        let share = if tab == Tab::Stages { STAGE_HEIGHT } else { 1.0 };
-        self.eye(tab, eye).pixel_m(HEIGHT_PX * share)
     }
 
     fn stages(&self, eye: &Eye) -> Node {
@@ -124,30 +120,29 @@ impl Layout {
         if self.error {
             views.push(seen("Error", paths::ERROR));
         }
-        let top = Node::Row(
-            "Stages",
-            vec![
-                (views.len() as f32, Node::Row("Stages", views)),
-                (REPORT_OVER_STAGE, View::text("Report", paths::REPORT).into()),
-            ],
-        );
+        let wide = views.len() as f32;
         let mut below: Vec<(f32, Node)> = vec![
-            (1.6, View::bars("Vertices over distance, cm; the levels", &[paths::HISTOGRAM]).into()),
+            (1.3, View::bars("Vertices over distance, cm; colours are levels", &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
         ];
         if self.several_tables {
-            below.push((1.0, self.plot("PARTs", "/numbers/part_count", false)));
-            if !self.held {
-                below.push((1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, false)));
-            }
-            if self.error {
-                below.push((1.0, self.plot("Error, mm", "/numbers/error", false)));
-            }
+            below.push((0.8, self.plot("PARTs over tables", "/numbers/part_count", false)));
         }
-        Node::Column(
+        below.push((1.0, View::plane("Colours", &[paths::STAGES_LEGEND], visible([1, self.stage_bars()])).into()));
+        let left = Node::Column(
             "Stages",
-            vec![(STAGE_HEIGHT as f32, top), (1.0 - STAGE_HEIGHT as f32, Node::Row("Levels", below))],
-        )
+            vec![
+                (STAGE_HEIGHT as f32, Node::Row("Stages", views)),
+                (1.0 - STAGE_HEIGHT as f32, Node::Row("Levels", below)),
+            ],
+        );
+        let report = View::text("Report", paths::REPORT).into();
+        Node::Row("Stages", vec![(wide, left), (REPORT_OVER_STAGE, report)])
+    }
+
+    /// Rows of the first tab's colours: the table's name, distance, force and error.
+    fn stage_bars(&self) -> usize {
+        2 + usize::from(!self.held) + usize::from(self.error)
     }
 
     fn numbers(&self) -> Node {
@@ -177,7 +172,7 @@ impl Layout {
             let path = format!("{}/{slot}", paths::COMPARE);
             (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
         });
-        Node::Row("Side by side", views.collect())
+        over(Node::Row("Side by side", views.collect()), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
     }
 
     fn fit(&self, eye: &Eye) -> Node {
@@ -187,7 +182,7 @@ impl Layout {
             let path = format!("{}/{name}", paths::FIT);
             views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
         }
-        Node::Row("Fit", views)
+        over(Node::Row("Fit", views), "Colours", paths::FIT_LEGEND, self.fit.len())
     }
 }
 
@@ -196,13 +191,24 @@ fn wrinkles(eye: &Eye) -> Node {
         (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
         (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
     ];
-    Node::Row("Wrinkles", views)
+    over(Node::Row("Wrinkles", views), "Colours", paths::WRINKLES_LEGEND, 2)
+}
+
+/// Views side by side over a row of colour bars or texts, one for each.
+fn over(views: Node, name: &str, path: &str, columns: usize) -> Node {
+    let bars = View::plane(name, &[path], visible([columns, 1])).into();
+    Node::Column("", vec![(1.0 - BARS_HEIGHT, views), (BARS_HEIGHT, bars)])
+}
+
+/// Width over height of a view that has a row of bars below.
+fn over_bars(aspect: f64) -> f64 {
+    aspect / (1.0 - f64::from(BARS_HEIGHT))
 }
 
 fn solver(eye: &Eye) -> Node {
     let plots = vec![
-        (1.0, View::plot("Energy, J", &[paths::ENERGY], false).into()),
-        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], false).into()),
+        (1.0, View::plot("Energy, J", &[paths::ENERGY], true).into()),
+        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], true).into()),
     ];
     Node::Row(
         "Solver",

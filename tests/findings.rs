@@ -1,0 +1,178 @@
+//! What a drape says of itself where its numbers alone would reassure: what slid, what fell, where skin shows, what slivers do.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use glam::DVec3;
+use partwise::drape::{Refine, Scene, drape, unobserved};
+use partwise::fabric::Fabric;
+use partwise::figures::Figures;
+use partwise::mechanics::energy::Cloth;
+use partwise::mesh::export::write_mesh;
+use partwise::mesh::self_intersection::crossing_pairs;
+use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::sweep::{Bench, Plan, Status};
+use partwise::{Job, Settings};
+
+/// Rings of `around` points from the top down, closed by a point at each end where `ends` are given.
+fn turned(profile: &[(f64, f64)], around: u32, ends: Option<[f64; 2]>) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for &(radius, z) in profile {
+        mesh.positions.extend((0..around).map(|i| {
+            let (y, x) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
+            DVec3::new(radius * x, radius * y, z)
+        }));
+    }
+    let rings = profile.len() as u32;
+    for (j, i) in (0..rings - 1).flat_map(|j| (0..around).map(move |i| (j, i))) {
+        let [a, b] = [j * around + i, j * around + (i + 1) % around];
+        mesh.triangles.extend([[a, a + around, b], [b, a + around, b + around]]);
+    }
+    if let Some([top, bottom]) = ends {
+        let tip = mesh.positions.len() as u32;
+        mesh.positions.extend([DVec3::Z * top, DVec3::Z * bottom]);
+        let last = (rings - 1) * around;
+        for (i, next) in (0..around).map(|i| (i, (i + 1) % around)) {
+            mesh.triangles.extend([[tip, i, next], [tip + 1, last + next, last + i]]);
+        }
+    }
+    mesh
+}
+
+/// A cone, 10 cm wide at the top and 40 cm at the foot (radii).
+fn cone() -> TriMesh {
+    let profile: Vec<(f64, f64)> = (0..=10).map(|k| (0.1 + 0.03 * f64::from(k), 1.0 - 0.1 * f64::from(k))).collect();
+    turned(&profile, 32, Some([1.02, -0.02]))
+}
+
+fn sphere() -> TriMesh {
+    let ring = |k: i32| {
+        let (s, c) = (std::f64::consts::PI * f64::from(k) / 24.0).sin_cos();
+        (0.3 * s, 1.0 + 0.3 * c)
+    };
+    turned(&(1..24).map(ring).collect::<Vec<_>>(), 48, Some([1.3, 0.7]))
+}
+
+fn draped(scene: &Scene) -> (Figures, Vec<String>, Vec<DVec3>) {
+    let job = Job::default();
+    let result = drape(scene, &job.settings, &mut unobserved).unwrap();
+    let measured = job.measure(scene, &result, None, &mut unobserved).unwrap();
+    (measured.figures, measured.warnings, result.positions)
+}
+
+#[test]
+fn a_garment_that_slides_down_is_told_with_what_to_hold() {
+    let mut tube = turned(&[(0.3, 0.95), (0.3, 0.9), (0.3, 0.85), (0.3, 0.8), (0.3, 0.75), (0.3, 0.7)], 40, None);
+    tube.groups = vec!["waist".to_owned()];
+    tube.triangle_group = vec![0; tube.triangles.len()];
+    let mut scene = Scene::of_meshes(&cone(), tube).unwrap();
+    let (figures, warnings, x) = draped(&scene);
+    let sank = (0..40).map(|v| scene.garment.positions[v].z - x[v].z).sum::<f64>() / 40.0;
+    assert!(sank > 0.2 && (figures.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
+    let said = warnings.join("\n");
+    assert!(said.contains("slid down") && said.contains("--hold top") && said.contains("waist"), "{said}");
+    // Held, it stays, and nothing is said.
+    scene.held = scene.edge("top").unwrap();
+    let (figures, warnings, _) = draped(&scene);
+    assert_eq!(figures.top_sank_mm, 0.0);
+    assert!(!warnings.join("\n").contains("slid"), "{warnings:?}");
+}
+
+#[test]
+fn skin_between_vertices_that_are_outside_is_told() {
+    // Triangles of 15 cm on a sphere of 30 cm: their middles sag a centimetre under their corners.
+    let cape = |around, rings: u32| {
+        let ring = |k: u32| {
+            let u = f64::from(k) / f64::from(rings - 1);
+            (0.05 + 0.4 * u, 1.33 - 0.25 * u)
+        };
+        turned(&(0..rings).map(ring).collect::<Vec<_>>(), around, None)
+    };
+    let scene = Scene::of_meshes(&sphere(), cape(12, 5)).unwrap();
+    let (figures, warnings, x) = draped(&scene);
+    let pairs = crossing_pairs(&scene.garment.with_positions(x), scene.body.mesh()).len();
+    assert!(pairs > 0 && figures.body_crossing_pairs == pairs && figures.penetrating_vertices == 0, "{pairs}");
+    let said = warnings.join("\n");
+    assert!(said.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{said}");
+    assert!(said.contains("no vertex is inside"), "{said}");
+    let (figures, warnings, _) = draped(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap());
+    assert_eq!(figures.body_crossing_pairs, 0);
+    assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
+fn a_garment_that_falls_off_is_a_failed_row_and_the_sweep_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    write_mesh(&folder.path().join("body.obj"), &sphere()).unwrap();
+    write_mesh(&folder.path().join("tube.obj"), &turned(&[(0.4, 1.2), (0.4, 1.1), (0.4, 1.0)], 30, None)).unwrap();
+    let text = format!(
+        "name = \"falls\"\n[base]\nbody = '{}'\ngarment = '{}'\noptions = {{ unit = \"m\", up = \"z\" }}\nrefine = \"converged\"\n[grid]\ntables = [\"table-3\", {{ quantile = 3 }}]\n",
+        place("body.obj"),
+        place("tube.obj")
+    );
+    let plan = Plan::parse(&text, "falls.toml", folder.path(), &Job::preview()).unwrap();
+    assert_eq!(plan.points.len(), 2);
+    let stop = AtomicBool::new(false);
+    let bench = Bench::new(None, &stop);
+    for point in &plan.points {
+        // No row would be the user's interruption, and the end of the sweep.
+        let row = bench.row(point, (0, 1), |_, _, _| Ok(())).unwrap();
+        assert_eq!(row.status, Status::Error);
+        assert!(row.error.contains("fallen off the body") && row.error.contains("hold"), "{}", row.error);
+    }
+}
+
+#[test]
+fn a_seam_of_slivers_bears_like_cloth_and_opens_by_no_more_than_a_fiftieth() {
+    // A strip of 10 by 20 cm hanging from its top, cut across its middle by a row of triangles a tenth of a millimetre high.
+    let (columns, side) = (10_u32, 0.01);
+    let seam = 1e-4;
+    let rows: Vec<f64> =
+        (0..=10).map(|j| f64::from(j) * side).chain((10..=20).map(|j| f64::from(j) * side + seam)).collect();
+    let strip = |rows: &[f64]| {
+        let mut mesh = TriMesh::default();
+        for z in rows {
+            mesh.positions.extend((0..=columns).map(|i| DVec3::new(f64::from(i) * side, 0.0, -z)));
+        }
+        let n = columns + 1;
+        for (j, i) in (0..rows.len() as u32 - 1).flat_map(|j| (0..columns).map(move |i| (j, i))) {
+            let a = j * n + i;
+            mesh.triangles.extend([[a, a + n, a + 1], [a + 1, a + n, a + n + 1]]);
+        }
+        mesh
+    };
+    let body = sphere();
+    let hung = |mesh: TriMesh| {
+        let lifted = mesh.positions.iter().map(|p| *p + DVec3::new(0.5, 0.0, 1.2)).collect();
+        let mut scene = Scene::of_meshes(&body, mesh.with_positions(lifted)).unwrap();
+        scene.held = (0..=columns).collect();
+        let settings = Settings { fabric: Fabric::by_name("denim").unwrap(), ..Settings::default() };
+        assert_eq!(settings.refine, Refine::Converged);
+        let found = drape(&scene, &settings, &mut unobserved).unwrap();
+        let state = found.state.unwrap();
+        assert!(
+            state.residual_over_weight < 1e-3 && state.steps < 30,
+            "{} after {}",
+            state.residual_over_weight,
+            state.steps
+        );
+        (found.positions, state.fit)
+    };
+    let (plain, _) = hung(strip(
+        &rows[..10].iter().chain(&rows[11..]).map(|z| if *z > 0.1 { z - seam } else { *z }).collect::<Vec<_>>(),
+    ));
+    let (sewn, fit) = hung(strip(&rows));
+    let lowest = |x: &[DVec3]| x.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let longer = lowest(&plain) - lowest(&sewn);
+    assert!((0.0..0.02 * side + 2.0 * seam).contains(&longer), "{longer}");
+    assert!(fit.strain_max_percent < 1.0, "{}", fit.strain_max_percent);
+    // No mass is invented: the seam weighs what it is.
+    let mesh = strip(&rows);
+    let rest = RestShape::from_edges(&mesh).unwrap();
+    let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &Fabric::by_name("denim").unwrap(), &[]).unwrap();
+    let area: f64 = cloth.areas.iter().sum();
+    assert!((area - 0.1 * (0.2 + seam)).abs() < 1e-12, "{area}");
+}
