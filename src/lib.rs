@@ -45,6 +45,7 @@ pub mod files;
 pub mod job;
 pub mod mechanics;
 pub mod mesh;
+pub mod methods;
 pub mod parts;
 pub mod quantile;
 pub mod range_table;
