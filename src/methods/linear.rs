@@ -5,13 +5,13 @@
 //! cloth simulation", SIGGRAPH 1998.
 //!
 //! Blocks and vectors are single precision in SIMD registers, sums are double: a step of a simulation in time wants three or four digits of its
-//! solution, and the matrix is what memory waits for. Rows are shared among the threads, and sums are taken over fixed chunks, so the bits do not
-//! depend on how many there are.
+//! solution, and the matrix is what memory waits for. Rows are shared among the threads, and sums are taken in the order of the rows, so the bits do
+//! not depend on how many there are.
 
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
-/// Rows of one task: fixed, as sums go by them.
+/// Rows of one task.
 const CHUNK: usize = 512;
 
 /// A symmetric matrix of 3×3 blocks, all of them, by rows with columns ascending.
@@ -72,21 +72,47 @@ impl BlockRows {
         }
         sums[0] + sums[1]
     }
+}
 
-    /// out = A d; returns dᵀ A d.
-    fn times(&self, d: &[Vec3A], out: &mut [Vec3A]) -> f64 {
-        let shares: Vec<f64> = (out.par_chunks_mut(CHUNK).enumerate())
-            .map(|(chunk, out)| {
-                let first = chunk * CHUNK;
-                let mut sum = 0.0;
-                for (k, out) in out.iter_mut().enumerate() {
-                    *out = self.row_times(first + k, d);
-                    sum += f64::from(out.dot(d[first + k]));
-                }
-                sum
-            })
-            .collect();
-        shares.iter().sum()
+/// A symmetric positive matrix that can be multiplied with; its own blocks are kept apart.
+pub trait Operator: Sync {
+    /// out = A d without what is added to A in the right side's own blocks.
+    fn times(&mut self, d: &[Vec3A], out: &mut [Vec3A]);
+}
+
+impl Operator for BlockRows {
+    fn times(&mut self, d: &[Vec3A], out: &mut [Vec3A]) {
+        out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = self.row_times(chunk * CHUNK + k, d);
+            }
+        });
+    }
+}
+
+/// A linear system (A + B) d = b with block diagonal B.
+pub struct System<'a> {
+    /// A.
+    pub matrix: &'a mut dyn Operator,
+    /// B.
+    pub added: &'a [Mat3A],
+    /// The diagonal blocks of A + B.
+    pub own: &'a [Mat3A],
+    /// b.
+    pub side: &'a [Vec3A],
+    /// Rows that keep their d.
+    pub fixed: &'a [bool],
+}
+
+impl System<'_> {
+    fn times(&mut self, d: &[Vec3A], out: &mut [Vec3A]) -> f64 {
+        self.matrix.times(d, out);
+        let mut sum = 0.0;
+        for ((out, d), added) in out.iter_mut().zip(d).zip(self.added) {
+            *out += *added * *d;
+            sum += f64::from(out.dot(*d));
+        }
+        sum
     }
 }
 
@@ -101,37 +127,29 @@ pub struct ConjugateGradients {
 
 impl ConjugateGradients {
     /// Improves `d` until the residual is under `tolerance` of the right side's, both in the preconditioner's norm, or for
-    /// `most` iterations. A row whose `fixed` is set keeps its `d`. Returns the number of iterations.
-    pub fn solve(
-        &mut self,
-        matrix: &BlockRows,
-        side: &[Vec3A],
-        fixed: &[bool],
-        (tolerance, most): (f64, usize),
-        d: &mut [Vec3A],
-    ) -> usize {
-        let n = matrix.rows();
+    /// `most` iterations. Returns the number of iterations.
+    pub fn solve(&mut self, mut system: System<'_>, (tolerance, most): (f64, usize), d: &mut [Vec3A]) -> usize {
+        let n = d.len();
         let Self { inverse, rest, direction, image } = self;
         for list in [&mut *rest, &mut *direction, &mut *image] {
             list.resize(n, Vec3A::ZERO);
         }
         // A fixed row has no inverse: its residual is never seen and its direction stays zero.
         inverse.clear();
-        inverse.extend(matrix.diagonal.iter().zip(fixed).map(|(&k, &fixed)| {
-            if fixed { Mat3A::ZERO } else { matrix.blocks[k as usize].inverse() }
-        }));
-        matrix.times(d, image);
+        let inverse_of = |(own, fixed): (&Mat3A, &bool)| if *fixed { Mat3A::ZERO } else { own.inverse() };
+        inverse.extend(system.own.iter().zip(system.fixed).map(inverse_of));
+        system.times(d, image);
         let (mut gamma, mut whole) = (0.0, 0.0);
         for i in 0..n {
-            rest[i] = side[i] - image[i];
+            rest[i] = system.side[i] - image[i];
             direction[i] = inverse[i] * rest[i];
             gamma += f64::from(rest[i].dot(direction[i]));
-            whole += f64::from(side[i].dot(inverse[i] * side[i]));
+            whole += f64::from(system.side[i].dot(inverse[i] * system.side[i]));
         }
         let goal = tolerance * tolerance * whole;
         let mut iterations = 0;
         while iterations < most && gamma > goal {
-            let curvature = matrix.times(direction, image);
+            let curvature = system.times(direction, image);
             if curvature.is_nan() || curvature <= 0.0 {
                 break;
             }
@@ -176,12 +194,15 @@ mod tests {
     #[test]
     fn a_hanging_chain_has_its_closed_form() {
         let n = 40;
-        let a = chain(n);
+        let mut a = chain(n);
         let mut fixed = vec![false; n as usize];
         fixed[0] = true;
         let side = vec![Vec3A::new(0.0, 1.0, -1.0); n as usize];
         let mut d = vec![Vec3A::ZERO; n as usize];
-        let iterations = ConjugateGradients::default().solve(&a, &side, &fixed, (1e-6, 200), &mut d);
+        let own: Vec<Mat3A> = a.diagonal.iter().map(|&k| a.blocks[k as usize]).collect();
+        let added = vec![Mat3A::ZERO; n as usize];
+        let system = System { matrix: &mut a, added: &added, own: &own, side: &side, fixed: &fixed };
+        let iterations = ConjugateGradients::default().solve(system, (1e-6, 200), &mut d);
         assert!(iterations < 60, "{iterations}");
         for i in 0..n {
             // Each spring bears the weight of what hangs below it: d_i = Σ_{k ≤ i} (n − k).

@@ -17,7 +17,7 @@
 
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
-use super::linear::{BlockRows, ConjugateGradients};
+use super::linear::{ConjugateGradients, Operator, System};
 use super::rest::{Ended, Rest, RestRule};
 use super::{Dressing, MethodError, Moment, Onlooker, Stopwatch};
 use crate::GRAVITY;
@@ -37,10 +37,13 @@ pub struct Pacing {
     pub iterations: usize,
 }
 
-/// The cloth of a method.
-pub trait Elastic: Sync {
-    /// Adds the cloth's force, N, to `force` and its stiffness, N/m, to the matrix, which both are zero.
-    fn assemble(&mut self, x: &[DVec3], matrix: &mut BlockRows, force: &mut [DVec3]);
+/// The cloth of a method; as an operator, its stiffness where it was last looked at.
+pub trait Elastic: Operator {
+    /// Adds the cloth's force at `x`, N, and keeps its stiffness there.
+    fn linearise(&mut self, x: &[DVec3], force: &mut [DVec3]);
+
+    /// Adds each vertex's own block of that stiffness, N/m.
+    fn add_own(&self, own: &mut [Mat3A]);
 
     /// Corrects positions after a step from `from`, if the method does so; returns how many corrections it made.
     fn limit(&mut self, _from: &[DVec3], _x: &mut [DVec3], _held: &[bool]) -> u64 {
@@ -102,6 +105,8 @@ struct State {
     v: Vec<DVec3>,
     force: Vec<DVec3>,
     side: Vec<Vec3A>,
+    added: Vec<Mat3A>,
+    own: Vec<Mat3A>,
     d: Vec<Vec3A>,
 }
 
@@ -110,7 +115,6 @@ pub(super) fn march(
     dressing: &Dressing<'_>,
     course: Course<'_>,
     (elastic, obstacle): (&mut dyn Elastic, &mut dyn Obstacle),
-    matrix: &mut BlockRows,
     watch: &mut Stopwatch,
     onlooker: Onlooker<'_>,
 ) -> Result<Marched, MethodError> {
@@ -122,6 +126,8 @@ pub(super) fn march(
         v: vec![DVec3::ZERO; n],
         force: Vec::new(),
         side: vec![Vec3A::ZERO; n],
+        added: Vec::new(),
+        own: Vec::new(),
         d: vec![Vec3A::ZERO; n],
     };
     let mut solver = ConjugateGradients::default();
@@ -131,9 +137,11 @@ pub(super) fn march(
     loop {
         let touches = watch.time("contact", || obstacle.touches(&state.x));
         friction.refresh(touches, &state.x);
-        watch.time("forces", || state.assemble(dressing, elastic, touches, &friction, matrix, course.pacing));
+        watch.time("forces", || state.assemble(dressing, elastic, touches, &friction, course.pacing));
         let limits = (course.pacing.tolerance, course.pacing.iterations);
-        let done = watch.time("linear solver", || solver.solve(matrix, &state.side, &cloth.held, limits, &mut state.d));
+        let State { added, own, side, d, .. } = &mut state;
+        let system = System { matrix: &mut *elastic, added, own, side, fixed: &cloth.held };
+        let done = watch.time("linear solver", || solver.solve(system, limits, d));
         iterations += done as u64;
         let from = state.advance(&cloth.held);
         corrections += watch.time("strain limiting", || elastic.limit(&from, &mut state.x, &cloth.held));
@@ -167,30 +175,30 @@ impl State {
         elastic: &mut dyn Elastic,
         touches: &[Touch],
         friction: &Friction,
-        matrix: &mut BlockRows,
         pacing: &Pacing,
     ) {
         let cloth = dressing.cloth;
-        matrix.blocks.fill(Mat3A::ZERO);
+        let h = pacing.step_s;
+        let inertia = 1.0 / (h * h) + pacing.damping_per_s / h;
+        self.added.clear();
+        self.added.extend(cloth.masses.iter().map(|m| Mat3A::from_diagonal(glam::Vec3::splat((m * inertia) as f32))));
         self.force.clear();
         self.force.resize(self.x.len(), DVec3::ZERO);
         // Friction's gradient, then its sign: everything else is a force.
         friction.add_gradient(&self.x, &mut self.force);
         self.force.iter_mut().for_each(|f| *f = -*f);
-        elastic.assemble(&self.x, matrix, &mut self.force);
+        elastic.linearise(&self.x, &mut self.force);
         for t in touches {
             self.force[t.vertex as usize] += t.normal * t.force();
             let n = t.normal.as_vec3a();
-            let push = Mat3A::from_cols(n * n.x, n * n.y, n * n.z) * t.stiffness as f32;
-            matrix.blocks[matrix.diagonal[t.vertex as usize] as usize] += push;
+            self.added[t.vertex as usize] += Mat3A::from_cols(n * n.x, n * n.y, n * n.z) * t.stiffness as f32;
         }
         for (v, block) in friction.hessian(&self.x) {
-            matrix.blocks[matrix.diagonal[v as usize] as usize] += single(block);
+            self.added[v as usize] += single(block);
         }
-        let h = pacing.step_s;
-        let inertia = 1.0 / (h * h) + pacing.damping_per_s / h;
+        self.own.clone_from(&self.added);
+        elastic.add_own(&mut self.own);
         for (i, &mass) in cloth.masses.iter().enumerate() {
-            matrix.blocks[matrix.diagonal[i] as usize] += Mat3A::from_diagonal(glam::Vec3::splat((mass * inertia) as f32));
             let side = self.force[i] + mass * (self.v[i] / h - GRAVITY * DVec3::Z);
             self.side[i] = if cloth.held[i] { Vec3A::ZERO } else { side.as_vec3a() };
             self.d[i] = if cloth.held[i] { Vec3A::ZERO } else { (self.v[i] * h).as_vec3a() };

@@ -16,6 +16,7 @@
 pub mod linear;
 pub mod march;
 pub mod rest;
+pub mod thomaszewski2006;
 pub mod zhu2016;
 
 use std::ops::ControlFlow;
@@ -134,13 +135,14 @@ pub trait ReferenceMethod: Sync {
 }
 
 /// Names of the methods, in the order of the paper's references.
-pub const METHODS: [&str; 1] = [zhu2016::NAME];
+pub const METHODS: [&str; 2] = [zhu2016::NAME, thomaszewski2006::NAME];
 
 /// The method of a name, with its defaults.
 #[must_use]
 pub fn by_name(name: &str) -> Option<Box<dyn ReferenceMethod>> {
     match name {
         zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016::default())),
+        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006::default())),
         _ => None,
     }
 }

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use partwise::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
-use partwise::methods::{Dressing, MethodDrape, MethodError, ReferenceMethod, RestRule};
 use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::methods::{Dressing, MethodDrape, MethodError, ReferenceMethod, RestRule};
 use partwise::{DVec3, Scene};
 
 /// A grid of right triangles over `u` × `v` from the origin, the diagonals alternating.

@@ -24,9 +24,9 @@ fn a_hanging_strip_stretches_as_its_closed_form() {
 
 #[test]
 fn no_spring_stays_longer_than_its_limit() {
-    let scene = hanging(rectangle(DVec3::X * 0.1, DVec3::NEG_Z * 0.6, 4, 24), (0..5).collect());
-    // By its own stiffness it would hang down by a third more.
-    let soft = fabric(0.2, 2.0, 0.3, 1e-7);
+    let scene = hanging(rectangle(DVec3::X * 0.1, DVec3::NEG_Z * 0.2, 2, 4), (0..3).collect());
+    // By its own stiffness its upper edge would be strained by a half.
+    let soft = fabric(0.2, 0.8, 0.3, 1e-7);
     let made = drape(&Zhu2016 { strain_limit: 0.05, ..Zhu2016::default() }, &scene, &soft, &STILL).unwrap();
     let longest = |made: &[DVec3]| {
         let ends = scene.topology.edges.iter().map(|edge| edge.map(|v| v as usize));
@@ -34,11 +34,11 @@ fn no_spring_stays_longer_than_its_limit() {
         ends.map(|[a, b]| made[a].distance(made[b]) / rest[a].distance(rest[b])).fold(0.0, f64::max)
     };
     // The sweeps of a step leave a rest, which grows with the number of springs that hang on one another.
-    assert!(longest(&made.positions) < 1.3, "{}", longest(&made.positions));
+    assert!(longest(&made.positions) < 1.1, "{}", longest(&made.positions));
     let count = |name: &str| made.counts.iter().find(|c| c.0 == name).unwrap().1;
     assert!(count("strain corrections") > 0);
     let free = drape(&Zhu2016 { strain_limit: 10.0, ..Zhu2016::default() }, &scene, &soft, &STILL).unwrap();
-    assert!(longest(&free.positions) > 1.5, "{}", longest(&free.positions));
+    assert!(longest(&free.positions) > 1.3, "{}", longest(&free.positions));
 }
 
 /// The dress form with a skirt.
@@ -54,14 +54,19 @@ fn the_hierarchy_finds_what_an_exact_search_finds() {
     let body = scene.body.mesh();
     let normals = body.vertex_normals();
     // Points about the skin from 15 mm inside to 15 mm outside, as many at a time as the cloth has vertices.
-    for (round, depth) in [-0.015, -0.004, 0.0, 0.5 * cloth.offset, 0.99 * cloth.offset, 0.015].into_iter().enumerate() {
+    for (round, depth) in [-0.015, -0.004, 0.0, 0.5 * cloth.offset, 0.99 * cloth.offset, 0.015].into_iter().enumerate()
+    {
         let mut hierarchy = Hierarchy::new(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
         let pick = |i: usize| (i * 7919 + round * 131) % body.vertex_count();
         let points: Vec<DVec3> = (0..cloth.vertex_count())
             .map(|i| {
                 let ([a, b, c], t) = (body.triangles[(i * 31 + round) % body.triangles.len()], 1.0 / 3.0);
                 let on_face = i % 2 == 0;
-                let p = if on_face { [a, b, c].iter().map(|&v| body.positions[v as usize]).sum::<DVec3>() * t } else { body.positions[pick(i)] };
+                let p = if on_face {
+                    [a, b, c].iter().map(|&v| body.positions[v as usize]).sum::<DVec3>() * t
+                } else {
+                    body.positions[pick(i)]
+                };
                 let n = if on_face { normals[a as usize] } else { normals[pick(i)] };
                 p + n * depth
             })
@@ -74,7 +79,11 @@ fn the_hierarchy_finds_what_an_exact_search_finds() {
             if exact.signed_distance < cloth.offset - 1e-9 {
                 let touch = of(v).unwrap_or_else(|| panic!("vertex {v} at {} was missed", exact.signed_distance));
                 let off = (cloth.offset - touch.depth - exact.signed_distance).abs();
-                assert!(off < 1e-9 || exact.signed_distance < -0.01, "vertex {v}: off by {off} at {}", exact.signed_distance);
+                assert!(
+                    off < 1e-9 || exact.signed_distance < -0.01,
+                    "vertex {v}: off by {off} at {}",
+                    exact.signed_distance
+                );
             } else if exact.signed_distance > cloth.offset + 1e-9 {
                 assert!(of(v).is_none(), "vertex {v} at {} does not touch", exact.signed_distance);
             }

@@ -98,12 +98,14 @@ impl Hierarchy {
             .filter_map(|(triangles, &is_limb)| BodyUnit::new(mesh, triangles, is_limb, offset))
             .collect();
         let normals = mesh.vertex_normals();
-        let leaf = |t: usize| Leaf { corners: mesh.corners(t), normals: mesh.triangles[t].map(|v| normals[v as usize]) };
+        let leaf =
+            |t: usize| Leaf { corners: mesh.corners(t), normals: mesh.triangles[t].map(|v| normals[v as usize]) };
         let leaves: Vec<Leaf> = units.iter().flat_map(|u| &u.leaves).map(|&t| leaf(t as usize)).collect();
         let balls = leaves.iter().map(|leaf| ball(leaf.corners)).collect();
         let (low, high) = mesh.bounds().unwrap_or_default();
         let stiff = cloth.contact_stiffness();
-        let stiffness = cloth.areas.iter().zip(&cloth.held).map(|(a, held)| if *held { 0.0 } else { stiff * a }).collect();
+        let stiffness =
+            cloth.areas.iter().zip(&cloth.held).map(|(a, held)| if *held { 0.0 } else { stiff * a }).collect();
         Ok(Self {
             units,
             leaves,
@@ -188,7 +190,8 @@ impl Hierarchy {
                 let (c, weights) = closest(leaf.corners, x);
                 let squared = c.distance_squared(x);
                 if squared < least {
-                    let normal = leaf.normals[0] * weights[0] + leaf.normals[1] * weights[1] + leaf.normals[2] * weights[2];
+                    let normal =
+                        leaf.normals[0] * weights[0] + leaf.normals[1] * weights[1] + leaf.normals[2] * weights[2];
                     best = Some((squared, c, normal));
                 }
             }

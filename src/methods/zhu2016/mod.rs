@@ -72,19 +72,14 @@ impl Zhu2016 {
     ) -> Result<MethodDrape, MethodError> {
         let began = Instant::now();
         let mut watch = Stopwatch::default();
-        let (mut springs, mut matrix) = watch.time("springs", || Springs::new(dressing, self.strain_limit));
+        let mut springs = watch.time("springs", || Springs::new(dressing, self.strain_limit));
         let mut hierarchy = watch.time("hierarchy", || Hierarchy::new(dressing))?;
         let course = Course { method: NAME, pacing: &self.pacing, rule, friction: dressing.fabric.friction };
-        let sides = (&mut springs as &mut dyn super::march::Elastic, &mut hierarchy as &mut dyn super::march::Obstacle);
-        let marched = march(dressing, course, sides, &mut matrix, &mut watch, onlooker)?;
+        let marched = march(dressing, course, (&mut springs, &mut hierarchy), &mut watch, onlooker)?;
         let total = began.elapsed();
         let Marched { positions, ended, steps, simulated_s, rms_speed, iterations, corrections } = marched;
         let counts = hierarchy.counts();
-        let exhibits = if self.exhibit {
-            vec![("quadrics", Exhibit::Lines(hierarchy.outlines()))]
-        } else {
-            Vec::new()
-        };
+        let exhibits = if self.exhibit { vec![("quadrics", Exhibit::Lines(hierarchy.outlines()))] } else { Vec::new() };
         Ok(MethodDrape {
             positions,
             ended,

@@ -42,7 +42,8 @@ impl Segments {
     pub(super) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let distance = geodesics(mesh, topology);
         let farthest = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
-        let edge = topology.edges.iter().map(|&[a, b]| length(mesh, a, b)).sum::<f64>() / topology.edges.len().max(1) as f64;
+        let edge =
+            topology.edges.iter().map(|&[a, b]| length(mesh, a, b)).sum::<f64>() / topology.edges.len().max(1) as f64;
         let width = (farthest / BANDS).max(1.5 * edge);
         let band_of = |t: &[u32; 3]| {
             let mean = t.iter().map(|&v| distance[v as usize]).sum::<f64>() / 3.0;
@@ -211,7 +212,8 @@ fn join_short(rings: &[Ring], chain: &mut [usize], chains: &mut [Vec<usize>]) {
             chains[c].iter().flat_map(move |&r| pick(&rings[r])).map(|&r| chain[r]).filter(|&other| other != c)
         };
         let longest = |found: Vec<usize>| found.into_iter().max_by_key(|&other| (chains[other].len(), Reverse(other)));
-        let into = longest(neighbours(|r| &r.parents).collect()).or_else(|| longest(neighbours(|r| &r.children).collect()));
+        let into =
+            longest(neighbours(|r| &r.parents).collect()).or_else(|| longest(neighbours(|r| &r.children).collect()));
         if let Some(into) = into {
             let moved = std::mem::take(&mut chains[c]);
             moved.iter().for_each(|&r| chain[r] = into);
@@ -231,7 +233,8 @@ fn cut_waists(rings: &[Ring], chain: &mut [usize], chains: &mut Vec<Vec<usize>>)
         }
         let bands: BTreeSet<usize> = chains[c].iter().map(|&r| rings[r].band).collect();
         let (Some(&first), Some(&last)) = (bands.first(), bands.last()) else { continue };
-        let area = |band: usize| -> f64 { chains[c].iter().filter(|&&r| rings[r].band == band).map(|&r| rings[r].area).sum() };
+        let area =
+            |band: usize| -> f64 { chains[c].iter().filter(|&&r| rings[r].band == band).map(|&r| rings[r].area).sum() };
         let quarter = (last - first) / 4;
         let waist = (first + quarter..=last - quarter).min_by(|&a, &b| area(a).total_cmp(&area(b)));
         let Some(waist) = waist else { continue };

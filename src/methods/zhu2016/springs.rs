@@ -24,7 +24,7 @@ use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::methods::Dressing;
-use crate::methods::linear::BlockRows;
+use crate::methods::linear::{BlockRows, Operator};
 use crate::methods::march::Elastic;
 
 /// Radius at which bending springs hold what the fabric does, m.
@@ -60,6 +60,7 @@ pub struct Springs {
     starts: Vec<u32>,
     arms: Vec<Arm>,
     limits: Vec<Limit>,
+    matrix: BlockRows,
 }
 
 /// An edge on its way to a spring.
@@ -76,9 +77,9 @@ struct Edge {
 }
 
 impl Springs {
-    /// Springs of the garment by its rest shape, and the matrix that holds their stiffness.
+    /// Springs of the garment by its rest shape.
     #[must_use]
-    pub fn new(dressing: &Dressing<'_>, strain_limit: f64) -> (Self, BlockRows) {
+    pub fn new(dressing: &Dressing<'_>, strain_limit: f64) -> Self {
         let Dressing { scene, fabric, cloth } = dressing;
         let mut edges = vec![Edge::default(); scene.topology.edges.len()];
         let mut bends: Vec<([u32; 2], f64, f64, usize)> = Vec::new();
@@ -137,7 +138,7 @@ impl Springs {
             })
             .collect();
         let (starts, arms) = arms(&springs, &matrix);
-        (Self { starts, arms, limits }, matrix)
+        Self { starts, arms, limits, matrix }
     }
 
     /// Number of springs of both kinds.
@@ -162,17 +163,30 @@ fn arms(springs: &[([u32; 2], f64, f64)], matrix: &BlockRows) -> (Vec<u32>, Vec<
     for &([a, b], rest, stiffness) in springs {
         for (own, other) in [(a, b), (b, a)] {
             let block = matrix.at(own, other).map_or(0, |k| k - matrix.starts[own as usize]);
-            arms[next[own as usize] as usize] =
-                Arm { other, block, rest: rest as f32, stiffness: stiffness as f32 };
+            arms[next[own as usize] as usize] = Arm { other, block, rest: rest as f32, stiffness: stiffness as f32 };
             next[own as usize] += 1;
         }
     }
     (starts, arms)
 }
 
+impl Operator for Springs {
+    fn times(&mut self, d: &[Vec3A], out: &mut [Vec3A]) {
+        self.matrix.times(d, out);
+    }
+}
+
 impl Elastic for Springs {
-    fn assemble(&mut self, x: &[DVec3], matrix: &mut BlockRows, force: &mut [DVec3]) {
+    fn add_own(&self, own: &mut [Mat3A]) {
+        for (own, &k) in own.iter_mut().zip(&self.matrix.diagonal) {
+            *own += self.matrix.blocks[k as usize];
+        }
+    }
+
+    fn linearise(&mut self, x: &[DVec3], force: &mut [DVec3]) {
+        let Self { starts, arms, matrix, .. } = self;
         let BlockRows { starts: rows, diagonal, blocks, .. } = matrix;
+        blocks.fill(Mat3A::ZERO);
         let mut tasks = Vec::with_capacity(force.len() / CHUNK + 1);
         let mut left = blocks.as_mut_slice();
         for (chunk, force) in force.chunks_mut(CHUNK).enumerate() {
@@ -188,7 +202,7 @@ impl Elastic for Springs {
                 let row = (rows[v] - base) as usize;
                 let mut sum = Vec3A::ZERO;
                 let mut own = Mat3A::ZERO;
-                for arm in &self.arms[self.starts[v] as usize..self.starts[v + 1] as usize] {
+                for arm in &arms[starts[v] as usize..starts[v + 1] as usize] {
                     let to = (x[arm.other as usize] - x[v]).as_vec3a();
                     let length = to.length();
                     let n = to / length.max(f32::MIN_POSITIVE);

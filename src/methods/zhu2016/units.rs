@@ -62,12 +62,26 @@ impl BodyUnit {
         let origin = weighted.iter().map(|(p, w)| *p * *w).sum::<DVec3>() / weight;
         let turn = frame(weighted.iter().map(|(p, w)| (*p - origin, *w / weight)));
         let local: Vec<[DVec3; 3]> = triangles.iter().map(|&t| corners(t).map(|p| turn * (p - origin))).collect();
-        let z = |c: &[DVec3; 3]| (c.iter().map(|p| p.z).fold(f64::INFINITY, f64::min), c.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max));
+        let z = |c: &[DVec3; 3]| {
+            (
+                c.iter().map(|p| p.z).fold(f64::INFINITY, f64::min),
+                c.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max),
+            )
+        };
         let ends = local.iter().map(z).fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = (ends.0 - offset, ends.1 + offset);
         let count = ((high - low) / HEIGHT).ceil().max(1.0);
         let height = (high - low) / count;
-        let mut unit = Self { is_limb, bounds: bounds(triangles.iter().map(|&t| corners(t)), offset), origin, turn, low, height, slices: Vec::new(), leaves: Vec::new() };
+        let mut unit = Self {
+            is_limb,
+            bounds: bounds(triangles.iter().map(|&t| corners(t)), offset),
+            origin,
+            turn,
+            low,
+            height,
+            slices: Vec::new(),
+            leaves: Vec::new(),
+        };
         for k in 0..count as usize {
             let (from, to) = (low + height * k as f64, low + height * (k + 1) as f64);
             let near = |c: &&[DVec3; 3], by: f64| z(c).0 <= to + by && z(c).1 >= from - by;
@@ -100,7 +114,9 @@ impl BodyUnit {
         let reach = REACH.max(offset);
         for s in 0..SECTORS {
             let middle = DVec2::from_angle((s as f64 + 0.5) * std::f64::consts::TAU / SECTORS as f64);
-            self.leaves.extend(within.iter().filter(|&&i| in_sector(&local[i], quadric.centre, middle, reach)).map(|&i| triangles[i]));
+            self.leaves.extend(
+                within.iter().filter(|&&i| in_sector(&local[i], quadric.centre, middle, reach)).map(|&i| triangles[i]),
+            );
             sectors[s + 1] = self.leaves.len() as u32;
         }
         self.slices.push(Some(Slice { quadric, sectors }));
@@ -129,7 +145,9 @@ impl BodyUnit {
         for (k, slice) in self.slices.iter().enumerate() {
             for end in 0..2 {
                 let z = self.low + self.height * (k + end) as f64;
-                lines.extend(slice.as_ref().map(|s| s.quadric.outline().map(|p| self.origin + back * p.extend(z)).collect()));
+                lines.extend(
+                    slice.as_ref().map(|s| s.quadric.outline().map(|p| self.origin + back * p.extend(z)).collect()),
+                );
             }
         }
         lines
@@ -171,7 +189,8 @@ impl Conjugate for DVec2 {
 }
 
 fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVec3) {
-    let all = corners.flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    let all =
+        corners.flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     (all.0 - offset, all.1 + offset)
 }
 
