@@ -37,6 +37,7 @@
 
 pub mod accuracy;
 pub mod assess;
+pub mod contest;
 pub mod distance;
 pub mod drape;
 pub mod fabric;
