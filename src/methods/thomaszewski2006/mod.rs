@@ -44,7 +44,7 @@ pub struct Thomaszewski2006 {
 
 impl Default for Thomaszewski2006 {
     fn default() -> Self {
-        let pacing = Pacing { step_s: 1.0 / 30.0, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
+        let pacing = Pacing { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
         Self { pacing, exhibit: false }
     }
 }
