@@ -38,6 +38,7 @@
 pub mod accuracy;
 pub mod assess;
 pub mod certificate;
+pub mod contest;
 pub mod distance;
 pub mod drape;
 pub mod fabric;
@@ -48,6 +49,7 @@ pub mod job;
 pub mod live;
 pub mod mechanics;
 pub mod mesh;
+pub mod methods;
 pub mod parts;
 pub mod quantile;
 pub mod range_table;

@@ -193,6 +193,12 @@ impl Cloth {
         self.masses.len()
     }
 
+    /// Contact stiffness κ to begin with, N/m³.
+    #[must_use]
+    pub fn contact_stiffness(&self) -> f64 {
+        HALF_THICKNESS_PRESSURE / (0.5 * self.offset)
+    }
+
     /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
     #[must_use]
     pub fn contacts<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
@@ -206,8 +212,8 @@ impl Cloth {
     }
 
     fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
-        let stiffness = HALF_THICKNESS_PRESSURE / (0.5 * self.offset);
-        Contacts::new(body, &self.areas, &self.held, self.offset, stiffness, Friction::new(self.friction))
+        let friction = Friction::new(self.friction);
+        Contacts::new(body, &self.areas, &self.held, self.offset, self.contact_stiffness(), friction)
     }
 
     fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {

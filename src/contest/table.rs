@@ -1,0 +1,216 @@
+//! A contest as text: times beside the paper's, errors, and how costs grow; and as CSV.
+
+use super::{ContestRow, ENTRANTS, Entry, printed_ms};
+
+/// Text of a table: header and rows of cells.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Cells {
+    /// What it shows.
+    pub title: String,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// As many cells as columns.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Times and ratios, errors, and state of every row.
+#[must_use]
+pub fn tables(rows: &[ContestRow]) -> Vec<Cells> {
+    let cell = |row: &ContestRow, name: &str, text: &dyn Fn(&Entry) -> String| {
+        let entry = row.entries.iter().find(|e| e.entrant == name);
+        entry.map_or("–".to_owned(), |e| if e.error.is_some() { "–".to_owned() } else { text(e) })
+    };
+    let names: Vec<&str> = ENTRANTS.iter().map(|e| e.name()).collect();
+    let table =
+        |title: &str, last: &[&str], text: &dyn Fn(&Entry) -> String, end: &dyn Fn(&ContestRow) -> Vec<String>| Cells {
+            title: title.to_owned(),
+            header: ["garment", "vertices"].iter().chain(&names).chain(last).map(|&s| s.to_owned()).collect(),
+            rows: rows
+                .iter()
+                .map(|row| {
+                    let own = names.iter().map(|name| cell(row, name, text));
+                    [row.garment.clone(), row.vertices.to_string()].into_iter().chain(own).chain(end(row)).collect()
+                })
+                .collect(),
+        };
+    let printed = |row: &ContestRow| match printed_ms(&row.garment, row.vertices) {
+        Some(ms) => ms.iter().map(|ms| format!("{ms:.0}")).collect(),
+        None => vec!["–".to_owned(); 4],
+    };
+    let nothing = |_: &ContestRow| Vec::new();
+    vec![
+        table(
+            "time to drape, ms: median ± interquartile range; on the right what the paper printed (Core i5 650, 2010)",
+            &["[19]", "[20]", "[21]", "proposed"],
+            &|e| format!("{} ± {}", short(e.median_ms), short(e.spread_ms)),
+            &printed,
+        ),
+        table(
+            "time over the converged drape's, round by round: median ± interquartile range",
+            &[],
+            &|e| format!("{} ± {}", short(e.ratio), short(e.ratio_spread)),
+            &nothing,
+        ),
+        table(
+            "error, mm RMS: to the canonical drape / to where it would settle itself; spread: canonical drapes of other starts",
+            &["spread"],
+            &|e| format!("{} / {}", short(e.canonical_rms_mm), short(e.own_rms_mm)),
+            &|row| vec![row.spread_mm.map_or("–".to_owned(), short)],
+        ),
+        table(
+            "state: residual of the common energy over the weight; strain, 95 % and largest; vertices in the body",
+            &[],
+            &|e| {
+                let strain = format!("{:.1}/{:.1} %", 100.0 * e.strain_p95, 100.0 * e.strain_max);
+                format!("{:.0e}; {strain}; {}", e.residual_over_weight, e.penetrating_vertices)
+            },
+            &nothing,
+        ),
+        table("how it ended, and after how many steps", &[], &|e| format!("{}, {}", e.ended, e.steps), &nothing),
+    ]
+}
+
+/// Three digits.
+fn short(x: f64) -> String {
+    let digits = if x.abs() >= 100.0 || x == 0.0 {
+        0
+    } else if x.abs() >= 10.0 {
+        1
+    } else if x.abs() >= 0.1 {
+        2
+    } else {
+        3
+    };
+    format!("{x:.digits$}")
+}
+
+/// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in logarithms.
+#[must_use]
+pub fn exponents(rows: &[ContestRow]) -> Option<Cells> {
+    let mut garments: Vec<&str> = rows.iter().map(|r| r.garment.as_str()).collect();
+    garments.sort_unstable();
+    garments.dedup();
+    let mut found = Vec::new();
+    for garment in garments {
+        let of: Vec<&ContestRow> = rows.iter().filter(|r| r.garment == garment).collect();
+        if of.len() < 3 {
+            continue;
+        }
+        let mut cells = vec![garment.to_owned(), of.len().to_string()];
+        cells.extend(ENTRANTS.iter().map(|entrant| {
+            let points = of.iter().filter_map(|row| {
+                let entry = row.entries.iter().find(|e| e.entrant == entrant.name() && e.error.is_none())?;
+                Some(((row.vertices as f64).ln(), entry.median_ms.ln()))
+            });
+            slope(&points.collect::<Vec<_>>()).map_or("–".to_owned(), |p| format!("{p:.2}"))
+        }));
+        found.push(cells);
+    }
+    let header = ["garment", "sizes"].into_iter().chain(ENTRANTS.iter().map(|e| e.name())).map(str::to_owned).collect();
+    let title = "exponent of time over vertices".to_owned();
+    (!found.is_empty()).then_some(Cells { title, header, rows: found })
+}
+
+/// Slope of the line through points by least squares.
+fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let (xx, xy) = points.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + (x - mx).powi(2), xy + (x - mx) * (y - my)));
+    (points.len() > 2 && xx > 0.0).then_some(xy / xx)
+}
+
+/// A line of CSV for every entrant of every row, with a header.
+///
+/// # Errors
+/// Those of the CSV writer, which writes to memory.
+pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "garment",
+        "vertices",
+        "entrant",
+        "median_ms",
+        "spread_ms",
+        "ratio_to_converged",
+        "ratio_spread",
+        "canonical_rms_mm",
+        "own_rms_mm",
+        "canonical_spread_mm",
+        "residual_over_weight",
+        "strain_p95",
+        "strain_max",
+        "penetrating_vertices",
+        "penetration_mm",
+        "ended",
+        "steps",
+        "simulated_s",
+        "times_ms",
+        "error",
+    ])?;
+    let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
+    for row in rows {
+        for e in &row.entries {
+            let number = |x: f64| if e.error.is_some() { String::new() } else { x.to_string() };
+            writer.write_record([
+                row.garment.clone(),
+                row.vertices.to_string(),
+                e.entrant.clone(),
+                number(e.median_ms),
+                number(e.spread_ms),
+                number(e.ratio),
+                number(e.ratio_spread),
+                number(e.canonical_rms_mm),
+                number(e.own_rms_mm),
+                optional(row.spread_mm),
+                number(e.residual_over_weight),
+                number(e.strain_p95),
+                number(e.strain_max),
+                number(e.penetrating_vertices as f64),
+                number(e.penetration_mm),
+                e.ended.clone(),
+                number(e.steps as f64),
+                optional(e.simulated_s),
+                e.times_ms.iter().map(|ms| format!("{ms:.3}")).collect::<Vec<_>>().join(" "),
+                e.error.clone().unwrap_or_default(),
+            ])?;
+        }
+    }
+    let bytes = writer.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(vertices: usize) -> ContestRow {
+        let entries = ENTRANTS.iter().enumerate().map(|(i, e)| Entry {
+            entrant: e.name().to_owned(),
+            median_ms: (vertices as f64).powf(1.0 + 0.25 * i as f64),
+            error: (i == 1).then(|| "cannot, as it is".to_owned()),
+            ..Entry::default()
+        });
+        ContestRow { garment: "flared-skirt".to_owned(), vertices, spread_mm: Some(3.0), entries: entries.collect() }
+    }
+
+    #[test]
+    fn exponents_are_those_of_the_powers() {
+        let rows = [row(1000), row(4000), row(16000)];
+        let found = exponents(&rows).unwrap();
+        assert_eq!(found.rows[0][..5], ["flared-skirt", "3", "1.00", "–", "1.50"]);
+        assert!(exponents(&rows[..2]).is_none());
+    }
+
+    #[test]
+    fn every_table_has_a_cell_for_every_column_and_says_where_there_is_none() {
+        let rows = [row(3613), row(1000)];
+        for table in tables(&rows) {
+            assert!(table.rows.iter().all(|cells| cells.len() == table.header.len()), "{}", table.title);
+            assert_eq!(table.rows[0][3], "–");
+        }
+        assert_eq!(tables(&rows)[0].rows[0][7..], ["824", "929", "979", "686"]);
+        let csv = csv_lines(&rows).unwrap();
+        assert_eq!(csv.lines().count(), 1 + 2 * ENTRANTS.len());
+        assert!(csv.contains("\"cannot, as it is\"") || csv.contains("cannot"), "{csv}");
+    }
+}

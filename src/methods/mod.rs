@@ -1,0 +1,171 @@
+//! The three methods that the paper measures itself against, as far as their sources tell them, behind one trait.
+//!
+//! | name | source |
+//! |---|---|
+//! | `zhu2016` | [19] Zhu, Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal 16(4), 2016 |
+//! | `gross2003` | [20] Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003 |
+//! | `thomaszewski2006` | [21] Thomaszewski, Wacker, Straßer: "A consistent bending model for cloth simulation with corotational subdivision finite elements", SCA 2006 |
+//!
+//! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its timings and
+//! counters. All three move the cloth in time until it rests, by the same rule; each file's head says what its source
+//! confirms and what is our reading. What is no part of a method is the same for all: the cloth's masses, areas and offset
+//! from the body, and, but for `gross2003`, which has its own, the contact forces.
+//!
+//! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
+
+pub mod linear;
+pub mod march;
+pub mod rest;
+pub mod thomaszewski2006;
+pub mod zhu2016;
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use crate::fabric::Fabric;
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mesh::TriMesh;
+use crate::scene::Scene;
+pub use rest::{Ended, RestRule};
+
+/// What a method drapes.
+#[derive(Debug, Clone, Copy)]
+pub struct Dressing<'a> {
+    /// Body and garment.
+    pub scene: &'a Scene,
+    /// The cloth's constants.
+    pub fabric: &'a Fabric,
+    /// Masses, areas, held vertices and offset of the garment; its energy is not used.
+    pub cloth: &'a Cloth,
+}
+
+/// The garment on its way, as the observer sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// Which part of the method it is in.
+    pub stage: &'static str,
+    /// Steps done.
+    pub step: usize,
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// RMS speed of the vertices, m/s.
+    pub rms_speed_m_per_s: f64,
+    /// Positions, m.
+    pub positions: &'a [DVec3],
+}
+
+/// Told of every step; may end the run.
+pub type Onlooker<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Send);
+
+/// What a method has to show besides the garment.
+#[derive(Debug, Clone)]
+pub enum Exhibit {
+    /// Lines in space, m: fitted quadrics, bounding surfaces.
+    Lines(Vec<Vec<DVec3>>),
+    /// A surface, m: laid pieces, a limit surface.
+    Surface(TriMesh),
+}
+
+/// What came out of a method.
+#[derive(Debug, Clone)]
+pub struct MethodDrape {
+    /// Vertex positions, m.
+    pub positions: Vec<DVec3>,
+    /// Why it ended.
+    pub ended: Ended,
+    /// Time steps done.
+    pub steps: usize,
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// RMS speed of the vertices at the end, m/s.
+    pub rms_speed_m_per_s: f64,
+    /// Each part of the work by name, in order.
+    pub times: Vec<(&'static str, Duration)>,
+    /// All of it, start to end.
+    pub total: Duration,
+    /// What was counted, by name.
+    pub counts: Vec<(&'static str, u64)>,
+    /// What the method made on its way, by name; empty unless it was asked for.
+    pub exhibits: Vec<(&'static str, Exhibit)>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Why a method cannot run on a scene.
+#[derive(Debug, thiserror::Error)]
+pub enum MethodError {
+    /// The method needs something that the scene does not have.
+    #[error("{method} cannot run here: {reason}")]
+    Unfit {
+        /// The method.
+        method: &'static str,
+        /// What is missing.
+        reason: String,
+    },
+    /// The cloth cannot be set up.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// It flew apart.
+    #[error("{method}: positions are not finite after step {step}; the time step is too long for this fabric and mesh")]
+    Unstable {
+        /// The method.
+        method: &'static str,
+        /// The step after which it was seen.
+        step: usize,
+    },
+}
+
+/// A way to drape a garment, from the placed start to rest.
+pub trait ReferenceMethod: Sync {
+    /// Its name: author and year.
+    fn name(&self) -> &'static str;
+
+    /// Drapes until the garment rests by `rule`; `onlooker` is told of every step and may end it.
+    ///
+    /// # Errors
+    /// [`MethodError`] says in one line why there is no drape.
+    fn drape(
+        &self,
+        dressing: &Dressing<'_>,
+        rule: &RestRule,
+        onlooker: Onlooker<'_>,
+    ) -> Result<MethodDrape, MethodError>;
+}
+
+/// Names of the methods, in the order of the paper's references.
+pub const METHODS: [&str; 2] = [zhu2016::NAME, thomaszewski2006::NAME];
+
+/// The method of a name, with its defaults.
+#[must_use]
+pub fn by_name(name: &str) -> Option<Box<dyn ReferenceMethod>> {
+    match name {
+        zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016::default())),
+        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006::default())),
+        _ => None,
+    }
+}
+
+/// An onlooker for who does not look.
+pub fn unwatched(_: &Moment<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// Durations by name, in the order they were begun first.
+#[derive(Debug, Clone, Default)]
+struct Stopwatch(Vec<(&'static str, Duration)>);
+
+impl Stopwatch {
+    /// Runs `work` on the account of `name`.
+    fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        let began = Instant::now();
+        let out = work();
+        let spent = began.elapsed();
+        match self.0.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += spent,
+            None => self.0.push((name, spent)),
+        }
+        out
+    }
+}

@@ -1,0 +1,112 @@
+//! The rest shape of a patch: a triangle and all that touches it, laid flat about it.
+//!
+//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are laid next to one another from the middle triangle on, from both
+//! sides; where they meet again the two places of a vertex, the same on cloth that lies flat, are blended by how many triangles each took.
+//!
+//! With the patch's flat places P_I and the derivatives N of its functions: J = [Σ N_s P, Σ N_t P], A = ½ |det J|; weights by the cloth's coordinates are
+//! b = N J⁻¹; and w = J⁻ᵀ (N'' − Γ·N') J⁻¹ with Γ the derivatives Σ N'' P in terms of J's columns.
+
+use glam::{DMat2, DVec2};
+
+use super::elements::Made;
+use super::patch::{Around, Derivatives, beyond};
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+/// The flat places of the vertices around triangle `t`, its own first, in the frame of its rest shape, m.
+pub(super) fn laid_flat(
+    t: usize,
+    mesh: &TriMesh,
+    rest: &RestShape,
+    topology: &Topology,
+    around: &[Around],
+) -> Vec<(u32, DVec2)> {
+    let triangle = mesh.triangles[t];
+    let own = rest.corners[t];
+    let mut places: Vec<(u32, DVec2)> = triangle.into_iter().zip(own).collect();
+    for k in 0..3 {
+        let [v, next, last] = [0, 1, 2].map(|i| triangle[(k + i) % 3]);
+        let [at, at_next, at_last] = [0, 1, 2].map(|i| own[(k + i) % 3]);
+        let left = laid_around(t as u32, (v, at), (last, at_last), mesh, rest, topology);
+        let right = laid_around(t as u32, (v, at), (next, at_next), mesh, rest, topology);
+        let n = around[v as usize].ring.len();
+        for (i, &(w, place)) in left.iter().enumerate() {
+            if w == next {
+                break;
+            }
+            // Met from the other side after as many triangles as are left.
+            let met = right.iter().position(|(other, _)| *other == w).filter(|_| around[v as usize].closed && n > 3);
+            let place = met.map_or(place, |j| place.lerp(right[j].1, i as f64 / (i + j).max(1) as f64));
+            keep(&mut places, w, place);
+        }
+        for &(w, place) in right.iter().take_while(|(w, _)| *w != last) {
+            keep(&mut places, w, place);
+        }
+    }
+    places
+}
+
+/// Keeps the first place of each vertex.
+fn keep(places: &mut Vec<(u32, DVec2)>, v: u32, place: DVec2) {
+    if !places.iter().any(|(known, _)| *known == v) {
+        places.push((v, place));
+    }
+}
+
+/// Vertices met in going around `v` from triangle `t` over its edge to `w`, with their places, until back or at an edge.
+fn laid_around(
+    t: u32,
+    (v, at): (u32, DVec2),
+    (w, at_w): (u32, DVec2),
+    mesh: &TriMesh,
+    rest: &RestShape,
+    topology: &Topology,
+) -> Vec<(u32, DVec2)> {
+    let mut met = Vec::new();
+    let (mut s, mut w, mut at_w) = (t, w, at_w);
+    while let Some(next) = beyond(topology, s, v, w) {
+        if next == t {
+            break;
+        }
+        let corners = mesh.triangles[next as usize];
+        let of = |v: u32| corners.iter().position(|&c| c == v);
+        let (Some(i), Some(j)) = (of(v), of(w)) else { break };
+        let k = 3 - i - j;
+        let flat = rest.corners[next as usize];
+        // The turn that takes its edge onto the one laid already.
+        let (from, to) = (flat[j] - flat[i], at_w - at);
+        let turn = DVec2::new(from.dot(to), from.perp_dot(to)).normalize_or(DVec2::X);
+        at_w = at + turn.rotate(flat[k] - flat[i]);
+        w = corners[k];
+        s = next;
+        met.push((w, at_w));
+    }
+    met
+}
+
+/// The element of a patch: its area and its weights by the cloth's coordinates; `None` where it has no area.
+pub(super) fn element(found: &[(u32, Derivatives)], flat: &[(u32, DVec2)]) -> Option<Made> {
+    let mut sums = [DVec2::ZERO; 5];
+    for (v, d) in found {
+        let place = flat.iter().find(|(w, _)| w == v)?.1;
+        for k in 0..5 {
+            sums[k] += place * d[k];
+        }
+    }
+    let j = DMat2::from_cols(sums[0], sums[1]);
+    let det = j.determinant();
+    if det.is_nan() || det <= 0.0 {
+        return None;
+    }
+    let inverse = j.inverse();
+    let curving = [sums[2], sums[3], sums[4]].map(|second| inverse * second);
+    let weights = found.iter().map(|(_, [s, t, ss, st, tt])| {
+        // The gradient by s, t times J⁻¹.
+        let b = inverse.transpose() * DVec2::new(*s, *t);
+        let second = [ss, st, tt];
+        let [ss, st, tt] = std::array::from_fn(|k| second[k] - curving[k].dot(DVec2::new(*s, *t)));
+        let w = inverse.transpose() * DMat2::from_cols(DVec2::new(ss, st), DVec2::new(st, tt)) * inverse;
+        // κ_uv is counted once: H x_uv².
+        [b.x, b.y, w.x_axis.x, w.x_axis.y, w.y_axis.y].map(|w| w as f32)
+    });
+    Some(Made { area: 0.5 * det, vertices: found.iter().map(|f| f.0).collect(), weights: weights.collect() })
+}

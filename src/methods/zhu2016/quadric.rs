@@ -1,0 +1,181 @@
+//! Cylinders and elliptic cylinders fitted to a slice by least squares.
+//!
+//! In the slice's plane, about points p with weights w (a triangle's area at its centroid):
+//!
+//! - circle: min Σ w (x² + y² + c x + d y + e)² (Kåsa: "A circle fitting procedure and its error analysis", IEEE Trans. Instrum. Meas. 25, 1976);
+//! - ellipse along the principal axes of the points: min Σ w (A x² + B y² + C x + D y − 1)².
+//!
+//! Where the fit is no ellipse, or one twice as large or half as large as the points spread, the slice is open or lopsided (a shoulder, a crotch), and its moments stand
+//! in: half axes √2 σ about the mean, which are right for a full ring.
+//!
+//! ε is what makes the quadric bound its slice: with ρ(p) = |((x/a), (y/b))|, 1 + ε = max ρ over the corners of the slice's triangles + o/min(a, b), o the
+//! cloth's offset. ρ is convex, so no point of a triangle has more than its corners; it grows by at most 1/min(a, b) a metre, so what touches is within.
+
+use faer::linalg::solvers::Solve;
+use faer::{Col, Mat};
+use glam::DVec2;
+
+/// An ellipse in a slice's plane, and how far the slice reaches beyond it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quadric {
+    /// Centre, m.
+    pub centre: DVec2,
+    /// Unit vector along the first half axis.
+    pub axis: DVec2,
+    /// Half axes a and b, m; equal for a cylinder.
+    pub half: DVec2,
+    /// (1 + ε)².
+    pub bound: f64,
+    /// Whether the least squares made no ellipse and the moments stand in.
+    pub by_moments: bool,
+}
+
+impl Quadric {
+    /// ρ², which is 1 on the quadric.
+    #[inline]
+    #[must_use]
+    pub fn level(&self, p: DVec2) -> f64 {
+        let q = p - self.centre;
+        let (x, y) = (q.dot(self.axis) / self.half.x, self.axis.perp_dot(q) / self.half.y);
+        x * x + y * y
+    }
+
+    /// Fits points with weights; `round` for a cylinder. `None` for fewer than three.
+    #[must_use]
+    pub fn fit(points: &[(DVec2, f64)], round: bool) -> Option<Self> {
+        let weight: f64 = points.iter().map(|p| p.1).sum();
+        if points.len() < 3 || weight <= 0.0 {
+            return None;
+        }
+        let mean = points.iter().map(|(p, w)| *p * *w).sum::<DVec2>() / weight;
+        let second = |f: fn(DVec2) -> f64| points.iter().map(|(p, w)| f(*p - mean) * w).sum::<f64>() / weight;
+        let (xx, xy, yy) = (second(|p| p.x * p.x), second(|p| p.x * p.y), second(|p| p.y * p.y));
+        let axis = if round { DVec2::X } else { DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy)) };
+        let spread = |a: DVec2| (2.0 * (xx * a.x * a.x + 2.0 * xy * a.x * a.y + yy * a.y * a.y)).max(0.0).sqrt();
+        let mut half = DVec2::new(spread(axis), spread(axis.perp()));
+        if round {
+            half = DVec2::splat((0.5 * half.length_squared()).sqrt());
+        }
+        let size = half.max_element();
+        if size.is_nan() || size <= 0.0 {
+            return None;
+        }
+        half = half.max(DVec2::splat(1e-3 * size));
+        // Scaled to about one, so that the normal equations are well posed.
+        let scaled: Vec<(DVec2, f64)> = points
+            .iter()
+            .map(|&(p, w)| (DVec2::new((p - mean).dot(axis), axis.perp_dot(p - mean)) / size, w / weight))
+            .collect();
+        let found = if round { circle(&scaled) } else { ellipse(&scaled) };
+        let sound = |(centre, found): &(DVec2, DVec2)| {
+            let ratio = *found * size / half;
+            centre.length() < 1.0 && (0.5..=2.0).contains(&ratio.x) && (0.5..=2.0).contains(&ratio.y)
+        };
+        Some(match found.filter(sound) {
+            Some((centre, found)) => {
+                let centre = mean + size * (axis * centre.x + axis.perp() * centre.y);
+                Self { centre, axis, half: found * size, bound: 1.0, by_moments: false }
+            }
+            None => Self { centre: mean, axis, half, bound: 1.0, by_moments: true },
+        })
+    }
+
+    /// Sets ε so that `corners` and what is within `offset` (m) of them lie inside.
+    pub fn enclose(&mut self, corners: impl Iterator<Item = DVec2>, offset: f64) {
+        let farthest = corners.map(|p| self.level(p)).fold(0.0, f64::max).sqrt();
+        self.bound = (farthest + offset / self.half.min_element()).powi(2);
+    }
+
+    /// The ellipse at 1 + ε as a closed line of points in the plane.
+    pub fn outline(&self) -> impl Iterator<Item = DVec2> + '_ {
+        let grown = self.half * self.bound.sqrt();
+        (0..=32).map(move |i| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 32.0).sin_cos();
+            self.centre + self.axis * (grown.x * cos) + self.axis.perp() * (grown.y * sin)
+        })
+    }
+}
+
+/// Least squares of rows·c = side with weights.
+fn least_squares<const N: usize>(rows: impl Iterator<Item = ([f64; N], f64, f64)>) -> Option<[f64; N]> {
+    let mut normal = Mat::<f64>::zeros(N, N);
+    let mut side = Col::<f64>::zeros(N);
+    for (row, b, w) in rows {
+        for i in 0..N {
+            side[i] += w * row[i] * b;
+            for j in 0..N {
+                normal[(i, j)] += w * row[i] * row[j];
+            }
+        }
+    }
+    let found = normal.partial_piv_lu().solve(&side);
+    let c: [f64; N] = std::array::from_fn(|i| found[i]);
+    c.iter().all(|c| c.is_finite()).then_some(c)
+}
+
+/// Centre and radius twice.
+fn circle(points: &[(DVec2, f64)]) -> Option<(DVec2, DVec2)> {
+    let [c, d, e] = least_squares(points.iter().map(|(p, w)| ([p.x, p.y, 1.0], -p.length_squared(), *w)))?;
+    let centre = DVec2::new(-0.5 * c, -0.5 * d);
+    let squared = centre.length_squared() - e;
+    (squared > 0.0).then(|| (centre, DVec2::splat(squared.sqrt())))
+}
+
+/// Centre and half axes.
+fn ellipse(points: &[(DVec2, f64)]) -> Option<(DVec2, DVec2)> {
+    let [a, b, c, d] = least_squares(points.iter().map(|(p, w)| ([p.x * p.x, p.y * p.y, p.x, p.y], 1.0, *w)))?;
+    let centre = DVec2::new(-0.5 * c / a, -0.5 * d / b);
+    // A (x − x₀)² + B (y − y₀)² = 1 + A x₀² + B y₀².
+    let right = 1.0 + a * centre.x * centre.x + b * centre.y * centre.y;
+    let half = DVec2::new(right / a, right / b);
+    (half.min_element() > 0.0).then(|| (centre, DVec2::new(half.x.sqrt(), half.y.sqrt())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring(centre: DVec2, turn: f64, half: DVec2, share: f64) -> Vec<(DVec2, f64)> {
+        (0..60)
+            .map(|i| {
+                let (sin, cos) = (share * std::f64::consts::TAU * f64::from(i) / 60.0).sin_cos();
+                (centre + DVec2::from_angle(turn).rotate(DVec2::new(half.x * cos, half.y * sin)), 1.0)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn points_on_an_ellipse_give_it_back() {
+        let (centre, half) = (DVec2::new(0.3, -0.1), DVec2::new(0.16, 0.1));
+        let found = Quadric::fit(&ring(centre, 0.7, half, 1.0), false).unwrap();
+        assert!(!found.by_moments);
+        assert!(found.centre.distance(centre) < 1e-9 && found.half.distance(half) < 1e-9, "{found:?}");
+        assert!(found.axis.perp_dot(DVec2::from_angle(0.7)).abs() < 1e-9);
+        // Of a circle three quarters are enough.
+        let found = Quadric::fit(&ring(centre, 0.0, DVec2::splat(0.05), 0.75), true).unwrap();
+        assert!(found.centre.distance(centre) < 1e-9 && (found.half.x - 0.05).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_no_ellipse_is_told_by_its_moments_and_bounded_all_the_same() {
+        let line: Vec<(DVec2, f64)> = (0..9).map(|i| (DVec2::new(f64::from(i), 0.0), 1.0)).collect();
+        let mut found = Quadric::fit(&line, false).unwrap();
+        assert!(found.by_moments);
+        found.enclose(line.iter().map(|p| p.0), 0.5);
+        assert!(line.iter().all(|(p, _)| found.level(*p) < found.bound));
+        assert!(Quadric::fit(&line[..2], true).is_none());
+    }
+
+    #[test]
+    fn nothing_within_the_offset_is_outside() {
+        let points = ring(DVec2::ZERO, 0.3, DVec2::new(0.16, 0.1), 0.6);
+        let mut found = Quadric::fit(&points, true).unwrap();
+        found.enclose(points.iter().map(|p| p.0), 0.01);
+        for (p, _) in &points {
+            for i in 0..16 {
+                let near = *p + 0.0099 * DVec2::from_angle(f64::from(i));
+                assert!(found.level(near) < found.bound);
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! A unit of the body: its frame, its slices with their quadrics, and the leaf triangles of each slice by sectors.
+//!
+//! The frame's z runs along the unit: the direction in which its triangles spread most, for a limb and a trunk alike. Slices are 4 cm
+//! high. A slice lists every triangle of the unit that comes within [`REACH`] of it, so that a point which has gone up to that deep
+//! into the body still finds the nearest one; a sector of a slice lists those of them that come within the same of the sector.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::quadric::Quadric;
+use crate::mesh::TriMesh;
+
+/// Height of a slice h, m.
+const HEIGHT: f64 = 0.04;
+/// How far a triangle counts beyond its slice and sector, m.
+pub const REACH: f64 = 0.02;
+/// Sectors of a slice.
+pub const SECTORS: usize = 24;
+
+/// A slice: its quadric, and for each sector its triangles.
+#[derive(Debug, Clone)]
+pub struct Slice {
+    /// The fitted (elliptic) cylinder.
+    pub quadric: Quadric,
+    /// First triangle of each sector in the unit's list, and one past the last.
+    pub sectors: [u32; SECTORS + 1],
+}
+
+/// A unit.
+#[derive(Debug, Clone)]
+pub struct BodyUnit {
+    /// Whether it ends: a limb or the head, fitted with cylinders.
+    pub is_limb: bool,
+    /// Its box in the world, with the offset, m.
+    pub bounds: (DVec3, DVec3),
+    /// Its origin, m.
+    origin: DVec3,
+    /// World to unit.
+    turn: DMat3,
+    /// z of the first slice's lower end, m.
+    low: f64,
+    /// Height of a slice, m.
+    height: f64,
+    /// Its slices, low to high; `None` where one has no triangle.
+    pub slices: Vec<Option<Slice>>,
+    /// Triangles of the sectors, one after the other.
+    pub leaves: Vec<u32>,
+}
+
+impl BodyUnit {
+    /// The unit of these triangles of `mesh`, for cloth that touches within `offset` (m); `None` without triangles.
+    #[must_use]
+    pub fn new(mesh: &TriMesh, triangles: &[u32], is_limb: bool, offset: f64) -> Option<Self> {
+        let corners = |t: u32| mesh.corners(t as usize);
+        let weighted: Vec<(DVec3, f64)> = triangles
+            .iter()
+            .map(|&t| (corners(t).into_iter().sum::<DVec3>() / 3.0, mesh.double_area_vector(t as usize).length()))
+            .collect();
+        let weight: f64 = weighted.iter().map(|w| w.1).sum();
+        if triangles.is_empty() || weight <= 0.0 {
+            return None;
+        }
+        let origin = weighted.iter().map(|(p, w)| *p * *w).sum::<DVec3>() / weight;
+        let turn = frame(weighted.iter().map(|(p, w)| (*p - origin, *w / weight)));
+        let local: Vec<[DVec3; 3]> = triangles.iter().map(|&t| corners(t).map(|p| turn * (p - origin))).collect();
+        let z = |c: &[DVec3; 3]| {
+            (
+                c.iter().map(|p| p.z).fold(f64::INFINITY, f64::min),
+                c.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max),
+            )
+        };
+        let ends = local.iter().map(z).fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (low, high) = (ends.0 - offset, ends.1 + offset);
+        let count = ((high - low) / HEIGHT).ceil().max(1.0);
+        let height = (high - low) / count;
+        let mut unit = Self {
+            is_limb,
+            bounds: bounds(triangles.iter().map(|&t| corners(t)), offset),
+            origin,
+            turn,
+            low,
+            height,
+            slices: Vec::new(),
+            leaves: Vec::new(),
+        };
+        for k in 0..count as usize {
+            let (from, to) = (low + height * k as f64, low + height * (k + 1) as f64);
+            let near = |c: &&[DVec3; 3], by: f64| z(c).0 <= to + by && z(c).1 >= from - by;
+            let within: Vec<usize> = (0..local.len()).filter(|&i| near(&&local[i], REACH.max(offset))).collect();
+            unit.push_slice(triangles, &local, &within, |c| near(&c, offset), offset);
+        }
+        Some(unit)
+    }
+
+    /// Adds a slice of the triangles `within` its reach; `touched` tells those that its quadric must bound.
+    fn push_slice(
+        &mut self,
+        triangles: &[u32],
+        local: &[[DVec3; 3]],
+        within: &[usize],
+        touched: impl Fn(&[DVec3; 3]) -> bool,
+        offset: f64,
+    ) {
+        let bounded: Vec<&[DVec3; 3]> = within.iter().map(|&i| &local[i]).filter(|c| touched(c)).collect();
+        let points: Vec<(DVec2, f64)> = bounded
+            .iter()
+            .map(|[a, b, c]| (((*a + *b + *c) / 3.0).truncate(), 0.5 * (*b - *a).cross(*c - *a).length()))
+            .collect();
+        let Some(mut quadric) = Quadric::fit(&points, self.is_limb) else {
+            self.slices.push(None);
+            return;
+        };
+        quadric.enclose(bounded.iter().flat_map(|c| c.iter().map(|p| p.truncate())), offset);
+        let mut sectors = [self.leaves.len() as u32; SECTORS + 1];
+        let reach = REACH.max(offset);
+        for s in 0..SECTORS {
+            let middle = DVec2::from_angle((s as f64 + 0.5) * std::f64::consts::TAU / SECTORS as f64);
+            self.leaves.extend(
+                within.iter().filter(|&&i| in_sector(&local[i], quadric.centre, middle, reach)).map(|&i| triangles[i]),
+            );
+            sectors[s + 1] = self.leaves.len() as u32;
+        }
+        self.slices.push(Some(Slice { quadric, sectors }));
+    }
+
+    /// Where a point of the world is in the unit's frame, m.
+    #[inline]
+    #[must_use]
+    pub fn local(&self, x: DVec3) -> DVec3 {
+        self.turn * (x - self.origin)
+    }
+
+    /// The slice at this height of the unit's frame: |z| < h/2 in the slice's own.
+    #[inline]
+    #[must_use]
+    pub fn slice(&self, z: f64) -> Option<&Slice> {
+        let k = (z - self.low) / self.height;
+        if k >= 0.0 { self.slices.get(k as usize)?.as_ref() } else { None }
+    }
+
+    /// Each slice's quadric at both its ends, as closed lines in the world, m.
+    #[must_use]
+    pub fn outlines(&self) -> Vec<Vec<DVec3>> {
+        let back = self.turn.transpose();
+        let mut lines = Vec::new();
+        for (k, slice) in self.slices.iter().enumerate() {
+            for end in 0..2 {
+                let z = self.low + self.height * (k + end) as f64;
+                lines.extend(
+                    slice.as_ref().map(|s| s.quadric.outline().map(|p| self.origin + back * p.extend(z)).collect()),
+                );
+            }
+        }
+        lines
+    }
+}
+
+impl Slice {
+    /// The range of the unit's leaves to be tested for a point of the slice's plane.
+    #[inline]
+    #[must_use]
+    pub fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
+        let q = p - self.quadric.centre;
+        let turns = q.y.atan2(q.x) / std::f64::consts::TAU;
+        let s = ((turns - turns.floor()) * SECTORS as f64) as usize % SECTORS;
+        self.sectors[s] as usize..self.sectors[s + 1] as usize
+    }
+}
+
+/// Whether a triangle comes within `reach` of a sector about `centre` whose middle has this direction: by its circle about the middle of its corners.
+fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> bool {
+    let flat = corners.map(DVec3::truncate);
+    let at = (flat[0] + flat[1] + flat[2]) / 3.0;
+    let radius = flat.iter().map(|p| p.distance(at)).fold(0.0, f64::max) + reach;
+    let off = at - centre;
+    // Distance from the two half planes that make the sector: outside it, one of them at least is as far as the sector or nearer.
+    let half = DVec2::from_angle(std::f64::consts::PI / SECTORS as f64);
+    let (left, right) = (middle.rotate(half), middle.rotate(half.conjugate()));
+    left.perp_dot(off) <= radius && right.perp_dot(off) >= -radius && middle.dot(off) >= -radius
+}
+
+trait Conjugate {
+    fn conjugate(self) -> Self;
+}
+
+impl Conjugate for DVec2 {
+    fn conjugate(self) -> Self {
+        Self::new(self.x, -self.y)
+    }
+}
+
+fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVec3) {
+    let all =
+        corners.flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    (all.0 - offset, all.1 + offset)
+}
+
+/// The rotation whose third row is the direction of largest spread, by power iteration on the covariance.
+fn frame(points: impl Iterator<Item = (DVec3, f64)>) -> DMat3 {
+    let mut covariance = DMat3::ZERO;
+    for (p, w) in points {
+        covariance += DMat3::from_cols(p * p.x, p * p.y, p * p.z) * w;
+    }
+    let mut axis = DVec3::new(0.31, 0.17, 1.0);
+    for _ in 0..200 {
+        axis = (covariance * axis).normalize_or(DVec3::Z);
+    }
+    let x = axis.any_orthonormal_vector();
+    DMat3::from_cols(x, axis.cross(x), axis).transpose()
+}
