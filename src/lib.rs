@@ -46,6 +46,7 @@ pub mod job;
 pub mod mechanics;
 pub mod mesh;
 pub mod parts;
+pub mod pattern;
 pub mod quantile;
 pub mod range_table;
 #[cfg(feature = "viewer")]
