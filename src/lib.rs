@@ -54,6 +54,7 @@ pub mod record;
 pub mod said;
 pub mod scene;
 pub mod sealed;
+pub mod sewing;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::outline::{Outline, divisions, outlines};
 use super::panel_mesh::{self, Meshed};
-use super::{EdgeAt, PatternError, SewingPattern};
+use super::{EdgeAt, PatternError, SewingPattern, laid_out};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Edge lengths a garment is made with, m.
@@ -201,6 +201,14 @@ impl SewnPanel {
 }
 
 impl SewnGarment {
+    /// Where each corner of each triangle lies with the panels beside each other ([`laid_out`]), m.
+    #[must_use]
+    pub fn laid_out(&self, pattern: &SewingPattern) -> Vec<[DVec2; 3]> {
+        let offsets = laid_out(pattern);
+        let corners = self.flat.iter().zip(&self.mesh.triangle_group);
+        corners.map(|(corners, &panel)| corners.map(|p| p + offsets[panel as usize])).collect()
+    }
+
     /// This garment laid over `coarse`, the same pattern in longer edges with its vertices at `positions` (m): each vertex goes where
     /// the cloth under it is.
     #[must_use]
