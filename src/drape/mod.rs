@@ -4,6 +4,7 @@
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
 mod error;
+mod let_go;
 mod levels;
 mod parts;
 mod settings;
@@ -23,6 +24,7 @@ use crate::parts::Parts;
 use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
+pub use let_go::LetGo;
 use levels::Levels;
 use parts::{approach, stage_one, stage_two};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
@@ -94,6 +96,8 @@ pub struct Drape {
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
+    /// What came of letting go what was held until it rested.
+    pub let_go: Option<LetGo>,
     /// Pairs of triangles of the displaced garment that cross: cloth through cloth, which no model here prevents.
     pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.
@@ -158,16 +162,19 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
-    let (positions, state) = match refined {
-        None => (stage.positions.clone(), None),
-        Some((cloth, refined)) => {
+    let (positions, state, let_go) = match refined {
+        None => (stage.positions.clone(), None, None),
+        Some((cloth, refined, let_go)) => {
             let contacts = met(&cloth, scene, settings.refine, &refined.positions);
             let fit = fit(&cloth, contacts, &refined.positions, refined.contact_stiffness);
             let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
-            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }))
+            (positions, Some(ClothState { energy, residual_over_weight, steps, stop, history, fit }), let_go)
         }
     };
     warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+    if let Some(slides @ LetGo::Slides { .. }) = &let_go {
+        warnings.push(format!("the garment {slides}"));
+    }
     if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
         && positions.iter().all(|x| x.z < low.z)
     {
@@ -188,6 +195,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         preview: stage.positions,
         folds: preview_folds,
         state,
+        let_go,
         self_intersecting_pairs,
         positions,
         penetrating_vertices,
@@ -205,7 +213,7 @@ fn refine_further(
     parts: &Parts,
     start: &[DVec3],
     observer: Observer<'_>,
-) -> Result<Option<(Cloth, Refined)>, DrapeError> {
+) -> Result<Option<(Cloth, Refined, Option<LetGo>)>, DrapeError> {
     let Some(levels) = levels else { return Ok(None) };
     let max_steps = match settings.refine {
         Refine::Steps(n) => Some(n),
@@ -219,7 +227,12 @@ fn refine_further(
         // What has fallen past the feet meets nothing any more, and would fall for ever.
         if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
     })?;
-    Ok(Some((levels.cloth, refined)))
+    if scene.let_go && !scene.held.is_empty() && settings.refine == Refine::Converged && refined.stop == Stop::Converged
+    {
+        let (cloth, refined, outcome) = let_go::let_go(scene, &settings.fabric, (levels.cloth, refined), observer)?;
+        return Ok(Some((cloth, refined, Some(outcome))));
+    }
+    Ok(Some((levels.cloth, refined, None)))
 }
 
 /// What the cloth meets at `x`: by planes where no step is taken, which need no more.

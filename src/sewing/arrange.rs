@@ -9,9 +9,12 @@ use super::landmarks::Landmarks;
 use crate::pattern::SewingPattern;
 
 /// Shoulder seams are placed this far above the shoulder's neck end, m: what GarmentCode's own patterns have on its own body.
-const ABOVE_SHOULDER: f64 = 0.0;
+const ABOVE_SHOULDER: f64 = -0.038;
 /// A waist is placed this far above the body's, m: the same.
-const ABOVE_WAIST: f64 = 0.0;
+const ABOVE_WAIST: f64 = -0.022;
+
+/// Shoulder seams are not farther below the armpits than this, m: what is, is a circle skirt's side.
+const BELOW_ARMPITS: f64 = 0.1;
 
 /// Less than this is let be, m and radians: the file's own placement is better than our landmarks are.
 const LEAST_SHIFT: f64 = 0.02;
@@ -61,7 +64,7 @@ fn placed(pattern: &SewingPattern, at: crate::pattern::EdgeAt) -> (DVec3, f64) {
     (placed.iter().sum::<DVec3>() / placed.len() as f64, top)
 }
 
-pub(super) fn expected(pattern: &SewingPattern) -> Expected {
+pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
     let sleeves = sleeves(pattern);
     let falls: Vec<f64> = sleeves.iter().flatten().copied().collect();
     let arm_fall = (!falls.is_empty()).then(|| falls.iter().sum::<f64>() / falls.len() as f64);
@@ -77,6 +80,7 @@ pub(super) fn expected(pattern: &SewingPattern) -> Expected {
             shoulder_z = Some(shoulder_z.map_or(top, |z| z.max(top)));
         }
     }
+    shoulder_z = shoulder_z.filter(|z| *z > armpit_z - BELOW_ARMPITS);
     let mut waist = Vec::new();
     let mut top = f64::NEG_INFINITY;
     for (panel, of) in pattern.panels.iter().enumerate() {
@@ -94,7 +98,8 @@ pub(super) fn expected(pattern: &SewingPattern) -> Expected {
 
 /// Moves the panels to a body.
 pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> Arranged {
-    let expected = expected(pattern);
+    let armpit_z = body.armpit_z.or(body.shoulder_z).unwrap_or(f64::INFINITY);
+    let expected = expected(pattern, armpit_z);
     let mut done = Arranged::default();
     let raised = match (expected.shoulder_z, body.shoulder_z, body.waist_z) {
         (Some(own), Some(shoulder), _) => shoulder + ABOVE_SHOULDER - own,

@@ -1,0 +1,89 @@
+//! What is held only until it rests is let go, and either stays where it is or slides.
+//!
+//! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Whether it stays up is another question, and
+//! friction's and the hips' to answer: the steps go on with nothing held. Where the cloth comes to rest again and its waist has
+//! hardly moved, that is the drape; where it slides, the held one is, and is said to be.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::DrapeError;
+use crate::fabric::Fabric;
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Step, Stop};
+use crate::scene::Scene;
+
+/// A waist that sinks farther than this slides, m.
+const FARTHEST: f64 = 0.03;
+
+/// Steps it may take to rest again.
+const STEPS: usize = 60;
+
+/// What came of letting go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LetGo {
+    /// It rests without being held.
+    Stays {
+        /// How far what was held has sunk, m.
+        sank_m: f64,
+    },
+    /// It does not, and stays held.
+    Slides {
+        /// How far what was held had sunk when that was clear, m.
+        sank_m: f64,
+    },
+}
+
+impl std::fmt::Display for LetGo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stays { sank_m } => {
+                write!(f, "stays up by itself: its waist sank {:.1} mm when let go", 1e3 * sank_m)
+            }
+            Self::Slides { sank_m } => write!(
+                f,
+                "does not stay up by itself: let go, its waist sank {:.1} mm and went on; it is shown held. A narrower waist or \
+                 a fabric of more friction would carry it",
+                1e3 * sank_m
+            ),
+        }
+    }
+}
+
+/// Goes on from a held drape that rests, with nothing held.
+pub(super) fn let_go(
+    scene: &Scene,
+    fabric: &Fabric,
+    (cloth, held): (Cloth, Refined),
+    observer: Observer<'_>,
+) -> Result<(Cloth, Refined, LetGo), DrapeError> {
+    let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &[])?;
+    let mut contacts = free.contacts(&scene.body, &held.positions);
+    contacts.stiffen(held.contact_stiffness / contacts.stiffness());
+    contacts.update(&held.positions);
+    contacts.friction_refresh(&held.positions);
+    let sank = |x: &[DVec3]| {
+        let down = scene.held.iter().map(|&v| held.positions[v as usize].z - x[v as usize].z).sum::<f64>();
+        down / scene.held.len().max(1) as f64
+    };
+    let options = RefineOptions { max_steps: Some(STEPS), ..RefineOptions::default() };
+    let mut stopped = false;
+    let again = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
+        if sank(step.positions) > FARTHEST {
+            return ControlFlow::Break(());
+        }
+        let told = observer(&Step { iteration: held.steps + step.iteration, ..*step });
+        stopped |= told.is_break();
+        told
+    })?;
+    let sank_m = sank(&again.positions);
+    if again.stop == Stop::Converged && sank_m <= FARTHEST {
+        let more = again.history.iter().skip(1).cloned();
+        let history = held.history.iter().cloned().chain(more).collect();
+        let all = Refined { steps: held.steps + again.steps, history, ..again };
+        return Ok((free, all, LetGo::Stays { sank_m }));
+    }
+    let stop = if stopped { Stop::Interrupted } else { held.stop };
+    Ok((cloth, Refined { stop, ..held }, LetGo::Slides { sank_m }))
+}
