@@ -7,6 +7,7 @@ use partwise::fabric::FabricError;
 use partwise::files::Unreadable;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
+use partwise::pattern::PatternError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
 use partwise::scene::SceneError;
@@ -38,6 +39,7 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
         || cause.is::<SceneError>()
+        || cause.is::<PatternError>()
         || cause.is::<Unreadable>()
         || cause.is::<TableError>()
         || cause.is::<FabricError>()

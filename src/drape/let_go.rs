@@ -11,11 +11,11 @@ use glam::DVec3;
 use super::DrapeError;
 use crate::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
-use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Step, Stop};
+use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
 
 /// A waist that sinks farther than this slides, m.
-const FARTHEST: f64 = 0.03;
+const FARTHEST: f64 = 0.05;
 
 /// Steps it may take to rest again.
 const STEPS: usize = 60;
@@ -79,8 +79,8 @@ pub(super) fn let_go(
     })?;
     let sank_m = sank(&again.positions);
     if again.stop == Stop::Converged && sank_m <= FARTHEST {
-        let more = again.history.iter().skip(1).cloned();
-        let history = held.history.iter().cloned().chain(more).collect();
+        let later = |r: &Record| Record { iteration: held.steps + r.iteration, ..*r };
+        let history = held.history.iter().copied().chain(again.history.iter().skip(1).map(later)).collect();
         let all = Refined { steps: held.steps + again.steps, history, ..again };
         return Ok((free, all, LetGo::Stays { sank_m }));
     }

@@ -9,7 +9,8 @@
 //! in turn for the isometries R_t nearest to F_t, which is a polar decomposition each, and for x, which is one sparse
 //! solve for three right sides. A vertex nearer to the body than the gap is drawn to y_c, the point at the gap above
 //! the nearest of the body, and is free again when the cloth draws it away; no vertex goes farther in a step than a limb is thick, so
-//! that none passes through one. There is no gravity, no friction and no bending: it is a placement, not a drape.
+//! that none passes through one. There is no friction and no bending, and gravity only where a skirt is to hang from its held waist inside the
+//! arms (− Σ γ A_i z_i, added to E): it is a placement, not a drape.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -17,6 +18,7 @@
 //! | w | weight of a contact | – |
 //! | m | weight of staying, for what nothing holds | – |
 //! | x' | positions before the step | m |
+//! | γ | weight over stiffness, [`HANGING`] | 1/m |
 //!
 //! Source: the two papers; contacts are ours. Limits: cloth may pass through cloth.
 
@@ -38,9 +40,17 @@ const STAY: f64 = 1e-3;
 /// Longest way of a vertex in one step, m: a wrist is 5 cm thick.
 const LONGEST_STEP: f64 = 0.02;
 
+/// γ, 1/m: half a metre of cloth stretches by a fortieth where it hangs by its weight.
+const HANGING: f64 = 0.1;
+
+/// Weight of staying of what is held.
+const HELD: f64 = 1e3;
+
 /// How a garment is drawn shut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Closing {
+pub(super) struct Closing<'a> {
+    /// What is held while the rest hangs; nothing hangs where there is none.
+    pub(super) held: &'a [u32],
     /// Distance kept from the body, m.
     pub(super) gap: f64,
     /// At most so many steps.
@@ -60,7 +70,7 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(mesh: &TriMesh, rest: &RestShape) -> Self {
+    fn new(mesh: &TriMesh, rest: &RestShape, held: &[u32]) -> Self {
         let (mut gradients, mut areas) = (Vec::new(), Vec::new());
         let mut terms: Vec<((u32, u32), f64)> = (0..mesh.vertex_count() as u32).map(|v| ((v, v), STAY)).collect();
         for (triangle, &[a, b, c]) in mesh.triangles.iter().zip(&rest.corners) {
@@ -78,6 +88,7 @@ impl Shape {
             gradients.push(of);
             areas.push(area);
         }
+        terms.extend(held.iter().map(|&v| ((v, v), HELD)));
         // A stable sort keeps the order of the sums.
         terms.sort_by_key(|term| term.0);
         let mut entries: Vec<Triplet<u32, u32, f64>> = Vec::new();
@@ -88,6 +99,13 @@ impl Shape {
             }
         }
         Self { triangles: mesh.triangles.clone(), gradients, areas, entries }
+    }
+
+    /// Adds the weight.
+    fn hang(&self, side: &mut [DVec3]) {
+        for (triangle, area) in self.triangles.iter().zip(&self.areas) {
+            triangle.iter().for_each(|&v| side[v as usize].z -= HANGING * area / 3.0);
+        }
     }
 
     /// Right side: Σ A ∇ᵀ R + m x'.
@@ -129,10 +147,10 @@ pub(super) fn close(
     rest: &RestShape,
     body: &Body,
     start: &[DVec3],
-    how: Closing,
+    how: Closing<'_>,
 ) -> (Vec<DVec3>, usize) {
     let n = start.len();
-    let mut shape = Shape::new(mesh, rest);
+    let mut shape = Shape::new(mesh, rest, how.held);
     let diagonal: Vec<usize> =
         (shape.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
     let own: Vec<f64> = diagonal.iter().map(|&i| shape.entries[i].val).collect();
@@ -140,6 +158,10 @@ pub(super) fn close(
     let mut symbolic: Option<SymbolicLlt<u32>> = None;
     for step in 0..how.steps {
         let mut side = shape.right_side(&x);
+        how.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
+        if !how.held.is_empty() {
+            shape.hang(&mut side);
+        }
         for (v, near) in body.nearest_all(&x).iter().enumerate() {
             let touches = near.signed_distance < how.gap;
             shape.entries[diagonal[v]].val = own[v] + if touches { CONTACT } else { 0.0 };

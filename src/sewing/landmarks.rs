@@ -19,6 +19,8 @@ const STEP: f64 = 0.01;
 const SPREAD: f64 = 1.5;
 /// Arms are told from fingers by their girth, m.
 const LEAST_ARM: f64 = 0.1;
+/// What is farther beside the trunk than this is an arm's, m.
+const BESIDE: f64 = 0.01;
 /// So many curves make an arm.
 const LEAST_CURVES: usize = 6;
 
@@ -37,6 +39,8 @@ pub struct Landmarks {
     pub armpit_z: Option<f64>,
     /// How far the arms point below the horizontal, radians.
     pub arm_fall: Option<f64>,
+    /// Heights, and half the width of the trunk there.
+    trunk: Vec<(f64, f64)>,
 }
 
 /// One level.
@@ -90,7 +94,27 @@ impl Landmarks {
         let arm_fall = armpit_z.and_then(|_| arm_fall(&arms, across));
         let waist_to = armpit_z.map_or(0.7, |z| (z - low.z) / height - 0.03);
         let waist_z = narrowest(from + 0.06, waist_to).map(|l| l.z);
-        Self { middle, facing, shoulder_z, waist_z, armpit_z, arm_fall }
+        let half = |l: &Level| Some((l.z, extent_from(l.trunk.as_ref()?, middle, across)));
+        let trunk = levels.iter().filter(|l| l.z < armpit_z.unwrap_or(top)).filter_map(half).collect();
+        Self { middle, facing, shoulder_z, waist_z, armpit_z, arm_fall, trunk }
+    }
+
+    /// The body without its arms, open where they were: what is worn below them hangs inside of them. `None` for a body without arms that
+    /// were found.
+    pub(super) fn without_arms(&self, body: &TriMesh) -> Option<TriMesh> {
+        let armpit = self.armpit_z?;
+        let across = DVec2::from_angle(self.facing);
+        let (lowest, at_crotch) = *self.trunk.first()?;
+        let hips = self.trunk.iter().fold(at_crotch, |w, (_, half)| w.max(*half));
+        let of_arm = |p: &DVec3| {
+            let aside = (p.truncate() - self.middle).dot(across).abs();
+            let trunk = self.trunk.get(((p.z - lowest) / STEP).round() as usize);
+            let half = if p.z < lowest { hips } else { trunk.map_or(hips, |t| t.1) };
+            p.z < armpit && aside > half + BESIDE
+        };
+        let arm: Vec<bool> = body.positions.iter().map(of_arm).collect();
+        let kept = |t: &&[u32; 3]| !t.iter().any(|&v| arm[v as usize]);
+        Some(TriMesh::new(body.positions.clone(), body.triangles.iter().filter(kept).copied().collect()))
     }
 }
 
@@ -126,6 +150,11 @@ fn extent(curve: &SectionLoop, across: DVec2) -> f64 {
     let along = curve.points.iter().map(|p| p.truncate().dot(across));
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     high - low
+}
+
+/// How far a curve reaches to the farther side of the middle.
+fn extent_from(curve: &SectionLoop, middle: DVec2, across: DVec2) -> f64 {
+    curve.points.iter().fold(0.0, |most: f64, p| most.max((p.truncate() - middle).dot(across).abs()))
 }
 
 fn level(body: &TriMesh, z: f64, middle: DVec2, across: DVec2) -> Level {

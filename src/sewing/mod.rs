@@ -17,6 +17,7 @@ pub use landmarks::Landmarks;
 
 use crate::distance::Body;
 use crate::pattern::{PatternError, SewingPattern, SewnGarment};
+use arrange::Arrangement;
 use close::{Closing, close};
 
 /// Edge lengths of the garments before the one that is asked for, m, the gap they keep from the body, m, and the most steps they
@@ -63,7 +64,10 @@ pub fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn
     let began = Instant::now();
     let landmarks = Landmarks::of(body.mesh());
     let mut pattern = pattern.clone();
-    let arranged = arrange::arrange(&mut pattern, &landmarks);
+    let Arrangement { arranged, has_shoulders } = arrange::arrange(&mut pattern, &landmarks);
+    // What is worn below the arms is drawn shut and hangs inside of them.
+    let armless = if has_shoulders { None } else { landmarks.without_arms(body.mesh()) };
+    let armless = armless.and_then(|mesh| Body::new_open(&mesh).ok());
     let mut coarse: Option<(SewnGarment, Vec<DVec3>)> = None;
     let mut steps = 0;
     for (edge, gap, most) in COARSER {
@@ -73,18 +77,25 @@ pub fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn
             continue;
         }
         let start = begin(&garment, coarse.as_ref());
-        let how = Closing { gap, steps: most, still: STILL };
-        let (x, taken) = close(&garment.mesh, &garment.rest, body, &start, how);
+        let how = Closing { held: &[], gap, steps: most, still: STILL };
+        let first = armless.as_ref().filter(|_| coarse.is_none());
+        let (mut x, mut taken) = close(&garment.mesh, &garment.rest, first.unwrap_or(body), &start, how);
+        if let Some(body) = first {
+            let (held, _) = held(&garment, &x, &landmarks);
+            let hung;
+            (x, hung) = close(&garment.mesh, &garment.rest, body, &x, Closing { held: &held, ..how });
+            taken += hung;
+        }
         steps += taken;
         coarse = Some((garment, x));
     }
     let mut garment = pattern.sew(edge_m)?;
     let start = begin(&garment, coarse.as_ref());
     let most = if coarse.is_some() { LAST.1 } else { COARSER[0].2 };
-    let how = Closing { gap: LAST.0, steps: most, still: STILL };
+    let how = Closing { held: &[], gap: LAST.0, steps: most, still: STILL };
     let (x, taken) = close(&garment.mesh, &garment.rest, body, &start, how);
     garment.mesh.positions = x;
-    let (held, held_by) = held(&garment, &landmarks);
+    let (held, held_by) = held(&garment, &garment.mesh.positions, &landmarks);
     Ok(PutOn { garment, arranged, held, held_by, steps: steps + taken, time: began.elapsed() })
 }
 
@@ -93,8 +104,8 @@ fn begin(garment: &SewnGarment, coarse: Option<&(SewnGarment, Vec<DVec3>)>) -> V
 }
 
 /// What holds a garment that has no shoulders: edges by label, or its highest edge.
-fn held(garment: &SewnGarment, body: &Landmarks) -> (Vec<u32>, Option<String>) {
-    let top = garment.mesh.positions.iter().fold(f64::NEG_INFINITY, |top, x| top.max(x.z));
+fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Option<String>) {
+    let top = x.iter().fold(f64::NEG_INFINITY, |top, x| top.max(x.z));
     let Some(armpit) = body.armpit_z.or(body.shoulder_z) else { return (Vec::new(), None) };
     if top > armpit - BELOW_ARMPITS {
         return (Vec::new(), None);
@@ -109,9 +120,7 @@ fn held(garment: &SewnGarment, body: &Landmarks) -> (Vec<u32>, Option<String>) {
         }
     }
     let topology = crate::mesh::Topology::new(&garment.mesh);
-    let height = |edge: &[u32]| {
-        edge.iter().map(|&v| garment.mesh.positions[v as usize].z).sum::<f64>() / edge.len().max(1) as f64
-    };
+    let height = |edge: &[u32]| edge.iter().map(|&v| x[v as usize].z).sum::<f64>() / edge.len().max(1) as f64;
     let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
     highest.map_or((Vec::new(), None), |edge| (edge, Some("top edge".to_owned())))
 }
