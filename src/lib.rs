@@ -51,6 +51,7 @@ pub mod mechanics;
 pub mod mesh;
 pub mod methods;
 pub mod parts;
+pub mod pattern;
 pub mod quantile;
 pub mod range_table;
 #[cfg(feature = "viewer")]
@@ -59,6 +60,7 @@ pub mod said;
 pub mod scene;
 pub mod sealed;
 pub mod session;
+pub mod sewing;
 pub mod shapes;
 pub mod sweep;
 pub mod table_search;

@@ -93,16 +93,51 @@ struct Kind {
 const SCENE: &str = "--body body.obj --garment garment.obj --unit m --up z";
 
 const KINDS: [Kind; 10] = [
-    Kind { name: "run", line: "SCENE --table table.toml --fabric fabric.toml --refine 0 --format json --no-save --export out.obj", files: &["body.obj", "garment.obj", "table.toml", "fabric.toml"], share: 30 },
-    Kind { name: "converge", line: "SCENE --hold collar --rest texture --format json --save out.rrd --export out.obj", files: &["body.obj", "garment.obj"], share: 14 },
-    Kind { name: "paper", line: "run SCENE --model paper --min-part 2 --gap own-level --table table.toml --no-save", files: &["body.obj", "garment.obj", "table.toml"], share: 8 },
-    Kind { name: "check", line: "check body.obj garment.obj --format json", files: &["body.obj", "garment.obj"], share: 16 },
-    Kind { name: "compare", line: "compare table-3 table.toml --body body.obj --garment garment.obj --repeats 1 --accuracy none --no-save --csv out.csv", files: &["body.obj", "garment.obj", "table.toml"], share: 6 },
-    Kind { name: "sweep", line: "sweep sweep.toml --out swept --no-save", files: &["sweep.toml", "body.obj", "garment.obj", "table.toml"], share: 6 },
+    Kind {
+        name: "run",
+        line: "SCENE --table table.toml --fabric fabric.toml --refine 0 --format json --no-save --export out.obj",
+        files: &["body.obj", "garment.obj", "table.toml", "fabric.toml"],
+        share: 30,
+    },
+    Kind {
+        name: "converge",
+        line: "SCENE --hold collar --rest texture --format json --save out.rrd --export out.obj",
+        files: &["body.obj", "garment.obj"],
+        share: 14,
+    },
+    Kind {
+        name: "paper",
+        line: "run SCENE --model paper --min-part 2 --gap own-level --table table.toml --no-save",
+        files: &["body.obj", "garment.obj", "table.toml"],
+        share: 8,
+    },
+    Kind {
+        name: "check",
+        line: "check body.obj garment.obj --format json",
+        files: &["body.obj", "garment.obj"],
+        share: 16,
+    },
+    Kind {
+        name: "compare",
+        line: "compare table-3 table.toml --body body.obj --garment garment.obj --repeats 1 --accuracy none --no-save --csv out.csv",
+        files: &["body.obj", "garment.obj", "table.toml"],
+        share: 6,
+    },
+    Kind {
+        name: "sweep",
+        line: "sweep sweep.toml --out swept --no-save",
+        files: &["sweep.toml", "body.obj", "garment.obj", "table.toml"],
+        share: 6,
+    },
     Kind { name: "merge", line: "merge done --out merged", files: &["done/rows.jsonl", "done/plan.json"], share: 6 },
     Kind { name: "cusick", line: "cusick fabric.toml --rows 4 --csv out.csv", files: &["fabric.toml"], share: 4 },
     Kind { name: "view", line: "view --check seen.rrd", files: &["seen.rrd"], share: 8 },
-    Kind { name: "made", line: "check form spec.toml --measurements body.toml --no-cache", files: &["spec.toml", "body.toml"], share: 2 },
+    Kind {
+        name: "made",
+        line: "check form spec.toml --measurements body.toml --no-cache",
+        files: &["spec.toml", "body.toml"],
+        share: 2,
+    },
 ];
 
 /// Flags that wait for somebody, or are asked of the window system.
@@ -315,7 +350,8 @@ fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
     if outcome == "refused" && !said.contains("error: ") {
         return Err(format!("refused without a word: {said}"));
     }
-    let half: Vec<PathBuf> = all_files(folder).into_iter().filter(|p| p.extension().is_some_and(|e| e == "part")).collect();
+    let half: Vec<PathBuf> =
+        all_files(folder).into_iter().filter(|p| p.extension().is_some_and(|e| e == "part")).collect();
     if !half.is_empty() {
         return Err(format!("half-written files are left: {half:?}"));
     }

@@ -8,6 +8,7 @@ use partwise::files::Unreadable;
 use partwise::live::LiveError;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
+use partwise::pattern::PatternError;
 use partwise::range_table::TableError;
 use partwise::record::RecordError;
 use partwise::scene::SceneError;
@@ -40,6 +41,7 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
         || cause.is::<SceneError>()
+        || cause.is::<PatternError>()
         || cause.is::<Unreadable>()
         || cause.is::<TableError>()
         || cause.is::<FabricError>()

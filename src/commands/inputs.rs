@@ -18,9 +18,15 @@ pub(crate) struct InputArgs {
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress, long-sleeved-dress, any of them @VERTICES, a TOML
-    /// spec, or an OBJ file
+    /// spec, an OBJ file, or a sewing pattern (JSON)
     #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_value_t = SceneSpec::default().garment)]
     garment: String,
+    /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
+    #[arg(long, value_name = "FILE.json", conflicts_with = "garment")]
+    pattern: Option<String>,
+    /// Length of the edges that a pattern is meshed with
+    #[arg(long, value_name = "CM", default_value_t = SceneSpec::default().edge_cm)]
+    edge_length: f64,
     /// Take one group or object of the body's file
     #[arg(long, value_name = "GROUP")]
     body_group: Option<String>,
@@ -61,7 +67,8 @@ impl InputArgs {
     pub(crate) fn spec(&self) -> anyhow::Result<SceneSpec> {
         Ok(SceneSpec {
             body: self.body.clone(),
-            garment: self.garment.clone(),
+            garment: self.pattern.clone().unwrap_or_else(|| self.garment.clone()),
+            edge_cm: self.edge_length,
             body_group: self.body_group.clone(),
             garment_group: self.garment_group.clone(),
             unit: self.unit,

@@ -11,6 +11,7 @@ mod interrupt;
 mod live;
 mod measurements;
 mod merge;
+mod pattern;
 mod readings;
 mod run;
 mod sinks;
@@ -44,6 +45,7 @@ Examples:
   partwise --garment flared-skirt@3613 --spawn    another garment and size, straight into the native viewer
   partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and said
   partwise live                                   a page: drag the bounds, the garment follows
+  partwise --pattern shirt.json --body me.obj     sew a pattern, put it on, drape it
   partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
   partwise --format json --threads 1              one JSON object on stdout, for scripts
 
@@ -87,6 +89,9 @@ enum Command {
     Tune(Box<tune::TuneArgs>),
     /// Join the shards of a sweep into what one run would have written
     Merge(Box<merge::MergeArgs>),
+    /// Sum up a sewing pattern, and draw it flat
+    #[command(long_about = pattern::LONG_ABOUT)]
+    Pattern(pattern::PatternArgs),
     /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
@@ -106,6 +111,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),
         Some(Command::Merge(args)) => args.execute(),
+        Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };

@@ -4,6 +4,7 @@
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
 mod error;
+mod let_go;
 mod levels;
 mod parts;
 mod pieces;
@@ -22,6 +23,8 @@ use crate::parts::Parts;
 use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
+pub use let_go::LetGo;
+use let_go::Released;
 pub(crate) use levels::Levels;
 pub(crate) use parts::{StageTwo, approach, stage_one, stage_two, told};
 pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
@@ -102,6 +105,8 @@ pub struct Drape {
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
+    /// What came of letting go what was held until it rested.
+    pub let_go: Option<LetGo>,
     /// Pairs of triangles of the displaced garment that cross: cloth through cloth, which no model here prevents.
     pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.
@@ -158,17 +163,21 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
     let state = match &cloth {
         None => None,
         Some(levels) => {
-            let refined = timed(&mut times.refine, || {
+            let released = timed(&mut times.refine, || {
                 let start = approach(scene, settings, levels, &stage.parts, &stage.positions, &on);
-                refine_from(scene, settings, &levels.cloth, start, observer)
+                let refined = refine_from(scene, settings, &levels.cloth, start, observer)?;
+                let_go::let_go(scene, settings, refined, observer)
             })?;
-            Some(settled(scene, settings, &levels.cloth, refined))
+            let Released { cloth, refined, let_go } = released;
+            let (positions, state) = settled(scene, settings, cloth.as_ref().unwrap_or(&levels.cloth), refined);
+            Some((positions, state, let_go))
         }
     };
+    let (state, let_go) = state.map_or((None, None), |(positions, state, let_go)| (Some((positions, state)), let_go));
     if settings.refine == Refine::Steps(0) {
         times.refine = Duration::ZERO;
     }
-    let made = Made { ground, table, level_part_count, stage, folds, state };
+    let made = Made { ground, table, level_part_count, stage, folds, state, let_go };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();
     Ok(drape)

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{ClothState, Drape, DrapeError, Levels, Model, Refine, Settings, StageTimes, StageTwo};
+use super::{ClothState, Drape, DrapeError, LetGo, Levels, Model, Refine, Settings, StageTimes, StageTwo};
 use crate::distance::SurfacePoint;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::fit;
@@ -77,12 +77,13 @@ pub(crate) struct Made {
     pub(crate) stage: StageTwo,
     pub(crate) folds: Option<Folds>,
     pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
+    pub(crate) let_go: Option<LetGo>,
 }
 
 impl Made {
     /// The drape, with what must be looked for in it.
     pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
-        let Self { ground, table, level_part_count, stage, folds, state } = self;
+        let Self { ground, table, level_part_count, stage, folds, state, let_go } = self;
         let mut warnings = unassigned_warning(&stage.parts);
         warnings.extend(stage.warnings);
         let (positions, state) = match state {
@@ -90,6 +91,9 @@ impl Made {
             Some((positions, state)) => (positions, Some(state)),
         };
         warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+        if let Some(slides @ LetGo::Slides { .. }) = &let_go {
+            warnings.push(format!("the garment {slides}"));
+        }
         if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
             && positions.iter().all(|x| x.z < low.z)
         {
@@ -110,6 +114,7 @@ impl Made {
             preview: stage.positions,
             folds,
             state,
+            let_go,
             self_intersecting_pairs,
             positions,
             penetrating_vertices,

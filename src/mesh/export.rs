@@ -3,10 +3,11 @@
 //! Vertices that no face uses are left out, so numbers are those of the file where it had none. Normals are not
 //! written: they would be those of the old shape.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::TriMesh;
 use super::error::MeshError;
@@ -22,6 +23,39 @@ pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> 
 /// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
 pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
     write(path, &mesh_text(mesh))
+}
+
+/// The same with the texture coordinates of each triangle's corners, m: each is written once for every group.
+pub fn write_textured(path: &Path, mesh: &TriMesh, texture: &[[DVec2; 3]]) -> Result<(), MeshError> {
+    write(path, &textured_text(mesh, texture))
+}
+
+fn textured_text(mesh: &TriMesh, texture: &[[DVec2; 3]]) -> String {
+    let mut text = format!("# {} m, z up; texture coordinates are the flat pattern in m\n", env!("CARGO_PKG_NAME"));
+    mesh.positions.iter().for_each(|p| write_vertex(&mut text, *p));
+    let mut numbers: BTreeMap<(u32, [u64; 2]), usize> = BTreeMap::new();
+    let mut faces = String::new();
+    let mut last = None;
+    for (t, (triangle, uvs)) in mesh.triangles.iter().zip(texture).enumerate() {
+        let group = mesh.triangle_group.get(t).copied();
+        if group != last {
+            last = group;
+            if let Some(name) = group.and_then(|g| mesh.groups.get(g as usize)) {
+                let _ = writeln!(faces, "g {name}");
+            }
+        }
+        faces.push('f');
+        for (v, uv) in triangle.iter().zip(uvs) {
+            let next = numbers.len() + 1;
+            let number = *numbers.entry((*v, [uv.x.to_bits(), uv.y.to_bits()])).or_insert(next);
+            if number == next {
+                let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
+            }
+            let _ = write!(faces, " {}/{number}", v + 1);
+        }
+        faces.push('\n');
+    }
+    text + &faces
 }
 
 fn write(path: &Path, text: &str) -> Result<(), MeshError> {

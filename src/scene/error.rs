@@ -4,6 +4,7 @@ use crate::distance::DistanceError;
 use crate::files::{Unreadable, listed};
 use crate::mesh::MeshError;
 use crate::mesh::rest::RestError;
+use crate::pattern::PatternError;
 use crate::shapes::ShapeError;
 
 /// A body or garment that cannot be used.
@@ -19,6 +20,9 @@ pub enum SceneError {
     /// A rest shape that is none.
     #[error(transparent)]
     Rest(#[from] RestError),
+    /// A sewing pattern that is none.
+    #[error(transparent)]
+    Pattern(#[from] PatternError),
     /// Measurements or a garment that make no shape.
     #[error(transparent)]
     Shape(#[from] ShapeError),

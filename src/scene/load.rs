@@ -7,10 +7,12 @@ use glam::DVec3;
 use super::{PushOutReport, Scene, SceneError, SceneSpec, facing_body};
 use crate::distance::Body;
 use crate::files::{names_a_file, stem};
-use crate::mesh::export::{write_imported, write_mesh};
+use crate::mesh::export::{write_imported, write_mesh, write_textured};
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::report::{MeshReport, Remark};
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
+use crate::pattern::{SewingPattern, SewnGarment};
+use crate::sewing::{PutOn, put_on};
 use crate::shapes::MeshCache;
 
 /// A scene with its origin.
@@ -26,7 +28,18 @@ pub struct Loaded {
     pub reports: Vec<MeshReport>,
     /// What was pushed out of the body.
     pub pushed_out: PushOutReport,
+    /// The sewing pattern it was made of, and how it was put on.
+    pub tailored: Option<Tailored>,
     imported: Option<Imported>,
+}
+
+/// A garment made of a sewing pattern.
+#[derive(Debug, Clone)]
+pub struct Tailored {
+    /// The pattern, as its file has it.
+    pub pattern: SewingPattern,
+    /// The garment, sewn and put on the body.
+    pub put_on: PutOn,
 }
 
 /// A garment before it meets the body.
@@ -34,6 +47,7 @@ struct Unplaced {
     mesh: TriMesh,
     rest: RestShape,
     held: Vec<u32>,
+    tailored: Option<Tailored>,
     imported: Option<Imported>,
 }
 
@@ -57,12 +71,16 @@ impl SceneSpec {
         let (body, of_body) = body?;
         let unplaced = match made {
             Some(made) => made?,
+            None if self.is_a_pattern() => self.tailor(&body)?,
             None => self.load_garment(&body, of_body.as_ref())?,
         };
         let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
         scene.held = match &self.hold {
-            None => unplaced.held,
+            None => {
+                scene.let_go = unplaced.tailored.is_some();
+                unplaced.held
+            }
             Some(what) => scene.edge(what).map_err(SceneError::about(&self.garment))?,
         };
         let reports = of_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
@@ -72,6 +90,7 @@ impl SceneSpec {
             garment_name: self.garment_name(),
             reports,
             pushed_out,
+            tailored: unplaced.tailored,
             imported: unplaced.imported,
         })
     }
@@ -92,7 +111,7 @@ impl SceneSpec {
 
     /// A garment that is no mesh from a file; `None` where it is one.
     fn make_garment(&self, meshes: &MeshCache) -> Option<Result<Unplaced, SceneError>> {
-        if Path::new(&self.garment).extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+        if self.is_a_mesh() || self.is_a_pattern() {
             return None;
         }
         let make = || {
@@ -101,7 +120,7 @@ impl SceneSpec {
             }
             let (spec, vertices) = self.described()?;
             let made = meshes.garment(&spec, &self.form()?, vertices)?;
-            Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, imported: None })
+            Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, tailored: None, imported: None })
         };
         Some(make())
     }
@@ -116,7 +135,16 @@ impl SceneSpec {
         let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
         imported.turn_outward(&facing_body(&imported.mesh, body));
         let rest = self.imported_rest(&mut imported)?;
-        Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), imported: Some(imported) })
+        Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), tailored: None, imported: Some(imported) })
+    }
+
+    /// A sewing pattern, sewn and put on the body.
+    fn tailor(&self, body: &Body) -> Result<Unplaced, SceneError> {
+        let pattern = SewingPattern::read(self.garment.as_ref())?;
+        let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
+        let SewnGarment { mesh, rest, .. } = &put_on.garment;
+        let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
+        Ok(Unplaced { mesh, rest, held, tailored: Some(Tailored { pattern, put_on }), imported: None })
     }
 
     /// The rest shape of a garment, which loses the triangles that have no area in it.
@@ -167,6 +195,10 @@ impl Loaded {
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
+        if let Some(Tailored { pattern, put_on }) = &self.tailored {
+            let of_both = pattern.notes.iter().cloned().chain(put_on.notes());
+            notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
+        }
         if self.pushed_out.is_clean() && self.pushed_out.found_inside > 0 {
             notes.push(self.pushed_out.to_string());
         }
@@ -176,9 +208,13 @@ impl Loaded {
     /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
     /// coordinates.
     pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
-        match &self.imported {
-            Some(imported) => write_imported(path.as_ref(), imported, positions),
-            None => write_mesh(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec())),
+        match (&self.imported, &self.tailored) {
+            (Some(imported), _) => write_imported(path.as_ref(), imported, positions),
+            (None, Some(Tailored { pattern, put_on })) => {
+                let laid_out = put_on.garment.laid_out(pattern);
+                write_textured(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec()), &laid_out)
+            }
+            (None, None) => write_mesh(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec())),
         }
     }
 }

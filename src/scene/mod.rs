@@ -11,7 +11,7 @@ mod push_out;
 mod spec;
 
 pub use error::SceneError;
-pub use load::Loaded;
+pub use load::{Loaded, Tailored};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
 pub use spec::{DRESS_FORM, SceneSpec};
@@ -36,6 +36,8 @@ pub struct Scene {
     pub rest: RestShape,
     /// Vertices that stay where they are worn (a waistband's edge).
     pub held: Vec<u32>,
+    /// Whether they are let go once the garment rests, to see whether it stays up by itself.
+    pub let_go: bool,
 }
 
 impl Scene {
@@ -57,7 +59,7 @@ impl Scene {
         let (garment, report) =
             if push { push_out(&garment, &body, PUSHED_CLEARANCE) } else { (garment, PushOutReport::default()) };
         let topology = Topology::new(&garment);
-        Ok((Self { body, garment, topology, rest, held: Vec::new() }, report))
+        Ok((Self { body, garment, topology, rest, held: Vec::new(), let_go: false }, report))
     }
 
     /// Whether each garment vertex is held.

@@ -8,6 +8,7 @@ use super::SceneError;
 use crate::files::{names_a_file, read_text, stem};
 use crate::mesh::import::ImportOptions;
 use crate::mesh::{Axis, Unit};
+use crate::pattern::DEFAULT_EDGE_M;
 use crate::shapes::{BodySpec, GarmentRequest, GarmentSpec};
 
 /// The name of the built-in body.
@@ -19,12 +20,15 @@ pub const DRESS_FORM: &str = "form";
 pub struct SceneSpec {
     /// `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file.
     pub body: String,
-    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, or an OBJ file placed around the body.
+    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, an OBJ file placed around the body, or a sewing
+    /// pattern (JSON as GarmentCode writes it).
     pub garment: String,
     /// One group or object of the body's file alone.
     pub body_group: Option<String>,
     /// One group or object of the garment's file alone.
     pub garment_group: Option<String>,
+    /// Length of the edges that a sewing pattern is meshed with, cm.
+    pub edge_cm: f64,
     /// Unit of the files; guessed from the body where it is not given.
     pub unit: Option<Unit>,
     /// Up axis of the files; guessed from the body where it is not given.
@@ -50,6 +54,7 @@ impl Default for SceneSpec {
             garment: "low-cut-dress".to_owned(),
             body_group: None,
             garment_group: None,
+            edge_cm: 100.0 * DEFAULT_EDGE_M,
             unit: None,
             up: None,
             open_body: false,
@@ -80,7 +85,8 @@ impl SceneSpec {
     #[must_use]
     pub fn garment_name(&self) -> String {
         if names_a_file(&self.garment) {
-            return stem(&self.garment);
+            let stem = stem(&self.garment);
+            return stem.strip_suffix("_specification").map_or(stem.clone(), str::to_owned);
         }
         self.garment.split('@').next().unwrap_or_default().to_owned()
     }
@@ -94,6 +100,17 @@ impl SceneSpec {
             self.described()?;
         }
         Ok(())
+    }
+
+    /// Whether the garment is a sewing pattern.
+    #[must_use]
+    pub fn is_a_pattern(&self) -> bool {
+        has_ending(&self.garment, "json")
+    }
+
+    /// Whether the garment is a mesh from a file.
+    pub(super) fn is_a_mesh(&self) -> bool {
+        has_ending(&self.garment, "obj")
     }
 
     /// The built-in or described garment, and how many vertices are asked of it.
@@ -128,4 +145,8 @@ impl SceneSpec {
             open_body: self.open_body,
         }
     }
+}
+
+fn has_ending(file: &str, ending: &str) -> bool {
+    Path::new(file).extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }

@@ -110,6 +110,7 @@ impl Workshop {
             folds: folds_of(settings, levels, &stage),
             stage,
             state,
+            let_go: None,
         };
         let drape = made.judged(scene, settings, times);
         let figures = Figures::of(scene, &drape);

@@ -1,0 +1,103 @@
+//! What is held only until it rests is let go, and either stays where it is or slides.
+//!
+//! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Whether it stays up is another question, and
+//! friction's and the hips' to answer: the steps go on with nothing held. Where the cloth comes to rest again and its waist has
+//! hardly moved, that is the drape; where it slides, the held one is, and is said to be.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::{DrapeError, Refine, Settings};
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
+use crate::scene::Scene;
+
+/// A waist that sinks farther than this slides, m.
+const FARTHEST: f64 = 0.05;
+
+/// Steps it may take to rest again.
+const STEPS: usize = 60;
+
+/// What came of letting go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LetGo {
+    /// It rests without being held.
+    Stays {
+        /// How far what was held has sunk, m.
+        sank_m: f64,
+    },
+    /// It does not, and stays held.
+    Slides {
+        /// How far what was held had sunk when that was clear, m.
+        sank_m: f64,
+    },
+}
+
+impl std::fmt::Display for LetGo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stays { sank_m } => {
+                write!(f, "stays up by itself: its waist sank {:.1} mm when let go", 1e3 * sank_m)
+            }
+            Self::Slides { sank_m } => write!(
+                f,
+                "does not stay up by itself: let go, its waist sank {:.1} mm and went on; it is shown held. A narrower waist or \
+                 a fabric of more friction would carry it",
+                1e3 * sank_m
+            ),
+        }
+    }
+}
+
+/// A drape whose held edges were let go, if they were to be.
+pub(crate) struct Released {
+    /// The cloth with nothing held, where it stays up so.
+    pub(crate) cloth: Option<Cloth>,
+    /// Where it rests.
+    pub(crate) refined: Refined,
+    /// What came of it; `None` where nothing was to be let go.
+    pub(crate) let_go: Option<LetGo>,
+}
+
+/// Goes on from a held drape that rests, with nothing held, where the scene asks for it.
+pub(crate) fn let_go(
+    scene: &Scene,
+    settings: &Settings,
+    held: Refined,
+    observer: Observer<'_>,
+) -> Result<Released, DrapeError> {
+    let asked = scene.let_go && !scene.held.is_empty() && settings.refine == Refine::Converged;
+    if !asked || held.stop != Stop::Converged {
+        return Ok(Released { cloth: None, refined: held, let_go: None });
+    }
+    let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &[])?;
+    let mut contacts = free.contacts(&scene.body, &held.positions);
+    contacts.stiffen(held.contact_stiffness / contacts.stiffness());
+    contacts.update(&held.positions);
+    contacts.friction_refresh(&held.positions);
+    let sank = |x: &[DVec3]| {
+        let down = scene.held.iter().map(|&v| held.positions[v as usize].z - x[v as usize].z).sum::<f64>();
+        down / scene.held.len().max(1) as f64
+    };
+    let options = RefineOptions { max_steps: Some(STEPS), ..RefineOptions::default() };
+    let mut stopped = false;
+    let again = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
+        if sank(step.positions) > FARTHEST {
+            return ControlFlow::Break(());
+        }
+        let told = observer(&Step { iteration: held.steps + step.iteration, ..*step });
+        stopped |= told.is_break();
+        told
+    })?;
+    let sank_m = sank(&again.positions);
+    if again.stop == Stop::Converged && sank_m <= FARTHEST {
+        let later = |r: &Record| Record { iteration: held.steps + r.iteration, ..*r };
+        let history = held.history.iter().copied().chain(again.history.iter().skip(1).map(later)).collect();
+        let all = Refined { steps: held.steps + again.steps, history, ..again };
+        return Ok(Released { cloth: Some(free), refined: all, let_go: Some(LetGo::Stays { sank_m }) });
+    }
+    let stop = if stopped { Stop::Interrupted } else { held.stop };
+    let let_go = Some(LetGo::Slides { sank_m });
+    Ok(Released { cloth: None, refined: Refined { stop, ..held }, let_go })
+}

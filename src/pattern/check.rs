@@ -1,0 +1,116 @@
+//! What makes panels and stitches a pattern: edges with a length, loops that do not cross themselves, each edge sewn once, to one about
+//! as long.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+
+use super::{EdgeAt, PatternError, SewingPattern};
+
+/// Edges are longer than this, m.
+const SHORTEST: f64 = 1e-4;
+
+/// Gathering beyond this is said: ruffles are cut two to three times as long.
+const MUCH: f64 = 3.0;
+/// Beyond this it is refused.
+const MOST: f64 = 10.0;
+
+/// Chords of a curve when it is looked at for crossings.
+const CHORDS: usize = 16;
+
+pub(super) fn pattern(pattern: &mut SewingPattern) -> Result<(), PatternError> {
+    for panel in &pattern.panels {
+        for (edge, e) in panel.edges.iter().enumerate() {
+            let length = e.curve.length();
+            // NaN is no length either.
+            if !(length >= SHORTEST && length.is_finite()) {
+                return Err(PatternError::Short { panel: panel.name.clone(), edge, length_cm: 100.0 * length });
+            }
+        }
+        let chords: Vec<Chord> = (panel.edges.iter().enumerate())
+            .flat_map(|(edge, e)| {
+                let count = if let super::Curve::Line { .. } = e.curve { 1 } else { CHORDS };
+                let points = e.curve.divided(count);
+                (0..count).map(|i| Chord { edge, from: points[i], to: points[i + 1] }).collect::<Vec<_>>()
+            })
+            .collect();
+        if let Some((first, second, at)) = crossing(&chords) {
+            let (panel, x_cm, y_cm) = (panel.name.clone(), 100.0 * at.x, 100.0 * at.y);
+            return Err(PatternError::Crossing { panel, first, second, x_cm, y_cm });
+        }
+    }
+    stitches(pattern)
+}
+
+struct Chord {
+    edge: usize,
+    from: DVec2,
+    to: DVec2,
+}
+
+/// The first two chords that meet where they should not, and where.
+fn crossing(chords: &[Chord]) -> Option<(usize, usize, DVec2)> {
+    let n = chords.len();
+    for i in 0..n {
+        for j in i + 1..n {
+            let (a, b) = (&chords[i], &chords[j]);
+            let neighbours = j == i + 1 || (i == 0 && j == n - 1);
+            let at = if neighbours { folded(a, b, j == i + 1) } else { meeting(a, b) };
+            if let Some(at) = at {
+                return Some((a.edge, b.edge, at));
+            }
+        }
+    }
+    None
+}
+
+/// Where two segments meet.
+fn meeting(a: &Chord, b: &Chord) -> Option<DVec2> {
+    let (low, high) = (a.from.min(a.to), a.from.max(a.to));
+    if b.from.min(b.to).cmpgt(high).any() || b.from.max(b.to).cmplt(low).any() {
+        return None;
+    }
+    let side = |c: &Chord, p: DVec2| (c.to - c.from).perp_dot(p - c.from);
+    let (s, t) = (side(a, b.from), side(a, b.to));
+    let (u, v) = (side(b, a.from), side(b, a.to));
+    let apart = |x: f64, y: f64| (x > 0.0 && y > 0.0) || (x < 0.0 && y < 0.0);
+    if apart(s, t) || apart(u, v) {
+        return None;
+    }
+    // Along one line the boxes say whether they meet.
+    Some(if s == t { b.from } else { b.from.lerp(b.to, s / (s - t)) })
+}
+
+/// Where one edge runs straight back over the one before.
+fn folded(a: &Chord, b: &Chord, in_order: bool) -> Option<DVec2> {
+    let (a, b) = if in_order { (a, b) } else { (b, a) };
+    let (back, on) = (a.from - a.to, b.to - b.from);
+    let flat = back.perp_dot(on).abs() <= 1e-9 * back.length() * on.length();
+    (flat && back.dot(on) > 0.0).then_some(b.from)
+}
+
+fn stitches(pattern: &mut SewingPattern) -> Result<(), PatternError> {
+    let mut sewn: BTreeMap<EdgeAt, usize> = BTreeMap::new();
+    let mut notes = Vec::new();
+    for (number, stitch) in pattern.stitches.iter().enumerate() {
+        for side in stitch.sides {
+            if let Some(first) = sewn.insert(side, number) {
+                let panel = pattern.panels[side.panel].name.clone();
+                return Err(PatternError::Twice { panel, edge: side.edge, first, second: number });
+            }
+        }
+        let ([a_m, b_m], ratio) = (pattern.lengths(stitch), pattern.gathering(stitch));
+        let [a, b] = stitch.sides.map(|side| pattern.edge_name(side));
+        let (a_cm, b_cm) = (100.0 * a_m, 100.0 * b_m);
+        if ratio > MOST {
+            return Err(PatternError::Lengths { stitch: number, a, a_cm, b, b_cm, most: MOST });
+        }
+        if ratio > MUCH {
+            notes.push(format!(
+                "stitch {number}: {a} ({a_cm:.1} cm) and {b} ({b_cm:.1} cm) differ by a factor of {ratio:.1}"
+            ));
+        }
+    }
+    pattern.notes.extend(notes);
+    Ok(())
+}

@@ -1,0 +1,238 @@
+//! The edges of a panel: lines, Béziers of second and third order, arcs.
+//!
+//! | kind | p(t), 0 ≤ t ≤ 1 |
+//! |---|---|
+//! | line | a + t (b − a) |
+//! | quadratic | (1−t)² a + 2 t (1−t) c + t² b |
+//! | cubic | (1−t)³ a + 3 t (1−t)² c + 3 t² (1−t) d + t³ b |
+//! | arc | m + r (cos φ, sin φ), φ = φ₀ + t Δφ |
+//!
+//! Lengths of Béziers are Gauss sums (five points) over [`PIECES`] pieces each, good to 1e-12 of the length where a curve has no cusp; a
+//! point at a given length along them is found in its piece by bisection and secants, so it lies on the curve to rounding.
+//! All in metres.
+
+use glam::DVec2;
+
+/// Pieces of a Bézier, of five Gauss points each.
+const PIECES: usize = 32;
+
+/// Abscissae and weights of Gauss and Legendre's rule of five points on [−1, 1].
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// A curve in the plane of its panel, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "the table above says what each field is")]
+pub enum Curve {
+    /// A straight edge.
+    Line { a: DVec2, b: DVec2 },
+    /// A Bézier with one control point.
+    Quadratic { a: DVec2, c: DVec2, b: DVec2 },
+    /// A Bézier with two control points.
+    Cubic { a: DVec2, c: DVec2, d: DVec2, b: DVec2 },
+    /// A part of a circle; `turn` (radians) is positive counter-clockwise.
+    Arc { a: DVec2, b: DVec2, centre: DVec2, radius: f64, from: f64, turn: f64 },
+}
+
+impl Curve {
+    /// The arc from `a` to `b` of this radius, as in SVG but y up: the longer one if `large`, counter-clockwise (it bulges to the right
+    /// of a → b) if `right`. `None` where the radius does not reach.
+    #[must_use]
+    pub fn arc(a: DVec2, b: DVec2, radius: f64, large: bool, right: bool) -> Option<Self> {
+        let half = 0.5 * (b - a);
+        // A half circle's radius is rounded in files.
+        let short = half.length() - radius;
+        if !(short <= 1e-4 * radius && radius > 0.0 && half.length() > 0.0) {
+            return None;
+        }
+        let radius = radius.max(half.length());
+        let height = (radius * radius - half.length_squared()).max(0.0).sqrt();
+        let side = if right == large { -1.0 } else { 1.0 };
+        let centre = a + half + half.perp().normalize() * side * height;
+        let from = (a - centre).to_angle();
+        let mut turn = (b - centre).to_angle() - from;
+        if right && turn <= 0.0 {
+            turn += std::f64::consts::TAU;
+        } else if !right && turn >= 0.0 {
+            turn -= std::f64::consts::TAU;
+        }
+        Some(Self::Arc { a, b, centre, radius, from, turn })
+    }
+
+    /// Where it begins.
+    #[must_use]
+    pub fn start(&self) -> DVec2 {
+        match *self {
+            Self::Line { a, .. } | Self::Quadratic { a, .. } | Self::Cubic { a, .. } | Self::Arc { a, .. } => a,
+        }
+    }
+
+    /// Where it ends.
+    #[must_use]
+    pub fn end(&self) -> DVec2 {
+        match *self {
+            Self::Line { b, .. } | Self::Quadratic { b, .. } | Self::Cubic { b, .. } | Self::Arc { b, .. } => b,
+        }
+    }
+
+    /// p(t); the ends are exact.
+    #[must_use]
+    pub fn at(&self, t: f64) -> DVec2 {
+        if t <= 0.0 {
+            return self.start();
+        }
+        if t >= 1.0 {
+            return self.end();
+        }
+        let s = 1.0 - t;
+        match *self {
+            Self::Line { a, b } => a * s + b * t,
+            Self::Quadratic { a, c, b } => a * (s * s) + c * (2.0 * s * t) + b * (t * t),
+            Self::Cubic { a, c, d, b } => {
+                a * (s * s * s) + c * (3.0 * s * s * t) + d * (3.0 * s * t * t) + b * (t * t * t)
+            }
+            Self::Arc { centre, radius, from, turn, .. } => centre + radius * DVec2::from_angle(from + t * turn),
+        }
+    }
+
+    /// dp/dt.
+    fn velocity(&self, t: f64) -> DVec2 {
+        let s = 1.0 - t;
+        match *self {
+            Self::Line { a, b } => b - a,
+            Self::Quadratic { a, c, b } => 2.0 * (s * (c - a) + t * (b - c)),
+            Self::Cubic { a, c, d, b } => 3.0 * (s * s * (c - a) + 2.0 * s * t * (d - c) + t * t * (b - d)),
+            Self::Arc { radius, from, turn, .. } => turn * radius * DVec2::from_angle(from + t * turn).perp(),
+        }
+    }
+
+    /// Length between two parameters in one piece.
+    fn stretch(&self, from: f64, to: f64) -> f64 {
+        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        half * GAUSS.iter().map(|(x, w)| w * self.velocity(middle + half * x).length()).sum::<f64>()
+    }
+
+    /// Length, m.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        match *self {
+            Self::Line { a, b } => a.distance(b),
+            Self::Arc { radius, turn, .. } => radius * turn.abs(),
+            _ => (0..PIECES).map(|i| self.stretch(parameter(i), parameter(i + 1))).sum(),
+        }
+    }
+
+    /// `count` + 1 points at equal lengths along it, both ends among them.
+    #[must_use]
+    pub fn divided(&self, count: usize) -> Vec<DVec2> {
+        let share = |i: usize| i as f64 / count as f64;
+        if let Self::Line { .. } | Self::Arc { .. } = self {
+            return (0..=count).map(|i| self.at(share(i))).collect();
+        }
+        let mut before = vec![0.0];
+        for i in 0..PIECES {
+            before.push(before[i] + self.stretch(parameter(i), parameter(i + 1)));
+        }
+        let whole = before[PIECES];
+        (0..=count)
+            .map(|i| {
+                if i == count {
+                    return self.end();
+                }
+                let wanted = whole * share(i);
+                let piece = before.partition_point(|&l| l <= wanted).clamp(1, PIECES) - 1;
+                let (mut low, mut high) = (parameter(piece), parameter(piece + 1));
+                let origin = low;
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    if before[piece] + self.stretch(origin, middle) < wanted {
+                        low = middle
+                    } else {
+                        high = middle
+                    }
+                    if high - low < 1e-15 {
+                        break;
+                    }
+                }
+                self.at(0.5 * (low + high))
+            })
+            .collect()
+    }
+
+    /// ½ ∮ p × dp along it: the edges of a loop add up to its area, m², positive counter-clockwise.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        if let Self::Arc { centre, radius, turn, a, b, .. } = *self {
+            return 0.5 * (centre.perp_dot(b - a) + radius * radius * turn);
+        }
+        // A polynomial of fifth degree at most: one rule of five points is exact.
+        0.5 * GAUSS
+            .iter()
+            .map(|(x, w)| {
+                let t = 0.5 * (1.0 + x);
+                0.5 * w * self.at(t).perp_dot(self.velocity(t))
+            })
+            .sum::<f64>()
+    }
+}
+
+fn parameter(i: usize) -> f64 {
+    i as f64 / PIECES as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    const A: DVec2 = DVec2::new(1.0, 0.0);
+    const B: DVec2 = DVec2::new(0.0, 1.0);
+
+    #[test]
+    fn arcs_go_the_way_and_the_length_that_is_asked() {
+        for (large, right, length, middle) in [
+            // Of the unit circle about 0 and the one about (1, 1).
+            (false, true, FRAC_PI_2, DVec2::splat(0.5_f64.sqrt())),
+            (false, false, FRAC_PI_2, DVec2::splat(1.0 - 0.5_f64.sqrt())),
+            (true, false, 3.0 * FRAC_PI_2, -DVec2::splat(0.5_f64.sqrt())),
+            (true, true, 3.0 * FRAC_PI_2, DVec2::splat(1.0 + 0.5_f64.sqrt())),
+        ] {
+            let arc = Curve::arc(A, B, 1.0, large, right).unwrap();
+            assert!((arc.length() - length).abs() < 1e-12, "{large} {right}: {}", arc.length());
+            assert!(arc.at(0.5).distance(middle) < 1e-12, "{large} {right}: {}", arc.at(0.5));
+            assert!((arc.at(1e-12).distance(A) + arc.at(1.0 - 1e-12).distance(B)) < 1e-9);
+        }
+        assert!(Curve::arc(A, -A, 0.9, false, true).is_none());
+        assert!(Curve::arc(A, A, 1.0, false, true).is_none());
+        assert!((Curve::arc(A, -A, 0.99999, false, true).unwrap().length() - PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_parabola_has_its_length_and_equal_parts_of_it() {
+        // y = x² from −1 to 1: length √5 + ½ asinh 2.
+        let parabola = Curve::Quadratic { a: DVec2::new(-1.0, 1.0), c: DVec2::new(0.0, -1.0), b: DVec2::new(1.0, 1.0) };
+        let exact = 5.0_f64.sqrt() + 0.5 * 2.0_f64.asinh();
+        assert!((parabola.length() - exact).abs() < 1e-12, "{}", parabola.length());
+        let to = |x: f64| 0.5 * x * (1.0 + 4.0 * x * x).sqrt() + 0.25 * (2.0 * x).asinh();
+        for (i, p) in parabola.divided(7).iter().enumerate() {
+            assert!((p.y - p.x * p.x).abs() < 1e-14);
+            assert!((to(p.x) - to(-1.0) - exact * i as f64 / 7.0).abs() < 1e-11, "{p}");
+        }
+    }
+
+    #[test]
+    fn loops_have_their_area() {
+        let circle = [Curve::arc(A, -A, 1.0, false, true).unwrap(), Curve::arc(-A, A, 1.0, false, true).unwrap()];
+        assert!((circle.iter().map(Curve::area).sum::<f64>() - PI).abs() < 1e-12);
+        let line = Curve::Line { a: B, b: A };
+        let cubic = Curve::Cubic { a: A, c: DVec2::new(2.0, 2.0), d: DVec2::new(-1.0, 3.0), b: B };
+        let fine = cubic.divided(4000);
+        let polygon: f64 = fine.windows(2).map(|p| 0.5 * p[0].perp_dot(p[1])).sum();
+        assert!((cubic.area() + line.area() - polygon - 0.5 * B.perp_dot(A)).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,248 @@
+//! From GarmentCode's JSON to panels and stitches in metres.
+//!
+//! Control points of an edge a → b are [u, w]: a + u d + w l with d = b − a and l = (−d.y, d.x), or coordinates where the file says
+//! `absolute`. A panel point (x, y) is placed at Rz Ry Rx (x, y, 0) + translation, angles in degrees.
+
+use glam::{DMat3, DVec2, DVec3};
+use serde_json::{Map, Value};
+
+use super::value::At;
+use super::{Curve, EdgeAt, PanelEdge, PatternError, PatternPanel, SewingPattern, Stitch};
+
+/// A pattern of 115,000 in the public data set has 60 kB at most.
+const MOST_MB: usize = 4;
+/// More panels or edges are another file.
+const MOST_PANELS: usize = 500;
+const MOST_EDGES: usize = 300;
+
+/// What all panels share.
+struct Properties {
+    metres_per_unit: f64,
+    relative: bool,
+}
+
+pub(super) fn pattern(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
+    if text.len() > MOST_MB << 20 {
+        return Err(PatternError::TooLong { megabytes: text.len() as f64 / f64::from(1 << 20), most_mb: MOST_MB });
+    }
+    let value: Value = serde_json::from_str(text).map_err(|e| PatternError::NotJson { reason: e.to_string() })?;
+    let root = At::new(&value, "the file");
+    let mut notes = Vec::new();
+    let object = root.object("an object with \"pattern\" in it")?;
+    unknown(
+        object,
+        &["pattern", "properties", "parameters", "parameter_order", "parameter_constraints"],
+        "the file",
+        &mut notes,
+    );
+    let inner = key(object, "pattern", "the file", "panels and stitches")?;
+    let place = "pattern";
+    let inner = At::new(inner, place).object("an object of panels and stitches")?;
+    unknown(inner, &["panels", "stitches", "panel_order"], place, &mut notes);
+    let properties = properties(object.get("properties"), &mut notes)?;
+    let panels = At::new(key(inner, "panels", place, "the panels by name")?, "pattern.panels");
+    let by_name = panels.object("the panels by name")?;
+    if by_name.is_empty() || by_name.len() > MOST_PANELS {
+        let found = format!("{} panels", by_name.len());
+        return Err(PatternError::Wrong { place: panels.place, found, expected: format!("1 to {MOST_PANELS}") });
+    }
+    let mut read = Vec::new();
+    for name in ordered(inner.get("panel_order"), by_name) {
+        read.push(panel(&name, &by_name[&name], &properties, &mut notes)?);
+    }
+    let none = Value::Array(Vec::new());
+    let stitches = At::new(inner.get("stitches").unwrap_or(&none), "pattern.stitches");
+    let stitches = stitches.list("a list of pairs of edges")?;
+    let stitches = stitches.iter().enumerate().map(|(i, s)| stitch(i, s, &read)).collect::<Result<Vec<_>, _>>()?;
+    Ok(SewingPattern { name: name.to_owned(), panels: read, stitches, notes })
+}
+
+fn key<'a>(
+    object: &'a Map<String, Value>,
+    key: &'static str,
+    place: &str,
+    expected: &'static str,
+) -> Result<&'a Value, PatternError> {
+    object.get(key).ok_or_else(|| PatternError::Missing { place: place.to_owned(), key, expected })
+}
+
+fn unknown(object: &Map<String, Value>, known: &[&str], place: &str, notes: &mut Vec<String>) {
+    let others: Vec<&str> = object.keys().map(String::as_str).filter(|key| !known.contains(key)).collect();
+    if !others.is_empty() {
+        notes.push(format!("{place}: {} not understood and left out", others.join(", ")));
+    }
+}
+
+/// The panels in the preferred order, if it names each once; else by name.
+fn ordered(order: Option<&Value>, panels: &Map<String, Value>) -> Vec<String> {
+    let mut names: Vec<String> = panels.keys().cloned().collect();
+    names.sort();
+    let preferred: Option<Vec<String>> =
+        order.and_then(Value::as_array).map(|list| list.iter().filter_map(Value::as_str).map(str::to_owned).collect());
+    let Some(preferred) = preferred else { return names };
+    let mut sorted = preferred.clone();
+    sorted.sort();
+    if sorted == names { preferred } else { names }
+}
+
+fn properties(value: Option<&Value>, notes: &mut Vec<String>) -> Result<Properties, PatternError> {
+    let mut found = Properties { metres_per_unit: 0.01, relative: true };
+    let Some(value) = value else {
+        notes.push("the file has no properties: lengths are taken for centimetres, curvatures for relative".to_owned());
+        return Ok(found);
+    };
+    let place = "properties";
+    let object = At::new(value, place).object("an object")?;
+    let known = ["curvature_coords", "units_in_meter", "normalize_panel_translation", "normalized_edge_loops"];
+    unknown(object, &known, place, notes);
+    if let Some(units) = object.get("units_in_meter") {
+        let at = At::new(units, "properties.units_in_meter");
+        let units = at.number()?;
+        if !(1e-3..=1e4).contains(&units) {
+            return Err(at.wrong("how many units make a metre, 100 for centimetres"));
+        }
+        found.metres_per_unit = units.recip();
+    }
+    if let Some(coordinates) = object.get("curvature_coords") {
+        let at = At::new(coordinates, "properties.curvature_coords");
+        found.relative = match at.value.as_str() {
+            Some("relative") => true,
+            Some("absolute") => false,
+            _ => return Err(at.wrong("\"relative\" or \"absolute\"")),
+        };
+    }
+    Ok(found)
+}
+
+fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) -> Result<PatternPanel, PatternError> {
+    let place = format!("panel {name}");
+    let object = At::new(value, place.clone()).object("an object of vertices and edges")?;
+    unknown(object, &["translation", "rotation", "vertices", "edges", "label"], &place, notes);
+    let at = |key: &str, value: &'_ Value| -> Result<DVec3, PatternError> {
+        let at = At::new(value, format!("{place}, {key}"));
+        at.numbers::<3>("three numbers").map(DVec3::from_array)
+    };
+    let translation = object.get("translation").map_or(Ok(DVec3::ZERO), |v| at("translation", v))?;
+    let angles = object.get("rotation").map_or(Ok(DVec3::ZERO), |v| at("rotation", v))?;
+    let list = At::new(key(object, "vertices", &place, "a list of points")?, format!("{place}, vertices"));
+    let mut vertices = Vec::new();
+    for (i, value) in list.list("a list of points [x, y]")?.iter().enumerate() {
+        let point = At::new(value, format!("{place}, vertex {i}")).numbers::<2>("a point [x, y]")?;
+        vertices.push(DVec2::from_array(point) * of.metres_per_unit);
+    }
+    let list = At::new(key(object, "edges", &place, "a list of edges")?, format!("{place}, edges"));
+    let values = list.list("a list of edges")?;
+    if !(2..=MOST_EDGES).contains(&values.len()) {
+        let found = format!("{} edges", values.len());
+        return Err(PatternError::Wrong { place: list.place, found, expected: format!("2 to {MOST_EDGES}") });
+    }
+    let mut edges = Vec::new();
+    let mut ends: Vec<[usize; 2]> = Vec::new();
+    for (i, value) in values.iter().enumerate() {
+        let place = format!("{place}, edge {i}");
+        let object = At::new(value, place.clone()).object("an object with endpoints")?;
+        unknown(object, &["endpoints", "curvature", "label"], &place, notes);
+        let at = At::new(key(object, "endpoints", &place, "two vertices")?, place.clone() + ", endpoints");
+        let pair = at.list("two vertices [i, j]")?;
+        let index = |v: &Value| v.as_u64().and_then(|v| usize::try_from(v).ok()).filter(|&v| v < vertices.len());
+        let expected = || at.wrong(format!("two numbers of vertices, from 0 to {}", vertices.len().max(1) - 1));
+        let [from, to] = pair else { return Err(expected()) };
+        let (from, to) = (index(from).ok_or_else(expected)?, index(to).ok_or_else(expected)?);
+        ends.push([from, to]);
+        let label = object.get("label").filter(|v| !v.is_null()).map(|v| label(v, &place)).transpose()?;
+        let label = label.filter(|label| !label.is_empty());
+        let curvature = object.get("curvature").filter(|v| !v.is_null());
+        let straight = Curve::Line { a: vertices[from], b: vertices[to] };
+        let curve = curvature.map_or(Ok(straight), |v| curve(&place, v, vertices[from], vertices[to], of))?;
+        edges.push(PanelEdge { curve, label });
+    }
+    for (i, [from, _]) in ends.iter().enumerate() {
+        let before = (i + ends.len() - 1) % ends.len();
+        if *from != ends[before][1] {
+            let (panel, expected) = (name.to_owned(), ends[before][1]);
+            return Err(PatternError::Open { panel, edge: i, before, found: *from, expected });
+        }
+    }
+    let label = object.get("label").filter(|v| !v.is_null()).map(|v| label(v, &place)).transpose()?;
+    let (rotation, translation) = upright(angles, translation * of.metres_per_unit);
+    Ok(PatternPanel { name: name.to_owned(), label: label.filter(|l| !l.is_empty()), edges, rotation, translation })
+}
+
+fn label(value: &Value, place: &str) -> Result<String, PatternError> {
+    Ok(At::new(value, format!("{place}, label")).text("a text")?.to_owned())
+}
+
+/// Placement with z up and the front at −y.
+fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
+    let [a, b, c] = degrees.to_array().map(f64::to_radians);
+    let rotation = DMat3::from_rotation_z(c) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(a);
+    let turn = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y);
+    (turn * rotation, turn * translation)
+}
+
+fn curve(place: &str, value: &Value, a: DVec2, b: DVec2, of: &Properties) -> Result<Curve, PatternError> {
+    let at = At::new(value, format!("{place}, curvature"));
+    let d = b - a;
+    let control = |value: &Value| -> Result<DVec2, PatternError> {
+        let p = DVec2::from_array(At::new(value, at.place.clone()).numbers::<2>("a control point [u, w]")?);
+        Ok(if of.relative { a + d * p.x + d.perp() * p.y } else { p * of.metres_per_unit })
+    };
+    // Older files: a bare control point.
+    if value.is_array() {
+        return Ok(Curve::Quadratic { a, c: control(value)?, b });
+    }
+    let kinds = "a curvature of type quadratic, cubic or circle with its params";
+    let object = at.object(kinds)?;
+    let params = object.get("params").and_then(Value::as_array).ok_or_else(|| at.wrong(kinds))?;
+    match (object.get("type").and_then(Value::as_str), params.as_slice()) {
+        (Some("quadratic"), [c]) => Ok(Curve::Quadratic { a, c: control(c)?, b }),
+        (Some("cubic"), [c, d]) => Ok(Curve::Cubic { a, c: control(c)?, d: control(d)?, b }),
+        (Some("circle"), [radius, large, right]) => {
+            let number = |v: &Value, what: &str| At::new(v, format!("{}, {what}", at.place)).number();
+            let flag = |v: &Value, what: &str| match v.as_bool() {
+                Some(flag) => Ok(flag),
+                None => number(v, what).map(|n| n != 0.0),
+            };
+            let radius = number(radius, "radius")?;
+            let arc = Curve::arc(a, b, radius * of.metres_per_unit, flag(large, "large")?, flag(right, "right")?);
+            arc.ok_or_else(|| PatternError::Wrong {
+                place: at.place.clone(),
+                found: format!("a circle of radius {radius}"),
+                expected: format!("one that reaches both ends, {:.4} or more", 0.5 * d.length() / of.metres_per_unit),
+            })
+        }
+        (kind, params) => Err(PatternError::Wrong {
+            place: at.place.clone(),
+            found: format!("type {} with {} params", kind.unwrap_or("(none)"), params.len()),
+            expected: "quadratic with 1, cubic with 2 or circle with 3".to_owned(),
+        }),
+    }
+}
+
+fn stitch(number: usize, value: &Value, panels: &[PatternPanel]) -> Result<Stitch, PatternError> {
+    let at = At::new(value, format!("stitch {number}"));
+    let expected =
+        "two edges, each {\"panel\": name, \"edge\": number}, and \"right_wrong\" after them if one is turned over";
+    let (pair, right_wrong) = match at.list(expected)? {
+        [a, b] => ([a, b], false),
+        [a, b, Value::String(flag)] if flag == "right_wrong" => ([a, b], true),
+        _ => return Err(at.wrong(expected)),
+    };
+    let side = |value: &Value| -> Result<EdgeAt, PatternError> {
+        let at = At::new(value, at.place.clone());
+        let object = at.object(expected)?;
+        let (Some(Value::String(name)), Some(edge)) = (object.get("panel"), object.get("edge").and_then(Value::as_u64))
+        else {
+            return Err(at.wrong(expected));
+        };
+        let known = || panels.iter().map(|p| p.name.clone()).collect();
+        let panel = panels.iter().position(|p| p.name == *name);
+        let panel =
+            panel.ok_or_else(|| PatternError::NoPanel { stitch: number, found: name.clone(), known: known() })?;
+        let last = panels[panel].edges.len() - 1;
+        let place = usize::try_from(edge).ok().filter(|&e| e <= last);
+        let missing = || PatternError::NoEdge { stitch: number, panel: name.clone(), found: edge, last };
+        Ok(EdgeAt { panel, edge: place.ok_or_else(missing)? })
+    };
+    Ok(Stitch { sides: [side(pair[0])?, side(pair[1])?], right_wrong })
+}

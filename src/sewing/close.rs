@@ -1,0 +1,219 @@
+//! Seams drawn shut: from panels held about the body to a garment on it, by geometry alone.
+//!
+//! What is sewn has one vertex for both sides of a seam, at the mean of two places that may be half a metre apart. The cloth is given
+//! back its shape by as-rigid-as-possible steps (Sorkine, Alexa: "As-rigid-as-possible surface modeling", SGP 2007; its planar
+//! form by Liu, Zhang, Xu, Gotsman, Gortler, SGP 2008): with F_t the 3×2 map from the flat triangle t to its place,
+//!
+//! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²,
+//!
+//! in turn for the isometries R_t nearest to F_t, which is a polar decomposition each, and for x, which is one sparse
+//! solve for three right sides. A vertex nearer to the body than the gap is drawn to y_c, the point at the gap above
+//! the nearest of the body, and is free again when the cloth draws it away; no vertex goes farther in a step than a limb is thick, so
+//! that none passes through one. There is no friction and no bending, and gravity only where a skirt is to hang from its held waist inside the
+//! arms (− Σ γ A_i z_i, added to E): it is a placement, not a drape.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | A_t | rest area | m² |
+//! | w | weight of a contact | – |
+//! | m | weight of staying, for what nothing holds | – |
+//! | x' | positions before the step | m |
+//! | γ | weight over stiffness, [`HANGING`] | 1/m |
+//!
+//! Source: the two papers; contacts are ours. Limits: cloth may pass through cloth.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side};
+use glam::{DMat2, DVec2, DVec3};
+
+use crate::distance::Body;
+use crate::mesh::{RestShape, TriMesh};
+
+/// Weight of a contact against a vertex's own of some 3.5: a step closes most of its gap, and cloth still slides along the body.
+const CONTACT: f64 = 3.0;
+
+/// Weight of staying.
+const STAY: f64 = 1e-3;
+
+/// Longest way of a vertex in one step, m: a wrist is 5 cm thick.
+const LONGEST_STEP: f64 = 0.02;
+
+/// γ, 1/m: half a metre of cloth stretches by a fortieth where it hangs by its weight.
+const HANGING: f64 = 0.1;
+
+/// Weight of staying of what is held.
+const HELD: f64 = 1e3;
+
+/// How a garment is drawn shut.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Closing<'a> {
+    /// What is held while the rest hangs; nothing hangs where there is none.
+    pub(super) held: &'a [u32],
+    /// Distance kept from the body, m.
+    pub(super) gap: f64,
+    /// At most so many steps.
+    pub(super) steps: usize,
+    /// Steps end where no vertex goes farther than this, m.
+    pub(super) still: f64,
+}
+
+/// What stays the same from step to step: triangles, their maps, and the matrix's places.
+struct Shape {
+    triangles: Vec<[u32; 3]>,
+    /// Columns: weights of the corners in the two columns of F.
+    gradients: Vec<[DVec2; 3]>,
+    areas: Vec<f64>,
+    /// Lower half of Σ A ∇ᵀ∇, sorted by column.
+    entries: Vec<Triplet<u32, u32, f64>>,
+}
+
+impl Shape {
+    fn new(mesh: &TriMesh, rest: &RestShape, held: &[u32]) -> Self {
+        let (mut gradients, mut areas) = (Vec::new(), Vec::new());
+        let mut terms: Vec<((u32, u32), f64)> = (0..mesh.vertex_count() as u32).map(|v| ((v, v), STAY)).collect();
+        for (triangle, &[a, b, c]) in mesh.triangles.iter().zip(&rest.corners) {
+            let inverse = DMat2::from_cols(b - a, c - a).inverse();
+            let (of_b, of_c) = (inverse.row(0), inverse.row(1));
+            let of = [-of_b - of_c, of_b, of_c];
+            let area = 0.5 * (b - a).perp_dot(c - a);
+            for i in 0..3 {
+                for j in 0..3 {
+                    if triangle[i] >= triangle[j] {
+                        terms.push(((triangle[j], triangle[i]), area * of[i].dot(of[j])));
+                    }
+                }
+            }
+            gradients.push(of);
+            areas.push(area);
+        }
+        terms.extend(held.iter().map(|&v| ((v, v), HELD)));
+        // A stable sort keeps the order of the sums.
+        terms.sort_by_key(|term| term.0);
+        let mut entries: Vec<Triplet<u32, u32, f64>> = Vec::new();
+        for ((column, row), value) in terms {
+            match entries.last_mut() {
+                Some(last) if (last.col, last.row) == (column, row) => last.val += value,
+                _ => entries.push(Triplet::new(row, column, value)),
+            }
+        }
+        Self { triangles: mesh.triangles.clone(), gradients, areas, entries }
+    }
+
+    /// Adds the weight.
+    fn hang(&self, side: &mut [DVec3]) {
+        for (triangle, area) in self.triangles.iter().zip(&self.areas) {
+            triangle.iter().for_each(|&v| side[v as usize].z -= HANGING * area / 3.0);
+        }
+    }
+
+    /// Right side: Σ A ∇ᵀ R + m x'.
+    fn right_side(&self, x: &[DVec3]) -> Vec<DVec3> {
+        let mut side: Vec<DVec3> = x.iter().map(|x| STAY * *x).collect();
+        for ((triangle, of), area) in self.triangles.iter().zip(&self.gradients).zip(&self.areas) {
+            let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
+            for (&i, of) in triangle.iter().zip(of) {
+                u += x[i as usize] * of.x;
+                v += x[i as usize] * of.y;
+            }
+            let [u, v] = nearest_isometry(u, v);
+            for (&i, of) in triangle.iter().zip(of) {
+                side[i as usize] += *area * (u * of.x + v * of.y);
+            }
+        }
+        side
+    }
+}
+
+/// R of F = R S, S = (FᵀF)^½ by Cayley and Hamilton.
+fn nearest_isometry(u: DVec3, v: DVec3) -> [DVec3; 2] {
+    let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
+    let root = (a * c - b * b).max(0.0).sqrt();
+    let trace = (a + c + 2.0 * root).sqrt();
+    // S⁻¹ = (FᵀF + √det)⁻¹ · trace; a triangle folded to a line takes the nearest there is.
+    let (p, q) = (a + root, c + root);
+    let determinant = p * q - b * b;
+    if determinant <= 1e-18 * (p * q).max(1e-300) {
+        return [u.normalize_or(DVec3::X), v.normalize_or(DVec3::Y)];
+    }
+    let scale = trace / determinant;
+    [(u * q - v * b) * scale, (v * p - u * b) * scale]
+}
+
+/// Draws a garment at `start` (m) shut; returns where its vertices come to lie and how many steps that took.
+pub(super) fn close(
+    mesh: &TriMesh,
+    rest: &RestShape,
+    body: &Body,
+    start: &[DVec3],
+    how: Closing<'_>,
+) -> (Vec<DVec3>, usize) {
+    let n = start.len();
+    let mut shape = Shape::new(mesh, rest, how.held);
+    let diagonal: Vec<usize> =
+        (shape.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
+    let own: Vec<f64> = diagonal.iter().map(|&i| shape.entries[i].val).collect();
+    let mut x = start.to_vec();
+    let mut symbolic: Option<SymbolicLlt<u32>> = None;
+    for step in 0..how.steps {
+        let mut side = shape.right_side(&x);
+        how.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
+        if !how.held.is_empty() {
+            shape.hang(&mut side);
+        }
+        for (v, near) in body.nearest_all(&x).iter().enumerate() {
+            let touches = near.signed_distance < how.gap;
+            shape.entries[diagonal[v]].val = own[v] + if touches { CONTACT } else { 0.0 };
+            if touches {
+                side[v] += CONTACT * (near.point + how.gap * near.normal);
+            }
+        }
+        let Some(solved) = solve(&shape.entries, n, &side, &mut symbolic) else { return (x, step) };
+        let mut farthest = 0.0_f64;
+        for (x, to) in x.iter_mut().zip(solved) {
+            let way = (to - *x).clamp_length_max(LONGEST_STEP);
+            farthest = farthest.max(way.length());
+            *x += way;
+        }
+        if farthest < how.still {
+            return (x, step + 1);
+        }
+    }
+    (x, how.steps)
+}
+
+/// One solve for three right sides; `None` where the matrix is not positive.
+fn solve(
+    entries: &[Triplet<u32, u32, f64>],
+    n: usize,
+    side: &[DVec3],
+    symbolic: &mut Option<SymbolicLlt<u32>>,
+) -> Option<Vec<DVec3>> {
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, entries).ok()?;
+    if symbolic.is_none() {
+        *symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok();
+    }
+    let factor = Llt::try_new_with_symbolic(symbolic.clone()?, matrix.as_ref(), Side::Lower).ok()?;
+    let right = Mat::from_fn(n, 3, |i, k| side[i][k]);
+    let solved = factor.solve(&right);
+    Some((0..n).map(|i| DVec3::new(solved[(i, 0)], solved[(i, 1)], solved[(i, 2)])).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_isometry_is_one_and_leaves_rotations_alone() {
+        let turned = [DVec3::new(0.0, 0.6, 0.8), DVec3::new(1.0, 0.0, 0.0)];
+        let [u, v] = nearest_isometry(turned[0], turned[1]);
+        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-14);
+        // R S with S symmetric and positive gives R back.
+        let s = [[1.3, 0.2], [0.2, 0.4]];
+        let [u, v] = [0, 1].map(|k| turned[0] * s[0][k] + turned[1] * s[1][k]);
+        let [u, v] = nearest_isometry(u, v);
+        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-12, "{u} {v}");
+        assert!(nearest_isometry(DVec3::X, DVec3::X).iter().all(|c| c.is_finite()));
+    }
+}

@@ -1,0 +1,106 @@
+//! Patterns that cannot be used, and what is said of them.
+
+use partwise::pattern::SewingPattern;
+use serde_json::{Value, json};
+
+use crate::{pattern, stitch, straight};
+
+const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]];
+
+fn said(text: &str) -> String {
+    SewingPattern::parse(text, "test").unwrap_err().to_string()
+}
+
+fn with(edit: impl Fn(&mut Value)) -> String {
+    let mut panel = straight(&SQUARE, 20.0);
+    edit(&mut panel);
+    said(&pattern(&json!({ "left_front": panel }), &json!([])))
+}
+
+fn names(said: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(said.contains(part), "{said:?} does not name {part:?}");
+    }
+}
+
+#[test]
+fn panels_that_cannot_be_used_are_named_with_their_edge() {
+    names(&with(|p| p["edges"][2]["endpoints"] = json!([2, 9])), &["left_front", "edge 2", "[2,9]", "0 to 3"]);
+    names(&with(|p| p["edges"][2]["endpoints"] = json!([0, 3])), &["left_front", "edge 2", "vertex 0", "expected 2"]);
+    names(&with(|p| p["vertices"][1] = json!([1e9, 0.0])), &["left_front", "vertex 1", "1000000000"]);
+    names(&with(|p| p["vertices"][1] = json!(["x", 0.0])), &["left_front", "vertex 1"]);
+    names(&with(|p| p["vertices"][1] = json!([0.0, 0.0])), &["left_front", "edge 0", "0.01 cm"]);
+    names(&with(|p| p["vertices"][2] = json!([-5.0, 20.0])), &["left_front", "edges 1 and 3", "cross"]);
+    names(&with(|p| p["vertices"][1] = json!([0.0, 60.0])), &["left_front", "cross"]);
+    names(&with(|p| p["edges"] = json!([])), &["left_front", "0 edges"]);
+    names(&with(|p| p["edges"][1]["curvature"] = json!({ "type": "spline", "params": [] })), &["edge 1", "spline"]);
+    names(
+        &with(|p| p["edges"][1]["curvature"] = json!({ "type": "circle", "params": [3.0, 0, 0] })),
+        &["edge 1", "radius 3", "20"],
+    );
+    names(&with(|p| drop(p.as_object_mut().unwrap().remove("vertices"))), &["left_front", "vertices"]);
+    // An edge that bulges over the other side.
+    names(
+        &with(|p| p["edges"][0]["curvature"] = json!({ "type": "quadratic", "params": [[0.5, 2.5]] })),
+        &["left_front", "edges 0 and 2", "cross"],
+    );
+}
+
+#[test]
+fn stitches_that_cannot_be_sewn_are_named() {
+    let panels = json!({ "a": straight(&SQUARE, 20.0), "b": straight(&SQUARE, -20.0) });
+    let of = |stitches: Value| said(&pattern(&panels, &stitches));
+    names(&of(json!([stitch(("a", 0), ("c", 0))])), &["stitch 0", "\"c\"", "a, b"]);
+    names(&of(json!([stitch(("a", 0), ("b", 4))])), &["stitch 0", "panel b", "edge 4", "0 to 3"]);
+    names(
+        &of(json!([stitch(("a", 0), ("b", 0)), stitch(("b", 0), ("a", 1))])),
+        &["stitches 0 and 1", "edge 0 of panel b"],
+    );
+    // Three in a triangle.
+    names(
+        &of(json!([stitch(("a", 0), ("b", 0)), stitch(("b", 0), ("b", 1)), stitch(("b", 1), ("a", 0))])),
+        &["stitches 0 and 1", "edge 0 of panel b"],
+    );
+    names(&of(json!([stitch(("a", 0), ("a", 0))])), &["edge 0 of panel a"]);
+    names(&of(json!([[{ "panel": "a", "edge": -1 }, { "panel": "b", "edge": 0 }]])), &["stitch 0"]);
+    names(&of(json!([[{ "panel": "a", "edge": 0 }]])), &["stitch 0", "two edges"]);
+    let narrow = json!({ "a": straight(&SQUARE, 20.0), "b": straight(&[[0.0, 0.0], [3.0, 0.0], [3.0, 40.0], [0.0, 40.0]], -20.0) });
+    names(
+        &said(&pattern(&narrow, &json!([stitch(("a", 0), ("b", 0))]))),
+        &["stitch 0", "a.0", "40.0 cm", "b.0", "3.0 cm"],
+    );
+}
+
+#[test]
+fn what_is_no_pattern_is_refused() {
+    names(&said("v 0 0 0"), &["no JSON"]);
+    names(&said("[1, 2]"), &["the file", "[1,2]"]);
+    names(&said("{}"), &["\"pattern\""]);
+    names(&said(&pattern(&json!({}), &json!([]))), &["0 panels"]);
+    // Python writes these, JSON has no such number.
+    let text = pattern(&json!({ "a": straight(&SQUARE, 20.0) }), &json!([])).replacen("40.0", "NaN", 1);
+    names(&said(&text), &["no JSON", "line 1"]);
+    let long = format!("{{\"pattern\": \"{}\"}}", "x".repeat(10 << 20));
+    names(&said(&long), &["10.0 MB", "4 MB"]);
+    let deep = "[".repeat(100_000);
+    names(&said(&deep), &["no JSON"]);
+}
+
+#[test]
+fn what_is_not_understood_is_said() {
+    let mut panel = straight(&SQUARE, 20.0);
+    panel["grain"] = json!(45);
+    let read = SewingPattern::parse(&pattern(&json!({ "a": panel }), &json!([])), "test").unwrap();
+    names(&read.notes.join("\n"), &["panel a", "grain"]);
+}
+
+#[test]
+fn edge_lengths_have_bounds() {
+    let read = SewingPattern::parse(&pattern(&json!({ "a": straight(&SQUARE, 20.0) }), &json!([])), "test").unwrap();
+    for wrong in [0.0, -1.0, f64::NAN, 1e-9, 3.0, f64::INFINITY] {
+        names(&read.sew(wrong).unwrap_err().to_string(), &["edge length", "0.2 to 20 cm"]);
+    }
+    let large: Vec<[f64; 2]> = SQUARE.iter().map(|v| v.map(|x| 50.0 * x)).collect();
+    let read = SewingPattern::parse(&pattern(&json!({ "a": straight(&large, 20.0) }), &json!([])), "test").unwrap();
+    names(&read.sew(0.002).unwrap_err().to_string(), &["250000", "longer"]);
+}

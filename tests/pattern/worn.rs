@@ -1,0 +1,78 @@
+//! Patterns on the dress form.
+
+use std::path::Path;
+
+use partwise::mesh::import::{Beside, ImportOptions, import_garment};
+use partwise::mesh::{Axis, Unit};
+use partwise::pattern::SewingPattern;
+use partwise::sewing::Landmarks;
+use partwise::shapes::{BodySpec, dress_form};
+use partwise::{DVec3, SceneSpec};
+
+fn asset(name: &str) -> String {
+    format!("{}/assets/patterns/{name}.json", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn the_forms_marks_are_found() {
+    let form = dress_form(&BodySpec::default()).unwrap();
+    let found = Landmarks::of(&form);
+    let near = |found: Option<f64>, expected: f64, by: f64| {
+        assert!(found.is_some_and(|z| (z - expected).abs() < by), "{found:?}, expected {expected}");
+    };
+    // Of a stature of 1.68 m: waists lie at 0.62 to 0.67 of it, armpits at 0.73 to 0.77.
+    near(found.waist_z, 1.68 * 0.645, 0.045);
+    near(found.armpit_z, 1.68 * 0.75, 0.035);
+    near(found.arm_fall, f64::to_radians(50.0), 0.05);
+    assert!(found.middle.length() < 0.02 && found.facing == 0.0, "{found:?}");
+    // Turned about, it is found turned.
+    let turn = glam::DMat3::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    let turned = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| turn * p).collect()));
+    assert!((turned.facing - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{turned:?}");
+    near(turned.arm_fall, f64::to_radians(50.0), 0.05);
+}
+
+#[test]
+fn patterns_are_drawn_shut_about_the_body() {
+    for (name, held) in [("tshirt", false), ("skirt", true)] {
+        let loaded = SceneSpec { edge_cm: 2.5, ..SceneSpec::new("form", asset(name)) }.load().unwrap();
+        let scene = &loaded.scene;
+        let inside =
+            scene.body.nearest_all(&scene.garment.positions).iter().filter(|n| n.signed_distance < 0.0).count();
+        assert_eq!(inside, 0, "{name}");
+        let mut strains: Vec<f64> = (scene.garment.triangles.iter().zip(&scene.rest.corners))
+            .flat_map(|(t, c)| {
+                let x = t.map(|v| scene.garment.positions[v as usize]);
+                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| x[i].distance(x[j]) / c[i].distance(c[j]) - 1.0)
+            })
+            .collect();
+        strains.sort_by(f64::total_cmp);
+        let p95 = strains[strains.len() * 95 / 100];
+        assert!(p95 < 0.1, "{name}: strain P95 {p95} before any drape");
+        assert_eq!(!scene.held.is_empty(), held, "{name}");
+        assert!(scene.let_go);
+        let again = SceneSpec { edge_cm: 2.5, ..SceneSpec::new("form", asset(name)) }.load().unwrap();
+        assert_eq!(again.scene.garment, scene.garment);
+    }
+}
+
+#[test]
+fn an_exported_garment_keeps_its_panels_and_its_flat_pattern() {
+    let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("tshirt")) }.load().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.obj");
+    let moved: Vec<DVec3> = loaded.scene.garment.positions.iter().map(|p| *p + DVec3::Z).collect();
+    loaded.write(&path, &moved).unwrap();
+    let options = ImportOptions { unit: Some(Unit::M), up: Some(Axis::Z), ..ImportOptions::default() };
+    let back = import_garment(&path, &options, &Beside::Bounds(DVec3::ZERO, DVec3::ONE)).unwrap();
+    assert_eq!(back.mesh.groups, ["front", "back"]);
+    assert_eq!(back.mesh.triangles, loaded.scene.garment.triangles);
+    assert_eq!(back.mesh.positions, moved);
+    let rest = partwise::mesh::RestShape::from_texture(&back.mesh, &back.texture, 1.0).unwrap();
+    for (a, b) in rest.areas().iter().zip(loaded.scene.rest.areas()) {
+        assert!((a - b).abs() < 1e-12);
+    }
+    let pattern = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap();
+    assert_eq!(pattern.stitches.len(), 8);
+    assert!(pattern.to_svg().matches("<path").count() >= 2 + 2 + 16);
+}
