@@ -307,3 +307,26 @@ fn help_teaches_and_mistakes_exit_with_two() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("fake.rrd"));
 }
+
+#[test]
+fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
+    let bench = Bench::new();
+    json(&bench.drape(&["--no-save", "--export", "draped.obj", "--format", "json"]));
+    let certified = |garment: &str| {
+        let check = ["check", "body.obj", garment, "--rest", "garment.obj", "--unit", "m", "--up", "z"];
+        bench.run(&[&check[..], &["--certificate", "--format", "json"]].concat())
+    };
+    let passes = |output: &Output, name: &str| -> bool {
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let findings = report["certificate"]["findings"].as_array().unwrap();
+        findings.iter().find(|f| f["name"] == name).unwrap()["passes"].as_bool().unwrap()
+    };
+    let at_rest = certified("draped.obj");
+    for line in ["residual", "forces add up", "friction", "inside the body", "largest strain"] {
+        assert!(passes(&at_rest, line), "{line}: {}", String::from_utf8_lossy(&at_rest.stdout));
+    }
+    let floating = certified("garment.obj");
+    assert_eq!(floating.status.code(), Some(1));
+    assert!(!passes(&floating, "residual"));
+    assert!(String::from_utf8_lossy(&floating.stderr).contains("not certified"));
+}

@@ -9,6 +9,7 @@ use hyper::body::Bytes;
 use tokio::sync::watch;
 
 use super::access::random_token;
+use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 use crate::parts::Parts;
 use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
@@ -164,7 +165,8 @@ fn encode(
     if let Some(found) = now.sectioned.as_ref().filter(|s| s.ground.generation == generation) {
         let known = encoded.parts.as_ref();
         if !known.is_some_and(|(p, f)| Arc::ptr_eq(p, &found.parts) && Arc::ptr_eq(f, &found.force_n)) {
-            made[1] = Some(encoder.parts(&found.parts.part_of_vertex, found.parts.len(), &found.force_n)?);
+            let levels = LevelCount::all(&found.table, &found.parts);
+            made[1] = Some(encoder.parts(&found.parts.part_of_vertex, &levels, found.parts.len(), &found.force_n)?);
             encoded.parts = Some((Arc::clone(&found.parts), Arc::clone(&found.force_n)));
         }
     }

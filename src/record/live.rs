@@ -27,6 +27,7 @@ use super::meshes::{self, CellMesh};
 use super::open::application;
 use super::paths;
 use super::step::{FORCE_QUANTILE, covering, part_arrows};
+use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 
 const PARTS: &str = "/parts";
@@ -73,7 +74,7 @@ pub struct LiveEncoder {
     garment: TriMesh,
     cells: CellMesh,
     eye: Eye,
-    vertex_colour: Vec<u8>,
+    vertex_shade: Vec<u8>,
 }
 
 impl LiveEncoder {
@@ -95,7 +96,7 @@ impl LiveEncoder {
             garment: TriMesh::default(),
             cells: CellMesh::new(&TriMesh::default()),
             eye: Eye::default(),
-            vertex_colour: Vec::new(),
+            vertex_shade: Vec::new(),
         })
     }
 
@@ -107,7 +108,7 @@ impl LiveEncoder {
         if self.garment != *garment {
             self.garment = garment.clone();
             self.cells = CellMesh::new(garment);
-            self.vertex_colour.clear();
+            self.vertex_shade.clear();
         }
         let views = 3 + pins.len();
         self.eye = Eye::on(garment, self.front, ROOM / views as f64).unwrap_or_default();
@@ -134,23 +135,23 @@ impl LiveEncoder {
         drained(&storage)
     }
 
-    /// Which PART each vertex belongs to, and the body's reaction on each, N (none: no arrows).
+    /// Which PART each vertex belongs to, the levels that made them, and the body's reaction on each, N (none: no arrows).
     ///
     /// # Errors
     /// Arrays that do not fit the garment, and what Rerun refuses.
     pub fn parts(
         &mut self,
         part_of_vertex: &[u32],
+        levels: &[LevelCount],
         part_count: usize,
         force_n: &[DVec3],
     ) -> Result<Vec<u8>, RecordError> {
         RecordError::unless_per_vertex(self.garment.vertex_count(), &[("PART numbers", part_of_vertex.len())])?;
         let part_of_vertex = covering(part_of_vertex, part_count);
         let with_rest = part_count + usize::from(part_of_vertex.contains(&(part_count as u32)));
-        let chosen = colour_parts(&part_of_vertex, with_rest, &self.garment.triangles, &self.vertex_colour);
-        self.vertex_colour = part_of_vertex.iter().map(|&p| chosen[p as usize]).collect();
-        let palette = colours::palette();
-        let coloured = self.cells.colours(|v| palette[self.vertex_colour[v as usize] as usize]);
+        let chosen = colour_parts(&part_of_vertex, with_rest, levels, &self.garment.triangles, &self.vertex_shade);
+        self.vertex_shade = part_of_vertex.iter().map(|&p| chosen.shade[p as usize]).collect();
+        let coloured = self.cells.colours(|v| chosen.colour[part_of_vertex[v as usize] as usize]);
         self.stream.log_static(format!("{PARTS}/garment"), &coloured)?;
         let arrows = if force_n.len() == part_count {
             let mut force_n = force_n.to_vec();

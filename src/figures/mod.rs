@@ -3,75 +3,23 @@
 //! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
 //! reference drape is there where somebody asked for one.
 
+mod levels;
+
 use glam::DVec3;
+pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
 use crate::drape::Drape;
 use crate::mesh::self_intersection::crossing_pairs;
-use crate::parts::Parts;
 use crate::quantile::nearest_rank;
-use crate::range_table::{Extent, METRES_PER_CM, RangeTable};
 use crate::scene::Scene;
 
 /// Strain above which a result is no garment that could be worn.
 const TORN: f64 = 0.5;
 /// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
 const SANK_MM: f64 = 100.0;
-
-/// One level of a range table on a garment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LevelCount {
-    /// Its number, from 1, nearest the body.
-    pub level: usize,
-    /// Lower value, cm.
-    pub lower_cm: f64,
-    /// Upper value, cm; infinite for the open last level, which is `null` in JSON.
-    pub upper_cm: f64,
-    /// The extent its PARTs are cut to by the table itself, cm.
-    #[serde(rename = "extent_cm")]
-    pub extent: Option<Extent>,
-    /// Vertices in it.
-    pub vertices: usize,
-    /// PARTs in it.
-    pub parts: usize,
-}
-
-impl LevelCount {
-    /// The levels of `table`, and what `parts`, made by it, has in each.
-    #[must_use]
-    pub fn all(table: &RangeTable, parts: &Parts) -> Vec<Self> {
-        let levels = table.effective_levels();
-        let mut counts: Vec<Self> = (levels.iter().enumerate())
-            .map(|(index, l)| Self {
-                level: index + 1,
-                lower_cm: l.lower_cm,
-                upper_cm: l.upper_cm,
-                extent: l.extent,
-                vertices: 0,
-                parts: 0,
-            })
-            .collect();
-        for part in &parts.parts {
-            counts[part.level as usize].parts += 1;
-            counts[part.level as usize].vertices += part.vertices.len();
-        }
-        counts
-    }
-
-    /// Lower value, m.
-    #[must_use]
-    pub fn lower_m(&self) -> f64 {
-        self.lower_cm * METRES_PER_CM
-    }
-
-    /// Upper value, m.
-    #[must_use]
-    pub fn upper_m(&self) -> f64 {
-        self.upper_cm * METRES_PER_CM
-    }
-}
 
 /// The figures of one drape. The names are the keys of `--format json` and the columns of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
