@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod client;
+mod watching;
 
 use std::io::{BufReader, Write as _};
 use std::process::Command;
