@@ -23,7 +23,7 @@ use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
 pub(crate) use levels::Levels;
-pub(crate) use parts::{StageTwo, approach, stage_one, stage_two, told};
+pub(crate) use parts::{ENOUGH, StageTwo, approach, stage_one, stage_two, told};
 pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 

@@ -153,6 +153,10 @@ async fn patch(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<
         }
     };
     if kind == "application/json" {
+        // A list would do for a structure.
+        if bytes.trim_ascii_start().first() != Some(&b'{') {
+            return Err((StatusCode::BAD_REQUEST, "expected an object such as {\"fabric\": \"denim\"}".to_owned()));
+        }
         let edit: Edit = serde_json::from_slice(&bytes).map_err(|e| malformed(&e))?;
         edit.names().into_iter().try_for_each(|name| known(name, &files))?;
         return changed(site, move |session| session.submit(&edit, gesture)).await;

@@ -136,8 +136,13 @@ try {
   // A PART is picked where the garment is in the middle of the first view.
   const scene = await page.locator("#scene").boundingBox();
   for (const [across, down] of [[0.1, 0.45], [0.12, 0.5], [0.13, 0.4], [0.125, 0.6]]) {
-    await page.mouse.click(scene.x + across * scene.width, scene.y + down * scene.height);
-    await page.waitForTimeout(700);
+    // A slow machine draws the pointer's way before it hears of the click.
+    await page.mouse.move(scene.x + across * scene.width, scene.y + down * scene.height);
+    await page.waitForTimeout(600);
+    await page.mouse.down();
+    await page.waitForTimeout(200);
+    await page.mouse.up();
+    await page.waitForTimeout(1500);
     if (await page.locator('#part dd[data-name="level"]').count()) break;
   }
   const part = await page.locator("#part").textContent();
