@@ -30,7 +30,7 @@ pub(crate) struct Level {
 #[derive(Debug)]
 pub(crate) struct Levels {
     pub(crate) cloth: Cloth,
-    pub(super) coarser: Vec<Level>,
+    pub(crate) coarser: Vec<Level>,
 }
 
 impl Levels {
@@ -51,17 +51,17 @@ impl Levels {
     }
 
     /// Positions of the level of this number (1: the first coarser one) from those of the full garment.
-    pub(super) fn restrict(&self, level: usize, full: &[DVec3]) -> Vec<DVec3> {
+    pub(crate) fn restrict(&self, level: usize, full: &[DVec3]) -> Vec<DVec3> {
         self.coarser[..level].iter().fold(full.to_vec(), |x, l| l.coarse.restrict(&x))
     }
 
     /// Where the full garment goes from `from` when the level of this number goes to `to`.
-    pub(super) fn prolong(&self, level: usize, from: &[DVec3], to: Vec<DVec3>) -> Vec<DVec3> {
+    pub(crate) fn prolong(&self, level: usize, from: &[DVec3], to: Vec<DVec3>) -> Vec<DVec3> {
         (1..=level).rev().fold(to, |to, l| self.coarser[l - 1].coarse.prolong(&self.restrict(l - 1, from), &to))
     }
 
     /// PARTs of the full garment on a level.
-    pub(super) fn parts(&self, level: usize, parts: &Parts) -> Parts {
+    pub(crate) fn parts(&self, level: usize, parts: &Parts) -> Parts {
         let label = self.coarser[..level].iter().fold(parts.part_of_vertex.clone(), |p, l| l.coarse.restrict(&p));
         let level_of = |label: u32| if label == UNASSIGNED { 0 } else { parts.parts[label as usize].level };
         Parts::from_labels(&self.coarser[level - 1].coarse.topology, &label, level_of, parts.own_extent.clone(), 0)
@@ -82,7 +82,7 @@ impl Level {
         Some(Self { coarse, cloth })
     }
 
-    pub(super) fn mesh(&self) -> &TriMesh {
+    pub(crate) fn mesh(&self) -> &TriMesh {
         &self.coarse.mesh
     }
 
@@ -94,7 +94,7 @@ impl Level {
     }
 
     /// What is draped at this level.
-    pub(super) fn garment<'a>(&'a self, fabric: &'a Fabric) -> Garment<'a> {
+    pub(crate) fn garment<'a>(&'a self, fabric: &'a Fabric) -> Garment<'a> {
         Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth, fabric }
     }
 }

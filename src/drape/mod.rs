@@ -26,7 +26,7 @@ pub use error::DrapeError;
 pub use let_go::LetGo;
 use let_go::Released;
 pub(crate) use levels::Levels;
-pub(crate) use parts::{StageTwo, approach, stage_one, stage_two, told};
+pub(crate) use parts::{ENOUGH, StageTwo, approach, stage_one, stage_two, told};
 pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 

@@ -99,7 +99,7 @@ pub(crate) fn told(p: &coupled::PartResult) -> PartOutcome {
 }
 
 /// Vertices for each PART that a coarse cloth needs: a PART is then some three vertices wide.
-const ENOUGH: usize = 8;
+pub(crate) const ENOUGH: usize = 8;
 
 /// Edges of a fold's width that a cloth needs to make folds: a knit skirt of 4,000 vertices in PARTs of 14 cm ends 20 mm from its rest, and
 /// 40 where it starts on a quarter of them.

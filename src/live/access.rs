@@ -92,6 +92,17 @@ impl Access {
     }
 }
 
+/// Whether it is another site's page that asks, as browsers say of requests without an `Origin` too, a picture's say.
+pub(super) fn check_site(headers: &HeaderMap) -> Result<(), Refused> {
+    match headers.get("sec-fetch-site").map(|value| value.to_str().unwrap_or("(not text)")) {
+        None | Some("same-origin" | "none") => Ok(()),
+        Some(site) => {
+            let said = format!("found Sec-Fetch-Site: {site}, expected this server's own page or none");
+            Err((StatusCode::FORBIDDEN, said))
+        }
+    }
+}
+
 /// Whether a request of this method and right may go on.
 pub(super) fn may(right: Right, method: &Method) -> Result<(), Refused> {
     if right == Right::Control || [Method::GET, Method::HEAD].contains(method) {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
+use std::time::Duration;
 
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
 use hyper::body::{Body, Bytes, Incoming};
@@ -11,7 +12,7 @@ use hyper::{Method, Request, Response, StatusCode, Uri};
 use serde_json::{Value, json};
 use tokio::sync::watch;
 
-use super::access::{Access, Refused, Right, may, query};
+use super::access::{Access, Refused, Right, check_site, may, query};
 use super::body::{Answer, answer, refusal, whole};
 use super::events::{MOST_FLOWS, Place, events, stream};
 use super::pieces::Pieces;
@@ -24,6 +25,9 @@ use crate::session::{Edit, EditError, Session, TableEdit};
 
 /// Bytes of the longest request.
 const LONGEST: usize = 1 << 20;
+
+/// How long a request's body may take.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The page's own files.
 const FILES: [(&str, &str, &str); 7] = [
@@ -64,6 +68,7 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
     site.access.check_origin(request.headers())?;
     let path = request.uri().path().to_owned();
     let Some(of_api) = path.strip_prefix("/api/") else { return file(&request, &path) };
+    check_site(request.headers())?;
     let right = site.access.right(request.headers(), request.uri())?;
     may(right, request.method())?;
     let method = request.method().clone();
@@ -153,6 +158,10 @@ async fn patch(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<
         }
     };
     if kind == "application/json" {
+        // A list would do for a structure.
+        if bytes.trim_ascii_start().first() != Some(&b'{') {
+            return Err((StatusCode::BAD_REQUEST, "expected an object such as {\"fabric\": \"denim\"}".to_owned()));
+        }
         let edit: Edit = serde_json::from_slice(&bytes).map_err(|e| malformed(&e))?;
         edit.names().into_iter().try_for_each(|name| known(name, &files))?;
         return changed(site, move |session| session.submit(&edit, gesture)).await;
@@ -220,10 +229,11 @@ async fn body(request: Request<Incoming>) -> Result<Bytes, Refused> {
     if request.body().size_hint().lower() > LONGEST as u64 {
         return Err(long());
     }
-    match Limited::new(request.into_body(), LONGEST).collect().await {
-        Ok(all) => Ok(all.to_bytes()),
-        Err(error) if error.is::<LengthLimitError>() => Err(long()),
-        Err(error) => Err((StatusCode::BAD_REQUEST, format!("the request broke off: {error}"))),
+    match tokio::time::timeout(PATIENCE, Limited::new(request.into_body(), LONGEST).collect()).await {
+        Ok(Ok(all)) => Ok(all.to_bytes()),
+        Ok(Err(error)) if error.is::<LengthLimitError>() => Err(long()),
+        Ok(Err(error)) => Err((StatusCode::BAD_REQUEST, format!("the request broke off: {error}"))),
+        Err(_) => Err((StatusCode::REQUEST_TIMEOUT, format!("the body did not come in {} s", PATIENCE.as_secs()))),
     }
 }
 

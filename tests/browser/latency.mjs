@@ -1,6 +1,6 @@
 // Times from an edit to its results on the wire, by kind of edit, beside a cold run with the same parameters.
 //
-//     node tests/browser/latency.mjs target/release/partwise [EDITS] [GARMENT] [SEED]
+//     node tests/browser/latency.mjs target/release/partwise [EDITS] [GARMENT] [SEED] [COLD RUNS of each kind]
 //
 // Every edit waits until the one before is finished. `parts`: PARTs and forces, in the answer to PATCH; `preview`: the first event with a
 // preview of the state; `rest`: the garment at rest; `all`: the two stages from the undraped garment and the figures too.
@@ -9,7 +9,7 @@ import { execFile, spawn } from "node:child_process";
 import { promisify } from "node:util";
 
 const run = promisify(execFile);
-const [program = "target/release/partwise", edits = "100", garment = "long-sleeved-dress@10861", seed = "1"] =
+const [program = "target/release/partwise", edits = "100", garment = "long-sleeved-dress@10861", seed = "1", colds = "3"] =
   process.argv.slice(2);
 let random = BigInt(seed);
 function next(n) {
@@ -98,7 +98,8 @@ for (let i = 0; i < Number(edits); i += 1) {
 }
 
 // A cold run of the last few of each kind.
-const { mkdtempSync, writeFileSync } = await import("node:fs");
+server.kill("SIGINT");
+const { appendFileSync, mkdtempSync, writeFileSync } = await import("node:fs");
 const { tmpdir } = await import("node:os");
 const { join } = await import("node:path");
 const folder = mkdtempSync(join(tmpdir(), "latency-"));
@@ -107,7 +108,7 @@ console.log(`${garment}, ${edits} edits, seed ${seed}; ms, median (95th percenti
 console.log("kind              n   parts        preview        rest           all            cold run");
 for (const [kind, { jobs, ...measured }] of Object.entries(times)) {
   const cold = [];
-  for (const job of jobs.slice(-3)) {
+  for (const job of jobs.slice(-Number(colds) || jobs.length)) {
     const table = join(folder, "table.toml");
     const rows = job.table.levels.map((row) => `[${row.join(", ")}]`).join(", ");
     writeFileSync(table, `name = "t"\nunit = "cm"\ngap = "${job.table.gap}"\nlevels = [${rows}]\n`);
@@ -122,5 +123,6 @@ for (const [kind, { jobs, ...measured }] of Object.entries(times)) {
   const cells = [measured.parts, measured.preview, measured.rest, measured.all].map(cell);
   cells[0] = cells[0].trimEnd().padEnd(13);
   console.log(`${kind.padEnd(16)} ${String(jobs.length).padStart(3)}   ${cells.join("")}${quantile(cold, 0.5).toFixed(0)}`);
+  // For who joins several runs.
+  if (process.env.RAW) appendFileSync(process.env.RAW, `${JSON.stringify({ kind, ...measured, cold })}\n`);
 }
-server.kill("SIGINT");

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod client;
+mod watching;
 
 use std::io::{BufReader, Write as _};
 use std::process::Command;
@@ -114,6 +115,7 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
         ("PATCH", "/api/state", vec![json, "Content-Length: 99999999999"], "", 413, "1048576"),
         ("PATCH", "/api/state", vec![json, "Origin: http://evil.example"], "{}", 403, "evil.example"),
         ("GET", "/api/state", vec!["Origin: null"], "", 403, "null"),
+        ("GET", "/api/events", vec!["Sec-Fetch-Site: cross-site"], "", 403, "cross-site"),
         ("GET", "/api/state", vec!["Host: evil.example"], "", 421, "evil.example"),
         ("POST", "/api/state", vec![json], "{}", 405, "PATCH"),
         ("DELETE", "/api/undo", vec![], "", 405, ""),

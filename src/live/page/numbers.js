@@ -75,10 +75,14 @@ function spark(trail) {
   for (const [kind, name, value, top] of lines) {
     const points = trail.map((point, i) => [i, value(point)]).filter(([, v]) => v !== null && v !== undefined);
     const most = Math.max(1e-9, ...points.map(([, v]) => v));
-    const place = ([i, v]) => `${((i + 0.5) / Math.max(1, trail.length)) * (width - 110)},${top + 28 - (v / most) * 24}`;
+    const place = ([i, v]) => `${((i + 0.5) / Math.max(1, trail.length)) * (width - 136)},${top + 28 - (v / most) * 24}`;
     drawn.push(node("polyline", { class: kind, points: points.map(place).join(" ") }));
+    for (const point of points.slice(-1)) {
+      const [cx, cy] = place(point).split(",");
+      drawn.push(node("circle", { class: kind, cx, cy, r: 2.5 }));
+    }
     const last = points.at(-1);
-    drawn.push(node("text", { x: width - 104, y: top + 18 }, `${name}: ${last ? digits(last[1]) : "–"}`));
+    drawn.push(node("text", { x: width - 130, y: top + 18 }, `${name}: ${last ? digits(last[1]) : "–"}`));
   }
   svg.replaceChildren(...drawn);
 }

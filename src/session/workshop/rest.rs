@@ -63,7 +63,7 @@ impl Workshop {
         let (positions, state) = settled(scene, settings, &levels.cloth, refined);
         let rest = Arc::new(AtRest {
             done: true,
-            reaction_n: Arc::new(reactions(&levels.cloth, &positions)),
+            reaction_n: Arc::new(reactions(&levels.cloth, &positions, &state.fit.pressure_kpa)),
             ms: took.as_secs_f64() * 1e3,
             told: Some(Arc::new(state.clone())),
             ..at(&positions, state.residual_over_weight, state.steps)
@@ -141,9 +141,10 @@ fn bound(settings: &Settings, scene: &Scene, drape: &Drape) -> f64 {
     }
 }
 
-/// Force of the body on each vertex where the cloth rests, N: what its weight and the cloth pull with, friction included.
-fn reactions(cloth: &Cloth, x: &[DVec3]) -> Vec<DVec3> {
+/// Force of the body on each vertex that it touches where the cloth rests, N: what its weight and the cloth pull with, friction included.
+fn reactions(cloth: &Cloth, x: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
     let mut gradient = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut gradient);
-    gradient.iter().zip(&cloth.held).map(|(g, held)| if *held { DVec3::ZERO } else { *g }).collect()
+    let carried = cloth.held.iter().zip(pressure_kpa).map(|(held, kpa)| !held && *kpa > 0.0);
+    gradient.iter().zip(carried).map(|(g, carried)| if carried { *g } else { DVec3::ZERO }).collect()
 }

@@ -1,0 +1,73 @@
+//! `--watch`: the same session with a file as its only source of edits, from outside.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::client::GARMENT;
+
+fn watching(table: &Path) -> (Child, Receiver<Value>) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_partwise"))
+        .args(["--garment", GARMENT, "--watch", "--no-save", "--format", "json", "--table"])
+        .arg(table)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let stdout = BufReader::new(child.stdout.take().unwrap());
+    let (sender, results) = channel();
+    std::thread::spawn(move || {
+        for line in stdout.lines().map_while(Result::ok) {
+            let _ = sender.send(serde_json::from_str(&line).unwrap());
+        }
+    });
+    (child, results)
+}
+
+fn save(table: &Path, levels: &str) {
+    std::fs::write(table, format!("name = \"mine\"\nunit = \"cm\"\nlevels = {levels}\n")).unwrap();
+}
+
+#[test]
+fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("mine.toml");
+    save(&table, "[[0, inf]]");
+    let (mut child, results) = watching(&table);
+    // Another file, touched all the time.
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            for i in 0.. {
+                std::fs::write(folder.path().join("other"), i.to_string()).unwrap();
+                std::thread::sleep(Duration::from_millis(30));
+                if over.load(Ordering::SeqCst) {
+                    break;
+                }
+            }
+        });
+        let next = || results.recv_timeout(Duration::from_secs(120)).unwrap()["part_count"].as_u64().unwrap();
+        let first = next();
+        save(&table, "[[0, 2], [2, inf]]");
+        let second = next();
+        assert!(second > first, "{second} PARTs after {first}");
+        // One that cannot be is told, and the next one counts.
+        save(&table, "[[0, 2], [1, inf]]");
+        std::thread::sleep(Duration::from_millis(500));
+        save(&table, "[[0, inf]]");
+        assert_eq!(next(), first);
+        over.store(true, Ordering::SeqCst);
+    });
+    let asked = Instant::now();
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", asked.elapsed());
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(said.contains("row 2 starts at 1"), "{said}");
+}
