@@ -85,8 +85,17 @@ fn two_runs_at_once_on_one_output_and_one_cache_leave_one_whole_file_each() {
     let bench = Bench::new();
     let arguments = [&SCENE[..], &["--save", "one.rrd", "--export", "one.obj", "--accuracy"]].concat();
     for _ in 0..4 {
-        let mut running: Vec<_> =
-            (0..3).map(|_| bench.command().args(&arguments).stderr(std::process::Stdio::null()).stdout(std::process::Stdio::null()).spawn().unwrap()).collect();
+        let mut running: Vec<_> = (0..3)
+            .map(|_| {
+                bench
+                    .command()
+                    .args(&arguments)
+                    .stderr(std::process::Stdio::null())
+                    .stdout(std::process::Stdio::null())
+                    .spawn()
+                    .unwrap()
+            })
+            .collect();
         for child in &mut running {
             assert!(child.wait().unwrap().success());
         }
@@ -136,7 +145,8 @@ fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
     ] {
         let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
         let mut command = Command::new("sh");
-        let run = ended(command.current_dir(bench.0.path()).env("XDG_CACHE_HOME", bench.0.path()).arg("-c").arg(&script));
+        let run =
+            ended(command.current_dir(bench.0.path()).env("XDG_CACHE_HOME", bench.0.path()).arg("-c").arg(&script));
         assert!(matches!(run.code, Some(1 | 2)), "{arguments}: {:?} {}", run.code, run.said);
         assert!(run.said.contains("too large") && !run.said.contains("panicked"), "{arguments}: {}", run.said);
         assert!(run.took < Duration::from_secs(90), "{arguments}: {:?}", run.took);
