@@ -28,8 +28,10 @@ use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
 use partwise::scene::Placement;
 
-/// What one run may take on a machine that is busy with other things.
-const LIMIT: Duration = Duration::from_secs(90);
+/// Processor time that one run may take, s, and how long it may wait: far more than any does. A machine that is busy with other things
+/// makes the second long, not the first.
+const WORK: u64 = 60;
+const LIMIT: Duration = Duration::from_secs(600);
 /// Memory that one run may ask for, KiB: the program and its libraries map two gigabytes before anything is read.
 const MEMORY: u64 = 6 << 20;
 /// Longest message: errors quote, and cut what they quote.
@@ -324,7 +326,7 @@ fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
     }
     let mut command = Command::new("sh");
     command
-        .args(["-c", &format!("ulimit -v {MEMORY}; ulimit -c 0; exec \"$0\" \"$@\""), &program()])
+        .args(["-c", &format!("ulimit -v {MEMORY}; ulimit -t {WORK}; ulimit -c 0; exec \"$0\" \"$@\""), &program()])
         .args(&case.arguments);
     command.current_dir(folder).env("XDG_CACHE_HOME", folder.join("cache")).env("RAYON_NUM_THREADS", "2");
     let (out, err) = (folder.join(".stdout"), folder.join(".stderr"));

@@ -9,7 +9,8 @@ use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use partwise::Job;
-use partwise::drape::Drape;
+use partwise::assess::AssessError;
+use partwise::drape::{self, Drape};
 use partwise::job::{Against, Measured};
 use partwise::record::{Layout, RecordOptions, Recorder};
 use partwise::scene::Loaded;
@@ -175,7 +176,15 @@ impl RunArgs {
         }
         let what = format!("{name}: references");
         let draped = Instant::now();
-        let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
+        let measured = match refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress)) {
+            // The drape is there all the same, and is not lost for what it was to be compared with.
+            Err(error @ (AssessError::Fallen | AssessError::Interrupted)) => {
+                console::warning(&format!("{error}; the drape is kept without its error"));
+                job.accuracy = Against::None;
+                job.measure(&loaded.scene, &drape, None, &mut drape::unobserved)?
+            }
+            other => other?,
+        };
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", load);
         summary.add_time("measure", draped.elapsed());

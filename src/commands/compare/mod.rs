@@ -126,7 +126,10 @@ impl CompareArgs {
         }
         let failed = rows.iter().filter(|row| row.status == Status::Error).count();
         if failed > 0 {
-            anyhow::bail!("{failed} of {} drapes failed: the table says why", rows.len());
+            let text = format!("{failed} of {} drapes failed: the table says why", rows.len());
+            // Body, garment and tables are the user's; a panic is not.
+            let ours = rows.iter().any(|row| row.error.starts_with("panicked"));
+            return Err(if ours { anyhow::Error::msg(text) } else { UserError::new(text) });
         }
         Ok(())
     }
