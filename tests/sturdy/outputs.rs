@@ -85,7 +85,8 @@ fn what_is_written_is_what_the_name_says_and_where_one_works() {
 #[test]
 fn two_runs_at_once_on_one_output_and_one_cache_leave_one_whole_file_each() {
     let bench = Bench::new();
-    let arguments = ["--garment", "flared-skirt@600", "--save", "one.rrd", "--export", "one.obj", "--accuracy", "--cache", "kept"];
+    let arguments =
+        ["--garment", "flared-skirt@600", "--save", "one.rrd", "--export", "one.obj", "--accuracy", "--cache", "kept"];
     for _ in 0..2 {
         let mut running: Vec<_> = (0..3)
             .map(|_| {
@@ -143,7 +144,7 @@ fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
         (0, "sweep sweep.toml --out full --no-save".to_owned()),
         (16, "sweep sweep.toml --out part --accuracy none".to_owned()),
         (8, format!("compare table-3 table-3 {scene} --accuracy none --repeats 1 --save full.rrd")),
-        (0, format!("tune {scene} --levels-only --max-parts 2 --out tuned")),
+        (0, "tune --garment flared-skirt@300 --levels-only --max-parts 2 --out tuned".to_owned()),
         (1, "assets --vertices 200 --out assets".to_owned()),
     ] {
         let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
@@ -164,6 +165,8 @@ fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
 #[test]
 fn a_garment_without_a_rest_is_draped_and_kept_all_the_same() {
     let bench = Bench::new();
-    bench.drape(&["--accuracy", "--save", "kept.rrd"]).with(0, &["falls off the body", "kept without its error", "--hold"]);
+    bench
+        .drape(&["--accuracy", "--save", "kept.rrd"])
+        .with(0, &["falls off the body", "kept without its error", "--hold"]);
     assert!(bench.path("kept.rrd").is_file());
 }
