@@ -3,9 +3,11 @@
 use std::error::Error;
 use std::process::ExitCode;
 
+use partwise::drape::DrapeError;
 use partwise::fabric::FabricError;
 use partwise::files::Unreadable;
 use partwise::live::LiveError;
+use partwise::mechanics::energy::EnergyError;
 use partwise::mechanics::paper::PaperError;
 use partwise::mesh::MeshError;
 use partwise::pattern::PatternError;
@@ -37,7 +39,11 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
 
 fn users_own(cause: &(dyn Error + 'static)) -> bool {
     let store = |error: &StoreError| !matches!(error, StoreError::Write { .. } | StoreError::Io { .. });
+    // A garment of which no vertex is free, say; what the solver itself fails at is ours.
+    let drape = |error: &DrapeError| !matches!(error, DrapeError::Solve(_));
     cause.downcast_ref::<RecordError>().is_some_and(RecordError::is_users)
+        || cause.downcast_ref::<DrapeError>().is_some_and(drape)
+        || cause.is::<EnergyError>()
         || cause.is::<UserError>()
         || cause.is::<MeshError>()
         || cause.is::<SceneError>()

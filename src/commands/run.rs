@@ -8,6 +8,8 @@ use std::time::Instant;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use partwise::Job;
+use partwise::assess::AssessError;
+use partwise::drape;
 use partwise::job::Against;
 use partwise::record::Recorder;
 
@@ -138,7 +140,15 @@ impl RunArgs {
         }
         let what = format!("{name}: references");
         let draped = Instant::now();
-        let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
+        let measured = match refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress)) {
+            // The drape is there all the same, and is not lost for what it was to be compared with.
+            Err(error @ (AssessError::Fallen | AssessError::Interrupted)) => {
+                console::warning(&format!("{error}; the drape is kept without its error"));
+                job.accuracy = Against::None;
+                job.measure(&loaded.scene, &drape, None, &mut drape::unobserved)?
+            }
+            other => other?,
+        };
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", load);
         summary.add_time("measure", draped.elapsed());

@@ -4,6 +4,7 @@
 //! reference drape is there where somebody asked for one.
 
 mod levels;
+mod warnings;
 
 use glam::DVec3;
 pub use levels::LevelCount;
@@ -16,10 +17,6 @@ use crate::mesh::self_intersection::crossing_pairs;
 use crate::quantile::nearest_rank;
 use crate::scene::Scene;
 
-/// Strain above which a result is no garment that could be worn.
-const TORN: f64 = 0.5;
-/// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
-const SANK_MM: f64 = 100.0;
 
 /// The figures of one drape. The names are the keys of `--format json` and the columns of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -116,7 +113,7 @@ impl Figures {
                 scene.body.mesh(),
             )
             .len(),
-            top_sank_mm: top_sank_mm(scene, &drape.positions),
+            top_sank_mm: warnings::top_sank_mm(scene, &drape.positions),
             self_intersecting_pairs: drape.self_intersecting_pairs,
             energy_j: state.map(|s| s.energy),
             residual_over_weight: state.map(|s| s.residual_over_weight),
@@ -217,38 +214,6 @@ impl Figures {
         found
     }
 
-    /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
-    #[must_use]
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        let mut found = Vec::new();
-        if self.top_sank_mm > SANK_MM && scene.held.is_empty() {
-            let groups = match scene.garment.groups.as_slice() {
-                [] => String::new(),
-                groups => format!(", or one of its groups: {}", groups.join(", ")),
-            };
-            found.push(format!(
-                "the garment has slid down: its highest edge sank by {:.0} cm, and nothing holds it; if it has a waistband, hold \
-                 that (--hold top{groups})",
-                0.1 * self.top_sank_mm
-            ));
-        }
-        if self.body_crossing_pairs > 0 {
-            found.push(format!(
-                "skin shows through the cloth: {} pairs of triangles of garment and body cross{}; contact is felt at vertices, so \
-                 a finer garment mesh mends it",
-                self.body_crossing_pairs,
-                if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
-            ));
-        }
-        if let Some(strain) = self.strain_max.filter(|strain| *strain > TORN) {
-            found.push(format!(
-                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
-                1e2 * strain
-            ));
-        }
-        found
-    }
-
     /// What a recording plots over its tables: leaf of `/numbers` and value.
     #[must_use]
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
@@ -270,17 +235,4 @@ impl Figures {
     pub fn error_mm(&self) -> Option<f64> {
         self.rms_mm.or(self.canonical_rms_mm)
     }
-}
-
-/// How far the highest edge, or the highest tenth of a garment without edges, is lower at `positions` (m) than as placed, mm.
-fn top_sank_mm(scene: &Scene, positions: &[DVec3]) -> f64 {
-    let placed = &scene.garment.positions;
-    let top = scene.edge("top").unwrap_or_else(|_| {
-        let mut highest: Vec<u32> = (0..placed.len() as u32).collect();
-        highest.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
-        highest.truncate(placed.len().div_ceil(10));
-        highest
-    });
-    let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
-    1e3 * sank / top.len().max(1) as f64
 }

@@ -16,7 +16,7 @@ use super::step::StepView;
 /// More dots than this would hide the PARTs.
 const MOST: usize = 400;
 /// Radius on screen, points.
-const RADIUS: f32 = 2.2;
+const RADIUS: f32 = 1.4;
 /// Height above the cloth, m.
 const ABOVE_M: f64 = 0.003;
 

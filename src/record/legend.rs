@@ -13,10 +13,12 @@ use super::{Open, RecordError};
 /// its light one: white is read on both if what lies behind is dark. Without a colour of their own Rerun gives each path another.
 pub(super) const TEXT: Color = Color(rerun::Rgba32(0xFFFF_FFFF));
 /// A column's width and a row's height, in the drawing's units: two to four pixels of the viewer's.
-const CELL: [f64; 2] = [150.0, 15.0];
+const CELL: [f64; 2] = [150.0, 19.0];
 /// Where in its cell the strip begins and ends, and how thick it is; the title stands before it, the numbers under it.
 const STRIP: [f64; 2] = [52.0, 142.0];
-const THICKNESS: f64 = 3.2;
+const THICKNESS: f64 = 4.0;
+/// How far under the strip the boxes of the numbers begin: the viewer's own begin above their point.
+const DROP: f64 = 1.8;
 /// Bands of the strip.
 const BANDS: u32 = 48;
 
@@ -65,7 +67,7 @@ impl Legend<'_> {
             let t = f64::from(tick) / f64::from(steps);
             let value = self.range.low + t * (self.range.high - self.range.low);
             let bound = if self.open_end && tick == steps { "≥" } else { "" };
-            places.push(single([at(t), y + THICKNESS]));
+            places.push(single([at(t), y + THICKNESS + DROP]));
             labels.push(format!("{bound}{}", number(value)));
         }
         open.log(&format!("{path}/ticks"), &texts(places, labels))

@@ -21,12 +21,18 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 use readers::Said;
 
 /// What one input may take: far more than any does, on a machine that is busy with other things.
 const LIMIT: Duration = Duration::from_secs(20);
+
+/// A seed and up to three changes.
+fn mutated() -> impl Strategy<Value = (u32, Vec<mutate::Mutation>)> {
+    (any::<u32>(), prop::collection::vec((0_u8..16, any::<u32>(), any::<u32>()), 0..4))
+}
 
 /// What came of an input: a message where it was refused; or what is wrong.
 type Reader = dyn Fn(&str) -> Result<Said, String> + Send + Sync;
@@ -86,7 +92,7 @@ fn fuzz(
         seed[..class.len()].copy_from_slice(class.as_bytes());
         let mut runner = TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &seed));
         let counted = Mutex::new(&mut counts);
-        let outcome = runner.run(&mutate::mutated(), |case| {
+        let outcome = runner.run(&mutated(), |case| {
             let text = input(&case);
             *told.lock().unwrap() = (Instant::now(), text.clone());
             let said = judge(&reader, &text).map_err(TestCaseError::fail)?;

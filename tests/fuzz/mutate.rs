@@ -1,14 +1,7 @@
 //! Texts mutated by their structure: numbers, words and lines, swapped for what breaks readers.
 
-use proptest::prelude::*;
-
 /// One change: what is done, where, and with what; places count modulo what there is, so that any three numbers do.
 pub(crate) type Mutation = (u8, u32, u32);
-
-/// A seed and up to three changes.
-pub(crate) fn mutated() -> impl Strategy<Value = (u32, Vec<Mutation>)> {
-    (any::<u32>(), prop::collection::vec((0_u8..16, any::<u32>(), any::<u32>()), 0..4))
-}
 
 /// Values that were met where numbers or words should be.
 const ODD: [&str; 40] = [

@@ -28,6 +28,12 @@ fn what_the_user_can_mend_ends_with_two() {
     bench.run(&["merge", "body.obj", "--out", "x"]).with(2, &["body.obj", "partwise sweep"]);
     bench.run(&["cusick", "nope"]).with(2, &["nope", "silk"]);
     bench.drape(&["--no-save", "--hold", "cuff"]).with(2, &["garment.obj", "cuff", "no groups"]);
+    bench.write("square.obj", "g all\nv -0.2 -0.2 1.62\nv 0.2 -0.2 1.62\nv 0.2 0.2 1.62\nv -0.2 0.2 1.62\nf 1 2 3 4\n");
+    let held =
+        ["--body", "body.obj", "--garment", "square.obj", "--unit", "m", "--up", "z", "--no-save", "--hold", "all"];
+    bench.run(&held).with(2, &["no vertex is free"]);
+    let tables = ["compare", "table-3", "table-3", "--body", "body.obj", "--garment", "nowhere.obj", "--no-save"];
+    bench.run(&tables).with(2, &["nowhere.obj"]);
     bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
     bench.write("large.toml", "bust_cm = 900\n");
     bench.run(&["--no-save", "--measurements", "large.toml"]).with(2, &["large.toml", "900"]);

@@ -96,6 +96,10 @@ impl CompareArgs {
         let plan = self.plan()?;
         let store = PointStore::in_memory();
         let bench = KeepingBench::new(&store, cache(self.cache.as_ref()));
+        // What cannot be loaded is said before anything is draped, and is the user's to mend.
+        for point in &plan.points {
+            bench.bench.scene(point).map_err(|error| UserError::new(error.to_string()))?;
+        }
         let bar = console::progress(Some(plan.points.len() as u64), "compare");
         let mut rows: Vec<Row> = Vec::new();
         for point in &plan.points {
@@ -122,7 +126,10 @@ impl CompareArgs {
         }
         let failed = rows.iter().filter(|row| row.status == Status::Error).count();
         if failed > 0 {
-            anyhow::bail!("{failed} of {} drapes failed: the table says why", rows.len());
+            let text = format!("{failed} of {} drapes failed: the table says why", rows.len());
+            // Body, garment and tables are the user's; a panic is not.
+            let ours = rows.iter().any(|row| row.error.starts_with("panicked"));
+            return Err(if ours { anyhow::Error::msg(text) } else { UserError::new(text) });
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::changes::Changes;
-use crate::commands::sweep::report::{right, rows_table};
+use crate::commands::sweep::report::{explained, right, rows_table};
 
 /// One table on one garment.
 #[derive(Debug, Clone, Serialize)]
@@ -35,7 +35,7 @@ impl Compared {
 /// For the terminal.
 pub(super) fn text(all: &[Compared]) -> String {
     let rows: Vec<Row> = all.iter().map(|c| c.row.clone()).collect();
-    let mut out = format!("{}\n", rows_table(&rows));
+    let mut out = format!("{}\n{}", rows_table(&rows), explained(&rows));
     for of_garment in all.chunk_by(|a, b| a.row.garment == b.row.garment) {
         let _ = writeln!(
             out,

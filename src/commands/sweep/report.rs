@@ -80,9 +80,9 @@ impl Report<'_> {
     }
 
     fn table(&self) -> String {
-        let mut out = rows_table(self.rows).to_string();
+        let mut out = format!("{}\n{}", rows_table(self.rows), explained(self.rows));
         out.push_str(&format!(
-            "\n{} of {} points done, {} failed; {} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
+            "{} of {} points done, {} failed; {} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
             self.rows.len(),
             self.total,
             self.failed(),
@@ -110,6 +110,16 @@ pub(crate) fn line(recording: &RecordSummary) -> String {
         recording.bytes as f64 / recording.raw_bytes.max(1) as f64,
         recording.log_ms / 1e3
     )
+}
+
+/// What the columns of [`rows_table`] are, where an error was measured.
+pub(crate) fn explained(rows: &[Row]) -> &'static str {
+    let measured = |row: &Row| row.figures.as_ref().is_some_and(|figures| figures.canonical_rms_mm.is_some());
+    if !rows.iter().any(measured) {
+        return "";
+    }
+    "RMS over the vertices, mm. own: to where this drape would settle; canonical: to the drape of the garment as placed, the same for \
+     all tables;\naffine, translation: what one affine map, one displacement, a PART leaves of the canonical drape at best\n"
 }
 
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.

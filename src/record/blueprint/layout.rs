@@ -15,7 +15,9 @@ const STAGE_HEIGHT: f64 = 0.75;
 /// Width of the text panel over that of a stage.
 const REPORT_OVER_STAGE: f32 = 1.25;
 /// Share of a tab's height that a row of colour bars takes: its title bar, the strip and the numbers.
-const BARS_HEIGHT: f32 = 0.1;
+const BARS_HEIGHT: f32 = 0.115;
+/// Height of a view's title bar over that of a tab, in a window of 1280 × 800.
+const TITLE_HEIGHT: f64 = 0.036;
 
 /// What a recording will hold beyond the stages of one drape; each piece gets its views only if it is there.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -98,10 +100,7 @@ impl Layout {
     /// The eye for the views of a tab, which share its width.
     fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
         eye.through(match tab {
-            Tab::Stages | Tab::Numbers => {
-                let wide = if self.error { 5.0 } else { 4.0 } + f64::from(REPORT_OVER_STAGE);
-                ASPECT / (wide * STAGE_HEIGHT)
-            }
+            Tab::Stages | Tab::Numbers => self.stage_grid(eye).1,
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
             Tab::Wrinkles => over_bars(0.5 * ASPECT),
@@ -109,7 +108,28 @@ impl Layout {
         })
     }
 
+    /// How many stages are shown.
+    fn stage_count(&self) -> usize {
+        3 + usize::from(!self.held) + usize::from(self.error)
+    }
+
+    /// In how many rows the stages stand, and width over height of a view: as the garment is largest, a gown in one row, a pullover
+    /// in two.
+    fn stage_grid(&self, eye: &Eye) -> (usize, f64) {
+        let count = self.stage_count() as f64;
+        let width = ASPECT * count / (count + f64::from(REPORT_OVER_STAGE));
+        let view = |rows: usize| {
+            let rows = rows as f64;
+            [width / (count / rows).ceil(), STAGE_HEIGHT / rows - TITLE_HEIGHT]
+        };
+        let scale = |[w, h]: [f64; 2]| (w / eye.half_width.max(1e-9)).min(h / eye.half_height.max(1e-9));
+        let rows = if scale(view(2)) > scale(view(1)) { 2 } else { 1 };
+        let [w, h] = view(rows);
+        (rows, w / h)
+    }
+
     fn stages(&self, eye: &Eye) -> Node {
+        let (rows, _) = self.stage_grid(eye);
         let eye = &self.eye(Tab::Stages, eye);
         let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
         let mut views = vec![seen("Distance", "/distance"), seen("PARTs", "/parts")];
@@ -121,6 +141,13 @@ impl Layout {
             views.push(seen("Error", paths::ERROR));
         }
         let wide = views.len() as f32;
+        let views = match rows {
+            1 => Node::Row("Stages", views),
+            _ => {
+                let lower = views.split_off(views.len().div_ceil(2));
+                Node::Column("Stages", vec![(1.0, Node::Row("Stages", views)), (1.0, Node::Row("Stages", lower))])
+            }
+        };
         let mut below: Vec<(f32, Node)> = vec![
             (1.3, View::bars("Vertices over distance, cm; colours are levels", &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
@@ -131,10 +158,7 @@ impl Layout {
         below.push((1.0, View::plane("Colours", &[paths::STAGES_LEGEND], visible([1, self.stage_bars()])).into()));
         let left = Node::Column(
             "Stages",
-            vec![
-                (STAGE_HEIGHT as f32, Node::Row("Stages", views)),
-                (1.0 - STAGE_HEIGHT as f32, Node::Row("Levels", below)),
-            ],
+            vec![(STAGE_HEIGHT as f32, views), (1.0 - STAGE_HEIGHT as f32, Node::Row("Levels", below))],
         );
         let report = View::text("Report", paths::REPORT).into();
         Node::Row("Stages", vec![(wide, left), (REPORT_OVER_STAGE, report)])
@@ -172,7 +196,7 @@ impl Layout {
             let path = format!("{}/{slot}", paths::COMPARE);
             (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
         });
-        over(Node::Row("Side by side", views.collect()), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
+        over("Side by side", views.collect(), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
     }
 
     fn fit(&self, eye: &Eye) -> Node {
@@ -182,7 +206,7 @@ impl Layout {
             let path = format!("{}/{name}", paths::FIT);
             views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
         }
-        over(Node::Row("Fit", views), "Colours", paths::FIT_LEGEND, self.fit.len())
+        over("Fit", views, "Colours", paths::FIT_LEGEND, self.fit.len())
     }
 }
 
@@ -191,13 +215,13 @@ fn wrinkles(eye: &Eye) -> Node {
         (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
         (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
     ];
-    over(Node::Row("Wrinkles", views), "Colours", paths::WRINKLES_LEGEND, 2)
+    over("Wrinkles", views, "Colours", paths::WRINKLES_LEGEND, 2)
 }
 
 /// Views side by side over a row of colour bars or texts, one for each.
-fn over(views: Node, name: &str, path: &str, columns: usize) -> Node {
+fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, columns: usize) -> Node {
     let bars = View::plane(name, &[path], visible([columns, 1])).into();
-    Node::Column("", vec![(1.0 - BARS_HEIGHT, views), (BARS_HEIGHT, bars)])
+    Node::Column(tab, vec![(1.0 - BARS_HEIGHT, Node::Row(tab, views)), (BARS_HEIGHT, bars)])
 }
 
 /// Width over height of a view that has a row of bars below.
@@ -219,4 +243,34 @@ fn solver(eye: &Eye) -> Node {
 fn capital(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+    use glam::DVec3;
+
+    /// The eye on a garment of this width and height.
+    fn on(width: f64, height: f64) -> Eye {
+        let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+        let corner = |[x, z]: [f64; 2]| DVec3::new(width * x, 0.0, height * z);
+        let sheet = TriMesh::new(corners.map(corner).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+        Eye::on(&sheet, DVec3::NEG_Y, ASPECT).unwrap()
+    }
+
+    #[test]
+    fn a_gown_stands_in_one_row_and_a_pullover_in_two_and_each_fills_its_view() {
+        let layout = Layout::default();
+        for (width, height, rows) in [(0.7, 1.1, 1), (1.5, 0.65, 2)] {
+            let eye = on(width, height);
+            let (found, aspect) = layout.stage_grid(&eye);
+            assert_eq!(found, rows, "{width} × {height}");
+            let seen = eye.through(aspect);
+            // Half the height seen at the garment, and how much of the view it takes along its tighter side.
+            let half = (seen.position - seen.target).dot(seen.toward) * 27.5f64.to_radians().tan();
+            let fills = (seen.half_height / half).max(seen.half_width / (half * aspect));
+            assert!((0.7..1.0).contains(&fills), "{fills}");
+        }
+    }
 }

@@ -1,0 +1,58 @@
+//! What a user should act upon although the numbers alone would reassure, and with what.
+
+use glam::DVec3;
+
+use super::Figures;
+use crate::scene::Scene;
+
+/// Strain above which a result is no garment that could be worn.
+const TORN: f64 = 0.5;
+/// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
+const SANK_MM: f64 = 100.0;
+
+impl Figures {
+    /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
+    #[must_use]
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        let mut found = Vec::new();
+        if self.top_sank_mm > SANK_MM && scene.held.is_empty() {
+            let groups = match scene.garment.groups.as_slice() {
+                [] => String::new(),
+                groups => format!(", or one of its groups: {}", groups.join(", ")),
+            };
+            found.push(format!(
+                "the garment has slid down: its highest edge sank by {:.0} cm, and nothing holds it; if it has a waistband, hold \
+                 that (--hold top{groups})",
+                0.1 * self.top_sank_mm
+            ));
+        }
+        if self.body_crossing_pairs > 0 {
+            found.push(format!(
+                "skin shows through the cloth: {} pairs of triangles of garment and body cross{}; contact is felt at vertices, so \
+                 a finer garment mesh mends it",
+                self.body_crossing_pairs,
+                if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
+            ));
+        }
+        if let Some(strain) = self.strain_max.filter(|strain| *strain > TORN) {
+            found.push(format!(
+                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
+                1e2 * strain
+            ));
+        }
+        found
+    }
+}
+
+/// How far the highest edge, or the highest tenth of a garment without edges, is lower at `positions` (m) than as placed, mm.
+pub(super) fn top_sank_mm(scene: &Scene, positions: &[DVec3]) -> f64 {
+    let placed = &scene.garment.positions;
+    let top = scene.edge("top").unwrap_or_else(|_| {
+        let mut highest: Vec<u32> = (0..placed.len() as u32).collect();
+        highest.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
+        highest.truncate(placed.len().div_ceil(10));
+        highest
+    });
+    let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
+    1e3 * sank / top.len().max(1) as f64
+}
