@@ -18,6 +18,7 @@
 //!
 //! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told with each row, and an error under it says nothing.
 
+mod journal;
 mod lineup;
 mod table;
 
@@ -37,6 +38,7 @@ use crate::mechanics::refine::{RefineOptions, Stop, refine};
 use crate::methods::{self, Dressing, Ended, RestRule};
 use crate::quantile::interpolated;
 use crate::scene::Scene;
+pub use journal::{Conditions, Journal, JournalError};
 pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
 pub use table::{csv_lines, exponents, tables};
 
@@ -105,6 +107,8 @@ pub struct Entry {
 pub struct ContestRow {
     /// The garment.
     pub garment: String,
+    /// Vertices asked for.
+    pub asked: usize,
     /// Its vertices.
     pub vertices: usize,
     /// RMS between canonical drapes of perturbed starts and the canonical one, mm; `None` where none were asked for.
@@ -142,7 +146,7 @@ pub type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()
 /// # Errors
 /// [`ContestError`]; an entrant that fails has an entry that says why.
 pub fn row(
-    garment: &str,
+    (garment, asked): (&str, usize),
     scene: &Scene,
     fabric: &Fabric,
     options: &ContestOptions,
@@ -203,7 +207,8 @@ pub fn row(
         }
         entries.push(entry);
     }
-    Ok(ContestRow { garment: garment.to_owned(), vertices: scene.garment.vertex_count(), spread_mm, entries })
+    let vertices = scene.garment.vertex_count();
+    Ok(ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, entries })
 }
 
 /// Fills in what needs no reference.
