@@ -8,7 +8,8 @@
 //! parameters' own curving puts in (Christoffel's symbols of the flat patch).
 //!
 //! Polar decomposition F = R S gives the frame r_u, r_v, n = r_u × r_v; strains S − 1; and bending strains κ = n·x_uu and so on, which are linear in X once R is fixed: one linear
-//! system a step.
+//! system a step. The force is the whole gradient, with what R's turning adds, which is of second order in the strains: without it coarse cloth, whose patches bend by their own length, turned by itself
+//! and flew off (seen at 600 vertices). Ours; a corotational force as usual leaves it out.
 //!
 //! E = Σ A [½ C_uu ε_u² + C_uv ε_u ε_v + ½ C_vv ε_v² + ½ μ γ² + ½ B_u κ_uu² + ½ H κ_uv² + ½ B_v κ_vv²], H = 4 B_45 − B_u − B_v.
 //!
@@ -33,6 +34,9 @@ const CHUNK: usize = 256;
 /// A floor for H as a share of B_u + B_v, as elsewhere in this project.
 const LEAST_TWIST: f64 = 0.1;
 
+/// Share of its rest area under which an element's own basis is no longer followed.
+const LEAST_AREA: f32 = 0.5;
+
 /// Weights of a control vertex: b_u, b_v, w_uu, w_uv, w_vv.
 pub(super) type Weights = [f32; 5];
 
@@ -54,6 +58,18 @@ struct Frame {
     n: Vec3A,
     /// σ⁺: uu, uv, vv.
     tension: [f32; 3],
+    /// Γ of x_uu, x_uv, x_vv: their parts in the surface, by F's own basis.
+    gamma: [[f32; 2]; 3],
+}
+
+impl Frame {
+    /// What moments take from the pulls along u and v: turning n costs no bending.
+    #[inline]
+    fn in_plane(&self, moments: [f32; 3]) -> [f32; 2] {
+        let sum =
+            |i: usize| moments[0] * self.gamma[0][i] + moments[1] * self.gamma[1][i] + moments[2] * self.gamma[2][i];
+        [sum(0), sum(1)]
+    }
 }
 
 /// What an element pulls with: stresses along u and v, and bending moments along n; times its area.
@@ -172,17 +188,34 @@ impl Elements {
     }
 }
 
-/// Frame and strains of F by its polar decomposition: S = (C + √det C)/√(tr C + 2 √det C), C = FᵀF.
-fn polar(f_u: Vec3A, f_v: Vec3A) -> (Frame, [f32; 3]) {
+/// Frame, strains and stretch S of F by its polar decomposition: S = (C + √det C)/√(tr C + 2 √det C), C = FᵀF.
+fn polar(f_u: Vec3A, f_v: Vec3A, second: [Vec3A; 3]) -> (Frame, [f32; 3], [f32; 3]) {
     let (uu, uv, vv) = (f_u.dot(f_u), f_u.dot(f_v), f_v.dot(f_v));
-    let root = (uu * vv - uv * uv).max(0.0).sqrt();
-    let t = (uu + vv + 2.0 * root).max(f32::MIN_POSITIVE).sqrt();
+    let squared = (uu * vv - uv * uv).max(f32::MIN_POSITIVE);
+    let root = squared.sqrt();
+    let t = (uu + vv + 2.0 * root).sqrt();
     let [s_uu, s_uv, s_vv] = [(uu + root) / t, uv / t, (vv + root) / t];
+    let r_u = (f_u * s_vv - f_v * s_uv) / root;
+    let r_v = (f_v * s_uu - f_u * s_uv) / root;
+    // The dual basis of F; cloth crushed to less than half its area has none to speak of.
+    let held = squared.max(LEAST_AREA * LEAST_AREA);
+    let (a_u, a_v) = ((f_u * vv - f_v * uv) / held, (f_v * uu - f_u * uv) / held);
+    let gamma = second.map(|x| [a_u.dot(x), a_v.dot(x)]);
+    let frame = Frame { r_u, r_v, n: r_u.cross(r_v), tension: [0.0; 3], gamma };
+    (frame, [s_uu - 1.0, s_vv - 1.0, 2.0 * s_uv], [s_uu, s_uv, s_vv])
+}
+
+/// What the stresses pull with along u and v, each by r_u and r_v: K = 2 S T with S T + T S = σ, so that F's power σ : Ṡ is P : Ḟ and
+/// nothing turns by itself. For small strains K is σ.
+fn pulls([s_uu, s_uv, s_vv]: [f32; 3], [a, b, c]: [f32; 3]) -> [[f32; 2]; 2] {
     let det = (s_uu * s_vv - s_uv * s_uv).max(f32::MIN_POSITIVE);
-    let r_u = (f_u * s_vv - f_v * s_uv) / det;
-    let r_v = (f_v * s_uu - f_u * s_uv) / det;
-    let frame = Frame { r_u, r_v, n: r_u.cross(r_v), tension: [0.0; 3] };
-    (frame, [s_uu - 1.0, s_vv - 1.0, 2.0 * s_uv])
+    // adj S · σ · adj S.
+    let (m, n) = ([s_vv * a - s_uv * b, s_vv * b - s_uv * c], [s_uu * b - s_uv * a, s_uu * c - s_uv * b]);
+    let turned = [m[0] * s_vv - m[1] * s_uv, m[1] * s_uu - m[0] * s_uv, n[1] * s_uu - n[0] * s_uv];
+    // Twice T.
+    let over = (s_uu + s_vv) * det;
+    let [t_uu, t_uv, t_vv] = [(det * a + turned[0]) / over, (det * b + turned[1]) / over, (det * c + turned[2]) / over];
+    [[s_uu * t_uu + s_uv * t_uv, s_uv * t_uu + s_vv * t_uv], [s_uu * t_uv + s_uv * t_vv, s_uv * t_uv + s_vv * t_vv]]
 }
 
 /// The part of a symmetric 2×2 matrix that pulls.
@@ -216,17 +249,20 @@ impl Elastic for Elements {
             // All weights sum to nothing: differences keep the digits.
             let base = x[this.vertices[this.starts[e] as usize] as usize];
             let [f_u, f_v, x_uu, x_uv, x_vv] = this.sums(e, |v| (x[v as usize] - base).as_vec3a());
-            let (mut found, strain) = polar(f_u, f_v);
+            let second = [x_uu, x_uv, x_vv];
+            let (mut found, strain, stretch) = polar(f_u, f_v, second);
             let [s_u, s_v, tau] = this.constants.stress(strain);
+            let [[p_uu, p_vu], [p_uv, p_vv]] = pulls(stretch, [s_u, tau, s_v]);
             found.tension = positive_part([s_u, tau, s_v]);
             (*frame, *kept) = (found, strain);
             let (a, n) = (this.areas[e], found.n);
-            let bend = |k: usize, x: Vec3A| a * this.constants.bending[k] * n.dot(x);
+            let moments: [f32; 3] = std::array::from_fn(|k| a * this.constants.bending[k] * n.dot(second[k]));
+            let [m_u, m_v] = found.in_plane(moments);
             Pull {
-                along_u: (found.r_u * s_u + found.r_v * tau) * a,
-                along_v: (found.r_v * s_v + found.r_u * tau) * a,
+                along_u: (found.r_u * p_uu + found.r_v * p_vu) * a - n * m_u,
+                along_v: (found.r_u * p_uv + found.r_v * p_vv) * a - n * m_v,
                 n,
-                moments: [bend(0, x_uu), bend(1, x_uv), bend(2, x_vv)],
+                moments,
             }
         };
         let mut frames = this.frames.clone();
@@ -250,7 +286,12 @@ impl Elastic for Elements {
                 let (f, a) = (&self.frames[*e as usize], self.areas[*e as usize]);
                 let (p, q) = (f.r_u * *b_u, f.r_v * *b_v);
                 let g = f.r_v * *b_u + f.r_u * *b_v;
-                let across = c.bending[0] * w_uu * w_uu + c.bending[1] * w_uv * w_uv + c.bending[2] * w_vv * w_vv;
+                let second = [w_uu, w_uv, w_vv];
+                let across = (0..3).map(|k| {
+                    let w = second[k] - f.gamma[k][0] * b_u - f.gamma[k][1] * b_v;
+                    c.bending[k] * w * w
+                });
+                let across: f32 = across.sum();
                 let [t_u, t, t_v] = f.tension;
                 let across = across + t_u * b_u * b_u + 2.0 * t * b_u * b_v + t_v * b_v * b_v;
                 let rows = [p * c.uu + q * c.uv, q * c.vv + p * c.uv, g * c.shear, f.n * across];
@@ -273,12 +314,15 @@ impl Operator for Elements {
             let [s_u, s_v, tau] = c.stress(strain);
             let (g_u, g_v) = (f.n.dot(d_u), f.n.dot(d_v));
             let [t_u, t, t_v] = f.tension;
-            let bend = |k: usize, x: Vec3A| a * c.bending[k] * f.n.dot(x);
+            let second = [d_uu, d_uv, d_vv];
+            let curving = |k: usize| f.n.dot(second[k]) - f.gamma[k][0] * g_u - f.gamma[k][1] * g_v;
+            let moments: [f32; 3] = std::array::from_fn(|k| a * c.bending[k] * curving(k));
+            let [m_u, m_v] = f.in_plane(moments);
             Pull {
-                along_u: (f.r_u * s_u + f.r_v * tau + f.n * (t_u * g_u + t * g_v)) * a,
-                along_v: (f.r_v * s_v + f.r_u * tau + f.n * (t * g_u + t_v * g_v)) * a,
+                along_u: (f.r_u * s_u + f.r_v * tau + f.n * (t_u * g_u + t * g_v)) * a - f.n * m_u,
+                along_v: (f.r_v * s_v + f.r_u * tau + f.n * (t * g_u + t_v * g_v)) * a - f.n * m_v,
                 n: f.n,
-                moments: [bend(0, d_uu), bend(1, d_uv), bend(2, d_vv)],
+                moments,
             }
         };
         (0..this.count()).into_par_iter().with_min_len(CHUNK).map(pull).collect_into_vec(&mut pulls);

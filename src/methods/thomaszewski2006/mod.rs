@@ -10,7 +10,8 @@
 //! The garment's vertices are the control vertices, and they are what is returned; the limit surface lies inside their folds by an eighth of edge² over
 //! radius (a millimetre and a half where edges of 15 mm bend about 2 cm) and is shown on request.
 //!
-//! Limits: cloth bears compression as it bears tension, so it buckles no finer than its mesh and holds up where it cannot. Contact at the control vertices alone.
+//! Limits: cloth bears compression as it bears tension, so it buckles no finer than its mesh and holds up where it cannot. Contact at the control vertices alone. One quadrature point does not see
+//! control vertices that zigzag about a smooth surface: on coarse meshes, edges of 4 cm and more, they do, and the strain of the garment's own triangles is then well over the surface's.
 
 mod box_spline;
 pub mod elements;
