@@ -63,7 +63,8 @@ const PRINTED: [[f64; 4]; 10] = [
     [1992.0, 2109.0, 2478.0, 1727.0],
 ];
 
-/// The paper's figures for a garment of so many vertices, ms: [19], [20], [21], proposed; `None` for what it has no row for.
+/// The paper's figures for a garment of so many vertices, ms: [19], [20], [21], proposed; `None` for what it has no row
+/// for.
 #[must_use]
 pub fn printed_ms(garment: &str, vertices: usize) -> Option<[f64; 4]> {
     TEN_ROWS.iter().position(|row| *row == (garment, vertices)).map(|i| PRINTED[i])

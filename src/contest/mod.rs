@@ -1,12 +1,12 @@
 //! The paper's Table 4 run again: every way to drape on the same garments, time and error together.
 //!
-//! A row is a garment at a size; an entrant is a way to drape it: the [reference methods](crate::methods), the paper's own equations, the coupled model's
-//! two stages alone, and those with the converged drape after. All drape the same scene in the same fabric on the same threads. Repeats are
-//! interleaved, each entrant once a round, after a round that is not counted; so what else the machine does hits all alike, and ratios are taken round
-//! by round.
+//! A row is a garment at a size; an entrant is a way to drape it: the [reference methods](crate::methods), the paper's
+//! own equations, the coupled model's two stages alone, and those with the converged drape after. All drape the same
+//! scene in the same fabric on the same threads. Repeats are interleaved, each entrant once a round, after a round that
+//! is not counted; so what else the machine does hits all alike, and ratios are taken round by round.
 //!
-//! Time is from the loaded scene to the draped positions; of ours the four stages' sum, without what is measured afterwards; of the methods all they do,
-//! their own preparation included, but for the cloth's masses and areas.
+//! Time is from the loaded scene to the draped positions; of ours the four stages' sum, without what is measured
+//! afterwards; of the methods all they do, their own preparation included, but for the cloth's masses and areas.
 //!
 //! | figure | meaning |
 //! |---|---|
@@ -16,7 +16,8 @@
 //! | own error | RMS distance to the equilibrium that Newton's method reaches from the result, mm |
 //! | residual | ‖∇E‖ of this project's energy over the weight, friction holding what it can |
 //!
-//! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told with each row, and an error under it says nothing.
+//! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told
+//! with each row, and an error under it says nothing.
 
 mod journal;
 mod lineup;
@@ -138,7 +139,8 @@ pub enum ContestError {
     Failed(String),
 }
 
-/// Asked between any two steps whether to go on, and told how far a row is: rounds done and of how many, and what is done now.
+/// Asked between any two steps whether to go on, and told how far a row is: rounds done and of how many, and what is
+/// done now.
 pub type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()> + Send);
 
 /// Runs a row.

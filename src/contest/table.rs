@@ -84,7 +84,8 @@ fn short(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-/// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in logarithms.
+/// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in
+/// logarithms.
 #[must_use]
 pub fn exponents(rows: &[ContestRow]) -> Option<Cells> {
     let mut garments: Vec<&str> = rows.iter().map(|r| r.garment.as_str()).collect();

@@ -1,19 +1,24 @@
 //! Corotational subdivision elements: strains, forces and stiffness at the middle of each triangle.
 //!
-//! x = Σ N_I X_I over the control vertices of a triangle. In the cloth's coordinates (u along the weft, v along the warp), with constant weights per vertex,
+//! x = Σ N_I X_I over the control vertices of a triangle. In the cloth's coordinates (u along the weft, v along the
+//! warp), with constant weights per vertex,
 //!
 //! F = [Σ b_u X, Σ b_v X],  x_uu = Σ w_uu X, ...,
 //!
-//! where b and w are the box spline's derivatives by the parameters, taken to the cloth's by the rest shape: J = [P_s P_t] of the patch laid flat, and second derivatives without what the
-//! parameters' own curving puts in (Christoffel's symbols of the flat patch).
+//! where b and w are the box spline's derivatives by the parameters, taken to the cloth's by the rest shape: J = [P_s
+//! P_t] of the patch laid flat, and second derivatives without what the parameters' own curving puts in (Christoffel's
+//! symbols of the flat patch).
 //!
-//! Polar decomposition F = R S gives the frame r_u, r_v, n = r_u × r_v; strains S − 1; and bending strains κ = n·x_uu and so on, which are linear in X once R is fixed: one linear
-//! system a step. The force is the whole gradient, with what R's turning adds, which is of second order in the strains: without it coarse cloth, whose patches bend by their own length, turned by itself
-//! and flew off (seen at 600 vertices). Ours; a corotational force as usual leaves it out.
+//! Polar decomposition F = R S gives the frame r_u, r_v, n = r_u × r_v; strains S − 1; and bending strains κ = n·x_uu
+//! and so on, which are linear in X once R is fixed: one linear system a step. The force is the whole gradient, with
+//! what R's turning adds, which is of second order in the strains: without it coarse cloth, whose patches bend by their
+//! own length, turned by itself and flew off (seen at 600 vertices). Ours; a corotational force as usual leaves it out.
 //!
-//! E = Σ A [½ C_uu ε_u² + C_uv ε_u ε_v + ½ C_vv ε_v² + ½ μ γ² + ½ B_u κ_uu² + ½ H κ_uv² + ½ B_v κ_vv²], H = 4 B_45 − B_u − B_v.
+//! E = Σ A [½ C_uu ε_u² + C_uv ε_u ε_v + ½ C_vv ε_v² + ½ μ γ² + ½ B_u κ_uu² + ½ H κ_uv² + ½ B_v κ_vv²], H = 4 B_45 −
+//! B_u − B_v.
 //!
-//! The stiffness is that with R fixed, and, ours, what tension adds across the plane, A σ⁺ n nᵀ, without which a taut cloth cannot take a step of tens of milliseconds.
+//! The stiffness is that with R fixed, and, ours, what tension adds across the plane, A σ⁺ n nᵀ, without which a taut
+//! cloth cannot take a step of tens of milliseconds.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -25,6 +30,7 @@
 use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use super::strain::{Frame, polar, positive_part, pulls};
 use crate::fabric::Fabric;
 use crate::methods::linear::Operator;
 use crate::methods::march::Elastic;
@@ -33,9 +39,6 @@ use crate::methods::march::Elastic;
 const CHUNK: usize = 256;
 /// A floor for H as a share of B_u + B_v, as elsewhere in this project.
 const LEAST_TWIST: f64 = 0.1;
-
-/// Share of its rest area under which an element's own basis is no longer followed.
-const LEAST_AREA: f32 = 0.5;
 
 /// Weights of a control vertex: b_u, b_v, w_uu, w_uv, w_vv.
 pub(super) type Weights = [f32; 5];
@@ -48,28 +51,6 @@ struct Constants {
     vv: f32,
     shear: f32,
     bending: [f32; 3],
-}
-
-/// An element as it stands.
-#[derive(Debug, Clone, Copy, Default)]
-struct Frame {
-    r_u: Vec3A,
-    r_v: Vec3A,
-    n: Vec3A,
-    /// σ⁺: uu, uv, vv.
-    tension: [f32; 3],
-    /// Γ of x_uu, x_uv, x_vv: their parts in the surface, by F's own basis.
-    gamma: [[f32; 2]; 3],
-}
-
-impl Frame {
-    /// What moments take from the pulls along u and v: turning n costs no bending.
-    #[inline]
-    fn in_plane(&self, moments: [f32; 3]) -> [f32; 2] {
-        let sum =
-            |i: usize| moments[0] * self.gamma[0][i] + moments[1] * self.gamma[1][i] + moments[2] * self.gamma[2][i];
-        [sum(0), sum(1)]
-    }
 }
 
 /// What an element pulls with: stresses along u and v, and bending moments along n; times its area.
@@ -185,52 +166,6 @@ impl Elements {
             sum += w[0] * p.along_u + w[1] * p.along_v + across * p.n;
         }
         sum
-    }
-}
-
-/// Frame, strains and stretch S of F by its polar decomposition: S = (C + √det C)/√(tr C + 2 √det C), C = FᵀF.
-fn polar(f_u: Vec3A, f_v: Vec3A, second: [Vec3A; 3]) -> (Frame, [f32; 3], [f32; 3]) {
-    let (uu, uv, vv) = (f_u.dot(f_u), f_u.dot(f_v), f_v.dot(f_v));
-    let squared = (uu * vv - uv * uv).max(f32::MIN_POSITIVE);
-    let root = squared.sqrt();
-    let t = (uu + vv + 2.0 * root).sqrt();
-    let [s_uu, s_uv, s_vv] = [(uu + root) / t, uv / t, (vv + root) / t];
-    let r_u = (f_u * s_vv - f_v * s_uv) / root;
-    let r_v = (f_v * s_uu - f_u * s_uv) / root;
-    // The dual basis of F; cloth crushed to less than half its area has none to speak of.
-    let held = squared.max(LEAST_AREA * LEAST_AREA);
-    let (a_u, a_v) = ((f_u * vv - f_v * uv) / held, (f_v * uu - f_u * uv) / held);
-    let gamma = second.map(|x| [a_u.dot(x), a_v.dot(x)]);
-    let frame = Frame { r_u, r_v, n: r_u.cross(r_v), tension: [0.0; 3], gamma };
-    (frame, [s_uu - 1.0, s_vv - 1.0, 2.0 * s_uv], [s_uu, s_uv, s_vv])
-}
-
-/// What the stresses pull with along u and v, each by r_u and r_v: K = 2 S T with S T + T S = σ, so that F's power σ : Ṡ is P : Ḟ and
-/// nothing turns by itself. For small strains K is σ.
-fn pulls([s_uu, s_uv, s_vv]: [f32; 3], [a, b, c]: [f32; 3]) -> [[f32; 2]; 2] {
-    let det = (s_uu * s_vv - s_uv * s_uv).max(f32::MIN_POSITIVE);
-    // adj S · σ · adj S.
-    let (m, n) = ([s_vv * a - s_uv * b, s_vv * b - s_uv * c], [s_uu * b - s_uv * a, s_uu * c - s_uv * b]);
-    let turned = [m[0] * s_vv - m[1] * s_uv, m[1] * s_uu - m[0] * s_uv, n[1] * s_uu - n[0] * s_uv];
-    // Twice T.
-    let over = (s_uu + s_vv) * det;
-    let [t_uu, t_uv, t_vv] = [(det * a + turned[0]) / over, (det * b + turned[1]) / over, (det * c + turned[2]) / over];
-    [[s_uu * t_uu + s_uv * t_uv, s_uv * t_uu + s_vv * t_uv], [s_uu * t_uv + s_uv * t_vv, s_uv * t_uv + s_vv * t_vv]]
-}
-
-/// The part of a symmetric 2×2 matrix that pulls.
-fn positive_part([a, b, c]: [f32; 3]) -> [f32; 3] {
-    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-    let radius = (half * half + b * b).sqrt();
-    let (high, low) = (mean + radius, mean - radius);
-    if low >= 0.0 {
-        [a, b, c]
-    } else if high <= 0.0 || radius == 0.0 {
-        [0.0; 3]
-    } else {
-        // The projector on the pulling direction is ½ (1 + (M − mean)/radius).
-        let share = 0.5 * high / radius;
-        [share * (radius + half), share * b, share * (radius - half)]
     }
 }
 
