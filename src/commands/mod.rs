@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand, its arguments beside its code.
 
 mod assets;
+mod bench;
 mod check;
 mod compare;
 mod console;
@@ -87,6 +88,9 @@ enum Command {
     /// Search range tables for the least error at every number of PARTs
     #[command(long_about = tune::LONG_ABOUT)]
     Tune(Box<tune::TuneArgs>),
+    /// Run the paper's Table 4 again: every way to drape on the same garments, time and error together
+    #[command(subcommand)]
+    Bench(bench::BenchCommand),
     /// Join the shards of a sweep into what one run would have written
     Merge(Box<merge::MergeArgs>),
     /// Sum up a sewing pattern, and draw it flat
@@ -110,6 +114,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Sweep(args)) => args.execute(),
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),
+        Some(Command::Bench(command)) => command.execute(),
         Some(Command::Merge(args)) => args.execute(),
         Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(),

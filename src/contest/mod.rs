@@ -1,12 +1,12 @@
 //! The paper's Table 4 run again: every way to drape on the same garments, time and error together.
 //!
-//! A row is a garment at a size; an entrant is a way to drape it: the [reference methods](crate::methods), the paper's own equations, the coupled model's
-//! two stages alone, and those with the converged drape after. All drape the same scene in the same fabric on the same threads. Repeats are
-//! interleaved, each entrant once a round, after a round that is not counted; so what else the machine does hits all alike, and ratios are taken round
-//! by round.
+//! A row is a garment at a size; an entrant is a way to drape it: the [reference methods](crate::methods), the paper's
+//! own equations, the coupled model's two stages alone, and those with the converged drape after. All drape the same
+//! scene in the same fabric on the same threads. Repeats are interleaved, each entrant once a round, after a round that
+//! is not counted; so what else the machine does hits all alike, and ratios are taken round by round.
 //!
-//! Time is from the loaded scene to the draped positions; of ours the four stages' sum, without what is measured afterwards; of the methods all they do,
-//! their own preparation included, but for the cloth's masses and areas.
+//! Time is from the loaded scene to the draped positions; of ours the four stages' sum, without what is measured
+//! afterwards; of the methods all they do, their own preparation included, but for the cloth's masses and areas.
 //!
 //! | figure | meaning |
 //! |---|---|
@@ -16,8 +16,10 @@
 //! | own error | RMS distance to the equilibrium that Newton's method reaches from the result, mm |
 //! | residual | ‖∇E‖ of this project's energy over the weight, friction holding what it can |
 //!
-//! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told with each row, and an error under it says nothing.
+//! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told
+//! with each row, and an error under it says nothing.
 
+mod journal;
 mod lineup;
 mod table;
 
@@ -37,6 +39,7 @@ use crate::mechanics::refine::{RefineOptions, Stop, refine};
 use crate::methods::{self, Dressing, Ended, RestRule};
 use crate::quantile::interpolated;
 use crate::scene::Scene;
+pub use journal::{Conditions, Journal, JournalError};
 pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
 pub use table::{csv_lines, exponents, tables};
 
@@ -105,6 +108,8 @@ pub struct Entry {
 pub struct ContestRow {
     /// The garment.
     pub garment: String,
+    /// Vertices asked for.
+    pub asked: usize,
     /// Its vertices.
     pub vertices: usize,
     /// RMS between canonical drapes of perturbed starts and the canonical one, mm; `None` where none were asked for.
@@ -134,7 +139,8 @@ pub enum ContestError {
     Failed(String),
 }
 
-/// Asked between any two steps whether to go on, and told how far a row is: rounds done and of how many, and what is done now.
+/// Asked between any two steps whether to go on, and told how far a row is: rounds done and of how many, and what is
+/// done now.
 pub type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()> + Send);
 
 /// Runs a row.
@@ -142,7 +148,7 @@ pub type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()
 /// # Errors
 /// [`ContestError`]; an entrant that fails has an entry that says why.
 pub fn row(
-    garment: &str,
+    (garment, asked): (&str, usize),
     scene: &Scene,
     fabric: &Fabric,
     options: &ContestOptions,
@@ -203,7 +209,8 @@ pub fn row(
         }
         entries.push(entry);
     }
-    Ok(ContestRow { garment: garment.to_owned(), vertices: scene.garment.vertex_count(), spread_mm, entries })
+    let vertices = scene.garment.vertex_count();
+    Ok(ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, entries })
 }
 
 /// Fills in what needs no reference.

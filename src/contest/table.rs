@@ -33,7 +33,7 @@ pub fn tables(rows: &[ContestRow]) -> Vec<Cells> {
                 })
                 .collect(),
         };
-    let printed = |row: &ContestRow| match printed_ms(&row.garment, row.vertices) {
+    let printed = |row: &ContestRow| match printed_ms(&row.garment, row.asked) {
         Some(ms) => ms.iter().map(|ms| format!("{ms:.0}")).collect(),
         None => vec!["–".to_owned(); 4],
     };
@@ -84,7 +84,8 @@ fn short(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-/// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in logarithms.
+/// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in
+/// logarithms.
 #[must_use]
 pub fn exponents(rows: &[ContestRow]) -> Option<Cells> {
     let mut garments: Vec<&str> = rows.iter().map(|r| r.garment.as_str()).collect();
@@ -190,7 +191,13 @@ mod tests {
             error: (i == 1).then(|| "cannot, as it is".to_owned()),
             ..Entry::default()
         });
-        ContestRow { garment: "flared-skirt".to_owned(), vertices, spread_mm: Some(3.0), entries: entries.collect() }
+        ContestRow {
+            garment: "flared-skirt".to_owned(),
+            asked: vertices,
+            vertices,
+            spread_mm: Some(3.0),
+            entries: entries.collect(),
+        }
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! The linear system of an implicit step: a symmetric matrix in 3×3 blocks by rows, and preconditioned conjugate gradients.
 //!
-//! A d = b, A symmetric and positive definite, preconditioned by the inverses of its diagonal blocks (block Jacobi). Iterates
-//! until ‖b − A d‖ ≤ τ ‖b‖ in the norm of the preconditioner. Source: Hestenes, Stiefel 1952; for cloth Baraff, Witkin: "Large steps in
-//! cloth simulation", SIGGRAPH 1998.
+//! A d = b, A symmetric and positive definite, preconditioned by the inverses of its diagonal blocks (block Jacobi).
+//! Iterates until ‖b − A d‖ ≤ τ ‖b‖ in the norm of the preconditioner. Source: Hestenes, Stiefel 1952; for cloth
+//! Baraff, Witkin: "Large steps in cloth simulation", SIGGRAPH 1998.
 //!
-//! Blocks and vectors are single precision in SIMD registers, sums are double: a step of a simulation in time wants three or four digits of its
-//! solution, and the matrix is what memory waits for. Rows are shared among the threads, and sums are taken in the order of the rows, so the bits do
-//! not depend on how many there are.
+//! Blocks and vectors are single precision in SIMD registers, sums are double: a step of a simulation in time wants
+//! three or four digits of its solution, and the matrix is what memory waits for. Rows are shared among the threads,
+//! and sums are taken in the order of the rows, so the bits do not depend on how many there are.
 
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;

@@ -1,12 +1,13 @@
 //! Implicit steps in time: what `zhu2016` and `thomaszewski2006` have in common.
 //!
-//! Backward Euler, linearised once a step (Baraff, Witkin: "Large steps in cloth simulation", SIGGRAPH 1998), with the displacement d of a step
-//! for its unknown:
+//! Backward Euler, linearised once a step (Baraff, Witkin: "Large steps in cloth simulation", SIGGRAPH 1998), with the
+//! displacement d of a step for its unknown:
 //!
 //! (M (1/h² + c/h) + K) d = f(x) + M v/h,  x ← x + d,  v ← d/h.
 //!
-//! The body pushes with κ A (h_o − q) along its normal, as everywhere in this project, and holds by Coulomb's friction with anchors
-//! ([`Friction`]). A vertex that touches has no velocity off the body after the step: cloth does not bounce.
+//! The body pushes with κ A (h_o − q) along its normal, as everywhere in this project, and holds by Coulomb's friction
+//! with anchors ([`Friction`]). A vertex that touches has no velocity off the body after the step: cloth does not
+//! bounce.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|

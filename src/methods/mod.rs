@@ -1,15 +1,17 @@
-//! The three methods that the paper measures itself against, as far as their sources tell them, behind one trait.
+//! Methods that the paper measures itself against, as far as their sources tell them, behind one trait.
 //!
 //! | name | source |
 //! |---|---|
-//! | `zhu2016` | [19] Zhu, Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal 16(4), 2016 |
-//! | `gross2003` | [20] Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003 |
-//! | `thomaszewski2006` | [21] Thomaszewski, Wacker, Straßer: "A consistent bending model for cloth simulation with corotational subdivision finite elements", SCA 2006 |
+//! | [`zhu2016`] | [19] Zhu, Li 2016: hybrid bounding volume hierarchy, masses and springs |
+//! | [`thomaszewski2006`] | [21] Thomaszewski, Wacker, Straßer 2006: corotational subdivision finite elements |
 //!
-//! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its timings and
-//! counters. All three move the cloth in time until it rests, by the same rule; each file's head says what its source
-//! confirms and what is our reading. What is no part of a method is the same for all: the cloth's masses, areas and offset
-//! from the body, and, but for `gross2003`, which has its own, the contact forces.
+//! The paper's third, [20] (Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003), is not
+//! built.
+//!
+//! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its
+//! timings and counters. They all move the cloth in time until it rests, by the same rule; each file's head says what
+//! its source confirms and what is our reading. What is no part of a method is the same for all: the cloth's masses,
+//! areas and offset from the body, and the law of the contact forces.
 //!
 //! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
 

@@ -1,10 +1,12 @@
 //! When a garment that moves in time has come to rest: one rule for every method.
 //!
-//! v = √(Σ |v_i|² / n) over the free vertices stays under a speed for a while, 1 cm/s over a quarter of a second unless asked otherwise. Gravity
-//! alone passes that speed within a millisecond, so a garment let go is not mistaken for one at rest. The rule sees speed
-//! and not forces: what creeps passes, and therefore the residual of the common energy is told beside it.
+//! v = √(Σ |v_i|² / n) over the free vertices stays under a speed for a while, 1 cm/s over a quarter of a second unless
+//! asked otherwise. Gravity alone passes that speed within a millisecond, so a garment let go is not mistaken for one
+//! at rest. The rule sees speed and not forces: what creeps passes, and therefore the residual of the common energy is
+//! told beside it.
 //!
-//! Source: the stopping rule of this project's comparison; the papers give none but "until the speed falls under a tolerance" ([20]).
+//! Source: the stopping rule of this project's comparison; the papers give none but "until the speed falls under a
+//! tolerance" ([20]).
 
 /// When a garment counts as resting, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -155,3 +155,24 @@ fn a_mesh_without_a_limit_surface_is_refused_in_one_line() {
     assert!(matches!(error, MethodError::Unfit { .. }));
     assert!(error.to_string().contains("vertex 16") && !error.to_string().contains('\n'), "{error}");
 }
+
+#[test]
+fn however_strained_nothing_pulls_or_turns_by_itself() {
+    let scene = hanging(uneven(), vec![0]);
+    let fabric = partwise::fabric::Fabric::default();
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
+    let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+    // Sheared, stretched unevenly and bent sharply, in a fabric of three stiffnesses.
+    let bend = |p: DVec3| {
+        let (angle, r) = (20.0 * p.x, 0.05 + 0.3 * p.z);
+        DVec3::new(r * angle.sin() + 0.4 * p.z, r * angle.cos(), 1.2 * p.z + 2.0 * p.x * p.z)
+    };
+    let x: Vec<DVec3> = scene.garment.positions.iter().map(|p| bend(*p)).collect();
+    let mut force = vec![DVec3::ZERO; x.len()];
+    elements.linearise(&x, &mut force);
+    let size: f64 = force.iter().map(|f| f.length()).sum();
+    let (push, turn) =
+        force.iter().zip(&x).fold((DVec3::ZERO, DVec3::ZERO), |(f, t), (g, x)| (f + *g, t + x.cross(*g)));
+    assert!(push.length() < 1e-5 * size, "{push} of {size}");
+    assert!(turn.length() < 1e-5 * size, "{turn} of {size}");
+}

@@ -122,3 +122,19 @@ fn an_open_body_is_refused_in_one_line() {
     assert!(matches!(error, MethodError::Unfit { .. }));
     assert!(error.to_string().contains("3 boundary edges") && !error.to_string().contains('\n'), "{error}");
 }
+
+#[test]
+fn the_quadrics_can_be_shown() {
+    let scene = dressed();
+    let rule = partwise::methods::RestRule { limit_s: 0.1, ..partwise::methods::RestRule::default() };
+    let method = Zhu2016 { exhibit: true, ..Zhu2016::default() };
+    let made = drape(&method, &scene, &partwise::fabric::Fabric::default(), &rule).unwrap();
+    assert_eq!(made.ended, Ended::TimeOver);
+    let [("quadrics", partwise::methods::Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
+    let quadrics = made.counts.iter().find(|c| c.0 == "quadrics").unwrap().1;
+    assert_eq!(lines.len() as u64, 2 * quadrics);
+    // Each slice's lines, at 1 + ε, go around the body: none of its vertices is outside all of them by height and breadth.
+    let reach = lines.iter().flatten().map(|p| p.z).fold(0.0, f64::max);
+    let top = scene.body.mesh().positions.iter().map(|p| p.z).fold(0.0, f64::max);
+    assert!(reach > top, "{reach} {top}");
+}

@@ -1,8 +1,10 @@
-//! The quartic box spline of a regular patch of Loop's subdivision: its twelve functions at the middle of the triangle, with derivatives.
+//! The quartic box spline of a regular patch of Loop's subdivision: its twelve functions at the middle of the triangle,
+//! with derivatives.
 //!
-//! With the barycentric coordinates p, q, r of a triangle, twelve times the functions of its own corner p, of the vertex across the edge pq, and of the vertex
-//! beside p next to that one are the polynomials [`CORNER`], [`ACROSS`] and [`BESIDE`]; the twelve are these by symmetry (Stam: "Evaluation of Loop subdivision
-//! surfaces", SIGGRAPH 1998 course notes; Loop: "Smooth subdivision surfaces based on triangles", 1987).
+//! With the barycentric coordinates p, q, r of a triangle, twelve times the functions of its own corner p, of the
+//! vertex across the edge pq, and of the vertex beside p next to that one are the polynomials [`CORNER`], [`ACROSS`]
+//! and [`BESIDE`]; the twelve are these by symmetry (Stam: "Evaluation of Loop subdivision surfaces", SIGGRAPH 1998
+//! course notes; Loop: "Smooth subdivision surfaces based on triangles", 1987).
 
 use glam::{DMat3, DVec3};
 
@@ -44,7 +46,8 @@ pub(super) const ACROSS: [Term; 9] = [
 /// Of the vertex beside p, next to the one across the edge from p to q.
 pub(super) const BESIDE: [Term; 2] = [(1.0, [4, 0, 0]), (2.0, [3, 1, 0])];
 
-/// A function at the middle of the triangle: its value, its gradient and its second derivatives by the barycentric coordinates of corners 0, 1, 2.
+/// A function at the middle of the triangle: its value, its gradient and its second derivatives by the barycentric
+/// coordinates of corners 0, 1, 2.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AtMiddle {
     pub(super) value: f64,

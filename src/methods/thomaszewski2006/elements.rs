@@ -1,18 +1,24 @@
 //! Corotational subdivision elements: strains, forces and stiffness at the middle of each triangle.
 //!
-//! x = Σ N_I X_I over the control vertices of a triangle. In the cloth's coordinates (u along the weft, v along the warp), with constant weights per vertex,
+//! x = Σ N_I X_I over the control vertices of a triangle. In the cloth's coordinates (u along the weft, v along the
+//! warp), with constant weights per vertex,
 //!
 //! F = [Σ b_u X, Σ b_v X],  x_uu = Σ w_uu X, ...,
 //!
-//! where b and w are the box spline's derivatives by the parameters, taken to the cloth's by the rest shape: J = [P_s P_t] of the patch laid flat, and second derivatives without what the
-//! parameters' own curving puts in (Christoffel's symbols of the flat patch).
+//! where b and w are the box spline's derivatives by the parameters, taken to the cloth's by the rest shape: J = [P_s
+//! P_t] of the patch laid flat, and second derivatives without what the parameters' own curving puts in (Christoffel's
+//! symbols of the flat patch).
 //!
-//! Polar decomposition F = R S gives the frame r_u, r_v, n = r_u × r_v; strains S − 1; and bending strains κ = n·x_uu and so on, which are linear in X once R is fixed: one linear
-//! system a step.
+//! Polar decomposition F = R S gives the frame r_u, r_v, n = r_u × r_v; strains S − 1; and bending strains κ = n·x_uu
+//! and so on, which are linear in X once R is fixed: one linear system a step. The force is the whole gradient, with
+//! what R's turning adds, which is of second order in the strains: without it coarse cloth, whose patches bend by their
+//! own length, turned by itself and flew off (seen at 600 vertices). Ours; a corotational force as usual leaves it out.
 //!
-//! E = Σ A [½ C_uu ε_u² + C_uv ε_u ε_v + ½ C_vv ε_v² + ½ μ γ² + ½ B_u κ_uu² + ½ H κ_uv² + ½ B_v κ_vv²], H = 4 B_45 − B_u − B_v.
+//! E = Σ A [½ C_uu ε_u² + C_uv ε_u ε_v + ½ C_vv ε_v² + ½ μ γ² + ½ B_u κ_uu² + ½ H κ_uv² + ½ B_v κ_vv²], H = 4 B_45 −
+//! B_u − B_v.
 //!
-//! The stiffness is that with R fixed, and, ours, what tension adds across the plane, A σ⁺ n nᵀ, without which a taut cloth cannot take a step of tens of milliseconds.
+//! The stiffness is that with R fixed, and, ours, what tension adds across the plane, A σ⁺ n nᵀ, without which a taut
+//! cloth cannot take a step of tens of milliseconds.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -24,6 +30,7 @@
 use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use super::strain::{Frame, polar, positive_part, pulls};
 use crate::fabric::Fabric;
 use crate::methods::linear::Operator;
 use crate::methods::march::Elastic;
@@ -44,16 +51,6 @@ struct Constants {
     vv: f32,
     shear: f32,
     bending: [f32; 3],
-}
-
-/// An element as it stands.
-#[derive(Debug, Clone, Copy, Default)]
-struct Frame {
-    r_u: Vec3A,
-    r_v: Vec3A,
-    n: Vec3A,
-    /// σ⁺: uu, uv, vv.
-    tension: [f32; 3],
 }
 
 /// What an element pulls with: stresses along u and v, and bending moments along n; times its area.
@@ -172,35 +169,6 @@ impl Elements {
     }
 }
 
-/// Frame and strains of F by its polar decomposition: S = (C + √det C)/√(tr C + 2 √det C), C = FᵀF.
-fn polar(f_u: Vec3A, f_v: Vec3A) -> (Frame, [f32; 3]) {
-    let (uu, uv, vv) = (f_u.dot(f_u), f_u.dot(f_v), f_v.dot(f_v));
-    let root = (uu * vv - uv * uv).max(0.0).sqrt();
-    let t = (uu + vv + 2.0 * root).max(f32::MIN_POSITIVE).sqrt();
-    let [s_uu, s_uv, s_vv] = [(uu + root) / t, uv / t, (vv + root) / t];
-    let det = (s_uu * s_vv - s_uv * s_uv).max(f32::MIN_POSITIVE);
-    let r_u = (f_u * s_vv - f_v * s_uv) / det;
-    let r_v = (f_v * s_uu - f_u * s_uv) / det;
-    let frame = Frame { r_u, r_v, n: r_u.cross(r_v), tension: [0.0; 3] };
-    (frame, [s_uu - 1.0, s_vv - 1.0, 2.0 * s_uv])
-}
-
-/// The part of a symmetric 2×2 matrix that pulls.
-fn positive_part([a, b, c]: [f32; 3]) -> [f32; 3] {
-    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-    let radius = (half * half + b * b).sqrt();
-    let (high, low) = (mean + radius, mean - radius);
-    if low >= 0.0 {
-        [a, b, c]
-    } else if high <= 0.0 || radius == 0.0 {
-        [0.0; 3]
-    } else {
-        // The projector on the pulling direction is ½ (1 + (M − mean)/radius).
-        let share = 0.5 * high / radius;
-        [share * (radius + half), share * b, share * (radius - half)]
-    }
-}
-
 impl Constants {
     /// σ_u, σ_v, τ.
     #[inline]
@@ -216,17 +184,20 @@ impl Elastic for Elements {
             // All weights sum to nothing: differences keep the digits.
             let base = x[this.vertices[this.starts[e] as usize] as usize];
             let [f_u, f_v, x_uu, x_uv, x_vv] = this.sums(e, |v| (x[v as usize] - base).as_vec3a());
-            let (mut found, strain) = polar(f_u, f_v);
+            let second = [x_uu, x_uv, x_vv];
+            let (mut found, strain, stretch) = polar(f_u, f_v, second);
             let [s_u, s_v, tau] = this.constants.stress(strain);
+            let [[p_uu, p_vu], [p_uv, p_vv]] = pulls(stretch, [s_u, tau, s_v]);
             found.tension = positive_part([s_u, tau, s_v]);
             (*frame, *kept) = (found, strain);
             let (a, n) = (this.areas[e], found.n);
-            let bend = |k: usize, x: Vec3A| a * this.constants.bending[k] * n.dot(x);
+            let moments: [f32; 3] = std::array::from_fn(|k| a * this.constants.bending[k] * n.dot(second[k]));
+            let [m_u, m_v] = found.in_plane(moments);
             Pull {
-                along_u: (found.r_u * s_u + found.r_v * tau) * a,
-                along_v: (found.r_v * s_v + found.r_u * tau) * a,
+                along_u: (found.r_u * p_uu + found.r_v * p_vu) * a - n * m_u,
+                along_v: (found.r_u * p_uv + found.r_v * p_vv) * a - n * m_v,
                 n,
-                moments: [bend(0, x_uu), bend(1, x_uv), bend(2, x_vv)],
+                moments,
             }
         };
         let mut frames = this.frames.clone();
@@ -250,7 +221,12 @@ impl Elastic for Elements {
                 let (f, a) = (&self.frames[*e as usize], self.areas[*e as usize]);
                 let (p, q) = (f.r_u * *b_u, f.r_v * *b_v);
                 let g = f.r_v * *b_u + f.r_u * *b_v;
-                let across = c.bending[0] * w_uu * w_uu + c.bending[1] * w_uv * w_uv + c.bending[2] * w_vv * w_vv;
+                let second = [w_uu, w_uv, w_vv];
+                let across = (0..3).map(|k| {
+                    let w = second[k] - f.gamma[k][0] * b_u - f.gamma[k][1] * b_v;
+                    c.bending[k] * w * w
+                });
+                let across: f32 = across.sum();
                 let [t_u, t, t_v] = f.tension;
                 let across = across + t_u * b_u * b_u + 2.0 * t * b_u * b_v + t_v * b_v * b_v;
                 let rows = [p * c.uu + q * c.uv, q * c.vv + p * c.uv, g * c.shear, f.n * across];
@@ -273,12 +249,15 @@ impl Operator for Elements {
             let [s_u, s_v, tau] = c.stress(strain);
             let (g_u, g_v) = (f.n.dot(d_u), f.n.dot(d_v));
             let [t_u, t, t_v] = f.tension;
-            let bend = |k: usize, x: Vec3A| a * c.bending[k] * f.n.dot(x);
+            let second = [d_uu, d_uv, d_vv];
+            let curving = |k: usize| f.n.dot(second[k]) - f.gamma[k][0] * g_u - f.gamma[k][1] * g_v;
+            let moments: [f32; 3] = std::array::from_fn(|k| a * c.bending[k] * curving(k));
+            let [m_u, m_v] = f.in_plane(moments);
             Pull {
-                along_u: (f.r_u * s_u + f.r_v * tau + f.n * (t_u * g_u + t * g_v)) * a,
-                along_v: (f.r_v * s_v + f.r_u * tau + f.n * (t * g_u + t_v * g_v)) * a,
+                along_u: (f.r_u * s_u + f.r_v * tau + f.n * (t_u * g_u + t * g_v)) * a - f.n * m_u,
+                along_v: (f.r_v * s_v + f.r_u * tau + f.n * (t * g_u + t_v * g_v)) * a - f.n * m_v,
                 n: f.n,
-                moments: [bend(0, d_uu), bend(1, d_uv), bend(2, d_vv)],
+                moments,
             }
         };
         (0..this.count()).into_par_iter().with_min_len(CHUNK).map(pull).collect_into_vec(&mut pulls);

@@ -1,21 +1,30 @@
-//! [21] B. Thomaszewski, M. Wacker, W. Straßer: "A consistent bending model for cloth simulation with corotational subdivision finite elements", SCA 2006, 107–116.
+//! [21] B. Thomaszewski, M. Wacker, W. Straßer: "A consistent bending model for cloth simulation with corotational
+//! subdivision finite elements", SCA 2006, 107–116.
 //!
-//! Confirmed by the source: Loop subdivision finite elements, so that the displacement is C¹ and patches have twelve control vertices; one-point quadrature; membrane and
-//! bending strains of a thin shell, corotated for each element by a polar decomposition, so that each implicit step is one linear system; conjugate gradients.
+//! Confirmed by the source: Loop subdivision finite elements, so that the displacement is C¹ and patches have twelve
+//! control vertices; one-point quadrature; membrane and bending strains of a thin shell, corotated for each element by
+//! a polar decomposition, so that each implicit step is one linear system; conjugate gradients.
 //!
-//! Our reading: where valences are not six, one subdivision step in place of Stam's eigenvectors, which at the one quadrature point gives the same ([`patch`]); boundaries by mirrored
-//! vertices; the fabric's orthotropic constants ([`elements`]); backward Euler and block Jacobi ([`march`](super::march)); lumped masses; penalty contact with Coulomb friction at the control vertices, through this
-//! project's own body queries; damping by the air; the stiffness of tension across the plane.
+//! Our reading: where valences are not six, one subdivision step in place of Stam's eigenvectors, which at the one
+//! quadrature point gives the same (`patch.rs`); boundaries by mirrored vertices; the fabric's orthotropic constants
+//! ([`elements`]); backward Euler and block Jacobi ([`march`](super::march)); lumped masses; penalty contact with
+//! Coulomb friction at the control vertices, through this project's own body queries; damping by the air; the stiffness
+//! of tension across the plane.
 //!
-//! The garment's vertices are the control vertices, and they are what is returned; the limit surface lies inside their folds by an eighth of edge² over
-//! radius (a millimetre and a half where edges of 15 mm bend about 2 cm) and is shown on request.
+//! The garment's vertices are the control vertices, and they are what is returned; the limit surface lies inside their
+//! folds by an eighth of edge² over radius (a millimetre and a half where edges of 15 mm bend about 2 cm) and is shown
+//! on request.
 //!
-//! Limits: cloth bears compression as it bears tension, so it buckles no finer than its mesh and holds up where it cannot. Contact at the control vertices alone.
+//! Limits: cloth bears compression as it bears tension, so it buckles no finer than its mesh and holds up where it
+//! cannot. Contact at the control vertices alone. One quadrature point does not see control vertices that zigzag about
+//! a smooth surface: on coarse meshes, edges of 4 cm and more, they do, and the strain of the garment's own triangles
+//! is then well over the surface's.
 
 mod box_spline;
 pub mod elements;
 mod patch;
 mod rest_patch;
+mod strain;
 
 use std::time::Instant;
 
@@ -135,7 +144,8 @@ fn fans(dressing: &Dressing<'_>) -> Result<Vec<Around>, MethodError> {
 /// The elements of a garment.
 ///
 /// # Errors
-/// [`MethodError::Unfit`] where the mesh has no limit surface, or the patch of a triangle folds over itself where it is laid flat.
+/// [`MethodError::Unfit`] where the mesh has no limit surface, or the patch of a triangle folds over itself where it is
+/// laid flat.
 pub fn elements_of_garment(dressing: &Dressing<'_>) -> Result<Elements, MethodError> {
     elements_of(dressing, &fans(dressing)?)
 }

@@ -1,12 +1,15 @@
 //! The control vertices of a triangle of the limit surface and the weights of their derivatives at its middle.
 //!
-//! One step of Loop's subdivision around a triangle makes its middle child regular, whatever the valences of its corners: the child's corners are edge points. So at the
-//! middle, where the one quadrature point is, Stam's evaluation needs a single subdivision step and no eigenvectors: the twelve control vertices of the middle child as combinations of the
-//! garment's vertices, times the box spline's functions. Where the patch is regular this is the same number as its own box spline would give.
+//! One step of Loop's subdivision around a triangle makes its middle child regular, whatever the valences of its
+//! corners: the child's corners are edge points. So at the middle, where the one quadrature point is, Stam's evaluation
+//! needs a single subdivision step and no eigenvectors: the twelve control vertices of the middle child as combinations
+//! of the garment's vertices, times the box spline's functions. Where the patch is regular this is the same number as
+//! its own box spline would give.
 //!
 //! Boundaries are closed by mirrored vertices: beyond the edge ab of the triangle abc lies a + b − c.
 //!
-//! Vertex points: (1 − n β) v + β Σ ring, β = (5/8 − (3/8 + ¼ cos 2π/n)²)/n (Loop 1987); edge points: ⅜ (a + b) + ⅛ (c + d).
+//! Vertex points: (1 − n β) v + β Σ ring, β = (5/8 − (3/8 + ¼ cos 2π/n)²)/n (Loop 1987); edge points: ⅜ (a + b) + ⅛ (c
+//! + d).
 
 use glam::DVec3;
 
@@ -152,7 +155,8 @@ pub(super) fn limit_stencil(v: u32, around: &Around) -> Stencil {
     out
 }
 
-/// The control vertices of a triangle with the derivatives of their functions at its middle, by s = λ₁ and t = λ₂; vertices ascending.
+/// The control vertices of a triangle with the derivatives of their functions at its middle, by s = λ₁ and t = λ₂;
+/// vertices ascending.
 pub(super) fn derivatives(triangle: [u32; 3], around: &[Around]) -> Option<Vec<(u32, Derivatives)>> {
     let mut sums: Vec<(u32, Derivatives)> = Vec::with_capacity(16);
     // Child coordinates μ = 1 − 2 λ.

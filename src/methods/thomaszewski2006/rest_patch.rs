@@ -1,10 +1,12 @@
 //! The rest shape of a patch: a triangle and all that touches it, laid flat about it.
 //!
-//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are laid next to one another from the middle triangle on, from both
-//! sides; where they meet again the two places of a vertex, the same on cloth that lies flat, are blended by how many triangles each took.
+//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are laid
+//! next to one another from the middle triangle on, from both sides; where they meet again the two places of a vertex,
+//! the same on cloth that lies flat, are blended by how many triangles each took.
 //!
-//! With the patch's flat places P_I and the derivatives N of its functions: J = [Σ N_s P, Σ N_t P], A = ½ |det J|; weights by the cloth's coordinates are
-//! b = N J⁻¹; and w = J⁻ᵀ (N'' − Γ·N') J⁻¹ with Γ the derivatives Σ N'' P in terms of J's columns.
+//! With the patch's flat places P_I and the derivatives N of its functions: J = [Σ N_s P, Σ N_t P], A = ½ |det J|;
+//! weights by the cloth's coordinates are b = N J⁻¹; and w = J⁻ᵀ (N'' − Γ·N') J⁻¹ with Γ the derivatives Σ N'' P in
+//! terms of J's columns.
 
 use glam::{DMat2, DVec2};
 

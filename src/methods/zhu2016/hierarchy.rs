@@ -1,19 +1,21 @@
 //! The hybrid hierarchy: world box, units, quadrics, leaf triangles, with a count of the tests at each level.
 //!
-//! A vertex x touches where its signed distance q to the body is less than the offset o. It is asked in turn: is it in the body's box; in the box of
-//! a unit; in the unit's frame, within (x/a)² + (y/b)² < (1 + ε)² of the slice at its height; and only then for the nearest of the
-//! triangles about it (closest point as in Ericson: "Real-time collision detection", 5.1.5). The sign of q is that of (x − c)·n with n the vertex
-//! normals blended at the closest point c.
+//! A vertex x touches where its signed distance q to the body is less than the offset o. It is asked in turn: is it in
+//! the body's box; in the box of a unit; in the unit's frame, within (x/a)² + (y/b)² < (1 + ε)² of the slice at its
+//! height; and only then for the nearest of the triangles about it (closest point as in Ericson: "Real-time collision
+//! detection", 5.1.5). The sign of q is that of (x − c)·n with n the vertex normals blended at the closest point c.
 //!
-//! A vertex remembers its last answer: within 2 mm of where it was asked the tangent plane there stands for the body, and where q was so large that it
-//! cannot touch yet (q has slope at most one) it is not asked again. Ours; the source tells of no memory.
+//! A vertex remembers its last answer: within 2 mm of where it was asked the tangent plane there stands for the body,
+//! and where q was so large that it cannot touch yet (q has slope at most one) it is not asked again. Ours; the source
+//! tells of no memory.
 //!
-//! Limits: beyond [`REACH`](super::units::REACH) under the skin the nearest triangle may be in another sector, and the depth is
-//! then overestimated.
+//! Limits: beyond [`REACH`](super::units::REACH) under the skin the nearest triangle may be in another sector, and the
+//! depth is then overestimated.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::closest::closest;
 use super::segment::Segments;
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
@@ -269,42 +271,4 @@ fn ball(corners: [DVec3; 3]) -> (DVec3, f64) {
 #[inline]
 fn inside(x: DVec3, (low, high): (DVec3, DVec3)) -> bool {
     x.cmpge(low).all() && x.cmple(high).all()
-}
-
-/// The point of a triangle nearest to `p`, and its barycentric weights.
-#[inline]
-fn closest([a, b, c]: [DVec3; 3], p: DVec3) -> (DVec3, [f64; 3]) {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return (a, [1.0, 0.0, 0.0]);
-    }
-    let bp = p - b;
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return (b, [0.0, 1.0, 0.0]);
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let t = d1 / (d1 - d3);
-        return (a + ab * t, [1.0 - t, t, 0.0]);
-    }
-    let cp = p - c;
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return (c, [0.0, 0.0, 1.0]);
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let t = d2 / (d2 - d6);
-        return (a + ac * t, [1.0 - t, 0.0, t]);
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return (b + (c - b) * t, [0.0, 1.0 - t, t]);
-    }
-    let sum = va + vb + vc;
-    let (v, w) = (vb / sum, vc / sum);
-    (a + ab * v + ac * w, [1.0 - v - w, v, w])
 }

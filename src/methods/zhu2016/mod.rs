@@ -1,19 +1,21 @@
-//! [19] D. Zhu, Z. Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal 16(4), 2016, 241–249.
+//! [19] D. Zhu, Z. Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal
+//! 16(4), 2016, 241–249.
 //!
-//! Confirmed by the source: the body is segmented (arms, legs, trunk, hip); each unit is cut into slices, and each slice fitted with a
-//! cylinder (limbs) or an elliptic cylinder (trunk, hip); a garment vertex is tested against the world box, then the units, then in the
-//! unit's frame against (x/a)² + (y/b)² < (1 + ε)², |z| < h/2, then against the leaf triangles; the garment is a
-//! triangle mesh of masses and springs.
+//! Confirmed by the source: the body is segmented (arms, legs, trunk, hip); each unit is cut into slices, and each
+//! slice fitted with a cylinder (limbs) or an elliptic cylinder (trunk, hip); a garment vertex is tested against the
+//! world box, then the units, then in the unit's frame against (x/a)² + (y/b)² < (1 + ε)², |z| < h/2, then against the
+//! leaf triangles; the garment is a triangle mesh of masses and springs.
 //!
-//! Our reading: how the body is segmented ([`units`]); ε from the fit itself, so that nothing within the cloth's offset of the body is
-//! missed ([`quadric`]); the leaf's triangles by sectors ([`hierarchy`]); the springs' constants from the fabric's, Provot's strain limiting
-//! at 10 % ([`springs`]); backward Euler ([`march`](super::march)), as its integrator is not confirmed; penalty contact with Coulomb
-//! friction; steps of 20 ms (of 33 ms a pullover of 900 vertices flew off) and damping by the air of 6 1/s (of 2, 4, 6 and 8 the time to rest was least at
-//! 6 and 8).
+//! Our reading: how the body is segmented ([`units`]); ε from the fit itself, so that nothing within the cloth's offset
+//! of the body is missed ([`quadric`]); the leaf's triangles by sectors ([`hierarchy`]); the springs' constants from
+//! the fabric's, Provot's strain limiting at 10 % ([`springs`]); backward Euler ([`march`](super::march)), as its
+//! integrator is not confirmed; penalty contact with Coulomb friction; steps of 20 ms (of 33 ms a pullover of 900
+//! vertices flew off) and damping by the air of 6 1/s (of 2, 4, 6 and 8 the time to rest was least at 6 and 8).
 //!
-//! Limits: springs along edges have no shear and no Poisson's ratio of their own; springs over edges bend by the fourth power of
-//! curvature, so they match the fabric at one radius only.
+//! Limits: springs along edges have no shear and no Poisson's ratio of their own; springs over edges bend by the fourth
+//! power of curvature, so they match the fabric at one radius only.
 
+mod closest;
 pub mod hierarchy;
 pub mod quadric;
 mod segment;

@@ -5,11 +5,13 @@
 //! - circle: min Σ w (x² + y² + c x + d y + e)² (Kåsa: "A circle fitting procedure and its error analysis", IEEE Trans. Instrum. Meas. 25, 1976);
 //! - ellipse along the principal axes of the points: min Σ w (A x² + B y² + C x + D y − 1)².
 //!
-//! Where the fit is no ellipse, or one twice as large or half as large as the points spread, the slice is open or lopsided (a shoulder, a crotch), and its moments stand
-//! in: half axes √2 σ about the mean, which are right for a full ring.
+//! Where the fit is no ellipse, or one twice as large or half as large as the points spread, the slice is open or
+//! lopsided (a shoulder, a crotch), and its moments stand in: half axes √2 σ about the mean, which are right for a full
+//! ring.
 //!
-//! ε is what makes the quadric bound its slice: with ρ(p) = |((x/a), (y/b))|, 1 + ε = max ρ over the corners of the slice's triangles + o/min(a, b), o the
-//! cloth's offset. ρ is convex, so no point of a triangle has more than its corners; it grows by at most 1/min(a, b) a metre, so what touches is within.
+//! ε is what makes the quadric bound its slice: with ρ(p) = |((x/a), (y/b))|, 1 + ε = max ρ over the corners of the
+//! slice's triangles + o/min(a, b), o the cloth's offset. ρ is convex, so no point of a triangle has more than its
+//! corners; it grows by at most 1/min(a, b) a metre, so what touches is within.
 
 use faer::linalg::solvers::Solve;
 use faer::{Col, Mat};

@@ -1,9 +1,10 @@
 //! The body cut into its units: trunk, limbs, head, wherever they branch.
 //!
-//! The geodesic distance from the body's highest vertex is cut into bands; the connected pieces of a band are its rings, and rings of
-//! neighbouring bands that touch make a graph (a Reeb graph; Reeb 1946, for bodies Hilaga and others: "Topology matching", SIGGRAPH 2001). Where it branches,
-//! at armpits and crotch, a unit ends. What is too short to be a limb goes to its parent. A unit between two branchings, the torso, is cut once
-//! more at its narrowest ring between its ends, the waist: trunk and hip.
+//! The geodesic distance from the body's highest vertex is cut into bands; the connected pieces of a band are its
+//! rings, and rings of neighbouring bands that touch make a graph (a Reeb graph; Reeb 1946, for bodies Hilaga and
+//! others: "Topology matching", SIGGRAPH 2001). Where it branches, at armpits and crotch, a unit ends. What is too
+//! short to be a limb goes to its parent. A unit between two branchings, the torso, is cut once more at its narrowest
+//! ring between its ends, the waist: trunk and hip.
 //!
 //! Our reading: the source says that arms, legs, trunk and hip are segmented, not how.
 

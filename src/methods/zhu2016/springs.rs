@@ -1,17 +1,19 @@
 //! The garment as masses and springs.
 //!
-//! Structural springs along the edges: k = Y Σ A_t / L², the sum over the edge's triangles, which makes a mesh of any triangles as stiff in
-//! tension as a membrane of stiffness Y (Van Gelder: "Approximate simulation of elastic membranes by triangulated spring meshes", J. Graphics
-//! Tools 3(2), 1998). Y goes from the fabric's k_u to its k_v with the square of the edge's direction cosines.
+//! Structural springs along the edges: k = Y Σ A_t / L², the sum over the edge's triangles, which makes a mesh of any
+//! triangles as stiff in tension as a membrane of stiffness Y (Van Gelder: "Approximate simulation of elastic membranes
+//! by triangulated spring meshes", J. Graphics Tools 3(2), 1998). Y goes from the fabric's k_u to its k_v with the
+//! square of the edge's direction cosines.
 //!
-//! Bending springs between the far corners of two triangles with a common edge, at their flat distance L. Bent to a curvature κ that distance shortens by κ² L³/24, so
-//! the energy goes by κ⁴; k_b is such that at a radius of 2 cm, a garment fold's, the springs in all directions hold as much as a plate of the
-//! fabric's mean bending stiffness B: ½ B κ² A = ½ k_b (κ² L³/24)² · 35/128 (the mean of cos⁸). No bending spring is stiffer than
-//! the edge it spans, or it would pull in the plane.
+//! Bending springs between the far corners of two triangles with a common edge, at their flat distance L. Bent to a
+//! curvature κ that distance shortens by κ² L³/24, so the energy goes by κ⁴; k_b is such that at a radius of 2 cm, a
+//! garment fold's, the springs in all directions hold as much as a plate of the fabric's mean bending stiffness B: ½ B
+//! κ² A = ½ k_b (κ² L³/24)² · 35/128 (the mean of cos⁸). No bending spring is stiffer than the edge it spans, or it
+//! would pull in the plane.
 //!
-//! Provot's limiting (Provot: "Deformation constraints in a mass-spring model to describe rigid cloth behaviour", Graphics Interface 1995): after a step,
-//! a structural spring that is longer than (1 + τ) L is shortened to that by moving its ends, each by the other's share of the
-//! mass; sweeps over all of them, a few a step.
+//! Provot's limiting (Provot: "Deformation constraints in a mass-spring model to describe rigid cloth behaviour",
+//! Graphics Interface 1995): after a step, a structural spring that is longer than (1 + τ) L is shortened to that by
+//! moving its ends, each by the other's share of the mass; sweeps over all of them, a few a step.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|

@@ -1,8 +1,9 @@
 //! A unit of the body: its frame, its slices with their quadrics, and the leaf triangles of each slice by sectors.
 //!
-//! The frame's z runs along the unit: the direction in which its triangles spread most, for a limb and a trunk alike. Slices are 4 cm
-//! high. A slice lists every triangle of the unit that comes within [`REACH`] of it, so that a point which has gone up to that deep
-//! into the body still finds the nearest one; a sector of a slice lists those of them that come within the same of the sector.
+//! The frame's z runs along the unit: the direction in which its triangles spread most, for a limb and a trunk alike.
+//! Slices are 4 cm high. A slice lists every triangle of the unit that comes within [`REACH`] of it, so that a point
+//! which has gone up to that deep into the body still finds the nearest one; a sector of a slice lists those of them
+//! that come within the same of the sector.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -166,7 +167,8 @@ impl Slice {
     }
 }
 
-/// Whether a triangle comes within `reach` of a sector about `centre` whose middle has this direction: by its circle about the middle of its corners.
+/// Whether a triangle comes within `reach` of a sector about `centre` whose middle has this direction: by its circle
+/// about the middle of its corners.
 fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> bool {
     let flat = corners.map(DVec3::truncate);
     let at = (flat[0] + flat[1] + flat[2]) / 3.0;

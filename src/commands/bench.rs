@@ -1,0 +1,212 @@
+//! `partwise bench table-4`: the paper's comparison as an experiment that anybody can repeat.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use comfy_table::{CellAlignment, Table, presets};
+use partwise::SceneSpec;
+use partwise::contest::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
+use partwise::fabric::{DEFAULT_FABRIC, Fabric};
+use partwise::shapes::{GarmentRequest, MeshCache};
+use serde_json::json;
+
+use super::failure::UserError;
+use super::sweep::report::Format;
+use super::work::{use_threads, write_csv};
+use super::{console, interrupt};
+
+const LONG_ABOUT: &str = "\
+Drapes the paper's garments in every way there is: its reference methods [19] and [21], its own equations (`paper`), the coupled \
+model's two stages (`preview`), and those with the settled drape after (`converged`). Rounds are interleaved, so that whatever else \
+the machine does hits all alike, and ratios are taken round by round.
+
+What moves in time rests by one rule: RMS speed of the vertices under 1 cm/s over a quarter of a second. Beside the time stands what \
+the paper does not report: the error against the settled drape, the residual of one common energy, strain, penetration.
+
+Of the paper's three, [20] (Gross, Fuhrmann, Luckas 2003) is not built: it has no column.";
+
+const EXAMPLES: &str = "\
+Examples:
+  partwise bench table-4                                       the ten rows; half an hour on two cores
+  partwise bench table-4 --quick                               two small garments, one round: does it run?
+  partwise bench table-4 --rows flared-skirt@1000,flared-skirt@4000,flared-skirt@16000   how costs grow
+  partwise bench table-4 --csv table-4.csv --format json       for scripts
+
+Rows are kept in --rows-file as they are done; the same command goes on from there after Ctrl-C.";
+
+/// What can be benched.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// The paper's Table 4: its reference methods, its own equations, and ours
+    #[command(name = "table-4", long_about = LONG_ABOUT, after_help = EXAMPLES)]
+    TableFour(TableFourArgs),
+}
+
+/// Arguments of `bench table-4`.
+#[derive(Debug, Args)]
+pub(crate) struct TableFourArgs {
+    /// Rows: built-in garments with their vertices [default: the paper's ten]
+    #[arg(long, value_name = "NAME@VERTICES", value_delimiter = ',')]
+    rows: Vec<GarmentRequest>,
+    /// Fabric: a built-in name or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
+    fabric: String,
+    /// Counted rounds
+    #[arg(long, value_name = "N", default_value_t = ContestOptions::default().rounds as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    rounds: u64,
+    /// Canonical drapes from this many perturbed starts, for the spread between equilibria
+    #[arg(long, value_name = "N", default_value_t = ContestOptions::default().starts)]
+    starts: u64,
+    /// Two garments of 600 vertices, one round, no perturbed starts; nothing is kept
+    #[arg(long, conflicts_with_all = ["rows", "rounds", "starts", "rows_file"])]
+    quick: bool,
+    /// Where rows are kept, and found again
+    #[arg(long, value_name = "FILE.json", default_value = "table-4.json")]
+    rows_file: PathBuf,
+    /// Write a line for every entrant of every row to this file as well
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// What to print on stdout
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Worker threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+impl BenchCommand {
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        match self {
+            Self::TableFour(args) => args.execute(),
+        }
+    }
+}
+
+impl TableFourArgs {
+    fn execute(&self) -> anyhow::Result<()> {
+        use_threads(self.threads)?;
+        let fabric = Fabric::by_name(&self.fabric)?;
+        let options = self.options();
+        let conditions = Conditions::here(&fabric.name, &options);
+        let asked = self.asked()?;
+        let mut journal = if self.quick {
+            Journal { conditions, rows: Vec::new() }
+        } else {
+            Journal::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
+        };
+        interrupt::listen();
+        let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
+        let runs = options.warm_up + options.rounds;
+        let bar = console::progress(Some((left.len() * runs * ENTRANTS.len()) as u64), "table 4");
+        for (done, (name, vertices)) in left.iter().enumerate() {
+            let (mut begun, before) = (0, (done * runs * ENTRANTS.len()) as u64);
+            let mut last = (usize::MAX, String::new());
+            let mut listen = |round: usize, of: usize, what: &str| {
+                if last.0 != round || last.1 != what {
+                    last = (round, what.to_owned());
+                    bar.set_position(before + begun);
+                    begun = (begun + 1).min((runs * ENTRANTS.len()) as u64);
+                    bar.set_message(format!("{name}@{vertices}: {what}, round {} of {of}", (round + 1).min(of)));
+                }
+                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
+            let loaded = spec.load_with(&MeshCache::in_user_cache())?;
+            match contest::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
+                Ok(row) => journal.rows.push(row),
+                Err(ContestError::Interrupted) => break,
+                Err(error) => return Err(error.into()),
+            }
+            if !self.quick {
+                self.keep(&journal)?;
+            }
+        }
+        bar.finish_and_clear();
+        self.report(&journal, &asked)
+    }
+
+    fn options(&self) -> ContestOptions {
+        if self.quick {
+            return ContestOptions { rounds: 1, warm_up: 0, starts: 0, ..ContestOptions::default() };
+        }
+        // The parser bounds it.
+        let rounds = usize::try_from(self.rounds).unwrap_or(usize::MAX);
+        ContestOptions { rounds, starts: self.starts, ..ContestOptions::default() }
+    }
+
+    /// Garments and vertices, in order.
+    fn asked(&self) -> anyhow::Result<Vec<(String, usize)>> {
+        if self.quick {
+            return Ok(["flared-skirt", "pullover-1"].map(|name| (name.to_owned(), 600)).to_vec());
+        }
+        if self.rows.is_empty() {
+            return Ok(TEN_ROWS.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect());
+        }
+        let row = |request: &GarmentRequest| match request.vertices {
+            Some(vertices) => Ok((request.name.clone(), vertices)),
+            None => Err(UserError::new(format!(
+                "--rows {}: found no number of vertices, expected {}@VERTICES",
+                request.name, request.name
+            ))),
+        };
+        let asked: Vec<(String, usize)> = self.rows.iter().map(row).collect::<Result<_, _>>()?;
+        // Before any of them is draped.
+        for (name, vertices) in &asked {
+            SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}")).check_names()?;
+        }
+        Ok(asked)
+    }
+
+    fn keep(&self, journal: &Journal) -> anyhow::Result<()> {
+        journal.write(&self.rows_file).map_err(|e| {
+            let file = self.rows_file.display();
+            UserError::new(format!("{file}: cannot be written: {e}; choose another file with --rows-file"))
+        })
+    }
+
+    fn report(&self, journal: &Journal, asked: &[(String, usize)]) -> anyhow::Result<()> {
+        let find =
+            |(name, n): &(String, usize)| journal.rows.iter().find(|row| row.garment == *name && row.asked == *n);
+        let rows: Vec<ContestRow> = asked.iter().filter_map(find).cloned().collect();
+        let csv = contest::csv_lines(&rows)?;
+        if let Some(path) = &self.csv {
+            write_csv(path, &csv)?;
+        }
+        let missing = asked.len() - rows.len();
+        match self.format {
+            Format::Csv => console::result(&csv),
+            Format::Json => {
+                let json = json!({ "conditions": journal.conditions, "rows": rows, "missing_rows": missing });
+                console::result(&serde_json::to_string(&json)?);
+            }
+            Format::Text => console::result(&text(journal, &rows)),
+        }
+        if missing > 0 {
+            console::warning(&format!("{missing} of {} rows are not done; the same command goes on", asked.len()));
+        }
+        Ok(())
+    }
+}
+
+/// For people.
+fn text(journal: &Journal, rows: &[ContestRow]) -> String {
+    let mut out = journal.conditions.said();
+    for cells in contest::tables(rows).into_iter().chain(contest::exponents(rows)) {
+        let mut table = Table::new();
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&cells.header);
+        for row in &cells.rows {
+            table.add_row(row);
+        }
+        table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+        out += &format!("\n\n{}\n{table}", cells.title);
+    }
+    for row in rows {
+        for entry in &row.entries {
+            if let Some(error) = &entry.error {
+                out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
+            }
+        }
+    }
+    out
+}

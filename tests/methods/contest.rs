@@ -1,0 +1,70 @@
+//! A row of the contest on a small garment.
+
+use std::ops::ControlFlow;
+
+use partwise::SceneSpec;
+use partwise::contest::{ContestError, ContestOptions, ENTRANTS, row};
+use partwise::fabric::Fabric;
+
+const SMALL: ContestOptions = ContestOptions {
+    rounds: 2,
+    warm_up: 0,
+    starts: 1,
+    rule: partwise::methods::RestRule { speed_m_per_s: 0.01, over_s: 0.25, limit_s: 20.0 },
+};
+
+#[test]
+fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
+    let scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
+    let mut told = Vec::new();
+    let made = row(("pullover-1", 600), &scene, &Fabric::default(), &SMALL, &mut |round, _, what| {
+        told.push((round, what.to_owned()));
+        ControlFlow::Continue(())
+    });
+    let made = made.unwrap();
+    assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
+    assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
+    let names: Vec<&str> = made.entries.iter().map(|e| e.entrant.as_str()).collect();
+    assert_eq!(names, ENTRANTS.map(|e| e.name()));
+    for entry in &made.entries {
+        assert_eq!(entry.error, None);
+        assert_eq!(entry.times_ms.len(), 2);
+        assert!(entry.median_ms > 0.0 && entry.ratio > 0.0);
+    }
+    let [zhu, subdivision, paper, preview, converged] = made.entries.as_slice() else { panic!("{names:?}") };
+    assert_eq!((zhu.ended.as_str(), subdivision.ended.as_str()), ("at-rest", "at-rest"));
+    assert_eq!((paper.ended.as_str(), preview.ended.as_str()), ("two-stages", "two-stages"));
+    assert_eq!((converged.ended.as_str(), converged.ratio, converged.ratio_spread), ("converged", 1.0, 0.0));
+    // It is at rest by the common energy, so little is left of its own way; the paper's equations leave most of it.
+    assert!(converged.residual_over_weight < 2e-3 && converged.own_rms_mm < 1.0, "{converged:?}");
+    assert!(paper.canonical_rms_mm > converged.canonical_rms_mm);
+    // Interleaved: each round has all of them before the next begins.
+    let first_of_second = told.iter().position(|(round, _)| *round == 1).unwrap();
+    assert!(ENTRANTS.iter().all(|e| told[..first_of_second].iter().any(|(_, what)| what == e.name())));
+}
+
+#[test]
+fn who_cannot_run_says_why_and_the_others_go_on() {
+    let mut scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
+    let mut open = scene.body.mesh().clone();
+    open.triangles.pop();
+    scene.body = partwise::distance::Body::new_open(&open).unwrap();
+    let options = ContestOptions { rounds: 1, starts: 0, ..SMALL };
+    let made = row(("pullover-1", 600), &scene, &Fabric::default(), &options, &mut |_, _, _| ControlFlow::Continue(()));
+    let made = made.unwrap();
+    let error = made.entries[0].error.as_deref().unwrap();
+    assert!(error.contains("zhu2016 cannot run here") && error.contains("not closed"), "{error}");
+    assert!(made.entries[1..].iter().all(|e| e.error.is_none()));
+    assert_eq!(made.spread_mm, None);
+}
+
+#[test]
+fn an_interrupted_row_is_none() {
+    let scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
+    let mut asked = 0;
+    let made = row(("pullover-1", 600), &scene, &Fabric::default(), &SMALL, &mut |_, _, _| {
+        asked += 1;
+        if asked > 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(made, Err(ContestError::Interrupted)));
+}
