@@ -303,3 +303,23 @@ fn help_teaches_and_mistakes_exit_with_two() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("fake.rrd"));
 }
+
+#[test]
+fn a_pattern_is_summed_up_and_drawn_and_a_bad_one_refused() {
+    let bench = Bench::new();
+    let skirt = format!("{}/assets/patterns/skirt.json", env!("CARGO_MANIFEST_DIR"));
+    let out = bench.run(&["pattern", &skirt, "--svg", "flat.svg", "--format", "json", "--edge-length", "3"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["panels"].as_array().unwrap().len(), 4);
+    assert_eq!(report["seams"][4]["sides"][1], "skirt_front.2");
+    assert!((report["seams"][4]["gathered_percent"].as_f64().unwrap() - 100.0 * (48.0 / 35.0 - 1.0)).abs() < 1e-9);
+    assert!(fs::read_to_string(bench.folder.path().join("flat.svg")).unwrap().contains("gathered 37 %"));
+    bench.write("bad.json", &fs::read_to_string(&skirt).unwrap().replace("[3, 0]", "[3, 7]"));
+    for arguments in [&["pattern", "bad.json"][..], &["--pattern", "bad.json", "--no-save"][..]] {
+        let out = bench.run(arguments);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{said}");
+        assert!(said.contains("bad.json") && said.contains("edge 3") && said.contains("[3,7]"), "{said}");
+    }
+}

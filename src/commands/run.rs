@@ -54,8 +54,9 @@ pub(crate) struct RunArgs {
     /// Under --accuracy: where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
-    /// Write the displaced garment as OBJ, with its original faces, groups and texture coordinates
-    #[arg(long, value_name = "FILE.obj", help_heading = "Output")]
+    /// Write the displaced garment: as OBJ with its original faces, groups and texture coordinates (of a pattern the panels and
+    /// where they lay flat), or as glTF in metres, y up
+    #[arg(long, value_name = "FILE.obj|FILE.glb", help_heading = "Output")]
     export: Option<PathBuf>,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
@@ -134,6 +135,7 @@ impl RunArgs {
                 follow: self.watch,
                 iterations: self.records_iterations() && solved.snapshots.len() > 1,
                 error: solved.measured.assessment.is_some(),
+                pattern: solved.loaded.tailored.is_some(),
                 wrinkles: solved.measured.assessment.is_some(),
                 fit: of_cloth.map(str::to_owned).collect(),
                 ..Layout::default()
@@ -175,7 +177,11 @@ impl RunArgs {
         let what = format!("{name}: references");
         let measured = refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress))?;
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.timings_ms.insert("load", ms(load));
+        let sew = loaded.tailored.as_ref().map(|tailored| tailored.put_on.time).unwrap_or_default();
+        summary.timings_ms.insert("load", ms(load.saturating_sub(sew)));
+        if loaded.tailored.is_some() {
+            summary.timings_ms.insert("sew", ms(sew));
+        }
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 

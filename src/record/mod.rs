@@ -19,6 +19,7 @@ mod open;
 mod page;
 mod panel;
 pub mod paths;
+mod pattern;
 mod remote;
 mod scatter;
 mod sinks;
@@ -39,6 +40,7 @@ pub use compare::Chosen;
 pub use error::RecordError;
 pub use folds::FoldView;
 pub use panel::Panel;
+pub use pattern::PatternView;
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
@@ -179,6 +181,11 @@ impl Recorder {
     /// Lines along the folds that no PART shows.
     pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
         self.timed(|open| folds::log(open, view))
+    }
+
+    /// The flat panels of a sewing pattern in the colours of the step before.
+    pub fn pattern(&mut self, view: &PatternView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| pattern::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use glam::DVec3;
-use partwise::record::{FoldView, Overlay, Recorder, StepView, WrinkleView};
+use partwise::record::{FoldView, Overlay, PatternView, Recorder, StepView, WrinkleView};
+use partwise::scene::Tailored;
 
 use super::{Solved, ms};
 
@@ -43,6 +44,12 @@ impl Solved {
             scalars: &scalars,
             overlays: &self.overlays(),
         })?;
+        if let Some(Tailored { pattern, put_on }) = &self.loaded.tailored {
+            let (flat, garment_vertex) = put_on.garment.unsewn(pattern);
+            let fit: Vec<Overlay<'_>> =
+                self.overlays().into_iter().filter(|o| ["strain", "pressure"].contains(&o.name)).collect();
+            recorder.pattern(&PatternView { index, flat: &flat, garment_vertex: &garment_vertex, overlays: &fit })?;
+        }
         if let Some(folds) = &self.drape.folds {
             let draped = &self.drape.positions;
             let (excess_percent, across) = (&folds.excess_percent, &folds.across);

@@ -1,8 +1,8 @@
 //! Which views there are, and where: the stages side by side with the report, the levels below, more in further tabs.
 
 use super::super::eye::Eye;
-use super::super::paths;
 use super::super::scatter::VISIBLE;
+use super::super::{paths, pattern};
 use super::view::View;
 use super::{Node, TimePanel};
 
@@ -30,6 +30,8 @@ pub struct Layout {
     pub error: bool,
     /// Names of the per-vertex overlays that will come (`strain`, `pressure`).
     pub fit: Vec<String>,
+    /// The flat panels of a sewing pattern will come.
+    pub pattern: bool,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -54,6 +56,8 @@ pub enum Tab {
     Numbers,
     /// Strain and pressure.
     Fit,
+    /// The flat panels of a sewing pattern beside the drape.
+    Pattern,
     /// Jumps at the PARTs' seams, and mean curvature.
     Wrinkles,
     /// Energy and residual over the iterations.
@@ -79,6 +83,9 @@ impl Layout {
         if !self.fit.is_empty() {
             tabs.push((Tab::Fit, self.fit(eye)));
         }
+        if self.pattern {
+            tabs.push((Tab::Pattern, self.panels(eye)));
+        }
         if self.wrinkles {
             tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
@@ -102,6 +109,7 @@ impl Layout {
             }
             Tab::SideBySide => ASPECT / self.compare.len() as f64,
             Tab::Fit => ASPECT / self.fit.len() as f64,
+            Tab::Pattern => pattern::ASPECT,
             Tab::Wrinkles => 0.5 * ASPECT,
             Tab::Solver => ASPECT / 3.0,
         })
@@ -109,7 +117,11 @@ impl Layout {
 
     /// Length of a pixel under the garment in the views of a tab, m.
     pub(crate) fn pixel_m(&self, tab: Tab, eye: &Eye) -> f64 {
-        let share = if tab == Tab::Stages { STAGE_HEIGHT } else { 1.0 };
+        let share = match tab {
+            Tab::Stages => STAGE_HEIGHT,
+            Tab::Pattern => 0.5,
+            _ => 1.0,
+        };
         self.eye(tab, eye).pixel_m(HEIGHT_PX * share)
     }
 
@@ -188,6 +200,26 @@ impl Layout {
             views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
         }
         Node::Row("Fit", views)
+    }
+
+    /// Two rows of two, so that each view is as wide as panels on a table are.
+    fn panels(&self, eye: &Eye) -> Node {
+        let eye = &self.eye(Tab::Pattern, eye);
+        let flat = |name: &str| {
+            let path = format!("{}/{name}", paths::PATTERN);
+            let name = if name == "parts" { "PARTs".to_owned() } else { capital(name) };
+            (1.0, View::spatial(format!("Flat: {name}"), &[&path], eye).into())
+        };
+        let mut views: Vec<(f32, Node)> = vec![flat("parts")];
+        let of_fit = || self.fit.iter().filter(|name| ["strain", "pressure"].contains(&name.as_str()));
+        views.extend(of_fit().map(|name| flat(name)));
+        if let Some(name) = of_fit().next() {
+            let path = format!("{}/{name}", paths::FIT);
+            views.push((1.0, View::spatial(format!("Worn: {}", capital(name)), &[paths::BODY, &path], eye).into()));
+        }
+        let below = views.split_off(views.len().div_ceil(2));
+        let rows = [views, below].into_iter().filter(|row| !row.is_empty());
+        Node::Column("Pattern", rows.map(|row| (1.0, Node::Row("Pattern", row))).collect())
     }
 }
 
