@@ -314,7 +314,7 @@ fn a_pattern_is_summed_up_and_drawn_and_a_bad_one_refused() {
     assert_eq!(report["panels"].as_array().unwrap().len(), 4);
     assert_eq!(report["seams"][4]["sides"][1], "skirt_front.2");
     assert!((report["seams"][4]["gathered_percent"].as_f64().unwrap() - 100.0 * (48.0 / 35.0 - 1.0)).abs() < 1e-9);
-    assert!(fs::read_to_string(bench.folder.path().join("flat.svg")).unwrap().contains("gathered 37 %"));
+    assert!(fs::read_to_string(bench.folder.path().join("flat.svg")).unwrap().contains("5 +37 %"));
     bench.write("bad.json", &fs::read_to_string(&skirt).unwrap().replace("[3, 0]", "[3, 7]"));
     for arguments in [&["pattern", "bad.json"][..], &["--pattern", "bad.json", "--no-save"][..]] {
         let out = bench.run(arguments);

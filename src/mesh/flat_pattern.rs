@@ -4,8 +4,9 @@
 //! lies or hangs as it was cut has one scale s and σ₁, σ₂ within a few percent of it, except where seams are still open or it
 //! is stretched. An atlas made for pictures is unfolded at any scale and stretched everywhere.
 //!
-//! s is the median of √(σ₁ σ₂), weighted by area; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the pattern where triangles
-//! of [`SHARE`] of the area are within [`NEAR`] of s, and it has room for them all: a texture tiled over the cloth lies over itself. Limits: a garment modelled as a cylinder and unrolled is one, too, and rightly so.
+//! s is the median of √(σ₁ σ₂), weighted by area; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the
+//! pattern where triangles of `SHARE` of the area are within `NEAR` of s, and there is room for them all: a texture tiled over the
+//! cloth lies over itself. Limits: a garment modelled as a cylinder and unrolled is one, too, and rightly so.
 
 use glam::DVec2;
 
