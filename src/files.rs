@@ -24,6 +24,12 @@ pub fn names_a_file(name: &str) -> bool {
     name.contains(['/', '\\', '.'])
 }
 
+/// Whether a file's name ends so, in large letters or small; `ending` without its dot.
+#[must_use]
+pub fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
 /// A file's name without folder and ending; any other name as it is.
 #[must_use]
 pub fn stem(name: &str) -> String {

@@ -31,9 +31,10 @@
 //! # Module map
 //! Data flows one way:
 //! [`mesh`] → [`distance`] → [`scene`] → [`parts`] → [`mechanics`] → [`drape()`](drape::drape) → [`job`] → `record` →
-//! the command line. [`shapes`] makes the built-in body and garments, [`range_table`] and [`fabric`] hold the two
-//! inputs a user tunes, [`accuracy`] measures a result against a reference, [`figures`] are what everybody reads of it,
-//! [`sweep`] runs jobs by the hundred, [`session`] keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
+//! the command line. [`shapes`] makes the built-in body and garments, [`pattern`] reads sewing patterns and [`sewing`] puts
+//! them on, [`range_table`] and [`fabric`] hold the two inputs a user tunes, [`accuracy`] measures a result against a
+//! reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the hundred, [`session`]
+//! keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
 
 pub mod accuracy;
 pub mod assess;

@@ -330,3 +330,23 @@ fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
     assert!(!passes(&floating, "residual"));
     assert!(String::from_utf8_lossy(&floating.stderr).contains("not certified"));
 }
+
+#[test]
+fn a_pattern_is_summed_up_and_drawn_and_a_bad_one_refused() {
+    let bench = Bench::new();
+    let skirt = format!("{}/assets/patterns/skirt.json", env!("CARGO_MANIFEST_DIR"));
+    let out = bench.run(&["pattern", &skirt, "--svg", "flat.svg", "--format", "json", "--edge-length", "3"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["panels"].as_array().unwrap().len(), 4);
+    assert_eq!(report["seams"][4]["sides"][1], "skirt_front.2");
+    assert!((report["seams"][4]["gathered_percent"].as_f64().unwrap() - 100.0 * (48.0 / 35.0 - 1.0)).abs() < 1e-9);
+    assert!(fs::read_to_string(bench.folder.path().join("flat.svg")).unwrap().contains("5 +37 %"));
+    bench.write("bad.json", &fs::read_to_string(&skirt).unwrap().replace("[3, 0]", "[3, 7]"));
+    for arguments in [&["pattern", "bad.json"][..], &["--pattern", "bad.json", "--no-save"][..]] {
+        let out = bench.run(arguments);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{said}");
+        assert!(said.contains("bad.json") && said.contains("edge 3") && said.contains("[3,7]"), "{said}");
+    }
+}

@@ -45,8 +45,9 @@ pub(crate) struct InputArgs {
     /// Join garment and body vertices that lie at exactly the same place
     #[arg(long)]
     weld: bool,
-    /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces
-    #[arg(long, value_name = "own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
+    /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`: the
+    /// texture coordinates where they are the flat pattern it was cut by, in whatever unit, else its own edges
+    #[arg(long, value_name = "auto|own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
     rest: String,
     /// Hold an edge of the garment where it is: `top` (its highest edge, a waistband, say) or the edges that a group of
     /// its file lies on [default: the waistband of a built-in skirt; of a file nothing]

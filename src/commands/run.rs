@@ -14,7 +14,7 @@ use partwise::job::Against;
 use partwise::record::Recorder;
 
 use super::inputs::InputArgs;
-use super::sinks::{SinkArgs, obj_file};
+use super::sinks::{SinkArgs, mesh_file};
 use super::solved::{Snapshot, Solved};
 use super::stages::StageArgs;
 use super::summary::Summary;
@@ -54,8 +54,9 @@ pub(crate) struct RunArgs {
     /// Under --accuracy: where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
-    /// Write the displaced garment as OBJ, with its original faces, groups and texture coordinates
-    #[arg(long, value_name = "FILE.obj", value_parser = PathBufValueParser::new().try_map(obj_file), help_heading = "Output")]
+    /// Write the displaced garment: as OBJ with its original faces, groups and texture coordinates (of a pattern the panels and
+    /// where they lay flat), or as glTF in metres, y up
+    #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
     export: Option<PathBuf>,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
@@ -150,7 +151,11 @@ impl RunArgs {
             other => other?,
         };
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.add_time("load", load);
+        let sew = loaded.tailored.as_ref().map(|tailored| tailored.put_on.time);
+        summary.add_time("load", load.saturating_sub(sew.unwrap_or_default()));
+        if let Some(sew) = sew {
+            summary.add_time("sew", sew);
+        }
         summary.add_time("measure", draped.elapsed());
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }

@@ -32,12 +32,13 @@ impl SeenFrom {
     }
 }
 
-/// Where a displaced garment goes: no other format is written, whatever the name says.
-pub(crate) fn obj_file(path: PathBuf) -> Result<PathBuf, String> {
+/// Where a displaced garment goes: no other formats are written, whatever the name says.
+pub(crate) fn mesh_file(path: PathBuf) -> Result<PathBuf, String> {
     match path.extension() {
-        Some(ending) if !ending.eq_ignore_ascii_case("obj") => {
-            Err(format!("found the ending `.{}`, expected `.obj`: garments are written as OBJ", ending.display()))
-        }
+        Some(ending) if !["obj", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)) => Err(format!(
+            "found the ending `.{}`, expected `.obj` or `.glb`: garments are written as OBJ or glTF",
+            ending.display()
+        )),
         _ => Ok(path),
     }
 }

@@ -7,8 +7,8 @@ use glam::DVec3;
 use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::Measured;
-use partwise::record::{FoldView, Layout, Overlay, RecordOptions, Recorder, StepView, WrinkleView};
-use partwise::scene::Loaded;
+use partwise::record::{FoldView, Layout, Overlay, PatternView, RecordOptions, Recorder, StepView, WrinkleView};
+use partwise::scene::{Loaded, Tailored};
 use partwise::session::Finished;
 
 use super::sinks::SinkArgs;
@@ -53,6 +53,7 @@ impl Solved {
                 follow: live,
                 iterations: iterations && self.snapshots.len() > 1,
                 error: self.measured.assessment.is_some(),
+                pattern: self.loaded.tailored.is_some(),
                 wrinkles: self.measured.assessment.is_some(),
                 fit: of_cloth.map(str::to_owned).collect(),
                 ..Layout::default()
@@ -97,6 +98,12 @@ impl Solved {
             scalars: &scalars,
             overlays: &self.overlays(),
         })?;
+        if let Some(Tailored { pattern, put_on }) = &self.loaded.tailored {
+            let (flat, garment_vertex) = put_on.garment.unsewn(pattern);
+            let fit: Vec<Overlay<'_>> =
+                self.overlays().into_iter().filter(|o| ["strain", "pressure"].contains(&o.name)).collect();
+            recorder.pattern(&PatternView { index, flat: &flat, garment_vertex: &garment_vertex, overlays: &fit })?;
+        }
         if let Some(folds) = &self.drape.folds {
             let draped = &self.drape.positions;
             let (excess_percent, across) = (&folds.excess_percent, &folds.across);

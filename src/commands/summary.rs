@@ -34,9 +34,11 @@ pub(crate) struct Summary {
     vertices_per_level: Vec<usize>,
     #[serde(skip)]
     levels: Vec<LevelCount>,
+    /// What came of letting go what was held until it rested.
+    let_go: Option<String>,
     /// Every figure against the own continuation, under `--accuracy`.
     accuracy: Option<Value>,
-    /// Milliseconds of `load`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `record`, and `total`.
+    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `record`, and `total`.
     timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
     /// Where the recording went.
@@ -74,6 +76,7 @@ impl Summary {
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
+            let_go: drape.let_go.map(|let_go| let_go.to_string()),
             accuracy,
             timings_ms: BTreeMap::new(),
             warnings,
@@ -126,11 +129,15 @@ impl Summary {
             "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
             "stage two", self.model, self.motion, self.fabric, figures.contact_parts, figures.displacement_rms_mm
         );
+        if let Some(let_go) = &self.let_go {
+            let _ = writeln!(out, "{:<20}{let_go}", "let go");
+        }
         for (name, value) in figures.findings() {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let _ = writeln!(out, "\n{}", self.levels_table());
-        let order = ["load", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
+        let order =
+            ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
         let times: Vec<String> =
             order.iter().filter_map(|stage| self.timings_ms.get(stage).map(|t| format!("{stage} {t:.1}"))).collect();
         let _ = writeln!(out, "milliseconds: {}", times.join(", "));
@@ -150,7 +157,7 @@ impl Summary {
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
             fabric: fabric_facts(fabric),
-            timings_ms: ["load", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
+            timings_ms: ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
                 .iter()
                 .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))
                 .collect(),

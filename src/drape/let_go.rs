@@ -13,11 +13,11 @@ use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
 
-/// A waist that sinks farther than this slides, m.
-const FARTHEST: f64 = 0.05;
+/// A waist that sinks farther than this slides, m: from the waist to the hips it is twice as far.
+const FARTHEST: f64 = 0.1;
 
 /// Steps it may take to rest again.
-const STEPS: usize = 60;
+const STEPS: usize = 80;
 
 /// What came of letting go.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -17,7 +17,6 @@ use crate::mesh::self_intersection::crossing_pairs;
 use crate::quantile::nearest_rank;
 use crate::scene::Scene;
 
-
 /// The figures of one drape. The names are the keys of `--format json` and the columns of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {

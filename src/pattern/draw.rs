@@ -1,7 +1,7 @@
 //! The pattern as SVG, in its true size: a millimetre of the drawing is one of cloth.
 //!
-//! Edges are written as the curves they are. Each seam has a number and a colour, the same on both sides; a gathered one says by
-//! how much its longer side is.
+//! Edges are written as the curves they are. Each seam has a number and a colour, the same on both sides; a gathered one says on its
+//! longer side by how much that is longer.
 
 use std::fmt::Write as _;
 
@@ -59,7 +59,7 @@ pub(super) fn svg(pattern: &SewingPattern) -> String {
         );
         for edge in panel.edges.iter() {
             if let Some(label) = &edge.label {
-                text(&mut out, inward(&outline, &edge.curve, 16e-3) + offset, &onto, 8.0, "#777", &escaped(label));
+                text(&mut out, inward(&outline, &edge.curve, 24e-3) + offset, &onto, 8.0, "#777", &escaped(label));
             }
         }
     }
@@ -81,12 +81,12 @@ pub(super) fn svg(pattern: &SewingPattern) -> String {
             let outline: Vec<DVec2> = panel.edges.iter().flat_map(|e| e.curve.divided(16)).collect();
             let mut name = (number + 1).to_string();
             if longer && gathering > SewingPattern::GATHERED {
-                let _ = write!(name, " gathered {:.0} %", 100.0 * gathering);
+                let _ = write!(name, " +{:.0} %", 100.0 * gathering);
             }
             if stitch.right_wrong {
                 name += " turned over";
             }
-            text(&mut out, inward(&outline, curve, 8e-3) + offset, &onto, 11.0, colour, &name);
+            text(&mut out, inward(&outline, curve, 12e-3) + offset, &onto, 11.0, colour, &name);
         }
     }
     out += "</svg>\n";

@@ -209,6 +209,19 @@ impl SewnGarment {
         corners.map(|(corners, &panel)| corners.map(|p| p + offsets[panel as usize])).collect()
     }
 
+    /// The panels beside each other and not sewn, m, x to the right and z up, and the garment's vertex that each of their vertices is.
+    #[must_use]
+    pub fn unsewn(&self, pattern: &SewingPattern) -> (TriMesh, Vec<u32>) {
+        let (mut mesh, mut of) = (TriMesh::default(), Vec::new());
+        for (panel, offset) in self.panels.iter().zip(laid_out(pattern)) {
+            let first = of.len() as u32;
+            mesh.positions.extend(panel.flat.iter().map(|p| DVec3::new(p.x + offset.x, 0.0, p.y + offset.y)));
+            mesh.triangles.extend(panel.triangles.iter().map(|t| t.map(|v| first + v)));
+            of.extend(&panel.vertices);
+        }
+        (mesh, of)
+    }
+
     /// This garment laid over `coarse`, the same pattern in longer edges with its vertices at `positions` (m): each vertex goes where
     /// the cloth under it is.
     #[must_use]

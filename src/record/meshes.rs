@@ -109,7 +109,12 @@ impl CellMesh {
 
     /// What is logged each step: a colour per vertex of the garment.
     pub(crate) fn colours(&self, of_vertex: impl Fn(u32) -> Rgb) -> Mesh3D {
-        colours(self.owner.iter().map(|&v| of_vertex(v)))
+        colours(self.of_vertices(of_vertex))
+    }
+
+    /// What each vertex of the cells has of its owner.
+    pub(crate) fn of_vertices(&self, of_vertex: impl Fn(u32) -> Rgb) -> Vec<Rgb> {
+        self.owner.iter().map(|&v| of_vertex(v)).collect()
     }
 }
 

@@ -21,6 +21,7 @@ mod open;
 mod page;
 mod panel;
 pub mod paths;
+mod pattern;
 mod remote;
 mod scatter;
 mod sinks;
@@ -44,6 +45,7 @@ pub use live::{LiveEncoder, LiveShape, PinnedView};
 pub(crate) use page::takes_gzip;
 pub use page::{Bundled, bundled};
 pub use panel::Panel;
+pub use pattern::PatternView;
 pub use scatter::{ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
@@ -192,6 +194,11 @@ impl Recorder {
     /// Lines along the folds that no PART shows.
     pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
         self.timed(|open| folds::log(open, view))
+    }
+
+    /// The flat panels of a sewing pattern in the colours of the step before.
+    pub fn pattern(&mut self, view: &PatternView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| pattern::log(open, view))
     }
 
     /// One of the tables chosen to stand side by side.

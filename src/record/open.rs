@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::layout::Layout;
-use super::colour_map::Range;
+use super::colour_map::{Range, Rgb};
 use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
@@ -33,6 +33,8 @@ pub(crate) struct Open {
     pub(super) eye: Eye,
     pub(super) distance: Vec<f64>,
     pub(super) vertex_shade: Vec<u8>,
+    /// Colour of each vertex's PART in the step before.
+    pub(super) vertex_colour: Vec<Rgb>,
     pub(super) levels: usize,
     /// What the ends of each quantity's colour map stand for, from its first step on.
     scales: RefCell<BTreeMap<String, Range>>,
@@ -70,6 +72,7 @@ impl Open {
             eye: Eye::default(),
             distance: Vec::new(),
             vertex_shade: Vec::new(),
+            vertex_colour: Vec::new(),
             levels: 0,
             scales: RefCell::default(),
             draped: None,
@@ -160,6 +163,7 @@ impl Open {
         self.cells = CellMesh::new(garment);
         self.distance.clear();
         self.vertex_shade.clear();
+        self.vertex_colour.clear();
         self.seen.borrow_mut().clear();
         if let Some(eye) = Eye::on(garment, self.options.front, blueprint::layout::ASPECT) {
             self.eye = eye;

@@ -14,6 +14,7 @@
 //! | `/drape/garment` | Mesh3D | the displaced garment | `table`, `iteration` |
 //! | `/fit/<name>/garment` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
 //! | `/fit/folds/lines` | LineStrips3D | directions of the folds that no PART shows | `table` |
+//! | `/pattern/parts/panels`, `/pattern/<name>/panels` | Mesh3D | the flat panels in the same colours | `table` |
 //! | `/wrinkles/seams/garment`, `.../lines` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
 //! | `/wrinkles/curvature/garment` | Mesh3D | mean curvature of the drape | `table` |
 //! | `/error/garment` | Mesh3D | distance to the reference drape | `table` |
@@ -41,6 +42,7 @@ pub const FORCE: &str = "/force/garment";
 pub const FORCE_ARROWS: &str = "/force/arrows";
 pub const DRAPE: &str = "/drape/garment";
 pub const FIT: &str = "/fit";
+pub const PATTERN: &str = "/pattern";
 pub const SEAMS: &str = "/wrinkles/seams";
 pub const CURVATURE: &str = "/wrinkles/curvature";
 pub const ERROR: &str = "/error";

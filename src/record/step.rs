@@ -122,6 +122,7 @@ fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let (count, levels) = (step.part_force_n.len(), &step.panel.levels);
     let chosen = colour_parts(step.part_of_vertex, count, levels, &open.garment.triangles, &open.vertex_shade);
     open.vertex_shade = step.part_of_vertex.iter().map(|&p| chosen.shade[p as usize]).collect();
+    open.vertex_colour = step.part_of_vertex.iter().map(|&p| chosen.colour[p as usize]).collect();
     let mesh = open.cells.colours(|v| chosen.colour[step.part_of_vertex[v as usize] as usize]);
     open.log(paths::PARTS, &mesh)?;
     dots::log(open, step, dots::told(step))?;
@@ -209,6 +210,14 @@ fn least(quantity: &str) -> f64 {
     }
 }
 
+/// The range of an overlay's colours, fixed by its first step.
+pub(super) fn scale(open: &Open, overlay: &Overlay<'_>) -> Range {
+    open.scale(overlay.name, || {
+        let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
+        Range { high: own.high.max(least(overlay.name)), ..own }
+    })
+}
+
 /// Values on the draped garment: `{branch}/garment`, and a colour bar where `legend` says.
 pub(super) fn overlay(
     open: &Open,
@@ -219,10 +228,7 @@ pub(super) fn overlay(
 ) -> Result<(), RecordError> {
     let path = format!("{branch}/garment");
     open.triangles_once(&path)?;
-    let range = open.scale(overlay.name, || {
-        let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
-        Range { high: own.high.max(least(overlay.name)), ..own }
-    });
+    let range = scale(open, overlay);
     let map = ColourMap::ALARM;
     let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
     open.log(&path, &coloured)?;

@@ -4,10 +4,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::spec::REST_AUTO;
 use super::{PushOutReport, Scene, SceneError, SceneSpec, facing_body};
 use crate::distance::Body;
-use crate::files::{names_a_file, stem};
+use crate::files::{has_ending, names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh, write_textured};
+use crate::mesh::flat_pattern::FlatPattern;
+use crate::mesh::glb::write_glb;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::report::{MeshReport, Remark};
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
@@ -30,6 +33,8 @@ pub struct Loaded {
     pub pushed_out: PushOutReport,
     /// The sewing pattern it was made of, and how it was put on.
     pub tailored: Option<Tailored>,
+    /// The pattern that was found in its texture coordinates.
+    pub flat_pattern: Option<FlatPattern>,
     imported: Option<Imported>,
 }
 
@@ -49,6 +54,7 @@ struct Unplaced {
     held: Vec<u32>,
     tailored: Option<Tailored>,
     imported: Option<Imported>,
+    pattern: Option<FlatPattern>,
 }
 
 impl SceneSpec {
@@ -91,6 +97,7 @@ impl SceneSpec {
             reports,
             pushed_out,
             tailored: unplaced.tailored,
+            flat_pattern: unplaced.pattern,
             imported: unplaced.imported,
         })
     }
@@ -120,7 +127,14 @@ impl SceneSpec {
             }
             let (spec, vertices) = self.described()?;
             let made = meshes.garment(&spec, &self.form()?, vertices)?;
-            Ok(Unplaced { mesh: made.mesh, rest: made.rest, held: made.held, tailored: None, imported: None })
+            Ok(Unplaced {
+                mesh: made.mesh,
+                rest: made.rest,
+                held: made.held,
+                tailored: None,
+                imported: None,
+                pattern: None,
+            })
         };
         Some(make())
     }
@@ -134,8 +148,16 @@ impl SceneSpec {
         let options = self.import_options(self.garment_group.as_ref());
         let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
         imported.turn_outward(&facing_body(&imported.mesh, body));
-        let rest = self.imported_rest(&mut imported)?;
-        Ok(Unplaced { mesh: imported.mesh.clone(), rest, held: Vec::new(), tailored: None, imported: Some(imported) })
+        let pattern = if self.rest == REST_AUTO { FlatPattern::find(&imported.mesh, &imported.texture) } else { None };
+        let rest = self.imported_rest(&mut imported, pattern)?;
+        Ok(Unplaced {
+            mesh: imported.mesh.clone(),
+            rest,
+            held: Vec::new(),
+            tailored: None,
+            imported: Some(imported),
+            pattern,
+        })
     }
 
     /// A sewing pattern, sewn and put on the body.
@@ -144,20 +166,20 @@ impl SceneSpec {
         let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
-        Ok(Unplaced { mesh, rest, held, tailored: Some(Tailored { pattern, put_on }), imported: None })
+        Ok(Unplaced { mesh, rest, held, tailored: Some(Tailored { pattern, put_on }), imported: None, pattern: None })
     }
 
     /// The rest shape of a garment, which loses the triangles that have no area in it.
-    fn imported_rest(&self, imported: &mut Imported) -> Result<RestShape, SceneError> {
+    fn imported_rest(&self, imported: &mut Imported, pattern: Option<FlatPattern>) -> Result<RestShape, SceneError> {
         let about = SceneError::about;
         let mut name = self.garment.as_str();
-        let mut rest = match self.rest.as_str() {
-            "own" => RestShape::edges_of(&imported.mesh),
-            "texture" => {
-                let rest = RestShape::texture_of(&imported.mesh, &imported.texture, 1.0);
-                rest.map_err(about(name))?
-            }
-            file => {
+        let of_texture =
+            |scale: f64| RestShape::texture_of(&imported.mesh, &imported.texture, scale).map_err(about(&self.garment));
+        let mut rest = match (self.rest.as_str(), pattern) {
+            (REST_AUTO, Some(pattern)) => of_texture(pattern.metres_per_unit)?,
+            (REST_AUTO | "own", _) => RestShape::edges_of(&imported.mesh),
+            ("texture", _) => of_texture(1.0)?,
+            (file, _) => {
                 let frame = imported.frame();
                 let options = ImportOptions {
                     unit: Some(frame.unit),
@@ -195,6 +217,9 @@ impl Loaded {
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
+        if let Some(pattern) = &self.flat_pattern {
+            notes.push(format!("{}: {pattern}", self.garment_name));
+        }
         if let Some(Tailored { pattern, put_on }) = &self.tailored {
             let of_both = pattern.notes.iter().cloned().chain(put_on.notes());
             notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
@@ -205,9 +230,12 @@ impl Loaded {
         notes
     }
 
-    /// Writes the garment at `positions` (m) as OBJ; one that came from a file keeps its faces, groups and texture
-    /// coordinates.
+    /// Writes the garment at `positions` (m) as OBJ, or as glTF where the path ends in `.glb`. As OBJ, one that came from a file keeps its
+    /// faces, groups and texture coordinates, and one of a pattern has its panels as groups and the flat pattern as texture coordinates.
     pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
+        if has_ending(path.as_ref(), "glb") {
+            return write_glb(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec()), None);
+        }
         match (&self.imported, &self.tailored) {
             (Some(imported), _) => write_imported(path.as_ref(), imported, positions),
             (None, Some(Tailored { pattern, put_on })) => {

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
-use crate::files::{names_a_file, read_text, stem};
+use crate::files::{has_ending, names_a_file, read_text, stem};
 use crate::mesh::import::ImportOptions;
 use crate::mesh::{Axis, Unit};
 use crate::pattern::DEFAULT_EDGE_M;
@@ -13,6 +13,9 @@ use crate::shapes::{BodySpec, GarmentRequest, GarmentSpec};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";
+
+/// The rest shape that is looked for.
+pub(super) const REST_AUTO: &str = "auto";
 
 /// What is draped over what. The default is the low-cut dress on the dress form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,7 +40,8 @@ pub struct SceneSpec {
     pub open_body: bool,
     /// Whether vertices at exactly the same place are joined.
     pub weld: bool,
-    /// Rest shape of a garment from a file: `own` edges, its `texture` coordinates in metres, or an OBJ file of the same faces.
+    /// Rest shape of a garment from a file: `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`: the
+    /// texture coordinates where they are the flat pattern, in whatever unit, else its own edges.
     pub rest: String,
     /// An edge held where it is: `top` (the highest) or the edges of a group; without it what a built-in garment holds.
     pub hold: Option<String>,
@@ -59,7 +63,7 @@ impl Default for SceneSpec {
             up: None,
             open_body: false,
             weld: false,
-            rest: "own".to_owned(),
+            rest: REST_AUTO.to_owned(),
             hold: None,
             push_out: true,
             measurements: BodySpec::default(),
@@ -105,12 +109,12 @@ impl SceneSpec {
     /// Whether the garment is a sewing pattern.
     #[must_use]
     pub fn is_a_pattern(&self) -> bool {
-        has_ending(&self.garment, "json")
+        has_ending(self.garment.as_ref(), "json")
     }
 
     /// Whether the garment is a mesh from a file.
     pub(super) fn is_a_mesh(&self) -> bool {
-        has_ending(&self.garment, "obj")
+        has_ending(self.garment.as_ref(), "obj")
     }
 
     /// The built-in or described garment, and how many vertices are asked of it.
@@ -145,8 +149,4 @@ impl SceneSpec {
             open_body: self.open_body,
         }
     }
-}
-
-fn has_ending(file: &str, ending: &str) -> bool {
-    Path::new(file).extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use partwise::drape::Refine;
 use partwise::fabric::{self, Fabric};
+use partwise::pattern::SewingPattern;
 use partwise::range_table::RangeTable;
 use partwise::said::said;
 use partwise::shapes::{BUILT_IN, BodySpec, GarmentSpec};
@@ -63,9 +64,13 @@ pub(crate) fn check(holds: bool, what: &str) -> Result<(), String> {
 }
 
 fn assets(folder: &str) -> Vec<String> {
+    with_ending(folder, "toml")
+}
+
+fn with_ending(folder: &str, wanted: &str) -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(folder);
     let mut paths: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    paths.retain(|path| path.extension().is_some_and(|ending| ending == wanted));
     paths.sort();
     paths.iter().map(|path| fs::read_to_string(path).unwrap()).collect()
 }
@@ -186,6 +191,26 @@ fn jobs() {
             check(serde_json::from_str::<Job>(&again).is_ok_and(|again| again == job), "it reads back as another")?;
             Ok(Said::Taken)
         }
+    });
+}
+
+#[test]
+fn patterns() {
+    // Every one that is taken is sewn, too: some milliseconds each.
+    fuzz("pattern", 0.1, with_ending("patterns", "json"), |text| match SewingPattern::parse(text, "input") {
+        Err(e) => refused(&e),
+        Ok(pattern) => match pattern.sew(0.04) {
+            Err(e) => refused(&e),
+            Ok(sewn) => {
+                check(sewn.mesh.positions.iter().all(|p| p.is_finite()), "a position is no number")?;
+                check(sewn.rest.areas().iter().all(|a| *a > 0.0), "a triangle has no area at rest")?;
+                check(sewn.rest.corners.len() == sewn.mesh.triangles.len(), "rest and mesh differ")?;
+                let known = |v: &u32| (*v as usize) < sewn.mesh.vertex_count();
+                check(sewn.mesh.triangles.as_flattened().iter().all(known), "a triangle has no vertex")?;
+                check(pattern.to_svg().ends_with("</svg>\n"), "its drawing has no end")?;
+                Ok(Said::Taken)
+            }
+        },
     });
 }
 

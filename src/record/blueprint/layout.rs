@@ -3,8 +3,8 @@
 
 use super::super::eye::Eye;
 use super::super::legend::visible;
-use super::super::paths;
 use super::super::scatter::VISIBLE;
+use super::super::{paths, pattern};
 use super::view::View;
 use super::{Node, TimePanel};
 
@@ -34,6 +34,8 @@ pub struct Layout {
     pub error: bool,
     /// Names of the per-vertex overlays that will come (`strain`, `pressure`).
     pub fit: Vec<String>,
+    /// The flat panels of a sewing pattern will come.
+    pub pattern: bool,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -58,6 +60,8 @@ pub enum Tab {
     Numbers,
     /// Strain and pressure.
     Fit,
+    /// The flat panels of a sewing pattern beside the drape.
+    Pattern,
     /// Jumps at the PARTs' seams, and mean curvature.
     Wrinkles,
     /// Energy and residual over the iterations.
@@ -83,6 +87,9 @@ impl Layout {
         if !self.fit.is_empty() {
             tabs.push((Tab::Fit, self.fit(eye)));
         }
+        if self.pattern {
+            tabs.push((Tab::Pattern, self.panels(eye)));
+        }
         if self.wrinkles {
             tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
@@ -103,6 +110,7 @@ impl Layout {
             Tab::Stages | Tab::Numbers => self.stage_grid(eye).1,
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
+            Tab::Pattern => over_bars(pattern::ASPECT),
             Tab::Wrinkles => over_bars(0.5 * ASPECT),
             Tab::Solver => ASPECT / 3.0,
         })
@@ -207,6 +215,32 @@ impl Layout {
             views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
         }
         over("Fit", views, "Colours", paths::FIT_LEGEND, self.fit.len())
+    }
+
+    /// Two rows of two, so that each view is as wide as panels on a table are.
+    fn panels(&self, eye: &Eye) -> Node {
+        let eye = &self.eye(Tab::Pattern, eye);
+        let flat = |name: &str| {
+            let path = format!("{}/{name}", paths::PATTERN);
+            let name = if name == "parts" { "PARTs".to_owned() } else { capital(name) };
+            (1.0, View::spatial(format!("Flat: {name}"), &[&path], eye).into())
+        };
+        let mut views: Vec<(f32, Node)> = vec![flat("parts")];
+        let of_fit = || self.fit.iter().filter(|name| ["strain", "pressure"].contains(&name.as_str()));
+        views.extend(of_fit().map(|name| flat(name)));
+        if let Some(name) = of_fit().next() {
+            let path = format!("{}/{name}", paths::FIT);
+            views.push((1.0, View::spatial(format!("Worn: {}", capital(name)), &[paths::BODY, &path], eye).into()));
+        }
+        let below = views.split_off(views.len().div_ceil(2));
+        let rows = [views, below].into_iter().filter(|row| !row.is_empty());
+        let mut rows: Vec<(f32, Node)> = rows.map(|row| (1.0, Node::Row("Pattern", row))).collect();
+        if !self.fit.is_empty() {
+            // The colours are those of the fit, and so are their bars.
+            let bars = View::plane("Colours", &[paths::FIT_LEGEND], visible([self.fit.len(), 1])).into();
+            rows.push((rows.len() as f32 * BARS_HEIGHT, bars));
+        }
+        Node::Column("Pattern", rows)
     }
 }
 

@@ -1,0 +1,157 @@
+//! Whether texture coordinates are the pattern that a garment was cut by, and in which unit.
+//!
+//! Each triangle has a map from its texture coordinates to its place; σ₁ ≥ σ₂ are its singular values, metres per unit. Cloth that
+//! lies or hangs as it was cut has one scale s and σ₁, σ₂ within a few percent of it, except where seams are still open or it
+//! is stretched. An atlas made for pictures is unfolded at any scale and stretched everywhere.
+//!
+//! s is the median of √(σ₁ σ₂), weighted by area; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the
+//! pattern where triangles of `SHARE` of the area are within `NEAR` of s, and there is room for them all: a texture tiled over the
+//! cloth lies over itself. Limits: a garment modelled as a cylinder and unrolled is one, too, and rightly so.
+
+use glam::DVec2;
+
+use super::{TriMesh, Unit};
+
+/// How far σ/s may be from 1 in cloth as cut.
+const NEAR: f64 = 0.03;
+/// Share of the area that must be so: seams of a garment not yet sewn shut take up to a third.
+const SHARE: f64 = 0.6;
+/// How near s must be to a unit for that to be meant.
+const ROUND: f64 = 0.03;
+
+/// A flat pattern found in texture coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlatPattern {
+    /// Metres of one unit of them.
+    pub metres_per_unit: f64,
+    /// The unit, where the scale is one's.
+    pub unit: Option<Unit>,
+    /// Share of the garment's area that lies as it was cut.
+    pub share: f64,
+}
+
+impl FlatPattern {
+    /// Looks for it; `None` where triangles have no texture coordinates or these are no pattern.
+    #[must_use]
+    pub fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
+        let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
+        let mut whole = 0.0;
+        let (mut low, mut high, mut covered) = (DVec2::INFINITY, DVec2::NEG_INFINITY, 0.0);
+        for (t, corners) in texture.iter().enumerate().take(mesh.triangles.len()) {
+            let [a, b, c] = (*corners)?;
+            let [p, q, r] = mesh.corners(t);
+            let area = 0.5 * (q - p).cross(r - p).length();
+            whole += area;
+            let flat = (b - a).perp_dot(c - a);
+            (low, high) = (low.min(a).min(b).min(c), high.max(a).max(b).max(c));
+            covered += 0.5 * flat.abs();
+            if flat == 0.0 {
+                continue;
+            }
+            // Columns of F from the edges, and the eigenvalues of FᵀF by their sum and product.
+            let u = ((q - p) * (c - a).y - (r - p) * (b - a).y) / flat;
+            let v = ((r - p) * (b - a).x - (q - p) * (c - a).x) / flat;
+            let (half, product) = (0.5 * (u.length_squared() + v.length_squared()), u.cross(v).length());
+            let apart = (half * half - product * product).max(0.0).sqrt();
+            let sigma = [(half + apart).sqrt(), (half - apart).max(0.0).sqrt()];
+            if product.is_finite() && product > 0.0 {
+                found.push((product.sqrt(), area, sigma));
+            }
+        }
+        let room = (high - low).element_product();
+        if covered > (1.0 + NEAR) * room {
+            return None;
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half: f64 = 0.5 * found.iter().map(|f| f.1).sum::<f64>();
+        let mut below = 0.0;
+        let median = found.iter().find(|f| {
+            below += f.1;
+            below >= half
+        })?;
+        let units = [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm, Unit::In];
+        let unit = units.into_iter().find(|unit| (median.0 / unit.metres() - 1.0).abs() < ROUND);
+        let scale = unit.map_or(median.0, Unit::metres);
+        let near = |f: &&(f64, f64, [f64; 2])| f.2.iter().all(|sigma| (sigma / scale - 1.0).abs() < NEAR);
+        let share = found.iter().filter(near).map(|f| f.1).sum::<f64>() / whole;
+        (share >= SHARE).then_some(Self { metres_per_unit: scale, unit, share })
+    }
+}
+
+impl std::fmt::Display for FlatPattern {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let unit = match self.unit {
+            Some(unit) => format!("in {unit}"),
+            None => format!("at {:.4} m a unit", self.metres_per_unit),
+        };
+        write!(
+            f,
+            "its texture coordinates are the flat pattern it was cut by, {unit}: {:.0} % of it lies so; rest shape taken from them \
+             (--rest own takes the edges as they are)",
+            100.0 * self.share
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// A grid of 10 × 10 squares rolled up to a quarter of a cylinder, its flat corners, and those stretched by `stretch` along x.
+    fn rolled(scale: f64, stretch: f64) -> (TriMesh, Vec<Option<[DVec2; 3]>>) {
+        let flat = |i: u32, j: u32| DVec2::new(f64::from(i), f64::from(j)) * 0.03;
+        let mut mesh = TriMesh::default();
+        for i in 0..=10 {
+            for j in 0..=10 {
+                let p = flat(i, j);
+                mesh.positions.push(DVec3::new(0.2 * (p.x / 0.2).sin(), p.y, 0.2 * (p.x / 0.2).cos()));
+            }
+        }
+        let at = |i: u32, j: u32| 11 * i + j;
+        let mut texture = Vec::new();
+        for i in 0..10 {
+            for j in 0..10 {
+                for cell in [[(i, j), (i + 1, j), (i + 1, j + 1)], [(i, j), (i + 1, j + 1), (i, j + 1)]] {
+                    mesh.triangles.push(cell.map(|(i, j)| at(i, j)));
+                    texture.push(Some(cell.map(|(i, j)| flat(i, j) * DVec2::new(stretch, 1.0) / scale)));
+                }
+            }
+        }
+        (mesh, texture)
+    }
+
+    #[test]
+    fn a_pattern_is_found_in_any_unit_and_an_atlas_is_none() {
+        for (scale, unit) in [(1.0, Some(Unit::M)), (0.01, Some(Unit::Cm)), (0.001, Some(Unit::Mm)), (0.73, None)] {
+            let (mesh, texture) = rolled(scale, 1.0);
+            let found = FlatPattern::find(&mesh, &texture).unwrap();
+            assert_eq!(found.unit, unit);
+            assert!((found.metres_per_unit / scale - 1.0).abs() < 0.01 && found.share > 0.99, "{found:?}");
+        }
+        let (mesh, texture) = rolled(1.0, 1.2);
+        assert_eq!(FlatPattern::find(&mesh, &texture), None);
+        let (mesh, mut texture) = rolled(1.0, 1.0);
+        texture[3] = None;
+        assert_eq!(FlatPattern::find(&mesh, &texture), None);
+        assert_eq!(FlatPattern::find(&TriMesh::default(), &[]), None);
+        // One square for every cell.
+        let (mesh, texture) = rolled(1.0, 1.0);
+        let tiled = |corners: &Option<[DVec2; 3]>| {
+            corners.map(|c| {
+                let cell = (c[0].min(c[1]).min(c[2]) / 0.03).round();
+                c.map(|p| p / 0.03 - cell)
+            })
+        };
+        assert_eq!(FlatPattern::find(&mesh, &texture.iter().map(tiled).collect::<Vec<_>>()), None);
+    }
+
+    #[test]
+    fn open_seams_do_not_hide_it() {
+        let (mut mesh, texture) = rolled(0.01, 1.0);
+        mesh.positions[..22].iter_mut().for_each(|p| p.z += 0.3);
+        let found = FlatPattern::find(&mesh, &texture).unwrap();
+        assert_eq!(found.unit, Some(Unit::Cm));
+        assert!(found.share < 0.95);
+    }
+}
