@@ -6,7 +6,6 @@
 mod levels;
 mod warnings;
 
-use glam::DVec3;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
 

@@ -60,9 +60,12 @@ fn facing_the_eye(open: &Open, flat: &TriMesh) -> Option<TriMesh> {
     let (middle, size) = (0.5 * (low + high), high - low);
     let half = open.eye.half_height.max(open.eye.half_width / ASPECT);
     let scale = FILLED * (2.0 * half / size.z).min(2.0 * half * ASPECT / size.x);
+    let toward = open.eye.toward;
+    let right = DVec3::Z.cross(toward).normalize_or(DVec3::X);
+    let up = toward.cross(right);
     let place = |p: &DVec3| {
         let d = (*p - middle) * scale;
-        open.eye.centre + d.x * open.eye.right + d.z * open.eye.up
+        open.eye.target + d.x * right + d.z * up
     };
     Some(flat.with_positions(flat.positions.iter().map(place).collect()))
 }
