@@ -293,6 +293,27 @@ fn the_drape_test_takes_a_fabric_from_a_file() {
 }
 
 #[test]
+fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
+    let bench = Bench::new();
+    let rows = bench.path("rows.json");
+    let contest = |rounds: &str| {
+        let of = ["--rows", "pullover-1@600", "--rounds", rounds, "--starts", "0", "--rows-file", &rows];
+        bench.run(&[&["bench", "table-4", "--format", "json"], &of[..]].concat())
+    };
+    let first = json(&contest("1"));
+    let entries = first["rows"][0]["entries"].as_array().unwrap();
+    let names: Vec<&str> = entries.iter().map(|e| e["entrant"].as_str().unwrap()).collect();
+    assert_eq!(names, ["zhu2016", "thomaszewski2006", "paper", "preview", "converged"]);
+    assert!(entries.iter().all(|e| e["error"].is_null() && e["median_ms"].as_f64().unwrap() > 0.0));
+    // The very times of the first run: nothing was draped again.
+    assert_eq!(json(&contest("1")), first);
+    let other = contest("2");
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));
+    bench.refuses(&["bench", "table-4", "--rows", "pullover-1"], &["pullover-1@VERTICES"]);
+}
+
+#[test]
 fn help_teaches_and_mistakes_exit_with_two() {
     let bench = Bench::new();
     let help = String::from_utf8(bench.run(&["--help"]).stdout).unwrap();

@@ -54,12 +54,13 @@ impl Conditions {
     pub fn said(&self) -> String {
         let [speed, over] = self.rest;
         format!(
-            "{}; {} threads; fabric {}; {} rounds after {} uncounted; rest: RMS speed under {} cm/s over {} s",
+            "{}; {} threads; fabric {}; {} counted rounds after {}; {} perturbed starts; rest: RMS speed under {} cm/s over {} s",
             self.machine,
             self.threads,
             self.fabric,
             self.rounds,
             self.warm_up,
+            self.starts,
             100.0 * speed,
             over
         )
@@ -117,7 +118,8 @@ impl Journal {
         let journal: Self = serde_json::from_str(&text)
             .map_err(|e| JournalError::Syntax { file: file.clone(), reason: e.to_string() })?;
         if journal.conditions != conditions {
-            let (found, expected) = (format!("{:?}", journal.conditions), format!("{conditions:?}"));
+            let [found, expected] =
+                [&journal.conditions, &conditions].map(|c| format!("version {}, {}", c.version, c.said()));
             return Err(JournalError::Other { file, found, expected });
         }
         Ok(journal)

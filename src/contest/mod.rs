@@ -29,10 +29,9 @@ use std::time::Duration;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::Settings;
 use crate::accuracy::{self, state::State};
 use crate::assess::perturbed;
-use crate::drape::{Model, Refine, StageTimes, drape};
+use crate::drape::{Model, Refine, Settings, StageTimes, drape};
 use crate::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{RefineOptions, Stop, refine};
@@ -41,7 +40,7 @@ use crate::quantile::interpolated;
 use crate::scene::Scene;
 pub use journal::{Conditions, Journal, JournalError};
 pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
-pub use table::{csv_lines, exponents, tables};
+pub use table::{Cells, csv_lines, exponents, tables};
 
 /// How a contest is run.
 #[derive(Debug, Clone, Copy, PartialEq)]

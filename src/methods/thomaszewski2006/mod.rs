@@ -28,11 +28,11 @@ mod strain;
 
 use std::time::Instant;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::march::{Course, Marched, Obstacle, Pacing, march};
 use super::{Dressing, Exhibit, MethodDrape, MethodError, Onlooker, ReferenceMethod, RestRule, Stopwatch};
-use crate::DVec3;
 use crate::mechanics::energy::Contacts;
 use crate::mechanics::energy::contact::Touch;
 use elements::{Elements, Made};

@@ -176,18 +176,8 @@ fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> 
     let off = at - centre;
     // Distance from the two half planes that make the sector: outside it, one of them at least is as far as the sector or nearer.
     let half = DVec2::from_angle(std::f64::consts::PI / SECTORS as f64);
-    let (left, right) = (middle.rotate(half), middle.rotate(half.conjugate()));
+    let (left, right) = (middle.rotate(half), middle.rotate(DVec2::new(half.x, -half.y)));
     left.perp_dot(off) <= radius && right.perp_dot(off) >= -radius && middle.dot(off) >= -radius
-}
-
-trait Conjugate {
-    fn conjugate(self) -> Self;
-}
-
-impl Conjugate for DVec2 {
-    fn conjugate(self) -> Self {
-        Self::new(self.x, -self.y)
-    }
 }
 
 fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVec3) {
