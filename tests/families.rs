@@ -289,7 +289,7 @@ fn chosen<'a>(variable: &str, all: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-#[ignore = "half an hour: `cargo test --release --no-default-features --test families -- --ignored --nocapture`"]
+#[ignore = "an hour: `cargo test --release --no-default-features --test families -- --ignored --nocapture`"]
 fn all_come_to_rest() {
     let sizes = chosen("PARTWISE_FAMILIES_VERTICES", &["60", "250", "1000", "4000", "10000", "60000"]);
     let defects = chosen("PARTWISE_FAMILIES_DEFECTS", &DEFECTS);
