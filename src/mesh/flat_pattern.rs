@@ -4,7 +4,7 @@
 //! lies or hangs as it was cut has one scale s and σ₁, σ₂ within a few percent of it, except where seams are still open or it
 //! is stretched. An atlas made for pictures is unfolded at any scale and stretched everywhere.
 //!
-//! s is the median of √(σ₁ σ₂), weighted by area; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the
+//! s is the median of √(σ₁ σ₂), weighted by area in the pattern; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the
 //! pattern where triangles of `SHARE` of the area are within `NEAR` of s, and there is room for them all: a texture tiled over the
 //! cloth lies over itself. Limits: a garment modelled as a cylinder and unrolled is one, too, and rightly so.
 
@@ -14,7 +14,7 @@ use super::{TriMesh, Unit};
 
 /// How far σ/s may be from 1 in cloth as cut.
 const NEAR: f64 = 0.03;
-/// Share of the area that must be so: seams of a garment not yet sewn shut take up to a third.
+/// Share of the area that must be so: triangles along open seams, and where cloth is stretched, take up to a third.
 const SHARE: f64 = 0.6;
 /// How near s must be to a unit for that to be meant.
 const ROUND: f64 = 0.03;
@@ -26,7 +26,7 @@ pub struct FlatPattern {
     pub metres_per_unit: f64,
     /// The unit, where the scale is one's.
     pub unit: Option<Unit>,
-    /// Share of the garment's area that lies as it was cut.
+    /// Share of the pattern's area that lies as it was cut.
     pub share: f64,
 }
 
@@ -36,15 +36,15 @@ impl FlatPattern {
     pub fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
         let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
         let mut whole = 0.0;
-        let (mut low, mut high, mut covered) = (DVec2::INFINITY, DVec2::NEG_INFINITY, 0.0);
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for (t, corners) in texture.iter().enumerate().take(mesh.triangles.len()) {
             let [a, b, c] = (*corners)?;
             let [p, q, r] = mesh.corners(t);
-            let area = 0.5 * (q - p).cross(r - p).length();
-            whole += area;
             let flat = (b - a).perp_dot(c - a);
+            // By area in the pattern: what bridges an open seam is long in space and an edge wide there.
+            let area = 0.5 * flat.abs();
+            whole += area;
             (low, high) = (low.min(a).min(b).min(c), high.max(a).max(b).max(c));
-            covered += 0.5 * flat.abs();
             if flat == 0.0 {
                 continue;
             }
@@ -59,7 +59,7 @@ impl FlatPattern {
             }
         }
         let room = (high - low).element_product();
-        if covered > (1.0 + NEAR) * room {
+        if whole > (1.0 + NEAR) * room {
             return None;
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));

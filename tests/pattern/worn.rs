@@ -76,3 +76,23 @@ fn an_exported_garment_keeps_its_panels_and_its_flat_pattern() {
     assert_eq!(pattern.stitches.len(), 8);
     assert!(pattern.to_svg().matches("<path").count() >= 2 + 2 + 16);
 }
+
+#[test]
+fn a_pattern_in_texture_coordinates_is_known_as_such() {
+    // As GarmentCode's own meshes come: panels held about the body, seams bridged by long triangles, coordinates in cm.
+    let pattern = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap();
+    let sewn = pattern.sew(0.02).unwrap();
+    let texture: Vec<_> = sewn.laid_out(&pattern).iter().map(|c| c.map(|p| 100.0 * p)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("box.obj").display().to_string();
+    partwise::mesh::export::write_textured(Path::new(&path), &sewn.mesh, &texture).unwrap();
+    let spec = SceneSpec { unit: Some(Unit::M), up: Some(Axis::Z), ..SceneSpec::new("form", &path) };
+    let found = spec.load().unwrap();
+    assert_eq!(found.flat_pattern.map(|p| p.unit), Some(Some(Unit::Cm)));
+    let area = |rest: &partwise::mesh::RestShape| rest.areas().iter().sum::<f64>();
+    assert!((area(&found.scene.rest) / area(&sewn.rest) - 1.0).abs() < 1e-9);
+    assert!(found.notes().iter().any(|note| note.contains("flat pattern") && note.contains("--rest own")));
+    let own = SceneSpec { rest: "own".into(), ..spec }.load().unwrap();
+    assert_eq!(own.flat_pattern, None);
+    assert!(area(&own.scene.rest) > 1.2 * area(&sewn.rest), "bridges over the seams and all");
+}
