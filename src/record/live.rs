@@ -113,11 +113,6 @@ impl LiveEncoder {
         let views = 3 + pins.len();
         self.eye = Eye::on(garment, self.front, ROOM / views as f64).unwrap_or_default();
         let (stream, storage) = open((self.builder)())?;
-        stream.log_static(paths::BODY, &meshes::plain(body, colours::BODY))?;
-        stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;
-        for (shape, colour) in [(LiveShape::Preview, colours::CLOTH), (LiveShape::Rest, colours::DRAPED)] {
-            stream.log_static(shape.path(), &meshes::plain(garment, colour))?;
-        }
         let seen =
             |name: String, body: &str, path: &str| (1.0, Node::from(View::spatial(name, &[body, path], &self.eye)));
         let mut row = vec![
@@ -127,11 +122,19 @@ impl LiveEncoder {
         ];
         for (i, pin) in pins.iter().enumerate() {
             let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
-            stream.log_static(body.as_str(), &meshes::plain(pin.body, colours::BODY))?;
-            stream.log_static(garment.as_str(), &meshes::plain(pin.draped, PINNED))?;
             row.push(seen(format!("Pinned: {}", pin.label), &body, &garment));
         }
+        // The layout first: a slow viewer takes seconds to read the triangles, and would lay out by itself what it has.
         blueprint::send(&stream, &Node::Row("Live", row), TimePanel { timeline: paths::TABLE, follow: false })?;
+        stream.log_static(paths::BODY, &meshes::plain(body, colours::BODY))?;
+        stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;
+        for (shape, colour) in [(LiveShape::Preview, colours::CLOTH), (LiveShape::Rest, colours::DRAPED)] {
+            stream.log_static(shape.path(), &meshes::plain(garment, colour))?;
+        }
+        for (i, pin) in pins.iter().enumerate() {
+            stream.log_static(format!("/pin/{i}/body"), &meshes::plain(pin.body, colours::BODY))?;
+            stream.log_static(format!("/pin/{i}/garment"), &meshes::plain(pin.draped, PINNED))?;
+        }
         drained(&storage)
     }
 
