@@ -43,7 +43,7 @@ fn jersey() -> Fabric {
 fn scene(body: &TriMesh, garment: TriMesh) -> Scene {
     let rest = RestShape::from_edges(&garment).unwrap();
     let topology = Topology::new(&garment);
-    Scene { body: Body::new(body).unwrap(), garment, topology, rest, held: Vec::new() }
+    Scene { body: Body::new(body).unwrap(), garment, topology, rest, held: Vec::new(), let_go: false }
 }
 
 /// The distance that the cloth keeps from what it lies on, m.

@@ -334,8 +334,8 @@ fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
     let bench = Bench::new();
     json(&bench.drape(&["--no-save", "--export", "draped.obj", "--format", "json"]));
     let certified = |garment: &str| {
-        let check = ["check", "body.obj", garment, "--rest", "garment.obj", "--unit", "m", "--up", "z"];
-        bench.run(&[&check[..], &["--certificate", "--format", "json"]].concat())
+        let check = ["check", "body.obj", "garment.obj", "--unit", "m", "--up", "z"];
+        bench.run(&[&check[..], &["--certificate", garment, "--format", "json"]].concat())
     };
     let passes = |output: &Output, name: &str| -> bool {
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -350,6 +350,10 @@ fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
     assert_eq!(floating.status.code(), Some(1));
     assert!(!passes(&floating, "residual"));
     assert!(String::from_utf8_lossy(&floating.stderr).contains("not certified"));
+    bench.write("other.obj", &sheet(11, 1.51));
+    let other = certified("other.obj");
+    let said = String::from_utf8_lossy(&other.stderr);
+    assert!(other.status.code() == Some(2) && said.contains("other.obj") && said.contains("169"), "{said}");
 }
 
 #[test]

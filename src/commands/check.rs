@@ -3,14 +3,15 @@
 
 use clap::Args;
 use comfy_table::{Table, presets};
-use partwise::SceneSpec;
-use partwise::certificate::{Certificate, certify};
+use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
+use partwise::{Scene, SceneSpec};
 use serde::Serialize;
 
 use super::console;
+use super::failure::UserError;
 use super::inputs::InputArgs;
 use super::run::Format;
 
@@ -25,10 +26,10 @@ pub(crate) struct CheckArgs {
     garment_file: Option<String>,
     #[command(flatten)]
     input: InputArgs,
-    /// Certify that the garment, one that was draped and exported, is at rest: forces, curvature, contact and strain, from its
-    /// positions alone. Give the undraped one as --rest, and the --fabric it was draped in; exit code 1 where a line fails
-    #[arg(long, help_heading = "Certificate")]
-    certificate: bool,
+    /// Certify that this file, the garment after it was draped and exported, is at rest: forces, curvature, contact and strain, from
+    /// its positions alone, with rest shape and held edges of the garment as it was given; exit code 1 where a line fails
+    #[arg(long, value_name = "DRAPED.obj", help_heading = "Certificate")]
+    certificate: Option<String>,
     /// Fabric it was draped in: a name or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC, help_heading = "Certificate")]
     fabric: String,
@@ -79,11 +80,7 @@ impl CheckArgs {
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
         let verdict = verdict(&body, &garment, &fit);
-        let certificate = if self.certificate {
-            Some(certify(scene, &Fabric::by_name(&self.fabric)?, &scene.garment.positions)?)
-        } else {
-            None
-        };
+        let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, scene, draped)).transpose()?;
         let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
         if self.format == Format::Json {
             console::result(&serde_json::to_string(&report)?);
@@ -105,6 +102,18 @@ impl CheckArgs {
             console::result(&text(certificate));
         }
         verified(report.certificate.as_ref())
+    }
+}
+
+impl CheckArgs {
+    /// The certificate of a file whose vertices are those of the garment, in their order.
+    fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
+        let spec = SceneSpec { garment: draped.to_owned(), rest: "own".to_owned(), hold: None, ..spec.clone() };
+        let positions = self.input.load(&spec)?.scene.garment.positions;
+        certify(scene, &Fabric::by_name(&self.fabric)?, &positions).map_err(|error| match error {
+            CertifyError::Count { .. } | CertifyError::NotFinite { .. } => UserError::new(format!("{draped}: {error}")),
+            other => other.into(),
+        })
     }
 }
 

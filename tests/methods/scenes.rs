@@ -30,7 +30,8 @@ fn elsewhere() -> TriMesh {
 /// Cloth that hangs free, held at `held`.
 pub(crate) fn hanging(garment: TriMesh, held: Vec<u32>) -> Scene {
     let (topology, rest) = (Topology::new(&garment), RestShape::from_edges(&garment).unwrap());
-    Scene { body: partwise::distance::Body::new(&elsewhere()).unwrap(), garment, topology, rest, held }
+    let body = partwise::distance::Body::new(&elsewhere()).unwrap();
+    Scene { body, garment, topology, rest, held, let_go: false }
 }
 
 /// A fabric alike in all directions.

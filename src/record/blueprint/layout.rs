@@ -15,7 +15,7 @@ const STAGE_HEIGHT: f64 = 0.75;
 /// Width of the text panel over that of a stage.
 const REPORT_OVER_STAGE: f32 = 1.25;
 /// Share of a tab's height that a row of colour bars takes: its title bar, the strip and the numbers.
-const BARS_HEIGHT: f32 = 0.115;
+pub(super) const BARS_HEIGHT: f32 = 0.115;
 /// Height of a view's title bar over that of a tab, in a window of 1280 × 800.
 const TITLE_HEIGHT: f64 = 0.036;
 
@@ -105,7 +105,7 @@ impl Layout {
     }
 
     /// The eye for the views of a tab, which share its width.
-    fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
+    pub(super) fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
         eye.through(match tab {
             Tab::Stages | Tab::Numbers => self.stage_grid(eye).1,
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
@@ -216,32 +216,6 @@ impl Layout {
         }
         over("Fit", views, "Colours", paths::FIT_LEGEND, self.fit.len())
     }
-
-    /// Two rows of two, so that each view is as wide as panels on a table are.
-    fn panels(&self, eye: &Eye) -> Node {
-        let eye = &self.eye(Tab::Pattern, eye);
-        let flat = |name: &str| {
-            let path = format!("{}/{name}", paths::PATTERN);
-            let name = if name == "parts" { "PARTs".to_owned() } else { capital(name) };
-            (1.0, View::spatial(format!("Flat: {name}"), &[&path], eye).into())
-        };
-        let mut views: Vec<(f32, Node)> = vec![flat("parts")];
-        let of_fit = || self.fit.iter().filter(|name| ["strain", "pressure"].contains(&name.as_str()));
-        views.extend(of_fit().map(|name| flat(name)));
-        if let Some(name) = of_fit().next() {
-            let path = format!("{}/{name}", paths::FIT);
-            views.push((1.0, View::spatial(format!("Worn: {}", capital(name)), &[paths::BODY, &path], eye).into()));
-        }
-        let below = views.split_off(views.len().div_ceil(2));
-        let rows = [views, below].into_iter().filter(|row| !row.is_empty());
-        let mut rows: Vec<(f32, Node)> = rows.map(|row| (1.0, Node::Row("Pattern", row))).collect();
-        if !self.fit.is_empty() {
-            // The colours are those of the fit, and so are their bars.
-            let bars = View::plane("Colours", &[paths::FIT_LEGEND], visible([self.fit.len(), 1])).into();
-            rows.push((rows.len() as f32 * BARS_HEIGHT, bars));
-        }
-        Node::Column("Pattern", rows)
-    }
 }
 
 fn wrinkles(eye: &Eye) -> Node {
@@ -274,7 +248,7 @@ fn solver(eye: &Eye) -> Node {
     )
 }
 
-fn capital(name: &str) -> String {
+pub(super) fn capital(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
