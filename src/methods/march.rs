@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
 use super::linear::{ConjugateGradients, Operator, System};
 use super::rest::{Ended, Rest, RestRule};
-use super::{Dressing, MethodError, Moment, Onlooker, Stopwatch};
+use super::{Dressing, MethodError, Moment, Spectator, Stopwatch};
 use crate::GRAVITY;
 use crate::mechanics::energy::Friction;
 use crate::mechanics::energy::contact::Touch;
@@ -117,7 +117,7 @@ pub(super) fn march(
     course: Course<'_>,
     (elastic, obstacle): (&mut dyn Elastic, &mut dyn Obstacle),
     watch: &mut Stopwatch,
-    onlooker: Onlooker<'_>,
+    onlooker: Spectator<'_>,
 ) -> Result<Marched, MethodError> {
     let cloth = dressing.cloth;
     let n = cloth.vertex_count();

@@ -59,7 +59,7 @@ pub struct Moment<'a> {
 }
 
 /// Told of every step; may end the run.
-pub type Onlooker<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Send);
+pub type Spectator<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Send);
 
 /// What a method has to show besides the garment.
 #[derive(Debug, Clone)]
@@ -132,7 +132,7 @@ pub trait ReferenceMethod: Sync {
         &self,
         dressing: &Dressing<'_>,
         rule: &RestRule,
-        onlooker: Onlooker<'_>,
+        onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError>;
 }
 

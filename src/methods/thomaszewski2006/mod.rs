@@ -32,7 +32,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::march::{Course, Marched, Obstacle, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, Onlooker, ReferenceMethod, RestRule, Stopwatch};
+use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use crate::mechanics::energy::Contacts;
 use crate::mechanics::energy::contact::Touch;
 use elements::{Elements, Made};
@@ -77,7 +77,7 @@ impl ReferenceMethod for Thomaszewski2006 {
         &self,
         dressing: &Dressing<'_>,
         rule: &RestRule,
-        onlooker: Onlooker<'_>,
+        onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         rayon::scope(|_| self.run(dressing, rule, onlooker))
     }
@@ -88,7 +88,7 @@ impl Thomaszewski2006 {
         &self,
         dressing: &Dressing<'_>,
         rule: &RestRule,
-        onlooker: Onlooker<'_>,
+        onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         let began = Instant::now();
         let mut watch = Stopwatch::default();

@@ -25,7 +25,7 @@ pub mod units;
 use std::time::Instant;
 
 use super::march::{Course, Marched, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, Onlooker, ReferenceMethod, RestRule, Stopwatch};
+use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use hierarchy::Hierarchy;
 use springs::Springs;
 
@@ -59,7 +59,7 @@ impl ReferenceMethod for Zhu2016 {
         &self,
         dressing: &Dressing<'_>,
         rule: &RestRule,
-        onlooker: Onlooker<'_>,
+        onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         // In the pool: hundreds of short parallel loops follow.
         rayon::scope(|_| self.run(dressing, rule, onlooker))
@@ -71,7 +71,7 @@ impl Zhu2016 {
         &self,
         dressing: &Dressing<'_>,
         rule: &RestRule,
-        onlooker: Onlooker<'_>,
+        onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         let began = Instant::now();
         let mut watch = Stopwatch::default();
