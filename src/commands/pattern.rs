@@ -92,7 +92,7 @@ impl PatternArgs {
             notes: pattern.notes.iter().chain(&sewn.notes).cloned().collect(),
         };
         if let Some(path) = &self.svg {
-            WholeFile::write(path, &pattern.to_svg())
+            WholeFile::write(path, pattern.to_svg())
                 .map_err(|e| anyhow::anyhow!("{}: cannot be written: {e}", path.display()))?;
         }
         if self.format == Format::Json {

@@ -83,7 +83,7 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
         "upper_cm": level.map(|l| l.upper_cm).filter(|cm| cm.is_finite()),
         "vertices": part.vertices.len(),
         "area_cm2": 1e4 * part.vertices.iter().map(|&v| areas[v as usize]).sum::<f64>(),
-        "force_n": force_n.map(|f| f.to_array()),
+        "force_n": force_n.map(DVec3::to_array),
         "force_size_n": force_n.map(|f| f.length()),
         "preview_displacement_mm": preview.map(|p| mean(&p.positions).to_array()),
         "rest_displacement_mm": rest.map(|x| mean(x).to_array()),

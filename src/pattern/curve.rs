@@ -151,9 +151,9 @@ impl Curve {
                 for _ in 0..60 {
                     let middle = 0.5 * (low + high);
                     if before[piece] + self.stretch(origin, middle) < wanted {
-                        low = middle
+                        low = middle;
                     } else {
-                        high = middle
+                        high = middle;
                     }
                     if high - low < 1e-15 {
                         break;

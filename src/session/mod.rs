@@ -201,7 +201,13 @@ impl Session {
 
     /// Makes something known of `state`, if it is still the newest.
     fn publish(&self, state: u64, add: impl FnOnce(&mut Desk)) {
-        let done = self.change(|desk| if desk.view.state == state { Ok(add(desk)) } else { Err(()) });
+        let done = self.change(|desk| {
+            if desk.view.state != state {
+                return Err(());
+            }
+            add(desk);
+            Ok(())
+        });
         // What nobody wants any more is dropped.
         done.unwrap_or_default();
     }

@@ -12,16 +12,16 @@ use partwise::{DVec3, Job, SceneSpec};
 use serde_json::Value;
 
 /// A small garment, so that a whole drape takes a moment.
-pub const GARMENT: &str = "flared-skirt@900";
+pub(crate) const GARMENT: &str = "flared-skirt@900";
 
-pub struct Live {
-    pub session: Session,
-    pub address: SocketAddr,
+pub(crate) struct Live {
+    pub(crate) session: Session,
+    pub(crate) address: SocketAddr,
     server: Option<LiveServer>,
     worker: Option<JoinHandle<()>>,
 }
 
-pub fn options() -> LiveOptions {
+pub(crate) fn options() -> LiveOptions {
     LiveOptions {
         address: "127.0.0.1:0".parse().unwrap(),
         host: None,
@@ -35,7 +35,7 @@ pub fn options() -> LiveOptions {
 
 impl Live {
     /// Serves a session, whose first state is finished.
-    pub fn start(options: &LiveOptions) -> Self {
+    pub(crate) fn start(options: &LiveOptions) -> Self {
         let session = Session::new(Job { scene: SceneSpec::new("form", GARMENT), ..Job::default() }, true);
         let server = LiveServer::start(&session, options).unwrap();
         let working = session.clone();
@@ -46,7 +46,7 @@ impl Live {
     }
 
     /// Waits until nothing is left to compute.
-    pub fn idle(&self) -> Value {
+    pub(crate) fn idle(&self) -> Value {
         let mut now = self.session.snapshot();
         while !now.idle {
             now = self.session.newer_than(now.serial, Duration::from_secs(120));
@@ -54,21 +54,21 @@ impl Live {
         self.get("/api/state").1
     }
 
-    pub fn get(&self, path: &str) -> (u16, Value) {
+    pub(crate) fn get(&self, path: &str) -> (u16, Value) {
         self.ask("GET", path, &[], "")
     }
 
-    pub fn patch(&self, json: &str) -> (u16, Value) {
+    pub(crate) fn patch(&self, json: &str) -> (u16, Value) {
         self.ask("PATCH", "/api/state", &["Content-Type: application/json"], json)
     }
 
     /// A request, and the status and JSON of its answer.
-    pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, Value) {
+    pub(crate) fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, Value) {
         let (status, text) = self.text(method, path, headers, body);
         (status, serde_json::from_str(&text).unwrap_or(Value::String(text)))
     }
 
-    pub fn text(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
+    pub(crate) fn text(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
         let mut lines: Vec<String> = headers.iter().map(|&h| h.to_owned()).collect();
         if !lines.iter().any(|h| h.starts_with("Content-Length") || h.starts_with("Transfer-Encoding")) {
             lines.push(format!("Content-Length: {}", body.len()));
@@ -80,7 +80,7 @@ impl Live {
     }
 
     /// Sends the head of a request and leaves the rest to the caller.
-    pub fn open(&self, method: &str, path: &str, headers: &[String]) -> TcpStream {
+    pub(crate) fn open(&self, method: &str, path: &str, headers: &[String]) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
         let mut head = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
@@ -104,7 +104,7 @@ impl Drop for Live {
 }
 
 /// Status and whole body of an answer.
-pub fn answer(stream: &mut BufReader<TcpStream>) -> (u16, String) {
+pub(crate) fn answer(stream: &mut BufReader<TcpStream>) -> (u16, String) {
     let (status, length) = head(stream);
     let mut bytes = Vec::new();
     match length {
@@ -120,7 +120,7 @@ pub fn answer(stream: &mut BufReader<TcpStream>) -> (u16, String) {
 }
 
 /// Status and length of an answer.
-pub fn head(stream: &mut BufReader<TcpStream>) -> (u16, Option<usize>) {
+pub(crate) fn head(stream: &mut BufReader<TcpStream>) -> (u16, Option<usize>) {
     let mut line = String::new();
     stream.read_line(&mut line).unwrap();
     let status = line.split(' ').nth(1).unwrap().parse().unwrap();
@@ -138,7 +138,7 @@ pub fn head(stream: &mut BufReader<TcpStream>) -> (u16, Option<usize>) {
 }
 
 /// The next chunk of an answer that goes on.
-pub fn chunk(stream: &mut BufReader<TcpStream>) -> Vec<u8> {
+pub(crate) fn chunk(stream: &mut BufReader<TcpStream>) -> Vec<u8> {
     let mut line = String::new();
     stream.read_line(&mut line).unwrap();
     let mut bytes = vec![0; usize::from_str_radix(line.trim(), 16).unwrap() + 2];

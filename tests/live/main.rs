@@ -14,6 +14,9 @@ use partwise::live::{LiveError, LiveOptions, LiveServer};
 use partwise::session::Session;
 use serde_json::{Value, json};
 
+/// Method, path, headers, body; status, and a word of the sentence.
+type Case<'a> = (&'a str, &'a str, Vec<&'a str>, &'a str, u16, &'a str);
+
 #[test]
 fn edits_answer_with_the_state_and_results_follow() {
     let live = Live::start(&options());
@@ -76,7 +79,7 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
     let live = Live::start(&options());
     let json = "Content-Type: application/json";
     let deep = "[".repeat(100_000);
-    let cases: Vec<(&str, &str, Vec<&str>, &str, u16, &str)> = vec![
+    let cases: Vec<Case<'_>> = vec![
         ("PATCH", "/api/state", vec![json], "{\"fabric\": ", 400, "line 1"),
         ("PATCH", "/api/state", vec![json], "{\"max_extent_cm\": [NaN]}", 400, "line 1"),
         ("PATCH", "/api/state", vec![json], "{\"max_extent_cm\": [-3]}", 422, "above 0"),

@@ -25,7 +25,7 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
     assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
     let names: Vec<&str> = made.entries.iter().map(|e| e.entrant.as_str()).collect();
-    assert_eq!(names, ENTRANTS.map(|e| e.name()));
+    assert_eq!(names, ENTRANTS.map(partwise::contest::Entrant::name));
     for entry in &made.entries {
         assert_eq!(entry.error, None);
         assert_eq!(entry.times_ms.len(), 2);

@@ -15,7 +15,7 @@ pub(crate) fn rectangle(u: DVec3, v: DVec3, nu: usize, nv: usize) -> TriMesh {
     let id = |i: usize, j: usize| (j * (nu + 1) + i) as u32;
     let cell = |i: usize, j: usize| {
         let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-        if (i + j) % 2 == 0 { [[a, c, b], [a, d, c]] } else { [[a, d, b], [b, d, c]] }
+        if (i + j).is_multiple_of(2) { [[a, c, b], [a, d, c]] } else { [[a, d, b], [b, d, c]] }
     };
     TriMesh::new(positions, (0..nv).flat_map(|j| (0..nu).flat_map(move |i| cell(i, j))).collect())
 }

@@ -94,7 +94,7 @@ fn stiffness_is_the_derivative_of_the_force_in_the_plane() {
     };
     let (plus, minus) = (forces(&mut elements, 1.0), forces(&mut elements, -1.0));
     elements.linearise(x, &mut vec![DVec3::ZERO; x.len()]);
-    let d: Vec<Vec3A> = move_by.iter().map(|d| d.as_vec3a()).collect();
+    let d: Vec<Vec3A> = move_by.iter().map(DVec3::as_vec3a).collect();
     let mut k_d = vec![Vec3A::ZERO; d.len()];
     elements.times(&d, &mut k_d);
     let scale = k_d.iter().map(|f| f.length()).fold(0.0, f32::max);

@@ -70,8 +70,8 @@ impl AtMiddle {
             for i in 0..3 {
                 let di = f64::from(by_corner[i]);
                 out.gradient[i] += c * di * third.powi(degree - 1);
-                for j in 0..3 {
-                    let dj = f64::from(by_corner[j] - i32::from(i == j));
+                for (j, &power) in by_corner.iter().enumerate() {
+                    let dj = f64::from(power - i32::from(i == j));
                     out.second.col_mut(j)[i] += c * di * dj * third.powi(degree - 2);
                 }
             }
