@@ -49,7 +49,7 @@ pub const TEN_ROWS: [(&str, usize); 10] = {
     rows
 };
 
-/// What Table 4 prints, ms: methods [19], [20], [21] and the paper's own, on an Intel Core i5 650 of 2010.
+/// What Table 4 prints, ms: methods \[19\], \[20\], \[21\] and the paper's own, on an Intel Core i5 650 of 2010.
 const PRINTED: [[f64; 4]; 10] = [
     [1012.0, 1133.0, 1257.0, 898.0],
     [960.0, 1084.0, 1189.0, 834.0],
@@ -63,7 +63,7 @@ const PRINTED: [[f64; 4]; 10] = [
     [1992.0, 2109.0, 2478.0, 1727.0],
 ];
 
-/// The paper's figures for a garment of so many vertices, ms: [19], [20], [21], proposed; `None` for what it has no row
+/// The paper's figures for a garment of so many vertices, ms: \[19\], \[20\], \[21\], proposed; `None` for what it has no row
 /// for.
 #[must_use]
 pub fn printed_ms(garment: &str, vertices: usize) -> Option<[f64; 4]> {

@@ -2,10 +2,10 @@
 //!
 //! | name | source |
 //! |---|---|
-//! | [`zhu2016`] | [19] Zhu, Li 2016: hybrid bounding volume hierarchy, masses and springs |
-//! | [`thomaszewski2006`] | [21] Thomaszewski, Wacker, Straßer 2006: corotational subdivision finite elements |
+//! | [`zhu2016`] | \[19\] Zhu, Li 2016: hybrid bounding volume hierarchy, masses and springs |
+//! | [`thomaszewski2006`] | \[21\] Thomaszewski, Wacker, Straßer 2006: corotational subdivision finite elements |
 //!
-//! The paper's third, [20] (Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003), is not
+//! The paper's third, \[20\] (Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003), is not
 //! built.
 //!
 //! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its

@@ -6,7 +6,7 @@
 //! told beside it.
 //!
 //! Source: the stopping rule of this project's comparison; the papers give none but "until the speed falls under a
-//! tolerance" ([20]).
+//! tolerance" (\[20\]).
 
 /// When a garment counts as resting, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,4 @@
-//! [21] B. Thomaszewski, M. Wacker, W. Straßer: "A consistent bending model for cloth simulation with corotational
+//! \[21\] B. Thomaszewski, M. Wacker, W. Straßer: "A consistent bending model for cloth simulation with corotational
 //! subdivision finite elements", SCA 2006, 107–116.
 //!
 //! Confirmed by the source: Loop subdivision finite elements, so that the displacement is C¹ and patches have twelve

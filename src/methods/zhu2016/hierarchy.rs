@@ -9,7 +9,7 @@
 //! and where q was so large that it cannot touch yet (q has slope at most one) it is not asked again. Ours; the source
 //! tells of no memory.
 //!
-//! Limits: beyond [`REACH`](super::units::REACH) under the skin the nearest triangle may be in another sector, and the
+//! Limits: beyond [`REACH`] under the skin the nearest triangle may be in another sector, and the
 //! depth is then overestimated.
 
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! [19] D. Zhu, Z. Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal
+//! \[19\] D. Zhu, Z. Li: "Dynamic garment simulation based on hybrid bounding volume hierarchy", Autex Research Journal
 //! 16(4), 2016, 241–249.
 //!
 //! Confirmed by the source: the body is segmented (arms, legs, trunk, hip); each unit is cut into slices, and each
