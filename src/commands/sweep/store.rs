@@ -230,7 +230,7 @@ mod tests {
         let (lower_cm, upper_cm) = (0.0, f64::INFINITY);
         KeptPoint {
             scene: SCENE_ID.to_owned(),
-            levels: vec![LevelCount { level: 0, lower_cm, upper_cm, extent: None, vertices: 2, parts: 1 }],
+            levels: vec![LevelCount { level: 1, lower_cm, upper_cm, extent: None, vertices: 2, parts: 1 }],
             force_n: vec![DVec3::Z * -0.5],
             part_of_vertex: vec![0, 0, UNASSIGNED],
             positions: scene().garment.positions,
