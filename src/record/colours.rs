@@ -194,9 +194,13 @@ mod tests {
         for pair in colours.colour.windows(2) {
             assert!(difference(pair[0], pair[1]) >= CLEAR, "{pair:?}");
         }
-        // Whatever the shade, colours of a cloth are lighter than the body's.
-        let light = |c: Rgb| c.iter().map(|&x| u32::from(x)).sum::<u32>();
-        assert!((0..SHADES.len()).all(|c| light(shade(Some(0.3), c as u8)) > light([80; 3])));
+        // Whatever level and shade, a cloth is told from the body beside it.
+        for place in (0..=20).map(|i| f64::from(i) / 20.0) {
+            for number in 0..SHADES.len() as u8 {
+                let colour = shade(Some(place), number);
+                assert!(difference(colour, BODY) >= CLEAR, "{place} {number}: {colour:?}");
+            }
+        }
     }
 
     #[test]
