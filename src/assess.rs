@@ -187,12 +187,11 @@ impl References<'_> {
             start,
             options: &format!("{solver:?}"),
         });
-        let floor = self.scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
         let mut compute = || {
             let began = Instant::now();
             let mut stopped = false;
             let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, &mut |step| {
-                if step.positions.iter().all(|x| x.z < floor) {
+                if self.scene.has_fallen(step.positions) {
                     return ControlFlow::Break(());
                 }
                 let answer = observer(step);

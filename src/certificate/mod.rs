@@ -16,7 +16,7 @@
 //! | inside the body | vertices, by the exact distance | none |
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
-//! | largest strain | principal strain of a triangle, % | [`TORN`]: more than fabrics bear |
+//! | largest strain | principal strain of a triangle, % | [`TORN_PERCENT`]: more than fabrics bear |
 //!
 //! Limits: a reaction that could be given need not be the one that history left; of the curvature, contacts are taken as they are.
 
@@ -31,7 +31,7 @@ pub use forces::Forces;
 
 use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mechanics::fit::principal_strain;
+use crate::mechanics::fit::{TORN_PERCENT, principal_strain};
 use crate::mechanics::refine::SolveError;
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::{Placement, Scene};
@@ -53,9 +53,6 @@ const NEAR_REST_MM: f64 = 1.0;
 
 /// ω² below which a rest does not last, 1/s²: what is softer takes over ten seconds to leave, and is not told from rounding.
 const LASTS: f64 = -1e-2;
-
-/// Principal strain above which a garment would be torn, %.
-pub const TORN: f64 = 50.0;
 
 /// Why nothing could be certified.
 #[derive(Debug, thiserror::Error)]
@@ -223,5 +220,5 @@ fn of_strain(cloth: &Cloth, x: &[DVec3]) -> Finding {
     let strains = cloth.triangles.iter().map(|t| 100.0 * principal_strain(t.deformation(x)));
     let (t, most) =
         strains.enumerate().fold((0, f64::NEG_INFINITY), |most, (t, s)| if s > most.1 { (t, s) } else { most });
-    at_most("largest strain", most, "%", TORN, format!("in triangle {}", t + 1))
+    at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}", t + 1))
 }

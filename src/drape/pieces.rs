@@ -52,11 +52,9 @@ pub(crate) fn refine_from(
         Refine::Converged => None,
     };
     let options = RefineOptions { max_steps, ..RefineOptions::default() };
-    let floor = scene.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
     let contacts = met(cloth, scene, settings.refine, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
-        // What has fallen past the feet meets nothing any more, and would fall for ever.
-        if step.positions.iter().all(|x| x.z < floor) { ControlFlow::Break(()) } else { observer(step) }
+        if scene.has_fallen(step.positions) { ControlFlow::Break(()) } else { observer(step) }
     })?;
     Ok(refined)
 }
@@ -94,9 +92,7 @@ impl Made {
         if let Some(slides @ LetGo::Slides { .. }) = &let_go {
             warnings.push(format!("the garment {slides}"));
         }
-        if let (Some((low, _)), true) = (scene.body.mesh().bounds(), state.is_some())
-            && positions.iter().all(|x| x.z < low.z)
-        {
+        if state.is_some() && scene.has_fallen(&positions) {
             warnings
                 .push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
         }

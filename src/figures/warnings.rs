@@ -3,10 +3,9 @@
 use glam::DVec3;
 
 use super::Figures;
+use crate::mechanics::fit::TORN_PERCENT;
 use crate::scene::Scene;
 
-/// Strain above which a result is no garment that could be worn.
-const TORN: f64 = 0.5;
 /// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
 const SANK_MM: f64 = 100.0;
 
@@ -34,7 +33,7 @@ impl Figures {
                 if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
             ));
         }
-        if let Some(strain) = self.strain_max.filter(|strain| *strain > TORN) {
+        if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
             found.push(format!(
                 "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
                 1e2 * strain

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use hyper::body::Bytes;
 use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until, timeout};
 
 use super::answer::Site;
@@ -60,13 +61,8 @@ pub(super) fn events(site: &Arc<Site>, place: Place) -> Receiver<Bytes> {
                 return;
             }
             sleep_until(began + PACE).await;
-            loop {
-                match timeout(PULSE, news.changed()).await {
-                    Ok(Ok(())) => break,
-                    Ok(Err(_)) => return,
-                    Err(_) if !sent(&sender, Bytes::from_static(b": still here\n\n")).await => return,
-                    Err(_) => {}
-                }
+            if !changed(&mut news, &sender, b": still here\n\n").await {
+                return;
             }
         }
     });
@@ -92,18 +88,24 @@ pub(super) fn stream(site: &Arc<Site>, place: Place) -> Receiver<Bytes> {
                 }
             }
             sleep_until(began + PACE).await;
-            loop {
-                match timeout(PULSE, news.changed()).await {
-                    Ok(Ok(())) => break,
-                    Ok(Err(_)) => return,
-                    // An empty piece.
-                    Err(_) if !sent(&sender, Bytes::from_static(&[0; 4])).await => return,
-                    Err(_) => {}
-                }
+            // An empty piece.
+            if !changed(&mut news, &sender, &[0; 4]).await {
+                return;
             }
         }
     });
     receiver
+}
+
+/// Waits for news, with a sign of life now and then; false where there will be none, or nobody to read them.
+async fn changed<T>(news: &mut watch::Receiver<T>, sender: &Sender<Bytes>, alive: &'static [u8]) -> bool {
+    loop {
+        match timeout(PULSE, news.changed()).await {
+            Ok(changed) => return changed.is_ok(),
+            Err(_) if !sent(sender, Bytes::from_static(alive)).await => return false,
+            Err(_) => {}
+        }
+    }
 }
 
 /// Whether the reader took it in time.

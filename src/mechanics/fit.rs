@@ -18,6 +18,9 @@ use glam::DVec3;
 use super::energy::{Cloth, Contacts};
 use crate::quantile::nearest_rank;
 
+/// Principal strain above which a result is no garment that could be worn, %: more than fabrics bear.
+pub const TORN_PERCENT: f64 = 50.0;
+
 /// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {

@@ -16,6 +16,8 @@ pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
 pub use spec::{DRESS_FORM, SceneSpec};
 
+use glam::DVec3;
+
 use crate::distance::Body;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use placement::check_near;
@@ -73,6 +75,12 @@ impl Scene {
             }
         }
         held
+    }
+
+    /// Whether every vertex at `x` (m) is below the body: what has fallen past its feet meets nothing any more, and would fall for ever.
+    #[must_use]
+    pub fn has_fallen(&self, x: &[DVec3]) -> bool {
+        self.body.mesh().bounds().is_some_and(|(low, _)| x.iter().all(|x| x.z < low.z))
     }
 
     /// Unsigned distance of each garment vertex to the body, m: equation (1) takes it without its sign, as a vertex inside is

@@ -1,8 +1,8 @@
 // `partwise live` in a real browser: loads the page, drags a bound, types, undoes, pins; looks that nothing else is asked and no
 // error is told; takes pictures.
 //
-//     npm install --prefix /tmp/browser playwright-core
-//     NODE_PATH=/tmp/browser/node_modules node tests/browser/live.mjs target/release/partwise [FOLDER for pictures]
+//     npm install --prefix target/browser playwright-core
+//     NODE_PATH=target/browser/node_modules node tests/browser/live.mjs target/release/partwise [FOLDER for pictures]
 //
 // CHROMIUM names the browser (default /usr/bin/chromium). It draws without a graphics card, so times are those of a slow machine.
 

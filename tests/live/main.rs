@@ -110,7 +110,7 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
             "PATCH",
             "/api/state",
             vec!["Content-Type: application/toml"],
-            "[scene]\nbody = \"/root/x.obj\"",
+            "[scene]\nbody = \"/elsewhere/x.obj\"",
             403,
             "x.obj",
         ),

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod beside;
+
 use std::fs;
 use std::path::Path;
 use std::process::Output;
@@ -293,27 +295,6 @@ fn the_drape_test_takes_a_fabric_from_a_file() {
 }
 
 #[test]
-fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
-    let bench = Bench::new();
-    let rows = bench.path("rows.json");
-    let contest = |rounds: &str| {
-        let of = ["--rows", "pullover-1@600", "--rounds", rounds, "--starts", "0", "--rows-file", &rows];
-        bench.run(&[&["bench", "table-4", "--format", "json"], &of[..]].concat())
-    };
-    let first = json(&contest("1"));
-    let entries = first["rows"][0]["entries"].as_array().unwrap();
-    let names: Vec<&str> = entries.iter().map(|e| e["entrant"].as_str().unwrap()).collect();
-    assert_eq!(names, ["zhu2016", "thomaszewski2006", "paper", "preview", "converged"]);
-    assert!(entries.iter().all(|e| e["error"].is_null() && e["median_ms"].as_f64().unwrap() > 0.0));
-    // The very times of the first run: nothing was draped again.
-    assert_eq!(json(&contest("1")), first);
-    let other = contest("2");
-    assert_eq!(other.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));
-    bench.refuses(&["bench", "table-4", "--rows", "pullover-1"], &["pullover-1@VERTICES"]);
-}
-
-#[test]
 fn help_teaches_and_mistakes_exit_with_two() {
     let bench = Bench::new();
     let help = String::from_utf8(bench.run(&["--help"]).stdout).unwrap();
@@ -327,51 +308,4 @@ fn help_teaches_and_mistakes_exit_with_two() {
     let output = bench.run(&["view", "fake.rrd"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("fake.rrd"));
-}
-
-#[test]
-fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
-    let bench = Bench::new();
-    json(&bench.drape(&["--no-save", "--export", "draped.obj", "--format", "json"]));
-    let certified = |garment: &str| {
-        let check = ["check", "body.obj", "garment.obj", "--unit", "m", "--up", "z"];
-        bench.run(&[&check[..], &["--certificate", garment, "--format", "json"]].concat())
-    };
-    let passes = |output: &Output, name: &str| -> bool {
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        let findings = report["certificate"]["findings"].as_array().unwrap();
-        findings.iter().find(|f| f["name"] == name).unwrap()["passes"].as_bool().unwrap()
-    };
-    let at_rest = certified("draped.obj");
-    for line in ["residual", "forces add up", "friction", "inside the body", "largest strain"] {
-        assert!(passes(&at_rest, line), "{line}: {}", String::from_utf8_lossy(&at_rest.stdout));
-    }
-    let floating = certified("garment.obj");
-    assert_eq!(floating.status.code(), Some(1));
-    assert!(!passes(&floating, "residual"));
-    assert!(String::from_utf8_lossy(&floating.stderr).contains("not certified"));
-    bench.write("other.obj", &sheet(11, 1.51));
-    let other = certified("other.obj");
-    let said = String::from_utf8_lossy(&other.stderr);
-    assert!(other.status.code() == Some(2) && said.contains("other.obj") && said.contains("169"), "{said}");
-}
-
-#[test]
-fn a_pattern_is_summed_up_and_drawn_and_a_bad_one_refused() {
-    let bench = Bench::new();
-    let skirt = format!("{}/assets/patterns/skirt.json", env!("CARGO_MANIFEST_DIR"));
-    let out = bench.run(&["pattern", &skirt, "--svg", "flat.svg", "--format", "json", "--edge-length", "3"]);
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(report["panels"].as_array().unwrap().len(), 4);
-    assert_eq!(report["seams"][4]["sides"][1], "skirt_front.2");
-    assert!((report["seams"][4]["gathered_percent"].as_f64().unwrap() - 100.0 * (48.0 / 35.0 - 1.0)).abs() < 1e-9);
-    assert!(fs::read_to_string(bench.folder.path().join("flat.svg")).unwrap().contains("5 +37 %"));
-    bench.write("bad.json", &fs::read_to_string(&skirt).unwrap().replace("[3, 0]", "[3, 7]"));
-    for arguments in [&["pattern", "bad.json"][..], &["--pattern", "bad.json", "--no-save"][..]] {
-        let out = bench.run(arguments);
-        let said = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{said}");
-        assert!(said.contains("bad.json") && said.contains("edge 3") && said.contains("[3,7]"), "{said}");
-    }
 }

@@ -1,0 +1,201 @@
+//! Whole runs of the program on mutated files and command lines: whatever it is given, it ends, in bounded time and memory, with an
+//! exit code that says whose fault it is and words that say what to do.
+//!
+//! `PARTWISE_FUZZ_RUNS` sets how many runs there are; without it a minute's worth. What shows something wrong is kept with its
+//! files and command line under `target/whole-runs/`.
+
+#![cfg(unix)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test fails by panicking, and tells counts"
+)]
+
+mod cases;
+#[path = "../fuzz/mutate.rs"]
+mod mutate;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use cases::{Case, KINDS, Seeds, program};
+use partwise::SceneSpec;
+use partwise::mesh::{Axis, Unit};
+use partwise::scene::Placement;
+
+/// Processor time that one run may take, s, and how long it may wait: far more than any does. A machine that is busy with other things
+/// makes the second long, not the first.
+const WORK: u64 = 60;
+const LIMIT: Duration = Duration::from_secs(600);
+/// Memory that one run may ask for, KiB: the program and its libraries map two gigabytes before anything is read.
+const MEMORY: u64 = 6 << 20;
+/// Longest message: errors quote, and cut what they quote.
+const LONGEST_SAID: usize = 20_000;
+
+/// How a run ended, or what is wrong with it.
+fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
+    for (name, bytes) in &case.files {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", &format!("ulimit -v {MEMORY}; ulimit -t {WORK}; ulimit -c 0; exec \"$0\" \"$@\""), &program()])
+        .args(&case.arguments);
+    command.current_dir(folder).env("XDG_CACHE_HOME", folder.join("cache")).env("RAYON_NUM_THREADS", "2");
+    let (out, err) = (folder.join(".stdout"), folder.join(".stderr"));
+    command.stdin(Stdio::null()).stdout(fs::File::create(&out).unwrap()).stderr(fs::File::create(&err).unwrap());
+    let began = Instant::now();
+    let mut child = command.spawn().map_err(|e| format!("it cannot be started: {e}"))?;
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        // A page is served until somebody ends it.
+        if case.kind.name == "view" && fs::metadata(&out).is_ok_and(|out| out.len() > 0) {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            return Ok("done");
+        }
+        if began.elapsed() > LIMIT {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            return Err(format!("still at work after {LIMIT:?}"));
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let mut said = Vec::new();
+    fs::File::open(&err).unwrap().read_to_end(&mut said).unwrap();
+    let said = String::from_utf8(said).map_err(|_| "what it says is no text".to_owned())?;
+    if said.contains("panicked") || said.contains("overflowed its stack") {
+        return Err(format!("it panicked: {said}"));
+    }
+    if said.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
+        return Err(format!("control characters in what it says: {said:?}"));
+    }
+    if said.len() > LONGEST_SAID {
+        return Err(format!("it says {} bytes", said.len()));
+    }
+    let outcome = match status.code() {
+        Some(0) => "done",
+        Some(2) => "refused",
+        // A sweep of which points failed, each a row that says why.
+        Some(1) if said.contains("points failed: the column `error`") => "failed points",
+        other => return Err(format!("it ended with {other:?} ({status}): {said}")),
+    };
+    if outcome != "done" && !said.contains("error: ") {
+        return Err(format!("refused without a word: {said}"));
+    }
+    let half: Vec<PathBuf> =
+        all_files(folder).into_iter().filter(|p| p.extension().is_some_and(|e| e == "part")).collect();
+    if !half.is_empty() {
+        return Err(format!("half-written files are left: {half:?}"));
+    }
+    if outcome == "done" && case.plain && case.arguments.contains(&"--export".to_owned()) {
+        agrees(folder, &fs::read_to_string(&out).unwrap(), case.kind.name == "converge")?;
+    }
+    Ok(outcome)
+}
+
+fn all_files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() { found.extend(all_files(&path)) } else { found.push(path) }
+    }
+    found
+}
+
+/// Whether the exported garment has the figures that were told of it.
+fn agrees(folder: &Path, told: &str, converged: bool) -> Result<(), String> {
+    let report: serde_json::Value = serde_json::from_str(told).map_err(|e| format!("no JSON: {e}: {told}"))?;
+    let exported = fs::read_to_string(folder.join("out.obj")).map_err(|e| format!("no export: {e}"))?;
+    let coordinates = exported.lines().filter(|line| line.starts_with('v')).flat_map(str::split_whitespace).skip(1);
+    if coordinates.filter_map(|word| word.parse::<f64>().ok()).any(|x| !x.is_finite()) {
+        return Err("the export holds what is no number".to_owned());
+    }
+    if converged && (report["strain_max"].is_null() || report["residual_over_weight"].is_null()) {
+        return Err(format!("a figure is no number: {told}"));
+    }
+    let place = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let spec = SceneSpec {
+        unit: Some(Unit::M),
+        up: Some(Axis::Z),
+        push_out: false,
+        ..SceneSpec::new(place("body.obj"), place("out.obj"))
+    };
+    let again = match spec.load() {
+        Ok(loaded) => loaded,
+        // Draped, it may have lost the area of a triangle, or have gone far off.
+        Err(_) => return Ok(()),
+    };
+    let found = Placement::new(&again.scene.garment, &again.scene.body);
+    let count = |key: &str| report[key].as_u64().unwrap_or(u64::MAX);
+    if count("vertices") != again.scene.garment.vertex_count() as u64 {
+        return Ok(());
+    }
+    // A vertex nearer the surface than the digits written may count either way.
+    let inside = found.penetrating_vertices as u64;
+    if count("penetrating_vertices").abs_diff(inside) > 1 {
+        return Err(format!("{} vertices inside were told, the export has {inside}", count("penetrating_vertices")));
+    }
+    Ok(())
+}
+
+#[test]
+fn whatever_it_is_given_it_ends_well() {
+    let runs = std::env::var("PARTWISE_FUZZ_RUNS").map_or(120, |text| text.parse::<u32>().unwrap());
+    let first = std::env::var("PARTWISE_FUZZ_FIRST").map_or(0, |text| text.parse::<u32>().unwrap());
+    let seeds = Seeds::new();
+    for kind in &KINDS {
+        let folder = seeds.folder.path().join(kind.name).join("a/b/c");
+        fs::create_dir_all(&folder).unwrap();
+        let ended = judge(&Case::whole(&seeds, kind), &folder);
+        assert_eq!(ended, Ok("done"), "{}: {}", kind.name, fs::read_to_string(folder.join(".stderr")).unwrap());
+    }
+    let (next, counts, wrong) = (AtomicU32::new(first), Mutex::new(BTreeMap::new()), Mutex::new(Vec::new()));
+    let work = |worker: usize| {
+        loop {
+            let number = next.fetch_add(1, Ordering::SeqCst);
+            if number >= first + runs {
+                break;
+            }
+            let case = Case::draw(&seeds, number);
+            // Deep enough that `../../x` stays in here.
+            let folder = seeds.folder.path().join(format!("{worker}/a/b/c"));
+            let _ = fs::remove_dir_all(seeds.folder.path().join(worker.to_string()));
+            fs::create_dir_all(&folder).unwrap();
+            match judge(&case, &folder) {
+                Ok(outcome) => *counts.lock().unwrap().entry((case.kind.name, outcome)).or_insert(0_u32) += 1,
+                Err(reason) => {
+                    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("../whole-runs/{number}"));
+                    fs::create_dir_all(&kept).unwrap();
+                    for (name, bytes) in &case.files {
+                        fs::write(kept.join(name.replace('/', "-")), bytes).unwrap();
+                    }
+                    let told = format!("run {number}: partwise {}\n{reason}\n", case.arguments.join(" "));
+                    fs::write(kept.join("told.txt"), &told).unwrap();
+                    eprintln!("{told}");
+                    wrong.lock().unwrap().push(told);
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for worker in 0..std::thread::available_parallelism().map_or(2, usize::from) {
+            let work = &work;
+            scope.spawn(move || work(worker));
+        }
+    });
+    eprintln!("{:?}", counts.lock().unwrap());
+    let wrong = wrong.into_inner().unwrap();
+    assert!(wrong.is_empty(), "{} of {runs} runs; the first:\n{}", wrong.len(), wrong[0]);
+}
