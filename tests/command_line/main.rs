@@ -282,7 +282,7 @@ fn what_parts_could_hold_is_said_in_words_and_figures() {
 #[test]
 fn the_drape_test_takes_a_fabric_from_a_file() {
     let bench = Bench::new();
-    bench.write("my, silk.toml", include_str!("../assets/fabrics/silk.toml"));
+    bench.write("my, silk.toml", include_str!("../../assets/fabrics/silk.toml"));
     let test = |fabric: &str, csv: &str| {
         let output = bench.run(&["cusick", fabric, "--rows", "4", "--csv", csv]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
