@@ -89,7 +89,10 @@ pub fn assess(
     observer: Observer<'_>,
 ) -> Result<Assessment, AssessError> {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
-    let mut references = References { scene, fabric: &settings.fabric, cloth: &cloth, options, warnings: Vec::new() };
+    let self_contact = settings.self_contact;
+    let solver = RefineOptions { self_contact, ..RefineOptions::default() };
+    let mut references =
+        References { scene, fabric: &settings.fabric, cloth: &cloth, solver, options, warnings: Vec::new() };
     let own = references.from(&drape.positions, observer)?;
     let canonical = references.from(&scene.garment.positions, observer)?;
     let mut spread = Vec::new();
@@ -135,7 +138,8 @@ pub fn canonical(
     observer: Observer<'_>,
 ) -> Result<(Reference, Vec<String>), AssessError> {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
-    let mut references = References { scene, fabric, cloth: &cloth, options, warnings: Vec::new() };
+    let solver = RefineOptions::default();
+    let mut references = References { scene, fabric, cloth: &cloth, solver, options, warnings: Vec::new() };
     let reference = references.from(&scene.garment.positions, observer)?;
     Ok((reference, references.warnings))
 }
@@ -171,13 +175,14 @@ struct References<'a> {
     scene: &'a Scene,
     fabric: &'a Fabric,
     cloth: &'a Cloth,
+    solver: RefineOptions,
     options: &'a AssessOptions,
     warnings: Vec<String>,
 }
 
 impl References<'_> {
     fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, AssessError> {
-        let solver = RefineOptions::default();
+        let solver = self.solver.clone();
         let key = ReferenceKey::new(&ReferenceInput {
             garment: &self.scene.garment,
             rest: &self.scene.rest,

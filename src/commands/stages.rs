@@ -37,6 +37,9 @@ pub(crate) struct DialArgs {
     /// Fabric: a built-in name or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
     fabric: String,
+    /// Let cloth go through cloth: for comparing, and for garments that are known not to touch themselves
+    #[arg(long)]
+    no_self_contact: bool,
 }
 
 /// The arguments of one drape.
@@ -70,7 +73,8 @@ impl DialArgs {
             Model::Paper(_) => Model::Paper(readings::options(&self.readings)?),
             coupled => coupled.clone().with_extents_cm(&extents).with_motion(self.motion),
         };
-        Ok(Settings { min_part: self.min_part, model, fabric: Fabric::by_name(&self.fabric)?, ..start })
+        let (fabric, self_contact) = (Fabric::by_name(&self.fabric)?, !self.no_self_contact);
+        Ok(Settings { min_part: self.min_part, model, fabric, self_contact, ..start })
     }
 }
 

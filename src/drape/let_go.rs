@@ -75,12 +75,13 @@ pub(crate) fn let_go(
     let mut contacts = free.contacts(&scene.body, &held.positions);
     contacts.stiffen(held.contact_stiffness / contacts.stiffness());
     contacts.update(&held.positions);
-    contacts.friction_refresh(&held.positions);
+    contacts.refresh(&held.positions);
     let sank = |x: &[DVec3]| {
         let down = scene.held.iter().map(|&v| held.positions[v as usize].z - x[v as usize].z).sum::<f64>();
         down / scene.held.len().max(1) as f64
     };
-    let options = RefineOptions { max_steps: Some(STEPS), ..RefineOptions::default() };
+    let self_contact = settings.self_contact;
+    let options = RefineOptions { max_steps: Some(STEPS), self_contact, ..RefineOptions::default() };
     let mut stopped = false;
     let again = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
         if sank(step.positions) > FARTHEST {

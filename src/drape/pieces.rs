@@ -51,7 +51,7 @@ pub(crate) fn refine_from(
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
-    let options = RefineOptions { max_steps, ..RefineOptions::default() };
+    let options = RefineOptions { max_steps, self_contact: settings.self_contact, ..RefineOptions::default() };
     let contacts = met(cloth, scene, settings.refine, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
         if scene.has_fallen(step.positions) { ControlFlow::Break(()) } else { observer(step) }

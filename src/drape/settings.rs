@@ -143,6 +143,8 @@ pub struct Settings {
     pub refine: Refine,
     /// The cloth.
     pub fabric: Fabric,
+    /// Whether steps at full resolution keep cloth off cloth.
+    pub self_contact: bool,
 }
 
 impl Default for Settings {
@@ -153,6 +155,7 @@ impl Default for Settings {
             model: Model::default(),
             refine: Refine::default(),
             fabric: Fabric::default(),
+            self_contact: true,
         }
     }
 }

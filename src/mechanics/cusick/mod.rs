@@ -96,9 +96,10 @@ pub fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
     let flat = specimen(rows);
     let cloth =
         Cloth::new(&flat.mesh, &Topology::new(&flat.mesh), &RestShape::from_edges(&flat.mesh)?, fabric, &flat.held)?;
-    let end = refine_with(&cloth, Contacts::none(), specimen::waved(&flat), &RefineOptions::default(), &mut |_| {
-        ControlFlow::Continue(())
-    })?;
+    // The folds of a specimen hang apart.
+    let options = RefineOptions { self_contact: false, ..RefineOptions::default() };
+    let end =
+        refine_with(&cloth, Contacts::none(), specimen::waved(&flat), &options, &mut |_| ControlFlow::Continue(()))?;
     let drape = flat.mesh.with_positions(end.positions);
     let circle = |r: f64| std::f64::consts::PI * r * r;
     let (plate, whole) = (circle(PLATE_RADIUS), circle(SPECIMEN_RADIUS));

@@ -18,6 +18,7 @@ use super::layout::HessianLayout;
 use super::membrane::{Stiffness, Triangle};
 use super::packs::TrianglePack;
 use super::pattern::{HELD, Pattern};
+use super::proximity::{Proximity, Skin};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::fabric::Fabric;
@@ -79,7 +80,9 @@ pub struct Cloth {
     pub weight: f64,
     /// Distance the cloth keeps from the body, m.
     pub offset: f64,
-    /// Coulomb friction against the body.
+    /// Thickness of the cloth, m.
+    pub thickness: f64,
+    /// Coulomb friction, against the body and against itself.
     pub friction: f64,
     /// The triangles' rest data.
     pub triangles: Vec<Triangle>,
@@ -90,6 +93,7 @@ pub struct Cloth {
     pub(super) packs: Vec<TrianglePack>,
     placed: Arc<Vec<DVec3>>,
     layout: Arc<OnceLock<HessianLayout>>,
+    skin: Arc<OnceLock<Arc<Skin>>>,
 }
 
 impl Cloth {
@@ -147,13 +151,17 @@ impl Cloth {
             stiffness: Stiffness::new(fabric),
             placed: Arc::new(mesh.positions.clone()),
             layout: Arc::new(OnceLock::new()),
+            skin: Arc::new(OnceLock::new()),
+            thickness: fabric.thickness_m,
         })
     }
 
     /// Unknowns and pattern of the Hessian, made when first asked for.
     #[must_use]
     pub fn layout(&self) -> &HessianLayout {
-        self.layout.get_or_init(|| HessianLayout::new(&self.placed, &self.triangles, &self.bending, &self.held))
+        self.layout.get_or_init(|| {
+            HessianLayout::new(&self.placed, &self.triangles, &self.bending, &self.held, std::iter::empty())
+        })
     }
 
     /// The unknown vertices in elimination order.
@@ -211,6 +219,18 @@ impl Cloth {
         self.found(self.untouched(body).by_planes(), x)
     }
 
+    /// Where this cloth meets itself; ask [`Contacts::refresh`] before use.
+    #[must_use]
+    pub fn proximity(&self) -> Proximity {
+        let skin = self.skin.get_or_init(|| Arc::new(Skin::new(&self.triangles, self.vertex_count())));
+        Proximity::new(Arc::clone(skin), Arc::clone(&self.placed), self.thickness, self.friction)
+    }
+
+    /// The layout of a Hessian with blocks for these pairs of vertices as well, ordered as the cloth lies at `x`.
+    pub(crate) fn layout_with(&self, x: &[DVec3], pairs: impl Iterator<Item = [u32; 2]>) -> HessianLayout {
+        HessianLayout::new(x, &self.triangles, &self.bending, &self.held, pairs)
+    }
+
     fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let friction = Friction::new(self.friction);
         Contacts::new(body, &self.areas, &self.held, self.offset, self.contact_stiffness(), friction)
@@ -218,19 +238,35 @@ impl Cloth {
 
     fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
         contacts.update(x);
-        contacts.friction_refresh(x);
+        contacts.refresh(x);
         contacts
     }
 
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
     pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(|t| t.hessian(&self.stiffness, x), x, contacts, blocks);
+        self.hessian_in(self.layout(), x, contacts, blocks);
+    }
+
+    /// The same in the blocks of another layout.
+    pub(crate) fn hessian_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.assemble(layout, |t| t.hessian(&self.stiffness, x), x, contacts, blocks);
     }
 
     /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
     /// than [`hessian`](Self::hessian), and not always positive.
     pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(|t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
+        self.hessian_bearing_in(self.layout(), x, contacts, blocks);
+    }
+
+    /// The same in the blocks of another layout.
+    pub(crate) fn hessian_bearing_in(
+        &self,
+        layout: &HessianLayout,
+        x: &[DVec3],
+        contacts: &Contacts,
+        blocks: &mut Vec<DMat3>,
+    ) {
+        self.assemble(layout, |t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
     }
 
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
@@ -250,16 +286,21 @@ impl Cloth {
         for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
             blocks[v as usize] += block;
         }
+        for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
+            for (v, w) in gap.members() {
+                blocks[v as usize] += block * (w * w);
+            }
+        }
     }
 
     fn assemble(
         &self,
+        layout: &HessianLayout,
         of_triangle: impl Fn(&Triangle) -> [DMat3; 6],
         x: &[DVec3],
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
     ) {
-        let layout = self.layout();
         blocks.clear();
         blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
@@ -274,6 +315,17 @@ impl Cloth {
             let i = layout.unknown[v as usize];
             if i != HELD {
                 blocks[layout.pattern.starts[i as usize] as usize] += block;
+            }
+        }
+        for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
+            let members: Vec<(u32, f64)> =
+                gap.members().map(|(v, w)| (layout.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect();
+            for (k, &(i, w)) in members.iter().enumerate() {
+                for &(j, other) in &members[..=k] {
+                    if let Some(sum) = blocks.get_mut(layout.pattern.slot(i, j).block as usize) {
+                        *sum += block * (w * other);
+                    }
+                }
             }
         }
     }

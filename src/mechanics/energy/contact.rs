@@ -15,13 +15,15 @@
 //! A distance costs as much as ten triangles' energies, so each vertex remembers its last one: q has slope at most one,
 //! hence q(x) ≥ q(x') − |x − x'|, and a vertex whose bound stays above h is not asked again.
 //!
-//! Limits: vertices are tested, not edges or triangles; a sharp body corner can poke through a triangle.
+//! Limits: vertices are tested, not edges or triangles; where the body pokes through a triangle all the same, the distance that its
+//! corners keep is raised (`cover.rs`).
 
 use glam::{DMat3, DVec3};
 
 use super::field::{Field, SIDE};
 use super::friction::Friction;
 use super::membrane::outer;
+use super::proximity::Proximity;
 use crate::distance::Body;
 
 /// A vertex nearer to the body than the offset.
@@ -61,7 +63,8 @@ enum Met<'b> {
 #[derive(Debug, Clone)]
 pub struct Contacts<'b> {
     met: Met<'b>,
-    offset: f64,
+    /// h of each vertex, m.
+    offsets: Vec<f64>,
     areas: Vec<f64>,
     held: Vec<bool>,
     asked_at: Vec<DVec3>,
@@ -74,6 +77,8 @@ pub struct Contacts<'b> {
     touches: Vec<Touch>,
     /// Where the cloth holds on to the body.
     pub friction: Friction,
+    /// Where the cloth meets itself; not asked where there is none.
+    pub proximity: Option<Proximity>,
 }
 
 impl<'b> Contacts<'b> {
@@ -82,7 +87,7 @@ impl<'b> Contacts<'b> {
     pub fn none() -> Self {
         Self {
             met: Met::Nothing,
-            offset: 0.0,
+            offsets: Vec::new(),
             areas: Vec::new(),
             held: Vec::new(),
             asked_at: Vec::new(),
@@ -92,6 +97,7 @@ impl<'b> Contacts<'b> {
             stiffness: 0.0,
             touches: Vec::new(),
             friction: Friction::none(),
+            proximity: None,
         }
     }
 
@@ -102,7 +108,7 @@ impl<'b> Contacts<'b> {
         let n = areas.len();
         Self {
             met: Met::Rounded(Field::new(body, n)),
-            offset,
+            offsets: vec![offset; n],
             areas: areas.to_vec(),
             held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],
@@ -112,6 +118,7 @@ impl<'b> Contacts<'b> {
             stiffness,
             touches: Vec::new(),
             friction,
+            proximity: None,
         }
     }
 
@@ -159,7 +166,7 @@ impl<'b> Contacts<'b> {
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
             self.keep(v, x[v], distance);
-            let depth = self.offset - distance;
+            let depth = self.offsets[v] - distance;
             if depth > 0.0 {
                 let stiffness = self.stiffness * self.areas[v];
                 self.touches.push(Touch { vertex, depth, normal, stiffness });
@@ -181,7 +188,7 @@ impl<'b> Contacts<'b> {
 
     /// Remembers a vertex's distance and where it was asked.
     fn keep(&mut self, v: usize, x: DVec3, distance: f64) {
-        let free = distance - self.offset;
+        let free = distance - self.offsets[v];
         (self.asked_at[v], self.answer[v], self.leave[v]) = (x, distance, free * free.abs());
     }
 
@@ -207,7 +214,7 @@ impl<'b> Contacts<'b> {
         let Met::Planes(_, normals) = &self.met else { return };
         for &vertex in &near {
             let v = vertex as usize;
-            let depth = self.offset - (self.answer[v] + normals[v].dot(x[v] - self.asked_at[v]));
+            let depth = self.offsets[v] - (self.answer[v] + normals[v].dot(x[v] - self.asked_at[v]));
             if depth > 0.0 {
                 let stiffness = self.stiffness * self.areas[v];
                 self.touches.push(Touch { vertex, depth, normal: normals[v], stiffness });
@@ -229,9 +236,12 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// Refreshes the friction from the contacts found last, at their positions `x`.
-    pub fn friction_refresh(&mut self, x: &[DVec3]) {
+    /// Refreshes what stays as it is between two steps, at the positions `x` last updated: friction, and where the cloth meets itself.
+    pub fn refresh(&mut self, x: &[DVec3]) {
         self.friction.refresh(&self.touches, x);
+        if let Some(proximity) = &mut self.proximity {
+            proximity.refresh(x);
+        }
     }
 
     /// The vertices in contact, ascending.
@@ -240,16 +250,29 @@ impl<'b> Contacts<'b> {
         &self.touches
     }
 
+    /// The body, if there is one.
+    pub(super) fn body(&self) -> Option<&'b Body> {
+        match &self.met {
+            Met::Nothing => None,
+            Met::Planes(body, _) => Some(*body),
+            Met::Rounded(field) => Some(field.body()),
+        }
+    }
+
+    /// Raises the distance that a vertex keeps by so much, m; takes effect with the next [`update`](Self::update).
+    pub(super) fn raise(&mut self, v: usize, by: f64) {
+        self.offsets[v] += by;
+        // What was far enough from the old distance may be near to the new one.
+        self.answer[v] = f64::NEG_INFINITY;
+        self.leave[v] = if self.held[v] { f64::INFINITY } else { f64::NEG_INFINITY };
+    }
+
     /// Vertices inside the body at the positions `x` last updated, and the deepest's depth (m), by the exact distance.
     #[must_use]
     pub fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
-        let body = match &self.met {
-            Met::Nothing => return (0, 0.0),
-            Met::Planes(body, _) => *body,
-            Met::Rounded(field) => field.body(),
-        };
+        let Some(body) = self.body() else { return (0, 0.0) };
         // The rounded distance is more than the exact one by less than the lattice's side: see `field`.
-        let near = self.touches.iter().filter(|t| self.offset - t.depth < SIDE);
+        let near = self.touches.iter().filter(|t| self.offsets[t.vertex as usize] - t.depth < SIDE);
         let exact = near.map(|t| -body.nearest(x[t.vertex as usize]).signed_distance);
         exact.filter(|&d| d > 0.0).fold((0, 0.0), |(n, deepest), d| (n + 1, d.max(deepest)))
     }

@@ -47,7 +47,8 @@ impl Cloth {
         let weight = self.join(padded, [one, other], gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
-        weight + (a + b) + contacts.energy() + contacts.friction.energy(x)
+        let itself = contacts.proximity.as_ref().map_or(0.0, |p| p.add_gradient(x, &self.held, gradient));
+        weight + (a + b) + contacts.energy() + contacts.friction.energy(x) + itself
     }
 
     /// Both halves' gradients and gravity's, where a vertex is not held; returns the energy of gravity.

@@ -30,7 +30,7 @@ pub const ELASTIC_SLIP: f64 = 5e-4;
 
 /// Share of ε from which a hold counts as slipping in the Hessian: a dragged anchor is left at ε exactly, up to rounding,
 /// and as a spring it would let the vertex creep by a fraction of ε a step.
-const YIELDED: f64 = 0.999;
+pub(super) const YIELDED: f64 = 0.999;
 
 /// One vertex's hold on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,6 +121,6 @@ impl Friction {
 }
 
 /// φ, m.
-fn huber(y: f64) -> f64 {
+pub(super) fn huber(y: f64) -> f64 {
     if y < ELASTIC_SLIP { y * y / (2.0 * ELASTIC_SLIP) } else { y - 0.5 * ELASTIC_SLIP }
 }

@@ -25,15 +25,22 @@ pub struct HessianLayout {
 }
 
 impl HessianLayout {
-    /// Of the vertices that are not `held`; `placed` is where they are cut apart for the elimination.
-    pub(super) fn new(placed: &[DVec3], triangles: &[Triangle], bending: &Bending, held: &[bool]) -> Self {
+    /// Of the vertices that are not `held`, with blocks for the pairs `more` beside the cloth's own; `placed` is where they are cut
+    /// apart for the elimination.
+    pub(super) fn new(
+        placed: &[DVec3],
+        triangles: &[Triangle],
+        bending: &Bending,
+        held: &[bool],
+        more: impl Iterator<Item = [u32; 2]>,
+    ) -> Self {
         let n = held.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); n];
         let sides = triangles.iter().flat_map(|t| {
             let [a, b, c] = t.vertices;
             [[a, b], [b, c], [c, a]]
         });
-        for [a, b] in sides.chain(bending.pairs()).filter(|[a, b]| a != b) {
+        for [a, b] in sides.chain(bending.pairs()).chain(more).filter(|[a, b]| a != b) {
             neighbours[a as usize].push(b);
             neighbours[b as usize].push(a);
         }
@@ -63,5 +70,13 @@ impl HessianLayout {
             }
         }
         Self { order, unknown, pattern, triangle_slots, bending_blocks }
+    }
+
+    /// Whether there is a block for each of these pairs of vertices, where none is held.
+    pub(crate) fn has(&self, mut pairs: impl Iterator<Item = [u32; 2]>) -> bool {
+        pairs.all(|[a, b]| {
+            let (i, j) = (self.unknown[a as usize], self.unknown[b as usize]);
+            i == HELD || j == HELD || self.pattern.slot(i, j).block != HELD
+        })
     }
 }

@@ -12,9 +12,11 @@
 //! | bending | [`bending`] | Σ ½ A (B_u \|x_uu\|² + H \|x_uv\|² + B_v \|x_vv\|²) |
 //! | contact | [`contact`] | Σ ½ κ A (h − q)² |
 //! | friction | [`friction`] | Σ μ N φ(\|u\|) |
+//! | cloth on cloth | [`proximity`] | Σ ½ κ A (h − n·Σ w x)², and friction |
 
 pub mod bending;
 mod cloth;
+mod cover;
 pub mod contact;
 mod evaluate;
 pub mod fan;
@@ -27,9 +29,11 @@ pub mod ordering;
 mod packs;
 pub mod pattern;
 mod plate;
+pub mod proximity;
 
 pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;
 pub use evaluate::Scratch;
 pub use friction::Friction;
 pub use layout::HessianLayout;
+pub use proximity::Proximity;

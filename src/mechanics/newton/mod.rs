@@ -27,6 +27,7 @@ mod whole;
 
 use glam::{DMat3, DVec3};
 
+use super::energy::proximity::Looked;
 use super::energy::{Cloth, Contacts, Scratch};
 use relax::Relaxation;
 pub use solver::{SolveError, Solver};
@@ -187,11 +188,30 @@ impl<'c, 'b> Descent<'c, 'b> {
     pub(crate) fn relax<T: Send>(&mut self, iterations: usize, beside: impl FnOnce() -> T + Send) -> T {
         self.cloth.own_blocks(&self.x, &self.contacts, self.damping, &mut self.blocks);
         self.relaxation.prepare(self.cloth, &self.contacts, &self.blocks);
-        let Self { cloth, contacts, x, relaxation, .. } = self;
+        let Self { cloth, contacts, x, relaxation, trial, .. } = self;
+        trial.clone_from(x);
         let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
-        self.contacts.friction_refresh(&self.x);
+        match contacts.proximity.as_mut().map(|p| p.look(trial, x)) {
+            None | Some(Looked::Clear) => {}
+            Some(Looked::Cut) => contacts.update(x),
+            Some(Looked::Crosses) => {
+                x.clone_from(trial);
+                contacts.update(x);
+            }
+        }
+        self.contacts.refresh(&self.x);
         self.evaluate();
         out
+    }
+
+    /// Untangles the start: relaxes it, what crosses asked apart, as often as it takes or `rounds` at most.
+    pub(crate) fn untangle(&mut self, rounds: usize, iterations: usize) {
+        for _ in 0..rounds {
+            if self.contacts.proximity.as_mut().is_none_or(|p| p.crossings(&self.x) == 0) {
+                return;
+            }
+            self.relax(iterations, || ());
+        }
     }
 
     /// One iteration. The damping is the caller's to change afterwards.
@@ -212,15 +232,23 @@ impl<'c, 'b> Descent<'c, 'b> {
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
             contacts.update(trial);
             let most = *energy + ARMIJO * t * slope;
-            if cloth.evaluate(trial, contacts, trial_gradient, scratch) <= most {
-                break true;
+            let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= most;
+            if !falls {
+                relaxed += 1;
+                falls = relaxed <= RELAXED_TRIALS
+                    && pace.relaxing_trial > 0
+                    && relaxation.run(cloth, contacts, trial, pace.relaxing_trial) <= most;
             }
-            relaxed += 1;
-            if relaxed <= RELAXED_TRIALS
-                && pace.relaxing_trial > 0
-                && relaxation.run(cloth, contacts, trial, pace.relaxing_trial) <= most
-            {
-                break true;
+            if falls {
+                relaxation.run(cloth, contacts, trial, pace.relaxing);
+                match contacts.proximity.as_mut().map(|p| p.look(x, trial)) {
+                    None | Some(Looked::Clear) => break true,
+                    Some(Looked::Cut) => {
+                        contacts.update(trial);
+                        break true;
+                    }
+                    Some(Looked::Crosses) => {}
+                }
             }
             t *= 0.5;
             // Also where t is not a number: nothing pulls any more.
@@ -230,13 +258,12 @@ impl<'c, 'b> Descent<'c, 'b> {
         };
         let mut largest_move_m = 0.0;
         if accepted {
-            relaxation.run(cloth, contacts, trial, pace.relaxing);
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
         } else {
             contacts.update(x);
         }
-        self.contacts.friction_refresh(&self.x);
+        self.contacts.refresh(&self.x);
         self.evaluate();
         Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m })
     }

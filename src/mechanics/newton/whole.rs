@@ -7,6 +7,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{SolveError, Solver, State, Tangent};
+use crate::mechanics::energy::HessianLayout;
 
 /// Steps with the positive Hessian, at most, after one whose bearing Hessian failed.
 const LONGEST_PAUSE: usize = 4;
@@ -16,6 +17,8 @@ const LONGEST_PAUSE: usize = 4;
 pub(crate) struct Whole {
     /// Analysed with the first step, if not before: a preview takes none.
     pub(crate) solver: Option<Solver>,
+    /// Where the blocks are once gaps of the cloth with itself couple vertices that are no neighbours.
+    coupled: Option<HessianLayout>,
     blocks: Vec<DMat3>,
     damped: Vec<f64>,
     unknowns: Vec<DVec3>,
@@ -31,24 +34,38 @@ impl Whole {
     /// Solves with `blocks`; the solution is in `unknowns`.
     fn solve(&mut self, here: &State<'_>, positive: bool) -> Result<(), SolveError> {
         let State { cloth, gradient, damping, .. } = *here;
+        let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
         let solver = match &mut self.solver {
             Some(solver) => solver,
-            none => none.insert(Solver::new(cloth.pattern())?),
+            none => none.insert(Solver::new(&layout.pattern)?),
         };
         self.damped.clear();
-        self.damped.extend(cloth.order().iter().map(|&v| cloth.masses[v as usize] * damping));
+        self.damped.extend(layout.order.iter().map(|&v| cloth.masses[v as usize] * damping));
         self.unknowns.clear();
-        self.unknowns.extend(cloth.order().iter().map(|&v| -gradient[v as usize]));
-        solver.solve(cloth.pattern(), &self.blocks, &self.damped, positive, &mut self.unknowns)
+        self.unknowns.extend(layout.order.iter().map(|&v| -gradient[v as usize]));
+        solver.solve(&layout.pattern, &self.blocks, &self.damped, positive, &mut self.unknowns)
+    }
+
+    /// Makes a place for every pair of vertices that a gap couples, if there is none yet.
+    fn couple(&mut self, here: &State<'_>) {
+        let State { cloth, x, contacts, .. } = *here;
+        let Some(proximity) = &contacts.proximity else { return };
+        let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+        if !layout.has(proximity.pairs()) {
+            self.coupled = Some(cloth.layout_with(x, proximity.pairs()));
+            self.solver = None;
+        }
     }
 }
 
 impl Tangent for Whole {
     fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError> {
         let State { cloth, x, contacts, .. } = *here;
+        self.couple(here);
         let mut solved = false;
         if self.waiting == 0 {
-            cloth.hessian_bearing(x, contacts, &mut self.blocks);
+            let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+            cloth.hessian_bearing_in(layout, x, contacts, &mut self.blocks);
             solved = self.solve(here, false).is_ok();
             self.pause = if solved { 0 } else { (2 * self.pause).clamp(1, LONGEST_PAUSE) };
             self.waiting = self.pause;
@@ -56,15 +73,17 @@ impl Tangent for Whole {
         self.bearing = solved;
         if !solved {
             self.waiting -= 1;
-            cloth.hessian(x, contacts, &mut self.blocks);
+            let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+            cloth.hessian_in(layout, x, contacts, &mut self.blocks);
             self.solve(here, true)?;
         }
         d.clear();
         d.resize(x.len(), DVec3::ZERO);
         own.clear();
         own.resize(x.len(), DMat3::ZERO);
-        let starts = &cloth.pattern().starts;
-        for (i, &v) in cloth.order().iter().enumerate() {
+        let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+        let starts = &layout.pattern.starts;
+        for (i, &v) in layout.order.iter().enumerate() {
             d[v as usize] = self.unknowns[i];
             own[v as usize] = self.blocks[starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(self.damped[i]));
         }

@@ -30,6 +30,8 @@ pub struct RefineOptions {
     pub longest_move_m: f64,
     /// Strain under its own hanging weight that stiff cloth may have to begin with; 0 for its true stiffness throughout.
     pub soft_strain: f64,
+    /// Whether cloth keeps off cloth: see [`proximity`](super::energy::proximity).
+    pub self_contact: bool,
 }
 
 /// No run takes more steps than this.
@@ -37,7 +39,14 @@ pub const STEP_LIMIT: usize = 2000;
 
 impl Default for RefineOptions {
     fn default() -> Self {
-        Self { max_steps: None, tolerance: 1e-3, damping: 300.0, longest_move_m: 0.1, soft_strain: 0.005 }
+        Self {
+            max_steps: None,
+            tolerance: 1e-3,
+            damping: 300.0,
+            longest_move_m: 0.1,
+            soft_strain: 0.005,
+            self_contact: true,
+        }
     }
 }
 

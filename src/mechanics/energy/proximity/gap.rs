@@ -1,0 +1,122 @@
+//! One gap: two places of the cloth that are near each other, and the plane between them.
+
+use glam::{DMat3, DVec3};
+
+use crate::mechanics::energy::friction::{ELASTIC_SLIP, YIELDED, huber};
+use crate::mechanics::energy::membrane::outer;
+
+/// No vertex: fills up a place that needs fewer.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// What makes a gap the same one at another time: whose it is and between which features.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    pub(super) kind: Kind,
+    /// The vertex and the corners of its feature, the ends of both edges, or those of an edge and the corners of a triangle; [`NONE`]
+    /// where there are fewer.
+    pub(super) vertices: [u32; 5],
+}
+
+/// What faces what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// A vertex and a triangle, or an edge or a corner of one.
+    Vertex,
+    /// Two edges.
+    Edges,
+    /// An edge and the triangle that it crosses.
+    Crossing,
+}
+
+/// A gap as it was when it was last looked for: places and plane stay until the next time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    pub(super) key: Key,
+    /// w of each vertex: they add up to zero.
+    pub(super) weights: [f64; 5],
+    /// n, from the second place to the first.
+    pub(super) normal: DVec3,
+    /// h: how far apart along n the two places are kept, m.
+    pub(super) goal: f64,
+    /// κ A, N/m.
+    pub(super) stiffness: f64,
+    /// κ A to begin with, N/m.
+    pub(super) first: f64,
+    /// From here on friction counts: Σ w x then, m.
+    pub(super) from: DVec3,
+    /// Elastic slip that it began with there, m.
+    pub(super) slip: DVec3,
+    /// μ N of then, N.
+    pub(super) limit: f64,
+}
+
+impl Gap {
+    /// Σ w x, m: from the second place to the first.
+    pub(super) fn across(&self, x: &[DVec3]) -> DVec3 {
+        self.members().map(|(v, w)| x[v as usize] * w).sum()
+    }
+
+    /// Its vertices and their weights.
+    pub(in crate::mechanics::energy) fn members(&self) -> impl Iterator<Item = (u32, f64)> + use<> {
+        self.key.vertices.into_iter().zip(self.weights).filter(|(v, _)| *v != NONE)
+    }
+
+    /// What is missing to the goal at `x`, m: positive where they press.
+    pub(super) fn depth(&self, x: &[DVec3]) -> f64 {
+        self.goal - self.normal.dot(self.across(x))
+    }
+
+    /// The part of the slip since [`from`](Self::from) along the plane, m.
+    fn slipped(&self, across: DVec3) -> DVec3 {
+        let u = across - self.from + self.slip;
+        u - self.normal * self.normal.dot(u)
+    }
+
+    /// Its energy (J) and the force on the first place (N), at `x`.
+    pub(super) fn push(&self, x: &[DVec3]) -> (f64, DVec3) {
+        let across = self.across(x);
+        let depth = (self.goal - self.normal.dot(across)).max(0.0);
+        let mut energy = 0.5 * self.stiffness * depth * depth;
+        let mut force = self.normal * (self.stiffness * depth);
+        if self.limit > 0.0 {
+            let u = self.slipped(across);
+            let y = u.length();
+            energy += self.limit * huber(y);
+            force -= u * (self.limit / y.max(ELASTIC_SLIP));
+        }
+        (energy, force)
+    }
+
+    /// How the force stiffens with Σ w x, N/m; none where nothing presses.
+    pub(super) fn hessian(&self, x: &[DVec3]) -> Option<DMat3> {
+        let across = self.across(x);
+        let pressed = self.goal > self.normal.dot(across);
+        if !pressed && self.limit <= 0.0 {
+            return None;
+        }
+        let nn = outer(self.normal, self.normal);
+        let mut block = if pressed { nn * self.stiffness } else { DMat3::ZERO };
+        if self.limit > 0.0 {
+            let u = self.slipped(across);
+            let y = u.length();
+            let tangent = DMat3::IDENTITY - nn;
+            block += if y < YIELDED * ELASTIC_SLIP {
+                tangent * (self.limit / ELASTIC_SLIP)
+            } else {
+                (tangent - outer(u / y, u / y)) * (self.limit / y)
+            };
+        }
+        Some(block)
+    }
+
+    /// Takes over what the same gap had before: its slip, and a stiffness that had to grow.
+    pub(super) fn continues(&mut self, before: &Self, x: &[DVec3]) {
+        self.stiffness = self.stiffness.max(before.stiffness);
+        // A place that went through has the other side's normal now, and must go back.
+        if before.normal.dot(self.normal) < 0.0 {
+            self.normal = -self.normal;
+        }
+        let u = before.slipped(before.across(x));
+        self.slip = u - self.normal * self.normal.dot(u);
+    }
+}

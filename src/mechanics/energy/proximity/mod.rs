@@ -1,0 +1,221 @@
+//! Cloth keeps off cloth.
+//!
+//! Where two places of a garment are nearer than the offset h, they push each other apart as the body pushes cloth:
+//!
+//! E = Σ ½ κ A (h − n·Σ w x)²  over the gaps with n·Σ w x < h,
+//!
+//! a gap being a vertex and the nearest point of a triangle, or the nearest points of two edges; w are the shares of its four vertices,
+//! which add up to zero. Which gaps there are, their shares and their normals are those of the last [`refresh`](Proximity::refresh) and
+//! stay in between, as the anchors of friction do: the energy is then quadratic in pieces, its gradient and Hessian exact, and a
+//! state that repeats itself under a refresh is at rest with the true distances. Friction holds the two places together along
+//! the plane by the same law as on the body ([`friction`](super::friction)).
+//!
+//! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
+//! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
+//! back towards how it was placed, if it did not cross there ([`clear`](Proximity::clear)), or finds its own way out (`untangle.rs`).
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | h | offset: the thickness of the cloth, and at least what its mesh can tell | m |
+//! | w | shares of a gap's vertices, positive on the one side | – |
+//! | n | unit normal from the second place to the first | – |
+//! | κ | stiffness: pressure over what is missing to h | N/m³ |
+//! | A | rest area that the gap stands for | m² |
+//!
+//! Limits: one offset for the whole garment; a gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
+
+mod gap;
+mod passage;
+mod search;
+mod skin;
+mod untangle;
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+pub use gap::Gap;
+pub(crate) use passage::Looked;
+use passage::Passage;
+pub(crate) use skin::Skin;
+
+/// Pressure that takes up half the offset, Pa: a garment's layers lie on each other by their weight, some 2 Pa each; where more is
+/// needed a gap grows stiffer.
+const HALF_OFFSET_PRESSURE: f64 = 200.0;
+
+/// Gaps are looked for this many times farther than the offset: what a step closes is felt within it.
+const REACH: f64 = 2.5;
+
+/// Share of the mean edge that the offset is at least, so that what touches is told from what crosses.
+const LEAST_OF_EDGE: f64 = 0.1;
+
+/// Share of it that the offset is at most: two triangles apart, a cloth is no nearer to itself.
+const MOST_OF_EDGE: f64 = 0.25;
+
+/// A gap left with less than this share of the offset grows stiffer.
+const NARROW: f64 = 0.25;
+
+/// By this factor.
+const STIFFER: f64 = 2.0;
+
+/// At most so many times as stiff as it began.
+const MOST_STIFF: f64 = 64.0;
+
+/// A start that crosses goes back by this factor at a time,
+const BACK: f64 = 0.7;
+
+/// and is as it was placed where this share of the way still crosses.
+const LEAST_SHARE: f64 = 0.02;
+
+/// Refreshes without fewer crossings after which what crosses is left as it is.
+const PATIENCE: usize = 40;
+
+/// The gaps of a cloth with itself.
+#[derive(Debug, Clone)]
+pub struct Proximity {
+    skin: Arc<Skin>,
+    placed: Arc<Vec<DVec3>>,
+    offset: f64,
+    stiffness: f64,
+    friction: f64,
+    gaps: Vec<Gap>,
+    passage: Passage,
+    /// Fewest crossings so far, and how many refreshes ago they were fewer than before.
+    fewest: usize,
+    since: usize,
+}
+
+impl Proximity {
+    /// None looked for yet: `thickness` in m.
+    pub(super) fn new(skin: Arc<Skin>, placed: Arc<Vec<DVec3>>, thickness: f64, friction: f64) -> Self {
+        let offset = thickness.clamp(LEAST_OF_EDGE * skin.edge_m, MOST_OF_EDGE * skin.edge_m);
+        let passage = Passage::new(Arc::clone(&skin));
+        Self {
+            skin,
+            placed,
+            offset,
+            stiffness: HALF_OFFSET_PRESSURE / (0.5 * offset),
+            friction,
+            gaps: Vec::new(),
+            passage,
+            fewest: usize::MAX,
+            since: 0,
+        }
+    }
+
+    /// Looks for gaps at `x` (m); those that were there before go on.
+    pub fn refresh(&mut self, x: &[DVec3]) {
+        let Self { skin, placed, offset, stiffness, friction, passage, .. } = self;
+        let mut gaps = search::gaps(skin, x, placed, REACH * *offset, *offset, *stiffness);
+        let crossing = passage.known(x);
+        self.since = if crossing.len() < self.fewest { 0 } else { self.since + 1 };
+        self.fewest = self.fewest.min(crossing.len());
+        if !crossing.is_empty() {
+            let back = if self.since < PATIENCE { untangle::gaps(skin, x, crossing, *stiffness) } else { Vec::new() };
+            // About a crossing nobody knows which side is the right one.
+            gaps.retain(|gap| !gap.members().any(|(v, _)| passage.is_tangled(v)));
+            gaps.extend(back);
+            gaps.sort_unstable_by_key(|gap| gap.key);
+        }
+        let mut before = self.gaps.iter().peekable();
+        for gap in &mut gaps {
+            while before.next_if(|b| b.key < gap.key).is_some() {}
+            let again = before.next_if(|b| b.key == gap.key);
+            gap.from = gap.across(x);
+            if gap.key.kind == gap::Kind::Crossing {
+                continue;
+            }
+            if let Some(before) = again {
+                gap.continues(before, x);
+            }
+            let depth = gap.depth(x);
+            gap.limit = *friction * gap.stiffness * depth.max(0.0);
+            // The pressure that is there stays as it is; what grows is how fast it grows from here on.
+            if depth > (1.0 - NARROW) * *offset {
+                gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
+            }
+            gap.slip =
+                if gap.limit > 0.0 { gap.slip.clamp_length_max(super::friction::ELASTIC_SLIP) } else { DVec3::ZERO };
+        }
+        self.gaps = gaps;
+    }
+
+    /// Adds the gradient (N) at `x`, but where a vertex is `held`; returns the energy, J.
+    pub(super) fn add_gradient(&self, x: &[DVec3], held: &[bool], gradient: &mut [DVec3]) -> f64 {
+        let mut energy = 0.0;
+        for gap in &self.gaps {
+            let (of_gap, force) = gap.push(x);
+            if of_gap > 0.0 {
+                energy += of_gap;
+                for (v, w) in gap.members().filter(|(v, _)| !held[*v as usize]) {
+                    gradient[v as usize] -= force * w;
+                }
+            }
+        }
+        energy
+    }
+
+    /// Each pressing gap's Hessian: block (v, w) is the matrix (N/m) times the shares of v and w.
+    pub(super) fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (&'a Gap, DMat3)> + 'a {
+        self.gaps.iter().filter_map(|gap| Some((gap, gap.hessian(x)?)))
+    }
+
+    /// Pairs of vertices that a gap couples.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.gaps
+            .iter()
+            .flat_map(|gap| {
+                let v = gap.key.vertices;
+                (1..v.len()).flat_map(move |i| (0..i).map(move |j| [v[i], v[j]]))
+            })
+            .filter(|[a, b]| *a != gap::NONE && *b != gap::NONE)
+    }
+
+    /// Gaps that press at `x`.
+    #[must_use]
+    pub fn pressing(&self, x: &[DVec3]) -> usize {
+        self.gaps.iter().filter(|gap| gap.depth(x) > 0.0).count()
+    }
+
+    /// What the gaps that press at `x` push with, N, normal to each.
+    pub fn forces(&self, x: &[DVec3]) -> impl Iterator<Item = DVec3> {
+        self.gaps.iter().map(|gap| gap.normal * (gap.stiffness * gap.depth(x).max(0.0)))
+    }
+
+    /// The distance it keeps, m.
+    #[must_use]
+    pub fn offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// Looks at the step from `from`, where the last one ended, to `to`: see [`Looked`].
+    pub(crate) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
+        self.passage.look(from, to)
+    }
+
+    /// Takes `x` (m) back towards how the garment was placed until nothing crosses, if nothing did there; leaves it where it did.
+    pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
+        if self.passage.known(x).is_empty() || !self.passage.anew(&self.placed).is_empty() {
+            return;
+        }
+        let end = std::mem::take(x);
+        let mut share = 1.0;
+        while share > LEAST_SHARE {
+            share *= BACK;
+            let there: Vec<DVec3> = self.placed.iter().zip(&end).map(|(a, b)| a.lerp(*b, share)).collect();
+            if self.passage.anew(&there).is_empty() {
+                *x = there;
+                break;
+            }
+        }
+        if x.is_empty() {
+            x.clone_from(&self.placed);
+        }
+        self.passage.begin(Vec::new());
+    }
+
+    /// Pairs of triangles that cross at `x`, where the last step ended.
+    pub(crate) fn crossings(&mut self, x: &[DVec3]) -> usize {
+        self.passage.known(x).len()
+    }
+}

@@ -1,0 +1,141 @@
+//! Steps that take no cloth through cloth.
+//!
+//! Where a step from x to x' ends, all pairs of triangles that cross are found, exactly (`mesh::self_intersection`). If one did not cross
+//! at x, a long step is refused, and tried again half as long; a short one is cut: the corners that cross go back towards where they
+//! came from, half the way each time, and after a few times all the way, their neighbours with them. As x has no crossing, this
+//! ends.
+//!
+//! Limits: only the end of a step is looked at, so what passes through whole, in one step of at most a few centimetres, is not seen. Where
+//! x crosses already, about what crosses there new crossings are let be: they are on their way out ([`untangle`](super::untangle)).
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::skin::Skin;
+use crate::mesh::TriMesh;
+use crate::mesh::self_intersection::self_intersecting_pairs;
+
+/// A step whose longest move is more than so many edges is not cut but refused: to cut it would tear the cloth.
+const LONG: f64 = 1.0;
+
+/// Times that crossing corners go back half the way; after that all the way, and their neighbours with them.
+const HALVINGS: usize = 4;
+
+/// Times that a step is cut, at most.
+const CUTS: usize = 16;
+
+/// Rings of neighbours about what crosses that are left alone.
+const RINGS: usize = 2;
+
+/// What there is to say of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Looked {
+    /// Nothing crosses that did not before.
+    Clear,
+    /// Vertices went back, so that nothing does.
+    Cut,
+    /// Something does, and the step is too long to be cut.
+    Crosses,
+}
+
+/// What crosses, and where.
+#[derive(Debug, Clone)]
+pub(super) struct Passage {
+    skin: Arc<Skin>,
+    mesh: TriMesh,
+    /// Pairs of triangles that cross where the last step ended; `None` before the first.
+    crossing: Option<Vec<[u32; 2]>>,
+    /// Whether each vertex is about what crosses there; empty where nothing does.
+    tangled: Vec<bool>,
+}
+
+impl Passage {
+    pub(super) fn new(skin: Arc<Skin>) -> Self {
+        let mesh = TriMesh::new(Vec::new(), skin.triangles.clone());
+        Self { skin, mesh, crossing: None, tangled: Vec::new() }
+    }
+
+    /// Pairs of triangles that cross at `x`, where the last step ended.
+    pub(super) fn known(&mut self, x: &[DVec3]) -> &[[u32; 2]] {
+        if self.crossing.is_none() {
+            let crossing = self.anew(x);
+            self.begin(crossing);
+        }
+        self.crossing.as_deref().unwrap_or_default()
+    }
+
+    /// Whether a vertex is about what crosses.
+    pub(super) fn is_tangled(&self, v: u32) -> bool {
+        self.tangled.get(v as usize).copied().unwrap_or(false)
+    }
+
+    /// The next step begins where these pairs cross.
+    pub(super) fn begin(&mut self, crossing: Vec<[u32; 2]>) {
+        self.tangled.clear();
+        if !crossing.is_empty() {
+            self.tangled.resize(self.skin.vertex_areas.len(), false);
+            for v in self.around(crossing.iter().flatten(), RINGS) {
+                self.tangled[v as usize] = true;
+            }
+        }
+        self.crossing = Some(crossing);
+    }
+
+    /// Pairs that cross at `x`, wherever the last step ended.
+    pub(super) fn anew(&mut self, x: &[DVec3]) -> Vec<[u32; 2]> {
+        self.mesh.positions.clear();
+        self.mesh.positions.extend_from_slice(x);
+        self_intersecting_pairs(&self.mesh)
+    }
+
+    /// The corners of some triangles and so many rings of neighbours, ascending.
+    fn around<'a>(&self, triangles: impl Iterator<Item = &'a u32>, rings: usize) -> Vec<u32> {
+        let mut found: Vec<u32> = triangles.flat_map(|&t| self.skin.triangles[t as usize]).collect();
+        for ring in 0..=rings {
+            if ring > 0 {
+                let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.neighbours(v)).copied().collect();
+                found.extend(next);
+            }
+            found.sort_unstable();
+            found.dedup();
+        }
+        found
+    }
+
+    /// Looks at the step from `from`, where the last one ended, to `to`. A short one that crosses where it did not before is cut.
+    pub(super) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
+        self.known(from);
+        let mut crossing = self.anew(to);
+        let mut new = self.appeared(&crossing);
+        let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        if !new.is_empty() && longest > LONG * self.skin.edge_m {
+            return Looked::Crosses;
+        }
+        let mut share = vec![1.0_f64; from.len()];
+        for look in 0..CUTS {
+            if new.is_empty() {
+                break;
+            }
+            for v in self.around(new.iter(), look.saturating_sub(HALVINGS)) {
+                let share = &mut share[v as usize];
+                *share = if look < HALVINGS { 0.5 * *share } else { 0.0 };
+            }
+            let kept: Vec<DVec3> = from.iter().zip(&*to).zip(&share).map(|((a, b), s)| a.lerp(*b, *s)).collect();
+            crossing = self.anew(&kept);
+            new = self.appeared(&crossing);
+        }
+        for ((to, from), share) in to.iter_mut().zip(from).zip(&share).filter(|(_, s)| **s < 1.0) {
+            *to = from.lerp(*to, *share);
+        }
+        let back = share.iter().filter(|s| **s < 1.0).count();
+        self.begin(crossing);
+        if back > 0 { Looked::Cut } else { Looked::Clear }
+    }
+
+    /// Triangles of pairs that are not on their way out.
+    fn appeared(&self, crossing: &[[u32; 2]]) -> Vec<u32> {
+        let tangled = |t: u32| self.skin.triangles[t as usize].iter().all(|&v| self.is_tangled(v));
+        crossing.iter().filter(|pair| !pair.iter().all(|&t| tangled(t))).flatten().copied().collect()
+    }
+}

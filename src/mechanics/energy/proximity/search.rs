@@ -1,0 +1,172 @@
+//! Which places of a cloth are near each other.
+//!
+//! Candidates come from parry3d's bounding volume hierarchy over the triangles. A vertex faces the nearest point of a triangle; where
+//! that lies on an edge or a corner, it faces the edge or the corner, and only if it does so from every triangle there: else another
+//! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
+//! each other between their ends alone; at the ends a vertex faces something.
+//!
+//! What shares a triangle's edge path with the other side is near for that reason alone: a pair of neighbours is left out unless the
+//! garment as placed kept them well apart.
+
+use glam::DVec3;
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::query::details::closest_points_segment_segment_with_locations_nD as nearest_of_segments;
+use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
+use rayon::prelude::*;
+
+use super::gap::{Gap, Key, Kind, NONE};
+use super::skin::Skin;
+
+/// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.
+const COINCIDENT: f64 = 1e-9;
+
+/// Neighbours count as far apart where the garment as placed keeps them this many times as far as they are looked for.
+const KEPT_APART: f64 = 2.0;
+
+/// A share of a vertex's area that its edges stand for, of which it has some three and each faces several others.
+const OF_EDGES: f64 = 0.25;
+
+/// All gaps under `reach` (m) at `x`, sorted by key; `placed` is where nothing was folded yet. Same bits on any number of threads.
+pub(super) fn gaps(skin: &Skin, x: &[DVec3], placed: &[DVec3], reach: f64, offset: f64, stiffness: f64) -> Vec<Gap> {
+    let boxes: Vec<Aabb> = skin.triangles.iter().map(|t| bounds(t, x)).collect();
+    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+    let look = Look { skin, x, placed, reach, offset, stiffness };
+    let mut found: Vec<Found> = (0..skin.triangles.len())
+        .into_par_iter()
+        .with_min_len(64)
+        .flat_map_iter(|t| {
+            let mut found = Vec::new();
+            for u in tree.intersect_aabb(&boxes[t].loosened(reach)) {
+                look.vertices_of(t, u as usize, &mut found);
+                if t < u as usize {
+                    look.edges_of(t, u as usize, &mut found);
+                }
+            }
+            found
+        })
+        .collect();
+    found.sort_unstable_by_key(|f| f.gap.key);
+    let seen_from_all = |same: &[Found]| same.len() as u32 >= same[0].faces;
+    found.chunk_by(|a, b| a.gap.key == b.gap.key).filter(|same| seen_from_all(same)).map(|same| same[0].gap).collect()
+}
+
+/// A gap, and from how many triangles it must be found to be one.
+struct Found {
+    gap: Gap,
+    faces: u32,
+}
+
+struct Look<'a> {
+    skin: &'a Skin,
+    x: &'a [DVec3],
+    placed: &'a [DVec3],
+    reach: f64,
+    offset: f64,
+    stiffness: f64,
+}
+
+impl Look<'_> {
+    /// The vertices that triangle `t` owns, against triangle `u`.
+    fn vertices_of(&self, t: usize, u: usize, found: &mut Vec<Found>) {
+        let corners = self.skin.triangles[u];
+        for v in self.skin.own_vertices[t].into_iter().filter(|v| *v != NONE && !corners.contains(v)) {
+            let [a, b, c] = corners.map(|v| self.x[v as usize]);
+            let p = self.x[v as usize];
+            let (nearest, at) = Triangle::new(a, b, c).project_local_point_and_get_location(p, true);
+            if p.distance_squared(nearest.point) > self.reach * self.reach {
+                continue;
+            }
+            let Some(shares) = at.barycentric_coordinates() else { continue };
+            let faces = match at {
+                TrianglePointLocation::OnVertex(i) => self.skin.vertex_triangles[corners[i as usize] as usize],
+                TrianglePointLocation::OnEdge(i, _) => self.triangles_at(corners, i),
+                _ => 1,
+            };
+            let mut to: [(u32, f64); 3] = [0, 1, 2].map(|i| (corners[i], -shares[i]));
+            for (v, share) in &mut to {
+                *v = if *share == 0.0 { NONE } else { *v };
+            }
+            to.sort_unstable_by_key(|(v, _)| *v);
+            let key = Key { kind: Kind::Vertex, vertices: [v, to[0].0, to[1].0, to[2].0, NONE] };
+            let weights = [1.0, to[0].1, to[1].1, to[2].1, 0.0];
+            let area = self.skin.vertex_areas[v as usize];
+            if let Some(gap) = self.gap(key, weights, area) {
+                found.push(Found { gap, faces });
+            }
+        }
+    }
+
+    /// How many triangles there are at side `i` of one with these corners, as parry3d counts sides.
+    fn triangles_at(&self, corners: [u32; 3], i: u32) -> u32 {
+        let [a, b, c] = corners;
+        let side = [[a, b], [b, c], [a, c]][i as usize];
+        let [low, high] = [side[0].min(side[1]), side[0].max(side[1])];
+        self.skin.edges.binary_search(&[low, high]).map_or(1, |e| self.skin.edge_triangles[e])
+    }
+
+    /// The edges that triangle `t` owns against those that `u` owns.
+    fn edges_of(&self, t: usize, u: usize, found: &mut Vec<Found>) {
+        for e in self.skin.own_edges[t].into_iter().filter(|e| *e != NONE) {
+            for f in self.skin.own_edges[u].into_iter().filter(|f| *f != NONE) {
+                self.edges(e, f, found);
+            }
+        }
+    }
+
+    fn edges(&self, e: u32, f: u32, found: &mut Vec<Found>) {
+        let ([a, b], [c, d]) = (self.skin.edges[e as usize], self.skin.edges[f as usize]);
+        if a == c || a == d || b == c || b == d {
+            return;
+        }
+        let [p, q, r, s] = [a, b, c, d].map(|v| self.x[v as usize]);
+        let (SegmentPointLocation::OnEdge([p_share, q_share]), SegmentPointLocation::OnEdge([r_share, s_share])) =
+            nearest_of_segments((&p, &q), (&r, &s))
+        else {
+            return;
+        };
+        let across = p * p_share + q * q_share - r * r_share - s * s_share;
+        if across.length_squared() > self.reach * self.reach {
+            return;
+        }
+        let key = Key { kind: Kind::Edges, vertices: [a, b, c, d, NONE] };
+        let area = OF_EDGES * self.skin.edge_areas[e as usize].min(self.skin.edge_areas[f as usize]);
+        if let Some(gap) = self.gap(key, [p_share, q_share, -r_share, -s_share, 0.0], area) {
+            found.push(Found { gap, faces: 1 });
+        }
+    }
+
+    fn gap(&self, key: Key, weights: [f64; 5], area: f64) -> Option<Gap> {
+        let mut gap = Gap {
+            key,
+            weights,
+            normal: DVec3::ZERO,
+            goal: self.offset,
+            stiffness: self.stiffness * area,
+            first: self.stiffness * area,
+            from: DVec3::ZERO,
+            slip: DVec3::ZERO,
+            limit: 0.0,
+        };
+        gap.from = gap.across(self.x);
+        let distance = gap.from.length();
+        gap.normal = gap.from / distance;
+        (distance > COINCIDENT && !self.belongs(&gap)).then_some(gap)
+    }
+
+    /// Whether the two places are near because they are neighbours.
+    fn belongs(&self, gap: &Gap) -> bool {
+        let (one, other): (Vec<_>, Vec<_>) = gap.members().partition(|(_, w)| *w > 0.0);
+        let near = |(a, _): &(u32, f64)| {
+            let around = self.skin.neighbours(*a);
+            other.iter().any(|(b, _)| around.contains(b))
+        };
+        one.iter().any(near) && gap.across(self.placed).length() < KEPT_APART * self.reach
+    }
+}
+
+fn bounds(triangle: &[u32; 3], x: &[DVec3]) -> Aabb {
+    let [a, b, c] = triangle.map(|v| x[v as usize]);
+    Aabb::new(a.min(b).min(c), a.max(b).max(c))
+}

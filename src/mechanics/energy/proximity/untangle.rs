@@ -1,0 +1,89 @@
+//! Cloth that is through cloth already finds its way back by the line along which it crosses.
+//!
+//! Two surfaces cross along a line that ends at edges or closes on itself. For an edge along E that crosses a triangle of normal N, the
+//! line goes on into each of the edge's triangles along R, in both planes; moving the edge against the triangle by δ changes the
+//! line's length by −G·δ with
+//!
+//! G = Σ (R − 2 (E·R)/(E·N) N)  over the triangles at the edge,
+//!
+//! so the edge is asked to go along G, and the triangle against it, until no line is left. Nothing needs to know which side
+//! is which. Source: Volino and Magnenat-Thalmann: "Resolving surface collisions through intersection contour minimization", ACM TOG
+//! 25(3), 2006, equation 3.
+//!
+//! Limits: a contour that cannot shrink (a tube pulled over a tube the wrong way round) stays.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::gap::{Gap, Key, Kind, NONE};
+use super::skin::Skin;
+
+/// How far a crossing edge is asked to go between two looks, in edges.
+const STRIDE: f64 = 0.5;
+
+/// |G| at which half of that is asked for, squared: between two flat triangles it has length two, over a smooth contour nearly none.
+const HALF_AT: f64 = 0.5;
+
+/// What crosses at `x` (`pairs` of triangles), as gaps that ask it back.
+pub(super) fn gaps(skin: &Skin, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64) -> Vec<Gap> {
+    let mut found = BTreeMap::new();
+    for &[t, u] in pairs {
+        for (one, other) in [(t, u), (u, t)] {
+            let [a, b, c] = skin.triangles[one as usize];
+            for side in [[a, b], [b, c], [c, a]] {
+                if let Ok(edge) = skin.edges.binary_search(&[side[0].min(side[1]), side[0].max(side[1])]) {
+                    if let Some(gap) = crossing(skin, x, edge, other as usize, stiffness) {
+                        found.insert(gap.key, gap);
+                    }
+                }
+            }
+        }
+    }
+    found.into_values().collect()
+}
+
+fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f64) -> Option<Gap> {
+    let ([p, q], corners) = (skin.edges[edge], skin.triangles[triangle]);
+    if corners.contains(&p) || corners.contains(&q) {
+        return None;
+    }
+    let ends = [p, q].map(|v| x[v as usize]);
+    let [a, b, c] = corners.map(|v| x[v as usize]);
+    let double_area = (b - a).cross(c - a);
+    let n = double_area.normalize_or_zero();
+    let along = ends[1] - ends[0];
+    let share = n.dot(a - ends[0]) / n.dot(along);
+    let at = ends[0] + along * share;
+    let of = |u: DVec3, v: DVec3| (u - at).cross(v - at).dot(n) / double_area.length();
+    let shares = [of(b, c), of(c, a), of(a, b)];
+    // What a rounded sum says of a corner does not matter here: its neighbour crosses as well.
+    if !(0.0..=1.0).contains(&share) || shares.iter().any(|s| !(*s >= 0.0)) {
+        return None;
+    }
+    let e = along.normalize_or_zero();
+    let mut g = DVec3::ZERO;
+    for wing in skin.wings[edge].into_iter().filter(|w| *w != NONE) {
+        let inward = x[wing as usize] - at;
+        let line = n.cross(along.cross(inward)).normalize_or_zero();
+        // Into the triangle: away from the edge, to the side of the third corner.
+        let across = inward - e * e.dot(inward);
+        let r = if line.dot(across) < 0.0 { -line } else { line };
+        g += r - n * (2.0 * e.dot(r) / e.dot(n));
+    }
+    let length = g.length();
+    let stride = STRIDE * skin.edge_m * length / (length * length + HALF_AT).sqrt();
+    let mut gap = Gap {
+        key: Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]] },
+        weights: [1.0 - share, share, -shares[0], -shares[1], -shares[2]],
+        normal: g / length,
+        goal: 0.0,
+        stiffness: stiffness * skin.edge_areas[edge],
+        first: stiffness * skin.edge_areas[edge],
+        from: DVec3::ZERO,
+        slip: DVec3::ZERO,
+        limit: 0.0,
+    };
+    gap.goal = gap.normal.dot(gap.across(x)) + stride;
+    (length > 1e-6 && gap.goal.is_finite()).then_some(gap)
+}

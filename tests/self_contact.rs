@@ -1,0 +1,276 @@
+//! Cloth keeps off cloth: the energy of its gaps, known cases, and garments that touch themselves.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3};
+use partwise::GRAVITY;
+use partwise::distance::Body;
+use partwise::drape::{Settings, drape, unobserved};
+use partwise::fabric::Fabric;
+use partwise::mechanics::energy::{Cloth, Contacts};
+use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine, refine_with};
+use partwise::mesh::self_intersection::self_intersecting_pairs;
+use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::scene::SceneSpec;
+
+/// A sheet of `columns` × `rows` squares from `origin` along `u` and `v`.
+fn sheet(columns: u32, rows: u32, origin: DVec3, u: DVec3, v: DVec3) -> TriMesh {
+    let at = |i: u32, j: u32| origin + u * f64::from(i) + v * f64::from(j);
+    let positions = (0..=rows).flat_map(|j| (0..=columns).map(move |i| at(i, j))).collect();
+    let index = |i: u32, j: u32| j * (columns + 1) + i;
+    let squares = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j)));
+    let triangles = squares
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i, j + 1), index(i + 1, j + 1)];
+            if (i + j) % 2 == 0 { [[a, b, d], [a, d, c]] } else { [[a, b, c], [b, d, c]] }
+        })
+        .collect();
+    TriMesh::new(positions, triangles)
+}
+
+fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
+    let n = a.positions.len() as u32;
+    a.positions.extend(b.positions);
+    a.triangles.extend(b.triangles.into_iter().map(|t| t.map(|v| v + n)));
+    a
+}
+
+/// A box, closed, its upper side in the plane z = 0.
+fn plate() -> Body {
+    let corner = |i: usize| {
+        let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
+        DVec3::new(side(0), side(1), side(2) * 0.2 - 0.1)
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
+}
+
+fn cloth(mesh: &TriMesh, held: &[u32]) -> Cloth {
+    let fabric = Fabric::by_name("jersey").unwrap();
+    Cloth::new(mesh, &Topology::new(mesh), &RestShape::from_edges(mesh).unwrap(), &fabric, held).unwrap()
+}
+
+fn crossings(mesh: &TriMesh, x: &[DVec3]) -> usize {
+    self_intersecting_pairs(&mesh.with_positions(x.to_vec())).len()
+}
+
+/// Where `mesh` comes to rest on `body`, which must be rest, and without a crossing.
+fn rests(mesh: &TriMesh, held: &[u32], body: Option<&Body>, start: Vec<DVec3>) -> Refined {
+    let cloth = cloth(mesh, held);
+    let options = RefineOptions::default();
+    let mut go_on = |_: &partwise::mechanics::refine::Step<'_>| std::ops::ControlFlow::Continue(());
+    let end = match body {
+        Some(body) => refine(&cloth, body, start, &options, &mut go_on),
+        None => refine_with(&cloth, Contacts::none(), start, &options, &mut go_on),
+    };
+    let end = end.unwrap();
+    assert_eq!(end.stop, Stop::Converged, "after {} steps: {}", end.steps, end.residual_over_weight);
+    assert_eq!(crossings(mesh, &end.positions), 0);
+    end
+}
+
+/// Two sheets half an offset apart, all vertices a little off their places.
+fn near_sheets() -> (Cloth, Vec<DVec3>) {
+    let lower = sheet(6, 6, DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01);
+    let upper =
+        sheet(5, 5, DVec3::new(0.004, 0.003, 5e-4), DVec3::new(0.01, 0.001, 0.0), DVec3::new(-0.001, 0.01, 0.0));
+    let mesh = both(lower, upper);
+    let cloth = cloth(&mesh, &[0]);
+    let off = |i: usize| DVec3::new((1.3 * i as f64).sin(), (2.1 * i as f64).sin(), (0.7 * i as f64).sin()) * 1e-4;
+    let x = mesh.positions.iter().enumerate().map(|(i, p)| *p + off(i)).collect();
+    (cloth, x)
+}
+
+#[test]
+fn the_gradient_is_that_of_the_energy() {
+    let (cloth, x) = near_sheets();
+    let mut contacts = Contacts::none();
+    contacts.proximity = Some(cloth.proximity());
+    contacts.refresh(&x);
+    // Slip and go on, so that friction has something to say.
+    let x: Vec<DVec3> =
+        x.iter().enumerate().map(|(i, p)| if i < 49 { *p } else { *p + DVec3::new(2e-4, 1e-4, -1e-4) }).collect();
+    let pressing = contacts.proximity.as_ref().unwrap().pressing(&x);
+    assert!(pressing > 50, "{pressing}");
+    let energy = |x: &[DVec3]| cloth.energy(x, &contacts) - cloth.energy(x, &Contacts::none());
+    let (mut with, mut without) = (Vec::new(), Vec::new());
+    cloth.gradient(&x, &contacts, &mut with);
+    cloth.gradient(&x, &Contacts::none(), &mut without);
+    let largest = with.iter().zip(&without).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    let step = 1e-8;
+    for v in [1, 17, 24, 30, 52, 60, 70, 83] {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let at = |s: f64| {
+                let mut x = x.clone();
+                x[v] += axis * s;
+                energy(&x)
+            };
+            let slope = (at(step) - at(-step)) / (2.0 * step);
+            let told = (with[v] - without[v]).dot(axis);
+            assert!((slope - told).abs() < 1e-5 * largest, "vertex {v}: {slope} and {told}");
+        }
+    }
+    // What one side is given the other is given too; the held vertex takes its share away.
+    let sum: DVec3 = with.iter().zip(&without).skip(1).map(|(a, b)| *a - *b).sum();
+    assert!(sum.length() < largest, "{sum}");
+}
+
+#[test]
+fn own_blocks_are_those_of_the_gradients_change() {
+    let (cloth, x) = near_sheets();
+    let mut contacts = Contacts::none();
+    contacts.proximity = Some(cloth.proximity());
+    contacts.refresh(&x);
+    let (mut with, mut without) = (Vec::new(), Vec::new());
+    cloth.hessian(&x, &contacts, &mut with);
+    cloth.hessian(&x, &Contacts::none(), &mut without);
+    let force = |x: &[DVec3], v: usize| {
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        cloth.gradient(x, &contacts, &mut a);
+        cloth.gradient(x, &Contacts::none(), &mut b);
+        a[v] - b[v]
+    };
+    let step = 1e-9;
+    for (i, &v) in cloth.order().iter().enumerate().step_by(7) {
+        let block = cloth.pattern().starts[i] as usize;
+        let told = with[block] - without[block];
+        let column = |axis: DVec3| {
+            let at = |s: f64| {
+                let mut x = x.clone();
+                x[v as usize] += axis * s;
+                force(&x, v as usize)
+            };
+            (at(step) - at(-step)) / (2.0 * step)
+        };
+        let measured = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        let off = (told - measured).to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        let scale = told.to_cols_array().into_iter().map(f64::abs).fold(1.0, f64::max);
+        assert!(off < 1e-4 * scale, "vertex {v}: {told} and {measured}");
+    }
+}
+
+#[test]
+fn of_two_sheets_on_a_plate_the_lower_carries_the_upper() {
+    let h = 0.01;
+    let lower = sheet(10, 10, DVec3::new(-0.05, -0.05, 0.003), DVec3::X * h, DVec3::Y * h);
+    let upper = sheet(8, 8, DVec3::new(-0.04, -0.043, 0.006), DVec3::X * h, DVec3::Y * h);
+    let mesh = both(lower, upper);
+    let (body, cloth) = (plate(), cloth(&mesh, &[]));
+    let end = rests(&mesh, &[], Some(&body), mesh.positions.clone());
+    let mut contacts = cloth.contacts(&body, &end.positions);
+    contacts.stiffen(end.contact_stiffness / contacts.stiffness());
+    contacts.proximity = Some(cloth.proximity());
+    contacts.update(&end.positions);
+    contacts.refresh(&end.positions);
+    let carried: f64 = contacts.touches().iter().map(|t| t.force() * t.normal.z).sum();
+    assert!((carried - cloth.weight).abs() < 0.01 * cloth.weight, "{carried} of {} N", cloth.weight);
+    let upper_weight = GRAVITY * cloth.masses[121..].iter().sum::<f64>();
+    let between: f64 = contacts.proximity.as_ref().unwrap().forces(&end.positions).map(|f| f.z.abs()).sum();
+    assert!((between - upper_weight).abs() < 0.03 * upper_weight, "{between} of {upper_weight} N");
+}
+
+#[test]
+fn a_sheet_folded_over_itself_stays_folded() {
+    let (h, radius) = (0.01, 0.006);
+    let mesh = sheet(24, 5, DVec3::ZERO, DVec3::X * h, DVec3::Y * h);
+    let turn = std::f64::consts::PI * radius;
+    // Half of it turned back over the other half about a line.
+    let bent = |p: DVec3| {
+        let s = p.x - 0.12;
+        let (x, z) = if s < 0.0 {
+            (s, 0.0)
+        } else if s < turn {
+            (radius * (s / radius).sin(), radius * (1.0 - (s / radius).cos()))
+        } else {
+            (turn - s, 2.0 * radius)
+        };
+        DVec3::new(x, p.y, z + 0.003)
+    };
+    let start: Vec<DVec3> = mesh.positions.iter().map(|p| bent(*p)).collect();
+    let end = rests(&mesh, &[], Some(&plate()), start);
+    // The upper half has come down on the lower one, and lies on it.
+    let top = (0..6).map(|j| end.positions[j * 25 + 24].z).fold(0.0, f64::max);
+    let under = (0..6).map(|j| end.positions[j * 25].z).fold(0.0, f64::max);
+    assert!(top > under + 3e-4 && top < 0.009, "{top} over {under}");
+}
+
+#[test]
+fn sheets_that_cross_come_apart() {
+    // The one is held at its upper edge; the other, held too, was pushed through it up to a third.
+    let h = 0.01;
+    let one = sheet(12, 12, DVec3::new(-0.06, 0.0, 0.0), DVec3::X * h, DVec3::NEG_Z * h);
+    let other = sheet(8, 8, DVec3::new(-0.031, -0.052, -0.043), DVec3::X * h, DVec3::Y * h);
+    let mesh = both(one, other);
+    let held: Vec<u32> = (0..13).chain(169..178).collect();
+    assert!(crossings(&mesh, &mesh.positions) > 10);
+    rests(&mesh, &held, None, mesh.positions.clone());
+}
+
+/// A ribbon closed to a ring of radius `r` about `centre`, its axis along `axis`, as wide as three edges.
+fn ring(r: f64, centre: DVec3, axis: DVec3, start: DVec3) -> TriMesh {
+    let (n, h) = (40, 0.008);
+    let (u, v) = (start, axis.cross(start));
+    let at = |i: u32, j: u32| {
+        let a = TAU * f64::from(i) / f64::from(n);
+        centre + (u * a.cos() + v * a.sin()) * r + axis * (f64::from(j) - 1.5) * h
+    };
+    let positions = (0..4).flat_map(|j| (0..n).map(move |i| at(i, j))).collect();
+    let squares = (0..3u32).flat_map(|j| (0..n).map(move |i| (i, j)));
+    let triangles = squares
+        .flat_map(|(i, j)| {
+            let [a, b] = [j * n + i, j * n + (i + 1) % n];
+            [[a, b, b + n], [a, b + n, a + n]]
+        })
+        .collect();
+    TriMesh::new(positions, triangles)
+}
+
+/// Gauss's integral over two closed lines: how many times they are linked.
+fn linking(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..a.len() {
+        let (p, dp) = ((a[i] + a[(i + 1) % a.len()]) / 2.0, a[(i + 1) % a.len()] - a[i]);
+        for j in 0..b.len() {
+            let (q, dq) = ((b[j] + b[(j + 1) % b.len()]) / 2.0, b[(j + 1) % b.len()] - b[j]);
+            let r = p - q;
+            sum += r.dot(dp.cross(dq)) / r.length().powi(3);
+        }
+    }
+    sum / (2.0 * TAU)
+}
+
+#[test]
+fn a_ring_through_a_ring_is_carried_by_it() {
+    let one = ring(0.05, DVec3::ZERO, DVec3::Y, DVec3::Z);
+    let other = ring(0.05, DVec3::new(0.0, 0.0, -0.06), DVec3::X, DVec3::Z);
+    let mesh = both(one, other);
+    let n = 160;
+    // The top of the first.
+    let held: Vec<u32> = (0..4).flat_map(|j| [39, 0, 1].map(|i| j * 40 + i)).collect();
+    assert_eq!(crossings(&mesh, &mesh.positions), 0);
+    let before = linking(&mesh.positions[40..80], &mesh.positions[n + 40..n + 80]);
+    let end = rests(&mesh, &held, None, mesh.positions.clone());
+    let after = linking(&end.positions[40..80], &end.positions[n + 40..n + 80]);
+    assert!((before.abs() - 1.0).abs() < 0.1 && (after - before).abs() < 0.1, "{before} and {after}");
+    // It hangs: all of it is below the top of the first, and it has come down on it.
+    let lowest = |x: &[DVec3]| x.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let (first, second) = (lowest(&end.positions[..n]), lowest(&end.positions[n..]));
+    assert!(second < first - 0.03, "{first} and {second}");
+}
+
+#[test]
+fn a_garment_that_touches_itself_ends_without_a_crossing_whatever_the_threads() {
+    // A pullover in cotton, small for its vertices, whose sleeves fold.
+    let scene = SceneSpec { garment: "flared-skirt@1500".into(), ..SceneSpec::default() }.load().unwrap().scene;
+    let settings = Settings { fabric: Fabric::by_name("cotton").unwrap(), ..Settings::default() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| drape(&scene, &settings, &mut unobserved).unwrap())
+    };
+    let (one, two) = (on(1), on(2));
+    assert_eq!(one.self_intersecting_pairs, 0);
+    assert!(one.positions == two.positions);
+}
