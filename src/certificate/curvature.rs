@@ -21,7 +21,8 @@ use glam::{DMat3, DVec3};
 use super::forces::Forces;
 use crate::mechanics::energy::friction::ELASTIC_SLIP;
 use crate::mechanics::energy::membrane::outer;
-use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::energy::pattern::HELD;
+use crate::mechanics::energy::{Cloth, Contacts, HessianLayout};
 use crate::mechanics::refine::{SolveError, Solver};
 
 /// Steps of Lanczos' method.
@@ -58,17 +59,17 @@ impl Curvature {
         let mut pencil = Pencil::new(cloth, forces, x)?;
         let mut step: Vec<DVec3> = pencil.gather(&forces.rest);
         step.iter_mut().for_each(|d| *d = -*d);
-        pencil.solver.solve(cloth.pattern(), &pencil.blocks, &pencil.damped, true, &mut step)?;
+        pencil.solver.solve(&pencil.layout.pattern, &pencil.blocks, &pencil.damped, true, &mut step)?;
         let (values, vector) = pencil.lanczos()?;
         let lowest = pencil.turned(&vector);
         let mass: f64 =
-            vector.iter().zip(cloth.order()).map(|(z, &v)| cloth.masses[v as usize] * z.length_squared()).sum();
+            vector.iter().zip(&pencil.layout.order).map(|(z, &v)| cloth.masses[v as usize] * z.length_squared()).sum();
         let farthest =
             (0..vector.len()).fold(0, |most, i| if vector[i].length() > vector[most].length() { i } else { most });
         Ok(Self {
             lowest: dot(&vector, &lowest) / mass,
             ways_out: values.iter().filter(|&&l| l < NEGATIVE).count(),
-            at: cloth.order().get(farthest).map_or(0, |&v| v as usize),
+            at: pencil.layout.order.get(farthest).map_or(0, |&v| v as usize),
             step: pencil.scatter(&step),
         })
     }
@@ -77,9 +78,10 @@ impl Curvature {
 /// H and B, over the free vertices in elimination order.
 struct Pencil<'a> {
     cloth: &'a Cloth,
+    layout: HessianLayout,
     x: &'a [DVec3],
-    /// What contact adds to both, of each unknown.
-    contact: Vec<DMat3>,
+    /// What contact adds to both: unknowns with their shares, and the matrix between them.
+    contact: Vec<(Vec<(usize, f64)>, DMat3)>,
     solver: Solver,
     blocks: Vec<DMat3>,
     damped: Vec<f64>,
@@ -87,33 +89,35 @@ struct Pencil<'a> {
 
 impl<'a> Pencil<'a> {
     fn new(cloth: &'a Cloth, forces: &Forces, x: &'a [DVec3]) -> Result<Self, SolveError> {
-        let layout = cloth.layout();
-        let mut contact = vec![DMat3::ZERO; layout.order.len()];
-        for t in forces.touching.iter().filter(|t| t.normal_n > 0.0) {
-            let along = outer(t.touch.normal, t.touch.normal);
-            let across = if t.sticks { cloth.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
-            if let Some(block) = contact.get_mut(layout.unknown[t.touch.vertex as usize] as usize) {
-                *block += along * t.touch.stiffness + (DMat3::IDENTITY - along) * across;
-            }
-        }
+        let pushing = || forces.touching.iter().filter(|t| t.normal_n > 0.0);
+        let pairs = pushing().flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])));
+        let layout = cloth.layout_with(x, pairs);
         let mut blocks = Vec::new();
-        cloth.hessian(x, &Contacts::none(), &mut blocks);
-        for (&start, block) in layout.pattern.starts.iter().zip(&contact) {
-            blocks[start as usize] += *block;
+        cloth.hessian_in(&layout, x, &Contacts::none(), &mut blocks);
+        let mut contact = Vec::new();
+        for t in pushing() {
+            let along = outer(t.normal, t.normal);
+            let across = if t.sticks { cloth.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
+            let block = along * t.stiffness + (DMat3::IDENTITY - along) * across;
+            let free = t.shares.iter().map(|(v, w)| (layout.unknown[*v as usize], *w)).filter(|(i, _)| *i != HELD);
+            let members: Vec<(u32, f64)> = free.collect();
+            layout.add(&members, block, &mut blocks);
+            contact.push((members.iter().map(|(i, w)| (*i as usize, *w)).collect(), block));
         }
         let damped = layout.order.iter().map(|&v| cloth.masses[v as usize] * DAMPING).collect();
-        Ok(Self { cloth, x, contact, solver: Solver::new(&layout.pattern)?, blocks, damped })
+        let solver = Solver::new(&layout.pattern)?;
+        Ok(Self { cloth, layout, x, contact, solver, blocks, damped })
     }
 
     /// Values of the unknowns, in their order.
     fn gather(&self, all: &[DVec3]) -> Vec<DVec3> {
-        self.cloth.order().iter().map(|&v| all[v as usize]).collect()
+        self.layout.order.iter().map(|&v| all[v as usize]).collect()
     }
 
     /// Values of all vertices, zero where held.
     fn scatter(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
         let mut all = vec![DVec3::ZERO; self.x.len()];
-        for (&v, z) in self.cloth.order().iter().zip(unknowns) {
+        for (&v, z) in self.layout.order.iter().zip(unknowns) {
             all[v as usize] = *z;
         }
         all
@@ -121,7 +125,7 @@ impl<'a> Pencil<'a> {
 
     /// B⁻¹ r, in place, with the factor there is.
     fn solve(&mut self, r: &mut [DVec3]) -> Result<(), SolveError> {
-        self.solver.solve_again(self.cloth.pattern(), &self.blocks, &self.damped, r)
+        self.solver.solve_again(&self.layout.pattern, &self.blocks, &self.damped, r)
     }
 
     /// H z.
@@ -137,12 +141,17 @@ impl<'a> Pencil<'a> {
         };
         let (ahead, behind) = (self.gather(&gradient_at(h)), self.gather(&gradient_at(-h)));
         let differences = ahead.iter().zip(&behind).map(|(a, b)| (*a - *b) / (2.0 * h));
-        differences.zip(z).zip(&self.contact).map(|((d, z), contact)| d + *contact * *z).collect()
+        let mut turned: Vec<DVec3> = differences.collect();
+        for (members, block) in &self.contact {
+            let across: DVec3 = members.iter().map(|&(i, w)| z[i] * w).sum();
+            members.iter().for_each(|&(i, w)| turned[i] += *block * across * w);
+        }
+        turned
     }
 
     /// The Ritz values, ascending, and the vector of the lowest.
     fn lanczos(&mut self) -> Result<(Vec<f64>, Vec<DVec3>), SolveError> {
-        let n = self.contact.len();
+        let n = self.layout.order.len();
         let (mut basis, mut turned): (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>) = (Vec::new(), Vec::new());
         let mut matrix = Mat::<f64>::zeros(STEPS.min(3 * n), STEPS.min(3 * n));
         // A start that leans to no side, the same on every machine: multiples of the golden section.

@@ -5,8 +5,10 @@
 //!
 //! K = { R : R·n ≥ 0, |R − (R·n) n| ≤ μ_f R·n },
 //!
-//! and the nearest such force is P(R), R's projection on K. What is left, r = R − P(R) where it touches and r = g elsewhere, is the residual
-//! force: zero if and only if a reaction that body and friction can give holds every vertex where it is.
+//! and the nearest such force is P(R), R's projection on K. Where cloth touches cloth, the two places are given opposite forces of the same
+//! kind, shared among their corners; then the reactions are those that leave least, one cone after the other (block coordinate descent,
+//! exact in every step). What is left is the residual force r: zero if and only if reactions that body, cloth and friction can give hold
+//! every vertex where it is.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -20,27 +22,39 @@
 use glam::DVec3;
 
 use crate::distance::Body;
-use crate::mechanics::energy::contact::Touch;
 use crate::mechanics::energy::{Cloth, Contacts, Friction};
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
 /// tenth of a millimetre.
 const TOUCHING: f64 = 2e-4;
 
+/// Vertices are kept this much farther from the body at most where it would poke through between them, m (`energy::cover`).
+const COVERED: f64 = 4e-3;
+
+/// Turns in which reactions are given, at most, and the change of all of them, over the weight, that ends it.
+const TURNS: usize = 500;
+const SETTLED: f64 = 1e-7;
+
 /// Share of μN from which a vertex counts as about to slip.
 pub(super) const SLIPPING: f64 = 0.999;
 
-/// A vertex that touches, and what the body gives it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A place of the cloth that touches the body or another place of it, and what it is given there.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Touching {
-    /// Where.
-    pub touch: Touch,
-    /// The reaction P(R), N.
+    /// The vertices that the reaction goes to, with their shares: one on the body, up to four of a gap of the cloth with itself.
+    pub shares: Vec<(u32, f64)>,
+    /// Unit normal that the reaction pushes along.
+    pub normal: DVec3,
+    /// How fast it grows as they come nearer, N/m.
+    pub stiffness: f64,
+    /// The reaction R, N.
     pub reaction: DVec3,
     /// Its normal part, N.
     pub normal_n: f64,
     /// Whether friction has something left.
     pub sticks: bool,
+    /// Whether it is the body that gives it.
+    pub of_body: bool,
 }
 
 /// All forces of a drape.
@@ -60,7 +74,7 @@ pub struct Forces {
     pub beyond: f64,
     /// Touching vertices with more of it than a hundredth of what they are given.
     pub beyond_count: usize,
-    /// The vertices that touch, ascending.
+    /// Where it touches: the body's vertices ascending, then the cloth's gaps with itself.
     pub touching: Vec<Touching>,
 }
 
@@ -68,14 +82,9 @@ impl Forces {
     /// Of `cloth` on `body` with its vertices at `x` (m).
     #[must_use]
     pub fn new(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
-        let stiffness = cloth.contacts(body, x).stiffness();
-        let nothing = vec![false; x.len()];
-        let offset = cloth.offset + TOUCHING;
-        let mut contacts = Contacts::new(body, &cloth.areas, &cloth.held, offset, stiffness, Friction::none());
-        contacts.update(x);
         // The reaction of what is held is its own gradient, which a cloth leaves out.
         let mut loose = cloth.clone();
-        loose.held = nothing;
+        loose.held = vec![false; x.len()];
         let mut gradient = Vec::new();
         loose.gradient(x, &Contacts::none(), &mut gradient);
         let mut forces = Self {
@@ -86,33 +95,100 @@ impl Forces {
             held: DVec3::ZERO,
             beyond: 0.0,
             beyond_count: 0,
-            touching: Vec::new(),
+            touching: touching(cloth, body, x),
         };
         for (rest, _) in forces.rest.iter_mut().zip(&cloth.held).filter(|(_, held)| **held) {
             forces.held += std::mem::take(rest);
         }
-        for &touch in contacts.touches() {
-            forces.grant(touch, cloth.friction);
-        }
+        forces.grant(&cloth.held, cloth.friction);
         forces.residual = forces.rest.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
-        forces.beyond = forces.beyond.sqrt();
+        let mut met = vec![false; x.len()];
+        for touching in &forces.touching {
+            for (v, _) in &touching.shares {
+                met[*v as usize] = true;
+            }
+            if touching.of_body {
+                forces.carried += touching.reaction;
+                let rest = touching.shares.iter().map(|(v, _)| forces.rest[*v as usize].length()).fold(0.0, f64::max);
+                forces.beyond_count += usize::from(rest > 0.01 * (touching.reaction.length() + rest));
+            }
+        }
+        let beyond = forces.rest.iter().zip(met).filter(|(_, met)| *met).map(|(r, _)| r.length_squared());
+        forces.beyond = beyond.sum::<f64>().sqrt();
         forces.unbalanced += forces.carried + forces.held;
         forces
     }
 
-    /// Gives a touching vertex what the body can.
-    fn grant(&mut self, touch: Touch, friction: f64) {
-        let needed = self.rest[touch.vertex as usize];
-        let n = touch.normal.normalize_or_zero();
-        let reaction = within_cone(needed, n, friction);
-        let rest = needed - reaction;
-        self.rest[touch.vertex as usize] = rest;
-        self.carried += reaction;
-        self.beyond += rest.length_squared();
-        self.beyond_count += usize::from(rest.length() > 0.01 * needed.length());
-        let normal_n = reaction.dot(n);
-        let sticks = (reaction - n * normal_n).length() < SLIPPING * friction * normal_n;
-        self.touching.push(Touching { touch, reaction, normal_n, sticks });
+    /// Gives all places what leaves least over: each in turn what lies nearest in its cone, as long as that changes anything. One turn is
+    /// enough where no two share a vertex.
+    fn grant(&mut self, held: &[bool], friction: f64) {
+        let weight: f64 = self.unbalanced.length();
+        for _ in 0..TURNS {
+            let mut changed = 0.0;
+            for touching in &mut self.touching {
+                let free = || touching.shares.iter().filter(|(v, _)| !held[*v as usize]);
+                let squares: f64 = free().map(|(_, w)| w * w).sum();
+                let left: DVec3 = free().map(|(v, w)| self.rest[*v as usize] * *w).sum();
+                if squares <= 0.0 {
+                    continue;
+                }
+                let given = within_cone(touching.reaction + left / squares, touching.normal, friction);
+                let more = given - touching.reaction;
+                for (v, w) in free() {
+                    self.rest[*v as usize] -= more * *w;
+                }
+                touching.reaction = given;
+                changed += more.length();
+            }
+            if changed <= SETTLED * weight {
+                break;
+            }
+        }
+        for touching in &mut self.touching {
+            touching.normal_n = touching.reaction.dot(touching.normal);
+            let across = touching.reaction - touching.normal * touching.normal_n;
+            touching.sticks = across.length() < SLIPPING * friction * touching.normal_n;
+        }
+    }
+}
+
+/// Where the cloth touches the body at `x`, and then where it touches itself.
+fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
+    let stiffness = cloth.contact_stiffness();
+    let mut contacts =
+        Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset + COVERED, stiffness, Friction::none());
+    contacts.update(x);
+    let spans = spanned(cloth, body, x);
+    let of_body = contacts.touches().iter().filter(|t| t.depth > COVERED - TOUCHING || spans[t.vertex as usize]);
+    let mut all: Vec<Touching> =
+        of_body.map(|t| Touching::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, true)).collect();
+    let mut itself = cloth.proximity();
+    itself.refresh(x);
+    let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
+    all.extend(gaps.map(|gap| Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), false)));
+    all
+}
+
+/// Whether a triangle of each vertex is nearer to the body between its corners than the cloth is thick: its corners may then be kept farther
+/// off than they would keep by themselves.
+fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<bool> {
+    let mut spans = vec![false; x.len()];
+    let inner = |v: [u32; 3]| {
+        let [a, b, c] = v.map(|v| x[v as usize]);
+        [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
+    };
+    let points: Vec<DVec3> = cloth.triangles.iter().flat_map(|t| inner(t.vertices)).collect();
+    for (t, near) in cloth.triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
+        if near.iter().any(|p| p.signed_distance < cloth.thickness) {
+            t.vertices.iter().for_each(|&v| spans[v as usize] = true);
+        }
+    }
+    spans
+}
+
+impl Touching {
+    fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, of_body: bool) -> Self {
+        Self { shares, normal, stiffness, reaction: DVec3::ZERO, normal_n: 0.0, sticks: false, of_body }
     }
 }
 

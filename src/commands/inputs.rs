@@ -18,9 +18,9 @@ pub(crate) struct InputArgs {
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress, long-sleeved-dress, any of them @VERTICES, a TOML
-    /// spec, an OBJ file, or a sewing pattern (JSON)
-    #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_value_t = SceneSpec::default().garment)]
-    garment: String,
+    /// spec, an OBJ file, or a sewing pattern (JSON). Given several times, garments are worn over each other, inner to outer
+    #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
+    garment: Vec<String>,
     /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
     #[arg(long, value_name = "FILE.json", conflicts_with = "garment")]
     pattern: Option<String>,
@@ -68,7 +68,8 @@ impl InputArgs {
     pub(crate) fn spec(&self) -> anyhow::Result<SceneSpec> {
         Ok(SceneSpec {
             body: self.body.clone(),
-            garment: self.pattern.clone().unwrap_or_else(|| self.garment.clone()),
+            garment: self.pattern.as_ref().or(self.garment.first()).cloned().unwrap_or_default(),
+            over: self.garment.iter().skip(1).cloned().collect(),
             edge_cm: self.edge_length,
             body_group: self.body_group.clone(),
             garment_group: self.garment_group.clone(),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::over::{join, put_over};
 use super::spec::REST_AUTO;
 use super::{PushOutReport, Scene, SceneError, SceneSpec, facing_body};
 use crate::distance::Body;
@@ -57,6 +58,17 @@ struct Unplaced {
     pattern: Option<FlatPattern>,
 }
 
+impl Unplaced {
+    /// Puts another garment over it; what came of files and patterns is then that of several, and is left behind.
+    fn put_on(&mut self, mut outer: Self, body: &Body) -> Result<(), SceneError> {
+        put_over(&mut outer.mesh, &self.mesh, body)?;
+        let before = join(&mut self.mesh, &mut self.rest, outer.mesh, outer.rest);
+        self.held.extend(outer.held.iter().map(|v| v + before));
+        (self.tailored, self.imported, self.pattern) = (None, None, None);
+        Ok(())
+    }
+}
+
 impl SceneSpec {
     /// Reads or makes body and garment.
     ///
@@ -75,11 +87,11 @@ impl SceneSpec {
         // What is made is cut for the form's measurements, not for its mesh: both at once.
         let (body, made) = rayon::join(|| self.load_body(meshes), || self.make_garment(meshes));
         let (body, of_body) = body?;
-        let unplaced = match made {
-            Some(made) => made?,
-            None if self.is_a_pattern() => self.tailor(&body)?,
-            None => self.load_garment(&body, of_body.as_ref())?,
-        };
+        let mut unplaced = self.unplaced(&body, of_body.as_ref(), made)?;
+        for layer in self.layers().skip(1) {
+            let outer = layer.unplaced(&body, of_body.as_ref(), layer.make_garment(meshes))?;
+            unplaced.put_on(outer, &body)?;
+        }
         let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
         scene.held = match &self.hold {
@@ -100,6 +112,20 @@ impl SceneSpec {
             flat_pattern: unplaced.pattern,
             imported: unplaced.imported,
         })
+    }
+
+    /// The garment, without what is worn over it.
+    fn unplaced(
+        &self,
+        body: &Body,
+        of_body: Option<&Imported>,
+        made: Option<Result<Unplaced, SceneError>>,
+    ) -> Result<Unplaced, SceneError> {
+        match made {
+            Some(made) => made,
+            None if self.is_a_pattern() => self.tailor(body),
+            None => self.load_garment(body, of_body),
+        }
     }
 
     fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {

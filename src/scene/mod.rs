@@ -6,6 +6,7 @@
 
 mod error;
 mod load;
+mod over;
 mod placement;
 mod push_out;
 mod spec;

@@ -26,6 +26,8 @@ pub struct SceneSpec {
     /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, an OBJ file placed around the body, or a sewing
     /// pattern (JSON as GarmentCode writes it).
     pub garment: String,
+    /// Garments worn over it, inner to outer, each named as it is.
+    pub over: Vec<String>,
     /// One group or object of the body's file alone.
     pub body_group: Option<String>,
     /// One group or object of the garment's file alone.
@@ -56,6 +58,7 @@ impl Default for SceneSpec {
         Self {
             body: DRESS_FORM.to_owned(),
             garment: "low-cut-dress".to_owned(),
+            over: Vec::new(),
             body_group: None,
             garment_group: None,
             edge_cm: 100.0 * DEFAULT_EDGE_M,
@@ -81,13 +84,17 @@ impl SceneSpec {
     /// The files it names.
     #[must_use]
     pub fn files(&self) -> Vec<&Path> {
-        let named = [&self.body, &self.garment, &self.rest].into_iter().filter(|name| names_a_file(name));
+        let named =
+            [&self.body, &self.garment, &self.rest].into_iter().chain(&self.over).filter(|name| names_a_file(name));
         named.map(Path::new).collect()
     }
 
     /// What the garment is called where one name will do, a recording's for one.
     #[must_use]
     pub fn garment_name(&self) -> String {
+        if !self.over.is_empty() {
+            return self.layers().map(|layer| layer.garment_name()).collect::<Vec<_>>().join("-under-");
+        }
         if names_a_file(&self.garment) {
             let stem = stem(&self.garment);
             return stem.strip_suffix("_specification").map_or(stem.clone(), str::to_owned);
@@ -95,13 +102,19 @@ impl SceneSpec {
         self.garment.split('@').next().unwrap_or_default().to_owned()
     }
 
+    /// Each garment by itself, inner to outer.
+    pub(super) fn layers(&self) -> impl Iterator<Item = Self> + '_ {
+        let one = |garment: &String| Self { garment: garment.clone(), over: Vec::new(), ..self.clone() };
+        std::iter::once(&self.garment).chain(&self.over).map(one)
+    }
+
     /// Finds names that mean nothing before any time is spent.
     pub fn check_names(&self) -> Result<(), SceneError> {
         if self.body != DRESS_FORM && !names_a_file(&self.body) {
             return Err(SceneError::UnknownBody { found: self.body.clone() });
         }
-        if !names_a_file(&self.garment) {
-            self.described()?;
+        for layer in self.layers().filter(|layer| !names_a_file(&layer.garment)) {
+            layer.described()?;
         }
         Ok(())
     }

@@ -320,13 +320,7 @@ impl Cloth {
         for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
             let members: Vec<(u32, f64)> =
                 gap.members().map(|(v, w)| (layout.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect();
-            for (k, &(i, w)) in members.iter().enumerate() {
-                for &(j, other) in &members[..=k] {
-                    if let Some(sum) = blocks.get_mut(layout.pattern.slot(i, j).block as usize) {
-                        *sum += block * (w * other);
-                    }
-                }
-            }
+            layout.add(&members, block, blocks);
         }
     }
 

@@ -16,17 +16,36 @@ use crate::mesh::self_intersection::crossing_pairs;
 /// Least and most that a corner is raised at a time, m: a tenth of a cloth's thickness, and a thick one's.
 const RAISE: [f64; 2] = [1e-4, 1e-3];
 
+/// Rounds that brought nothing after which it ends.
+const IDLE: usize = 2;
+
 /// A corner is raised by no more than this in all, m.
-const FARTHEST: f64 = 8e-3;
+const FARTHEST: f64 = 4e-3;
+
+/// What covering has done so far.
+#[derive(Debug, Default)]
+pub(crate) struct Covered {
+    raised_m: Vec<f64>,
+    fewest: Option<usize>,
+    idle: usize,
+}
 
 impl Contacts<'_> {
     /// Asks the corners of the triangles through which the body reaches at `x` to keep farther off; returns how many were raised. Takes
     /// effect with the next [`update`](Self::update).
-    pub(crate) fn cover(&mut self, triangles: &[[u32; 3]], x: &[DVec3], raised: &mut Vec<f64>) -> usize {
+    pub(crate) fn cover(&mut self, triangles: &[[u32; 3]], x: &[DVec3], so_far: &mut Covered) -> usize {
         let Some(body) = self.body() else { return 0 };
         let garment = TriMesh::new(x.to_vec(), triangles.to_vec());
         let mut by = vec![0.0_f64; x.len()];
-        for [t, u] in crossing_pairs(&garment, body.mesh()) {
+        let pairs = crossing_pairs(&garment, body.mesh());
+        // A place too tight to be covered is not stretched for it.
+        let fewer = so_far.fewest.is_none_or(|fewest| pairs.len() < fewest);
+        so_far.idle = if fewer { 0 } else { so_far.idle + 1 };
+        so_far.fewest = Some(so_far.fewest.map_or(pairs.len(), |fewest| fewest.min(pairs.len())));
+        if so_far.idle >= IDLE {
+            return 0;
+        }
+        for [t, u] in pairs {
             let [a, b, c] = garment.corners(t as usize);
             let plane = (b - a).cross(c - a).normalize_or_zero();
             let skin = body.mesh().corners(u as usize);
@@ -37,9 +56,9 @@ impl Contacts<'_> {
                 by[v as usize] = by[v as usize].max(through);
             }
         }
-        raised.resize(x.len(), 0.0);
+        so_far.raised_m.resize(x.len(), 0.0);
         let mut count = 0;
-        for (v, (by, raised)) in by.into_iter().zip(raised).enumerate() {
+        for (v, (by, raised)) in by.into_iter().zip(&mut so_far.raised_m).enumerate() {
             let by = by.min(FARTHEST - *raised);
             if by > 0.0 {
                 *raised += by;

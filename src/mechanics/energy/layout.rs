@@ -2,7 +2,7 @@
 //!
 //! Made when first asked for: a preview by PARTs factors nothing of it.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::bending::Bending;
 use super::membrane::Triangle;
@@ -70,6 +70,17 @@ impl HessianLayout {
             }
         }
         Self { order, unknown, pattern, triangle_slots, bending_blocks }
+    }
+
+    /// Adds a symmetric `block` (N/m) between unknowns with these shares; what has no block of its own is left out.
+    pub(crate) fn add(&self, members: &[(u32, f64)], block: DMat3, blocks: &mut [DMat3]) {
+        for (k, &(i, w)) in members.iter().enumerate() {
+            for &(j, other) in &members[..=k] {
+                if let Some(sum) = blocks.get_mut(self.pattern.slot(i, j).block as usize) {
+                    *sum += block * (w * other);
+                }
+            }
+        }
     }
 
     /// Whether there is a block for each of these pairs of vertices, where none is held.

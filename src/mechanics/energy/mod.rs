@@ -16,8 +16,8 @@
 
 pub mod bending;
 mod cloth;
-mod cover;
 pub mod contact;
+mod cover;
 mod evaluate;
 pub mod fan;
 pub mod field;
@@ -33,6 +33,7 @@ pub mod proximity;
 
 pub use cloth::{Cloth, EnergyError};
 pub use contact::Contacts;
+pub(crate) use cover::Covered;
 pub use evaluate::Scratch;
 pub use friction::Friction;
 pub use layout::HessianLayout;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
-use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::energy::{Cloth, Contacts, Covered};
 use crate::mechanics::newton::{Descent, Pace, SolveError, Solver, Tangent, Whole};
 
 /// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
@@ -96,7 +96,7 @@ fn settle(
         descent.untangle(UNTANGLING, RELAXING);
     }
     let triangles: Vec<[u32; 3]> = cloth.triangles.iter().map(|t| t.vertices).collect();
-    let mut raised = Vec::new();
+    let mut covered = Covered::default();
     let mut tangent = Whole::default();
     // Whether the energy is new to these positions: at the start, and when the cloth gets its true stiffness.
     let mut fresh = true;
@@ -109,7 +109,7 @@ fn settle(
         if !soft && descent.residual < options.tolerance {
             if descent.contacts.penetration(&descent.x).0 > 0 {
                 descent.contacts.stiffen(4.0);
-            } else if !options.self_contact || descent.contacts.cover(&triangles, &descent.x, &mut raised) == 0 {
+            } else if !options.self_contact || descent.contacts.cover(&triangles, &descent.x, &mut covered) == 0 {
                 break Stop::Converged;
             }
             descent.contacts.update(&descent.x);

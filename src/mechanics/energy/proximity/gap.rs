@@ -57,13 +57,23 @@ impl Gap {
     }
 
     /// Its vertices and their weights.
-    pub(in crate::mechanics::energy) fn members(&self) -> impl Iterator<Item = (u32, f64)> + use<> {
+    pub(crate) fn members(&self) -> impl Iterator<Item = (u32, f64)> + use<> {
         self.key.vertices.into_iter().zip(self.weights).filter(|(v, _)| *v != NONE)
     }
 
     /// What is missing to the goal at `x`, m: positive where they press.
-    pub(super) fn depth(&self, x: &[DVec3]) -> f64 {
+    pub(crate) fn depth(&self, x: &[DVec3]) -> f64 {
         self.goal - self.normal.dot(self.across(x))
+    }
+
+    /// n.
+    pub(crate) fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// κ A, N/m.
+    pub(crate) fn stiffness(&self) -> f64 {
+        self.stiffness
     }
 
     /// The part of the slip since [`from`](Self::from) along the plane, m.

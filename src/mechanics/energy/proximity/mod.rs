@@ -177,6 +177,11 @@ impl Proximity {
         self.gaps.iter().filter(|gap| gap.depth(x) > 0.0).count()
     }
 
+    /// All gaps, what crosses left out.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = &Gap> {
+        self.gaps.iter().filter(|gap| gap.key.kind != gap::Kind::Crossing)
+    }
+
     /// What the gaps that press at `x` push with, N, normal to each.
     pub fn forces(&self, x: &[DVec3]) -> impl Iterator<Item = DVec3> {
         self.gaps.iter().map(|gap| gap.normal * (gap.stiffness * gap.depth(x).max(0.0)))

@@ -1,12 +1,11 @@
 //! Steps that take no cloth through cloth.
 //!
-//! Where a step from x to x' ends, all pairs of triangles that cross are found, exactly (`mesh::self_intersection`). If one did not cross
+//! Where a step from x to x' ends, and a few times on its way where it is long, all pairs of triangles that cross are found, exactly (`mesh::self_intersection`). If one did not cross
 //! at x, a long step is refused, and tried again half as long; a short one is cut: the corners that cross go back towards where they
 //! came from, half the way each time, and after a few times all the way, their neighbours with them. As x has no crossing, this
 //! ends.
 //!
-//! Limits: only the end of a step is looked at, so what passes through whole, in one step of at most a few centimetres, is not seen. Where
-//! x crosses already, about what crosses there new crossings are let be: they are on their way out ([`untangle`](super::untangle)).
+//! Limits: what passes through whole between two looks, a few centimetres apart, is not seen. Where x crosses already, about what crosses there new crossings are let be: they are on their way out ([`untangle`](super::untangle)).
 
 use std::sync::Arc;
 
@@ -18,6 +17,11 @@ use crate::mesh::self_intersection::self_intersecting_pairs;
 
 /// A step whose longest move is more than so many edges is not cut but refused: to cut it would tear the cloth.
 const LONG: f64 = 1.0;
+
+/// A longer one is looked at on its way, so many edges apart but no more often than this: cloth that passes through cloth crosses
+/// it for as long as it is round.
+const APART: f64 = 2.0;
+const MOST_STAGES: f64 = 4.0;
 
 /// Times that crossing corners go back half the way; after that all the way, and their neighbours with them.
 const HALVINGS: usize = 4;
@@ -106,10 +110,20 @@ impl Passage {
     /// Looks at the step from `from`, where the last one ended, to `to`. A short one that crosses where it did not before is cut.
     pub(super) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
         self.known(from);
+        let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.skin.edge_m;
+        let stages = (longest / APART).ceil().clamp(1.0, MOST_STAGES);
+        let mut stage = 1.0;
+        while stage < stages {
+            let there: Vec<DVec3> = from.iter().zip(&*to).map(|(a, b)| a.lerp(*b, stage / stages)).collect();
+            let crossing = self.anew(&there);
+            if !self.appeared(&crossing).is_empty() {
+                return Looked::Crosses;
+            }
+            stage += 1.0;
+        }
         let mut crossing = self.anew(to);
         let mut new = self.appeared(&crossing);
-        let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        if !new.is_empty() && longest > LONG * self.skin.edge_m {
+        if !new.is_empty() && longest > LONG {
             return Looked::Crosses;
         }
         let mut share = vec![1.0_f64; from.len()];
