@@ -169,8 +169,8 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     all
 }
 
-/// Whether a triangle of each vertex is nearer to the body between its corners than the cloth is thick: its corners may then be kept farther
-/// off than they would keep by themselves.
+/// Whether a triangle of each vertex is nearer to the body between its corners than these keep by themselves: they may then be kept
+/// farther off, so that it does not poke through.
 fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<bool> {
     let mut spans = vec![false; x.len()];
     let inner = |v: [u32; 3]| {
@@ -179,7 +179,7 @@ fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<bool> {
     };
     let points: Vec<DVec3> = cloth.triangles.iter().flat_map(|t| inner(t.vertices)).collect();
     for (t, near) in cloth.triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
-        if near.iter().any(|p| p.signed_distance < cloth.thickness) {
+        if near.iter().any(|p| p.signed_distance < cloth.offset) {
             t.vertices.iter().for_each(|&v| spans[v as usize] = true);
         }
     }

@@ -10,6 +10,7 @@ use partwise::scene::Placement;
 use partwise::{Scene, SceneSpec};
 use serde::Serialize;
 
+use super::certified;
 use super::console;
 use super::failure::UserError;
 use super::inputs::InputArgs;
@@ -84,7 +85,7 @@ impl CheckArgs {
         let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
         if self.format == Format::Json {
             console::result(&serde_json::to_string(&report)?);
-            return verified(report.certificate.as_ref());
+            return certified::verified(report.certificate.as_ref());
         }
         for note in &report.notes {
             console::note(note);
@@ -99,48 +100,26 @@ impl CheckArgs {
         }
         console::result(&format!("{table}\nverdict: {}", report.verdict));
         if let Some(certificate) = &report.certificate {
-            console::result(&text(certificate));
+            console::result(&certified::text(certificate));
         }
-        verified(report.certificate.as_ref())
+        certified::verified(report.certificate.as_ref())
     }
 }
 
 impl CheckArgs {
     /// The certificate of a file whose vertices are those of the garment, in their order.
     fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
-        let spec = SceneSpec { garment: draped.to_owned(), rest: "own".to_owned(), hold: None, ..spec.clone() };
+        let spec = SceneSpec {
+            garment: draped.to_owned(),
+            rest: "own".to_owned(),
+            hold: None,
+            over: Vec::new(),
+            ..spec.clone()
+        };
         let positions = self.input.load(&spec)?.scene.garment.positions;
         certify(scene, &Fabric::by_name(&self.fabric)?, &positions).map_err(|error| match error {
             CertifyError::Count { .. } | CertifyError::NotFinite { .. } => UserError::new(format!("{draped}: {error}")),
             other => other.into(),
         })
     }
-}
-
-/// A certificate for people.
-fn text(certificate: &Certificate) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["certificate", "", "found", "limit", "", ""]);
-    for f in &certificate.findings {
-        let number =
-            |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };
-        let found = if f.passes { "passes" } else { "FAILS" };
-        table.add_row([
-            f.name.to_owned(),
-            found.to_owned(),
-            number(f.value),
-            number(f.limit),
-            f.unit.to_owned(),
-            f.remark.clone(),
-        ]);
-    }
-    let verdict = if certificate.passes { "a drape at rest" } else { "not certified" };
-    format!("{table}\n{verdict}")
-}
-
-/// Ends with 1 where a line fails.
-fn verified(certificate: Option<&Certificate>) -> anyhow::Result<()> {
-    let failed = certificate.map_or(0, |c| c.findings.iter().filter(|f| !f.passes).count());
-    anyhow::ensure!(failed == 0, "not certified: {failed} lines of the certificate fail");
-    Ok(())
 }

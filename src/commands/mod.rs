@@ -2,6 +2,7 @@
 
 mod assets;
 mod bench;
+mod certified;
 mod check;
 mod compare;
 mod console;

@@ -9,7 +9,8 @@ use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use partwise::Job;
 use partwise::assess::AssessError;
-use partwise::drape;
+use partwise::certificate::certify;
+use partwise::drape::{self, LetGo};
 use partwise::job::Against;
 use partwise::record::Recorder;
 
@@ -19,7 +20,7 @@ use super::solved::{Snapshot, Solved};
 use super::stages::StageArgs;
 use super::summary::Summary;
 use super::work::{cache, refining, use_threads};
-use super::{console, interrupt};
+use super::{certified, console, interrupt};
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -54,6 +55,10 @@ pub(crate) struct RunArgs {
     /// Under --accuracy: where references are kept [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
+    /// Certify the drape: whether it is at rest, would stay so, and nothing goes through anything, by forces taken anew from its
+    /// positions; exit code 1 where a line fails
+    #[arg(long, help_heading = "Stages", conflicts_with = "watch")]
+    certify: bool,
     /// Write the displaced garment: as OBJ with its original faces, groups and texture coordinates (of a pattern the panels and
     /// where they lay flat), or as glTF in metres, y up
     #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
@@ -99,7 +104,7 @@ impl RunArgs {
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
-        Ok(())
+        certified::verified(solved.summary.certificate.as_ref())
     }
 
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
@@ -157,6 +162,15 @@ impl RunArgs {
             summary.add_time("sew", sew);
         }
         summary.add_time("measure", draped.elapsed());
+        if self.certify {
+            let began = Instant::now();
+            let mut scene = loaded.scene.clone();
+            if matches!(drape.let_go, Some(LetGo::Stays { .. })) {
+                scene.held.clear();
+            }
+            summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
+            summary.add_time("certify", began.elapsed());
+        }
         Ok(Solved { job, loaded, drape, measured, snapshots, summary })
     }
 
@@ -168,7 +182,12 @@ impl RunArgs {
             console::note(&note);
         }
         match self.format {
-            Format::Text => console::result(&solved.summary.text()),
+            Format::Text => {
+                console::result(&solved.summary.text());
+                if let Some(certificate) = &solved.summary.certificate {
+                    console::result(&certified::text(certificate));
+                }
+            }
             Format::Json => console::result(&solved.summary.json()?),
         }
         Ok(())

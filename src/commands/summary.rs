@@ -7,6 +7,7 @@ use std::time::Duration;
 use comfy_table::{CellAlignment, Table, presets};
 use partwise::Settings;
 use partwise::accuracy::Accuracy;
+use partwise::certificate::Certificate;
 use partwise::drape::Drape;
 use partwise::fabric::Fabric;
 use partwise::figures::{Figures, LevelCount};
@@ -38,9 +39,12 @@ pub(crate) struct Summary {
     let_go: Option<String>,
     /// Every figure against the own continuation, under `--accuracy`.
     accuracy: Option<Value>,
-    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `record`, and `total`.
+    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, and `total`.
     timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
+    /// What was certified, where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) certificate: Option<Certificate>,
     /// Where the recording went.
     pub(crate) outputs: Vec<String>,
 }
@@ -80,6 +84,7 @@ impl Summary {
             accuracy,
             timings_ms: BTreeMap::new(),
             warnings,
+            certificate: None,
             outputs: Vec::new(),
         };
         let times = drape.times;

@@ -107,7 +107,7 @@ pub struct Drape {
     pub state: Option<ClothState>,
     /// What came of letting go what was held until it rested.
     pub let_go: Option<LetGo>,
-    /// Pairs of triangles of the displaced garment that cross: cloth through cloth, which no model here prevents.
+    /// Pairs of triangles of the displaced garment that cross: steps at full resolution keep cloth off cloth, PARTs alone do not.
     pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.
     pub penetrating_vertices: usize,

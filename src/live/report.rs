@@ -54,7 +54,7 @@ pub(super) fn choices() -> Value {
 
 /// A job in the words of an edit.
 fn job(job: &Job) -> Value {
-    let Settings { table, min_part, model, refine, fabric } = &job.settings;
+    let Settings { table, min_part, model, refine, fabric, self_contact } = &job.settings;
     let table = match table {
         TableRule::Rows(rows) => json!(rows),
         TableRule::Quantile { levels, .. } => json!({ "quantile": levels }),
@@ -71,6 +71,7 @@ fn job(job: &Job) -> Value {
         "max_extent_cm": model.extents_cm(),
         "motion": match model { Model::Coupled(_) => json!(model.motion()), Model::Paper(_) => Value::Null },
         "refine": refine,
+        "self_contact": self_contact,
     })
 }
 

@@ -128,6 +128,8 @@ pub struct Edit {
     pub model: Option<String>,
     /// `"converged"`, or `{"steps": n}` at full resolution.
     pub refine: Option<Refine>,
+    /// Whether steps at full resolution keep cloth off cloth.
+    pub self_contact: Option<bool>,
 }
 
 impl Edit {
@@ -164,6 +166,7 @@ impl Edit {
                 settings.fabric = (**fabric).clone();
             }
         }
+        settings.self_contact = self.self_contact.unwrap_or(settings.self_contact);
         if let Some(min_part) = self.min_part {
             settings.min_part = min_part.max(1);
         }
@@ -195,6 +198,7 @@ impl Edit {
         }
         if let Some(garment) = &self.garment {
             scene.garment.clone_from(garment);
+            scene.over.clear();
         }
         if self.body.is_some() || self.garment.is_some() {
             scene.check_names()?;
