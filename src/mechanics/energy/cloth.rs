@@ -211,12 +211,12 @@ impl Cloth {
         self.found(self.untouched(body).by_planes(), x)
     }
 
-    fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
+    pub(super) fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let friction = Friction::new(self.friction);
         Contacts::new(body, &self.areas, &self.held, self.offset, self.contact_stiffness(), friction)
     }
 
-    fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
+    pub(super) fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
         contacts.update(x);
         contacts.friction_refresh(x);
         contacts
