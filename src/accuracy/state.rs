@@ -17,6 +17,7 @@ use super::quantile::MM_PER_M;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::principal_strain;
+use crate::mechanics::reactions::grant_beside;
 use crate::quantile::nearest_rank;
 
 /// Figures of one drape.
@@ -45,6 +46,7 @@ impl State {
         // Fresh contacts have fresh anchors: no friction force yet.
         let energy_j = cloth.gradient(x, &contacts, &mut gradient);
         hold(cloth, &contacts, &mut gradient);
+        grant_beside(cloth, body, &contacts, x, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
         let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
         let (penetrating_vertices, depth) = contacts.penetration(x);

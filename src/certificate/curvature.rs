@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | λ | curvature relative to B | – |
 //! | ω² | zᵀHz / zᵀMz of the lowest: negative where the cloth would leave | 1/s² |
-//! | r | force that nothing balances ([`forces`](super::forces)) | N |
+//! | r | force that nothing balances ([`reactions`](crate::mechanics::reactions)) | N |
 //! | d | −B⁻¹ r: the next Newton step | m |
 //!
 //! Source: Lanczos' method for a pencil (Parlett: "The Symmetric Eigenvalue Problem", chapter 15), with full reorthogonalisation. Limits:
@@ -18,11 +18,11 @@
 use faer::{Mat, Side};
 use glam::{DMat3, DVec3};
 
-use super::forces::Forces;
 use crate::mechanics::energy::friction::ELASTIC_SLIP;
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::pattern::HELD;
 use crate::mechanics::energy::{Cloth, Contacts, HessianLayout};
+use crate::mechanics::reactions::Forces;
 use crate::mechanics::refine::{SolveError, Solver};
 
 /// Steps of Lanczos' method.

@@ -21,13 +21,12 @@
 //! Limits: a reaction that could be given need not be the one that history left; of the curvature, contacts are taken as they are.
 
 mod curvature;
-mod forces;
 
 use glam::DVec3;
 use serde::Serialize;
 
+pub use crate::mechanics::reactions::Forces;
 pub use curvature::Curvature;
-pub use forces::Forces;
 
 use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};

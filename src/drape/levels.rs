@@ -50,8 +50,8 @@ impl Levels {
         Ok(Self { cloth: cloth?, coarser })
     }
 
-    /// Positions of the level of this number (1: the first coarser one) from those of the full garment.
-    pub(crate) fn restrict(&self, level: usize, full: &[DVec3]) -> Vec<DVec3> {
+    /// What the vertices of the level of this number (1: the first coarser one) have of those of the full garment.
+    pub(crate) fn restrict<T: Copy>(&self, level: usize, full: &[T]) -> Vec<T> {
         self.coarser[..level].iter().fold(full.to_vec(), |x, l| l.coarse.restrict(&x))
     }
 

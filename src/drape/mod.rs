@@ -164,12 +164,13 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
         None => None,
         Some(levels) => {
             let released = timed(&mut times.refine, || {
-                let start = approach(scene, settings, levels, &stage.parts, &stage.positions, &on);
-                let refined = refine_from(scene, settings, &levels.cloth, start, observer)?;
+                let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
+                let refined = refine_from(scene, settings, &levels.cloth, Some(&ground), start, observer)?;
                 let_go::let_go(scene, settings, refined, observer)
             })?;
             let Released { cloth, refined, let_go } = released;
-            let (positions, state) = settled(scene, settings, cloth.as_ref().unwrap_or(&levels.cloth), refined);
+            let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
+            let (positions, state) = settled(scene, settings, cloth, Some(&ground), refined);
             Some((positions, state, let_go))
         }
     };

@@ -8,7 +8,7 @@ use super::levels::{Level, Levels};
 use super::{DrapeError, Model, PartOutcome, Refine, Settings};
 use crate::distance::SurfacePoint;
 use crate::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Given};
 use crate::mechanics::paper::{self, PartForces};
 use crate::parts::{Parts, segment};
 use crate::range_table::RangeTable;
@@ -48,7 +48,7 @@ pub(crate) fn stage_two(
         Model::Coupled(options) => {
             let made = if levels.is_none() { Some(Levels::new(scene, fabric)?) } else { None };
             let Some(levels) = levels.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
-            couple(scene, fabric, levels, parts, options, asked)
+            couple(scene, fabric, levels, surface, parts, options, asked)
         }
         Model::Paper(options) => {
             let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
@@ -69,6 +69,7 @@ fn couple(
     scene: &Scene,
     fabric: &Fabric,
     levels: &Levels,
+    surface: &[SurfacePoint],
     parts: Parts,
     options: &CoupledOptions,
     asked: Asked<'_>,
@@ -80,7 +81,7 @@ fn couple(
     let uncut = [f64::INFINITY];
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
-        let result = through_levels(scene, fabric, levels, &stage.parts, &stage.positions, options, asked)?;
+        let result = through_levels(scene, fabric, levels, surface, &stage.parts, &stage.positions, options, asked)?;
         stage.outcomes = result.parts.iter().map(told).collect();
         stage.positions = result.positions;
         stage.warnings.extend(result.warnings);
@@ -109,13 +110,17 @@ const EDGES_A_FOLD: f64 = 8.0;
 const FOLDING: f64 = 0.5;
 
 /// Steps of a level after the coarsest: they take off what the prolongation strained, and tell the forces.
-const STEPS_AFTER_COARSE: usize = 6;
+const STEPS_AFTER_COARSE: usize = 4;
+
+/// A coarser level ends where its last steps bring less than this share of what all have: what is left is less than what it is off by.
+const LEAST_SHARE: f64 = 0.01;
 
 /// The coupled model on the coarsest cloth whose vertices still tell these PARTs apart, then on the finer ones.
 fn through_levels(
     scene: &Scene,
     fabric: &Fabric,
     levels: &Levels,
+    surface: &[SurfacePoint],
     parts: &Parts,
     start: &[DVec3],
     options: &CoupledOptions,
@@ -127,21 +132,25 @@ fn through_levels(
             && (folding.share < FOLDING || EDGES_A_FOLD * level.edge_m() <= folding.width_m)
     };
     let coarsest = levels.coarser.iter().take_while(enough).count();
+    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let mut x = start.to_vec();
     for number in (1..=coarsest).rev() {
         let level = &levels.coarser[number - 1];
         let parts = levels.parts(number, parts);
         let (garment, start) = (level.garment(fabric), levels.restrict(number, &x));
-        let solved = coupled::solve_before(&garment, &scene.body, &parts, &start, options, &mut |_| asked())?;
+        let distance_m = &levels.restrict(number, &distance);
+        let given = Given { distance_m, least_share: LEAST_SHARE };
+        let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, given, options, &mut |_| asked())?;
         x = levels.prolong(number, &x, solved.positions);
     }
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth, fabric };
+    let given = Given { distance_m: &distance, least_share: 0.0 };
     if coarsest == 0 {
-        return coupled::solve_before(&garment, &scene.body, parts, &x, options, &mut |_| asked());
+        return coupled::solve_given(&garment, &scene.body, parts, &x, given, options, &mut |_| asked());
     }
     let max_steps = options.max_steps.min(STEPS_AFTER_COARSE);
     let fewer = CoupledOptions { max_steps, ..options.clone() };
-    let mut solved = coupled::solve_before(&garment, &scene.body, parts, &x, &fewer, &mut |_| asked())?;
+    let mut solved = coupled::solve_given(&garment, &scene.body, parts, &x, given, &fewer, &mut |_| asked())?;
     // That they go on moving after so few steps is meant.
     solved.warnings.clear();
     Ok(solved)
@@ -160,6 +169,7 @@ pub(crate) fn approach(
     scene: &Scene,
     settings: &Settings,
     levels: &Levels,
+    surface: &[SurfacePoint],
     parts: &Parts,
     start: &[DVec3],
     asked: Asked<'_>,
@@ -172,6 +182,8 @@ pub(crate) fn approach(
     }
     let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
     let garment = Garment { mesh, topology, cloth: &levels.cloth, fabric: &settings.fabric };
-    let solved = coupled::solve_before(&garment, body, &finer, start, &options, &mut |_| asked());
+    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
+    let given = Given { distance_m: &distance, least_share: 0.0 };
+    let solved = coupled::solve_given(&garment, body, &finer, start, given, &options, &mut |_| asked());
     solved.map_or_else(|_| start.to_vec(), |result| result.positions)
 }

@@ -44,6 +44,7 @@ pub(crate) fn refine_from(
     scene: &Scene,
     settings: &Settings,
     cloth: &Cloth,
+    ground: Option<&Distances>,
     start: Vec<DVec3>,
     observer: Observer<'_>,
 ) -> Result<Refined, DrapeError> {
@@ -52,7 +53,7 @@ pub(crate) fn refine_from(
         Refine::Converged => None,
     };
     let options = RefineOptions { max_steps, self_contact: settings.self_contact, ..RefineOptions::default() };
-    let contacts = met(cloth, scene, settings.refine, &start);
+    let contacts = met(cloth, scene, settings.refine, ground, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
         if scene.has_fallen(step.positions) { ControlFlow::Break(()) } else { observer(step) }
     })?;
@@ -60,8 +61,14 @@ pub(crate) fn refine_from(
 }
 
 /// Where the steps ended, and how the cloth fits there.
-pub(crate) fn settled(scene: &Scene, settings: &Settings, cloth: &Cloth, refined: Refined) -> (Vec<DVec3>, ClothState) {
-    let contacts = met(cloth, scene, settings.refine, &refined.positions);
+pub(crate) fn settled(
+    scene: &Scene,
+    settings: &Settings,
+    cloth: &Cloth,
+    ground: Option<&Distances>,
+    refined: Refined,
+) -> (Vec<DVec3>, ClothState) {
+    let contacts = met(cloth, scene, settings.refine, ground, &refined.positions);
     let fit = fit(cloth, contacts, &refined.positions, refined.contact_stiffness);
     let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
     (positions, ClothState { energy, residual_over_weight, steps, stop, history, fit })
@@ -96,8 +103,7 @@ impl Made {
             warnings
                 .push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
         }
-        let inside =
-            scene.body.nearest_all(&positions).into_iter().map(|s| -s.signed_distance).filter(|&depth| depth > 0.0);
+        let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
         Drape {
@@ -121,9 +127,19 @@ impl Made {
     }
 }
 
-/// What the cloth meets at `x`: by planes where no step is taken, which need no more.
-fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, x: &[DVec3]) -> Contacts<'b> {
-    if refine == Refine::Steps(0) { cloth.contacts_by_planes(&scene.body, x) } else { cloth.contacts(&scene.body, x) }
+/// What the cloth meets at `x`: by planes where no step is taken, which need no more. `ground` are distances of the garment as placed.
+fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, ground: Option<&Distances>, x: &[DVec3]) -> Contacts<'b> {
+    let known = ground.into_iter().flat_map(|ground| &ground.surface).map(|s| s.signed_distance);
+    cloth.contacts_knowing(&scene.body, x, refine == Refine::Steps(0), &scene.garment.positions, known)
+}
+
+/// How deep those vertices at `x` are in the body, m, that can have come to it since they were placed.
+fn depths(scene: &Scene, ground: &Distances, x: &[DVec3]) -> Vec<f64> {
+    let placed = scene.garment.positions.iter().zip(&ground.surface);
+    let near =
+        |(x, (placed, surface)): &(&DVec3, (&DVec3, &SurfacePoint))| surface.signed_distance <= x.distance(**placed);
+    let near: Vec<DVec3> = x.iter().zip(placed).filter(near).map(|(x, _)| *x).collect();
+    scene.body.nearest_all(&near).into_iter().map(|s| -s.signed_distance).collect()
 }
 
 fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {

@@ -9,4 +9,5 @@ pub(crate) mod lanes;
 pub(crate) mod newton;
 pub mod paper;
 pub(crate) mod principal;
+pub mod reactions;
 pub mod refine;

@@ -10,6 +10,9 @@ use crate::distance::Body;
 /// Times a vertex is moved at most: the second is for narrow places (an armpit), the rest for luck.
 const ROUNDS: usize = 4;
 
+/// Nearer than this share of the offset a vertex is moved: rounding may leave it a hair short, and an eighth of the way is near enough.
+pub(super) const NEAR: f64 = 0.875;
+
 /// Moves every vertex that is not held to at least `offset_m` from the body; returns how many moved.
 pub fn push_out(body: &Body, held: &[bool], offset_m: f64, positions: &mut [DVec3]) -> usize {
     let moved: Vec<bool> = positions
@@ -20,8 +23,7 @@ pub fn push_out(body: &Body, held: &[bool], offset_m: f64, positions: &mut [DVec
             let mut moved = false;
             for _ in 0..if held { 0 } else { ROUNDS } {
                 let near = body.nearest(*x);
-                // Rounding may leave it a hair short: an eighth of the way is near enough.
-                if near.signed_distance >= 0.875 * offset_m {
+                if near.signed_distance >= NEAR * offset_m {
                     break;
                 }
                 *x += near.normal * (offset_m - near.signed_distance);

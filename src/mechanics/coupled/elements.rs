@@ -4,7 +4,7 @@
 //! pair by pair. The pattern is built PART by PART: the column of a PART's unknown holds what is left of its own block, then its
 //! neighbours that come later in the order of elimination.
 
-use crate::mechanics::energy::ordering::nested_dissection;
+use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
 use crate::mechanics::energy::pattern::Pattern;
 use crate::mechanics::energy::{Cloth, bending::Bending};
 
@@ -164,7 +164,7 @@ impl Layout {
         for &q in &order {
             let own = motions.first[q as usize];
             let count = |p: u32| u32::from(motions.count[p as usize]);
-            let later = neighbours[q as usize].iter().copied().filter(|&p| motions.first[p as usize] > own);
+            let later = neighbours.of(q).iter().copied().filter(|&p| motions.first[p as usize] > own);
             let mut later: Vec<u32> = later.filter(|&p| count(p) > 0).collect();
             later.sort_unstable_by_key(|&p| motions.first[p as usize]);
             let mut skip = 0;
@@ -188,25 +188,21 @@ impl Layout {
     }
 }
 
-/// PARTs that share an element with each, ascending.
-fn neighbours(parts: usize, all: &[&Elements]) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); parts];
+/// PARTs that share an element with each.
+fn neighbours(parts: usize, all: &[&Elements]) -> Adjacency {
+    let mut pairs: Vec<[u32; 2]> = Vec::new();
     for elements in all {
         let mut last: &[u32] = &[];
         for i in 0..elements.len() {
             let list = elements.parts(i);
             // Inside a PART one element is like the one before.
-            if list.len() > 1 && list != last {
-                for &p in list {
-                    neighbours[p as usize].extend(list.iter().copied().filter(|&q| q != p));
+            if list != last {
+                for (k, &p) in list.iter().enumerate() {
+                    pairs.extend(list[..k].iter().map(|&q| [p, q]));
                 }
             }
             last = list;
         }
     }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    neighbours
+    Adjacency::new(parts, || pairs.iter().copied())
 }

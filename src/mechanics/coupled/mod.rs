@@ -32,6 +32,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use clearance::NEAR;
 pub use clearance::push_out;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
@@ -102,6 +103,31 @@ pub fn solve_before(
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<CoupledResult, CoupledError> {
+    solve_given(garment, body, parts, start, Given::default(), options, onlooker)
+}
+
+/// What a solve may take for given, and when it is good enough for what comes after it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Given<'a> {
+    /// Signed distances of the garment as placed, m; none where they are not known.
+    pub(crate) distance_m: &'a [f64],
+    /// The solve ends where its last [`LATE`] steps brought less than this share of what all have.
+    pub(crate) least_share: f64,
+}
+
+/// Steps by which the end of a solve is told that need not be followed to it.
+const LATE: usize = 6;
+
+/// [`solve_before`] with something [`Given`].
+pub(crate) fn solve_given(
+    garment: &Garment<'_>,
+    body: &Body,
+    parts: &Parts,
+    start: &[DVec3],
+    given: Given<'_>,
+    options: &CoupledOptions,
+    onlooker: Onlooker<'_>,
+) -> Result<CoupledResult, CoupledError> {
     let Garment { mesh, topology, cloth, fabric } = *garment;
     check("the list of start positions", start.len(), mesh.vertex_count())?;
     check("the list of vertex PARTs", parts.part_of_vertex.len(), mesh.vertex_count())?;
@@ -117,13 +143,15 @@ pub fn solve_before(
     let setup = began.elapsed();
 
     let began = Instant::now();
-    let contacts = soft.contacts_by_planes(body, start);
+    let contacts = soft.contacts_knowing(body, start, true, &mesh.positions, given.distance_m.iter().copied());
     let mut descent = Descent::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
-    let history = settle(&mut descent, &mut tangent, options, onlooker)?;
+    let history = settle(&mut descent, &mut tangent, given, options, onlooker)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
     let mut positions = descent.x;
-    let pushed_out = push_out(body, &cloth.held, cloth.offset, &mut positions);
+    let leave = |(v, &held): (usize, &bool)| held || descent.contacts.is_clear(v, positions[v], NEAR * cloth.offset);
+    let leave: Vec<bool> = cloth.held.iter().enumerate().map(leave).collect();
+    let pushed_out = push_out(body, &leave, cloth.offset, &mut positions);
     for (part, out) in parts.parts.iter().zip(&mut results) {
         let moved = part.vertices.iter().map(|&v| positions[v as usize] - start[v as usize]).sum::<DVec3>();
         out.displacement = moved / part.vertices.len() as f64;
@@ -153,6 +181,7 @@ pub fn solve_before(
 fn settle(
     descent: &mut Descent<'_, '_>,
     tangent: &mut Reduced,
+    given: Given<'_>,
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
@@ -167,6 +196,10 @@ fn settle(
         }
         let still = advance.accepted && advance.step_length >= 1.0 && advance.largest_move_m < options.least_move_m;
         if still && descent.damping <= FREE_DAMPING || !advance.accepted && descent.damping >= DAMPING[1] {
+            break;
+        }
+        let fell = |steps: usize| history[history.len() - 1 - steps].energy - descent.energy;
+        if iteration > LATE && fell(LATE) < given.least_share * fell(iteration) {
             break;
         }
         if advance.share >= 1.0 {

@@ -94,7 +94,9 @@ impl Bending {
                 bending.push_hinge(mesh, rest, edge, [s, t], mean);
             }
         }
-        bending.plate = Plate::new(mesh.vertex_count(), bending.hessian());
+        let elements: Vec<_> = bending.elements().collect();
+        let plate = Plate::new(mesh.vertex_count(), &elements);
+        bending.plate = plate;
         bending
     }
 
@@ -184,9 +186,9 @@ impl Bending {
         0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
     }
 
-    /// Every pair of vertices that bend together, each once per element, the first not before the second.
-    pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
-        self.hessian().map(|(pair, _)| pair)
+    /// Every pair of vertices that bend together and Q_ij (N/m), the first after the second; a few twice, the second time with nothing.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        self.plate.pairs()
     }
 
     /// The Hessian's scalars, N/m: each pair of an element once, the diagonal included.

@@ -231,12 +231,12 @@ impl Cloth {
         HessianLayout::new(x, &self.triangles, &self.bending, &self.held, pairs)
     }
 
-    fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
+    pub(super) fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let friction = Friction::new(self.friction);
         Contacts::new(body, &self.areas, &self.held, self.offset, self.contact_stiffness(), friction)
     }
 
-    fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
+    pub(super) fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
         contacts.update(x);
         contacts.refresh(x);
         contacts

@@ -52,7 +52,7 @@ const PLANE: f64 = 2e-3;
 
 /// What there is to touch, and by which distance.
 #[derive(Debug, Clone)]
-enum Met<'b> {
+pub(super) enum Met<'b> {
     Nothing,
     /// The exact distance's tangent plane where it was last asked.
     Planes(&'b Body, Vec<DVec3>),
@@ -62,13 +62,13 @@ enum Met<'b> {
 /// What the cloth meets at its current positions, with the memory that makes asking again cheap.
 #[derive(Debug, Clone)]
 pub struct Contacts<'b> {
-    met: Met<'b>,
+    pub(super) met: Met<'b>,
     /// h of each vertex, m.
     offsets: Vec<f64>,
     areas: Vec<f64>,
-    held: Vec<bool>,
-    asked_at: Vec<DVec3>,
-    answer: Vec<f64>,
+    pub(super) held: Vec<bool>,
+    pub(super) asked_at: Vec<DVec3>,
+    pub(super) answer: Vec<f64>,
     /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
     leave: Vec<f64>,
     /// The vertices that may be near, of the last [`update`](Self::update).
@@ -187,7 +187,7 @@ impl<'b> Contacts<'b> {
     }
 
     /// Remembers a vertex's distance and where it was asked.
-    fn keep(&mut self, v: usize, x: DVec3, distance: f64) {
+    pub(super) fn keep(&mut self, v: usize, x: DVec3, distance: f64) {
         let free = distance - self.offsets[v];
         (self.asked_at[v], self.answer[v], self.leave[v]) = (x, distance, free * free.abs());
     }
@@ -196,12 +196,12 @@ impl<'b> Contacts<'b> {
     fn update_planes(&mut self, x: &[DVec3]) {
         self.find_near(x);
         let near = std::mem::take(&mut self.near);
-        let Met::Planes(body, _) = &self.met else { return };
+        let Met::Planes(body, normals) = &self.met else { return };
         let body = *body;
-        // What was never asked has minus infinity for an answer.
+        // What was never asked has no normal.
         let stale = |&&v: &&u32| {
             let v = v as usize;
-            self.answer[v] == f64::NEG_INFINITY || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
+            normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
         };
         let stale: Vec<usize> = near.iter().filter(stale).map(|&v| v as usize).collect();
         let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());

@@ -5,6 +5,7 @@
 //! is the mean of the triangles' wefts, as lines: a piece sewn on upside down counts the same.
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::mesh::{RestShape, TriMesh};
 
@@ -38,7 +39,7 @@ impl Fan {
                 slices[triangle[i] as usize].push(Slice { from: triangle[j], to: triangle[k], spokes });
             }
         }
-        slices.iter().map(|around| Self::close(around)).collect()
+        slices.par_iter().with_min_len(256).map(|around| Self::close(around)).collect()
     }
 
     /// Walks once around; `None` if that does not meet every triangle and come back.

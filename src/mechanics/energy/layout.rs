@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::bending::Bending;
 use super::membrane::Triangle;
-use super::ordering::nested_dissection;
+use super::ordering::{Adjacency, nested_dissection};
 use super::pattern::{HELD, Pattern, Slot};
 
 /// Order, pattern and slots of one cloth.
@@ -35,28 +35,22 @@ impl HessianLayout {
         more: impl Iterator<Item = [u32; 2]>,
     ) -> Self {
         let n = held.len();
-        let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); n];
-        let sides = triangles.iter().flat_map(|t| {
-            let [a, b, c] = t.vertices;
-            [[a, b], [b, c], [c, a]]
-        });
-        for [a, b] in sides.chain(bending.pairs()).chain(more).filter(|[a, b]| a != b) {
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
-        }
-        for list in &mut neighbours {
-            list.sort_unstable();
-            list.dedup();
-        }
+        let sides = || {
+            triangles.iter().flat_map(|t| {
+                let [a, b, c] = t.vertices;
+                [[a, b], [b, c], [c, a]]
+            })
+        };
+        let more: Vec<[u32; 2]> = more.collect();
+        let of_all = || sides().chain(bending.pairs().map(|(pair, _)| pair)).chain(more.iter().copied());
+        let neighbours = Adjacency::new(n, of_all);
         let free: Vec<u32> = (0..n as u32).filter(|&v| !held[v as usize]).collect();
         let order = nested_dissection(free, placed, &neighbours);
         let mut unknown = vec![HELD; n];
         for (i, &v) in order.iter().enumerate() {
             unknown[v as usize] = i as u32;
         }
-        let pairs = order.iter().flat_map(|&v| neighbours[v as usize].iter().map(move |&w| (v, w)));
-        let pairs = pairs.map(|(v, w)| (unknown[v as usize], unknown[w as usize])).filter(|&(i, j)| j != HELD && i > j);
-        let pattern = Pattern::new(order.len(), pairs);
+        let pattern = Pattern::of(&order, &unknown, &neighbours);
         let slot = |a: u32, b: u32| pattern.slot(unknown[a as usize], unknown[b as usize]);
         let slots = |t: &Triangle| {
             let [a, b, c] = t.vertices;
@@ -64,7 +58,8 @@ impl HessianLayout {
         };
         let triangle_slots = triangles.iter().map(slots).collect();
         let mut bending_blocks = vec![0.0; pattern.rows.len()];
-        for ([a, b], scalar) in bending.hessian() {
+        let own = order.iter().map(|&v| ([v, v], bending.own_scalar(v as usize)));
+        for ([a, b], scalar) in bending.pairs().chain(own) {
             if let Some(sum) = bending_blocks.get_mut(slot(a, b).block as usize) {
                 *sum += scalar;
             }

@@ -4,55 +4,155 @@
 //! before what separates it (George: "Nested dissection of a regular finite element mesh", SIAM J. Numer. Anal. 10(2),
 //! 1973). A garment is placed in space, so a plane through the median is a good cut: of the three axes the one whose
 //! separator is smallest. For a tube that is first a ring, then its generators.
+//!
+//! A separator is numbered in halves of halves too, so that what is near is numbered near: what the two sides add to it then comes
+//! in a few long runs.
+//!
+//! The halves go to the threads there are; neither reads what the other writes but for marks that cannot be its own.
+
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 
 /// This many vertices are cut no further: below it a separator costs as much as it saves.
 const LEAF: usize = 24;
 
-/// The vertices of `members` in elimination order. `neighbours[v]` are those that share a Hessian block with v.
-#[must_use]
-pub fn nested_dissection(members: Vec<u32>, positions: &[DVec3], neighbours: &[Vec<u32>]) -> Vec<u32> {
-    let mut order = Vec::with_capacity(members.len());
-    let mut side = vec![0u32; positions.len()];
-    let mut next_mark = 1;
-    dissect(members, positions, neighbours, &mut side, &mut next_mark, &mut order);
-    order
+/// Fewer are no work for another thread.
+const ALONE: usize = 1000;
+
+/// Neighbours of each vertex, one list after the other.
+#[derive(Debug, Clone, Default)]
+pub struct Adjacency {
+    starts: Vec<u32>,
+    others: Vec<u32>,
 }
 
-fn dissect(
-    mut members: Vec<u32>,
-    positions: &[DVec3],
-    neighbours: &[Vec<u32>],
-    side: &mut [u32],
-    next_mark: &mut u32,
-    order: &mut Vec<u32>,
-) {
-    if members.len() <= LEAF {
-        order.append(&mut members);
-        return;
+impl Adjacency {
+    /// Of `count` vertices, from pairs, in any order, repeated or not; a vertex is no neighbour of itself.
+    #[must_use]
+    pub fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
+        let mut starts = vec![0u32; count + 1];
+        for [a, b] in pairs().filter(|[a, b]| a != b) {
+            starts[a as usize + 1] += 1;
+            starts[b as usize + 1] += 1;
+        }
+        for i in 0..count {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut all = vec![0; starts[count] as usize];
+        for [a, b] in pairs().filter(|[a, b]| a != b) {
+            for (v, w) in [(a, b), (b, a)] {
+                all[next[v as usize] as usize] = w;
+                next[v as usize] += 1;
+            }
+        }
+        let mut kept = Self { starts: vec![0], others: Vec::with_capacity(all.len()) };
+        for v in 0..count {
+            let list = &mut all[starts[v] as usize..starts[v + 1] as usize];
+            list.sort_unstable();
+            kept.others.extend(list.chunk_by(|a, b| a == b).map(|same| same[0]));
+            kept.starts.push(kept.others.len() as u32);
+        }
+        kept
     }
-    let mut best: Option<(Vec<u32>, Vec<u32>, Vec<u32>)> = None;
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        // Ties (a ring at one height) fall by index, so the cut is the same on every run.
-        members.sort_by(|&a, &b| {
-            positions[a as usize].dot(axis).total_cmp(&positions[b as usize].dot(axis)).then(a.cmp(&b))
-        });
+
+    /// Neighbours of a vertex, ascending.
+    #[must_use]
+    pub fn of(&self, v: u32) -> &[u32] {
+        &self.others[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
+    }
+}
+
+/// The vertices of `members` in elimination order. Neighbours are those that share a Hessian block.
+#[must_use]
+pub fn nested_dissection(mut members: Vec<u32>, positions: &[DVec3], neighbours: &Adjacency) -> Vec<u32> {
+    let side: Vec<AtomicU32> = positions.iter().map(|_| AtomicU32::new(0)).collect();
+    let cut = Cut { positions, neighbours, side: &side };
+    cut.dissect(&mut members, 1);
+    members
+}
+
+#[derive(Clone, Copy)]
+struct Cut<'a> {
+    positions: &'a [DVec3],
+    neighbours: &'a Adjacency,
+    /// The last cut that had each vertex in its upper half.
+    side: &'a [AtomicU32],
+}
+
+impl Cut<'_> {
+    /// Puts `members` in order; `number` is this cut's own.
+    fn dissect(self, members: &mut [u32], number: u32) {
+        if members.len() <= LEAF {
+            return self.lay_along(members);
+        }
+        let mut best = (usize::MAX, 0);
+        for axis in 0..3 {
+            best = best.min((self.halve(members, axis, number), axis));
+        }
+        self.halve(members, best.1, number);
+        // The separator last: low, high, separator.
+        let mark = mark(number, best.1);
         let middle = members.len() / 2;
-        // A fresh mark for every cut, so that one is never read as another's.
-        let mark = *next_mark;
-        *next_mark += 1;
-        for &v in &members[middle..] {
-            side[v as usize] = mark;
+        let mut low = 0;
+        for i in 0..middle {
+            if !self.touches(members[i], mark) {
+                members.swap(low, i);
+                low += 1;
+            }
         }
-        let (separator, low): (Vec<u32>, Vec<u32>) =
-            members[..middle].iter().partition(|&&v| neighbours[v as usize].iter().any(|&w| side[w as usize] == mark));
-        if best.as_ref().is_none_or(|(s, _, _)| separator.len() < s.len()) {
-            best = Some((separator, low, members[middle..].to_vec()));
+        members[low..].rotate_left(middle - low);
+        let (below, rest) = members.split_at_mut(low);
+        let (above, separator) = rest.split_at_mut(rest.len() - (middle - low));
+        self.lay_along(separator);
+        let mut one = || self.dissect(below, 2 * number);
+        if low < ALONE {
+            one();
+            self.dissect(above, 2 * number + 1);
+        } else {
+            rayon::join(one, || self.dissect(above, 2 * number + 1));
         }
     }
-    let Some((mut separator, low, high)) = best else { return };
-    dissect(low, positions, neighbours, side, next_mark, order);
-    dissect(high, positions, neighbours, side, next_mark, order);
-    order.append(&mut separator);
+
+    /// The lower half of `members` along an axis first, the upper half marked; returns how many of the lower one touch it.
+    fn halve(self, members: &mut [u32], axis: usize, number: u32) -> usize {
+        let middle = members.len() / 2;
+        self.select(members, middle, axis);
+        let mark = mark(number, axis);
+        for &v in &members[middle..] {
+            self.side[v as usize].store(mark, Ordering::Relaxed);
+        }
+        members[..middle].iter().filter(|&&v| self.touches(v, mark)).count()
+    }
+
+    fn touches(self, v: u32, mark: u32) -> bool {
+        self.neighbours.of(v).iter().any(|&w| self.side[w as usize].load(Ordering::Relaxed) == mark)
+    }
+
+    /// Those before `middle` along an axis first. Ties (a ring at one height) fall by index, so the cut is the same on every run.
+    fn select(self, members: &mut [u32], middle: usize, axis: usize) {
+        let along = |v: u32| self.positions[v as usize][axis];
+        members.select_nth_unstable_by(middle, |&a, &b| along(a).total_cmp(&along(b)).then(a.cmp(&b)));
+    }
+
+    /// In halves of halves, each across its longest side.
+    fn lay_along(self, members: &mut [u32]) {
+        if members.len() <= 2 {
+            return members.sort_unstable();
+        }
+        let bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let at = members.iter().map(|&v| self.positions[v as usize]);
+        let (low, high) = at.fold(bounds, |(low, high), p| (low.min(p), high.max(p)));
+        let middle = members.len() / 2;
+        self.select(members, middle, (high - low).max_position());
+        let (one, other) = members.split_at_mut(middle);
+        self.lay_along(one);
+        self.lay_along(other);
+    }
+}
+
+/// No two cuts along no two axes have one mark: half of the vertices at most go on, so numbers stay small.
+fn mark(number: u32, axis: usize) -> u32 {
+    4 * number + axis as u32
 }

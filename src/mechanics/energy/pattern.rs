@@ -5,6 +5,8 @@
 
 use glam::{DMat3, DVec3};
 
+use super::ordering::Adjacency;
+
 /// Marks a vertex that is held, and a block that falls away with it.
 pub const HELD: u32 = u32::MAX;
 
@@ -42,6 +44,21 @@ impl Pattern {
             starts[i + 1] += starts[i];
         }
         Self { starts, rows: all.into_iter().map(|(_, row)| row).collect() }
+    }
+
+    /// Of neighbours, with the vertex of each unknown in `order` and the unknown of each vertex.
+    #[must_use]
+    pub fn of(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {
+        let mut pattern = Self { starts: vec![0], rows: Vec::new() };
+        for (j, &v) in (0u32..).zip(order) {
+            let start = pattern.rows.len();
+            pattern.rows.push(j);
+            let others = neighbours.of(v).iter().map(|&w| unknown[w as usize]);
+            pattern.rows.extend(others.filter(|&i| i != HELD && i > j));
+            pattern.rows[start..].sort_unstable();
+            pattern.starts.push(pattern.rows.len() as u32);
+        }
+        pattern
     }
 
     /// Number of unknown vertices.

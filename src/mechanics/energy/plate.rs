@@ -14,6 +14,9 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+use rayon::prelude::*;
+
 use crate::mechanics::lanes::{Four, Lanes, Pack};
 
 /// The pairs j < i with Q_ij, by i, two at a time.
@@ -33,47 +36,95 @@ struct Two {
     scalars: [f64; 2],
 }
 
+/// Vertices that a thread takes at a time.
+const CHUNK: usize = 256;
+
+/// The pairs j < i of the elements that i is in, each with its place there, by twos; equal ones summed in the order of the elements.
+fn gather<'a>(
+    i: u32,
+    elements: impl Iterator<Item = (&'a (&'a [u32], &'a [DVec3], DVec3), usize)>,
+    row: &mut Vec<(u32, f64)>,
+    twos: &mut Vec<Two>,
+) {
+    row.clear();
+    for ((vertices, weights, stiffness), at) in elements {
+        for (k, &j) in vertices.iter().enumerate().filter(|(_, j)| **j < i) {
+            row.push((j, (weights[at.max(k)] * *stiffness).dot(weights[at.min(k)])));
+        }
+    }
+    // Sorts are stable, so that equal entries stay in their order.
+    row.sort_by_key(|e| e.0);
+    row.dedup_by(|later, first| {
+        let same = later.0 == first.0;
+        if same {
+            first.1 += later.1;
+        }
+        same
+    });
+    // Filled up by what it has already, and not by i, whose sum the product keeps to itself.
+    if let (1, Some(&(j, _))) = (row.len() % 2, row.first()) {
+        row.push((j, 0.0));
+    }
+    twos.extend(row.as_chunks::<2>().0.iter().map(|two| Two { others: two.map(|e| e.0), scalars: two.map(|e| e.1) }));
+}
+
 impl Plate {
-    /// From the Hessian's scalars, each pair of an element once.
-    pub(super) fn new(vertices: usize, hessian: impl Iterator<Item = ([u32; 2], f64)>) -> Self {
-        let of_pair = |([a, b], scalar): ([u32; 2], f64)| (a.max(b), a.min(b), scalar);
-        let all: Vec<(u32, u32, f64)> = hessian.map(of_pair).filter(|(i, j, _)| i != j).collect();
-        let mut ends = vec![0usize; vertices + 1];
-        for &(i, ..) in &all {
-            ends[i as usize + 1] += 1;
+    /// From elements: vertices, weights and stiffness of each.
+    pub(super) fn new(vertices: usize, elements: &[(&[u32], &[DVec3], DVec3)]) -> Self {
+        let mut starts = vec![0u32; vertices + 1];
+        for v in elements.iter().flat_map(|e| e.0) {
+            starts[*v as usize + 1] += 1;
         }
         for i in 0..vertices {
-            ends[i + 1] += ends[i];
+            starts[i + 1] += starts[i];
         }
-        // In the order of their elements by i, then by j: sorts are stable, so that equal entries are summed in that order.
-        let mut next = ends.clone();
-        let mut by_row = vec![(0u32, 0.0f64); all.len()];
-        for (i, j, scalar) in all {
-            by_row[next[i as usize]] = (j, scalar);
-            next[i as usize] += 1;
+        // Each vertex's elements in their order, and its place in them.
+        let mut next = starts.clone();
+        let mut of = vec![(0u32, 0u32); starts[vertices] as usize];
+        for (e, element) in (0u32..).zip(elements) {
+            for (k, &v) in (0u32..).zip(element.0) {
+                of[next[v as usize] as usize] = (e, k);
+                next[v as usize] += 1;
+            }
         }
+        let numbers: Vec<usize> = (0..vertices).collect();
+        let rows: Vec<(Vec<Two>, Vec<u32>)> = (numbers.par_chunks(CHUNK))
+            .map(|chunk| {
+                let (mut twos, mut counts, mut row) = (Vec::new(), Vec::with_capacity(chunk.len()), Vec::new());
+                for &i in chunk {
+                    let before = twos.len();
+                    let own = of[starts[i] as usize..starts[i + 1] as usize].iter();
+                    gather(i as u32, own.map(|&(e, k)| (&elements[e as usize], k as usize)), &mut row, &mut twos);
+                    counts.push((twos.len() - before) as u32);
+                }
+                (twos, counts)
+            })
+            .collect();
         let mut plate = Self { starts: vec![0], own: vec![0.0; vertices], ..Self::default() };
-        let mut row: Vec<(u32, f64)> = Vec::new();
+        plate.twos.reserve_exact(rows.iter().map(|(twos, _)| twos.len()).sum());
+        for (twos, counts) in rows {
+            plate.twos.extend(twos);
+            for count in counts {
+                let end = plate.starts.last().map_or(0, |end| end + count);
+                plate.starts.push(end);
+            }
+        }
         for i in 0..vertices {
-            let entries = &mut by_row[ends[i]..ends[i + 1]];
-            entries.sort_by_key(|e| e.0);
-            row.clear();
-            for same in entries.chunk_by(|a, b| a.0 == b.0) {
-                let (j, scalar) = (same[0].0, same.iter().map(|e| e.1).sum());
-                row.push((j, scalar));
-                plate.own[i] -= scalar;
-                plate.own[j as usize] -= scalar;
+            for two in &plate.twos[plate.starts[i] as usize..plate.starts[i + 1] as usize] {
+                for (j, scalar) in two.others.into_iter().zip(two.scalars) {
+                    plate.own[i] -= scalar;
+                    plate.own[j as usize] -= scalar;
+                }
             }
-            // Filled up by what it has already, and not by i, whose sum the product keeps to itself.
-            if let (1, Some(&(j, _))) = (row.len() % 2, row.first()) {
-                row.push((j, 0.0));
-            }
-            for two in row.as_chunks::<2>().0 {
-                plate.twos.push(Two { others: two.map(|e| e.0), scalars: two.map(|e| e.1) });
-            }
-            plate.starts.push(plate.twos.len() as u32);
         }
         plate
+    }
+
+    /// Every pair j < i as [i, j] with Q_ij, N/m.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
+        let of = |i: usize| &self.twos[self.starts[i] as usize..self.starts[i + 1] as usize];
+        let both = move |i: usize, two: &Two| [0, 1].map(|k| ([i as u32, two.others[k]], two.scalars[k]));
+        (0..self.own.len()).flat_map(move |i| of(i).iter().flat_map(move |two| both(i, two)))
     }
 
     /// Q_ii, N/m.

@@ -18,10 +18,15 @@
 //! | ε | damping | 1/s² |
 //! | M | lumped masses | kg |
 
+mod dense;
 mod factor;
 mod flat;
+mod forest;
+mod groves;
 pub(crate) mod relax;
 mod solver;
+mod substitute;
+mod supernodes;
 mod vectors;
 mod whole;
 

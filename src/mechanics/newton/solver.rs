@@ -8,15 +8,10 @@
 //! chapter 12). That works while the matrix's condition is under some 1e7: for knits, and for wovens while they are soft. The
 //! first time it does not, or a pivot is lost that double precision holds, the solver takes double from then on.
 
-use faer::Side;
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
 use glam::{DMat3, DVec3};
 
-use super::factor::{Factor, Shape};
+use super::factor::{Factor, Matrix};
+use super::forest::{Forest, Front};
 use crate::mechanics::energy::pattern::Pattern;
 
 /// What can go wrong in a solve.
@@ -46,9 +41,7 @@ const MENDS: usize = 4;
 
 /// A factorisation whose pattern is fixed.
 pub struct Solver {
-    symbolic: SymbolicCholesky<u32>,
-    starts: Vec<u32>,
-    rows: Vec<u32>,
+    forest: Forest,
     single: Option<Factor<f32>>,
     double: Factor<f64>,
 }
@@ -56,7 +49,7 @@ pub struct Solver {
 impl std::fmt::Debug for Solver {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Solver")
-            .field("unknowns", &(self.starts.len() - 1))
+            .field("unknowns", &(3 * self.forest.order.len()))
             .field("factor", &self.factor_len())
             .finish()
     }
@@ -68,42 +61,14 @@ impl Solver {
     /// # Errors
     /// [`SolveError::Analysis`] where memory or index range do not suffice.
     pub fn new(pattern: &Pattern) -> Result<Self, SolveError> {
-        let unknowns = 3 * pattern.unknowns();
-        let mut starts = Vec::with_capacity(unknowns + 1);
-        let mut rows: Vec<u32> = Vec::with_capacity(9 * pattern.rows.len());
-        starts.push(0);
-        for j in 0..pattern.unknowns() {
-            for c in 0..3 {
-                for (k, &i) in pattern.rows[pattern.column(j)].iter().enumerate() {
-                    let from = if k == 0 { c } else { 0 };
-                    rows.extend((from..3).map(|r| 3 * i + r));
-                }
-                starts.push(rows.len() as u32);
-            }
-        }
-        let failed = |reason: String| SolveError::Analysis { unknowns, reason };
-        let (upper_starts, upper_rows) = transposed(&starts, &rows);
-        let upper = SymbolicSparseColMatRef::new_checked(unknowns, unknowns, &upper_starts, None, &upper_rows);
-        let symbolic = factorize_symbolic_cholesky(
-            upper,
-            Side::Upper,
-            SymmetricOrdering::Identity,
-            // Supernodal always: the numeric phase then takes the lower half as it is.
-            CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-                ..Default::default()
-            },
-        )
-        .map_err(|e| failed(format!("{e:?}")))?;
-        let single = Factor::new(&symbolic).map_err(&failed)?;
-        let double = Factor::new(&symbolic).map_err(&failed)?;
-        Ok(Self { symbolic, starts, rows, single: Some(single), double })
+        let forest = Forest::new(pattern);
+        Ok(Self { forest, single: Some(Factor::default()), double: Factor::default() })
     }
 
     /// Numbers in the factor: a measure of its cost.
     #[must_use]
     pub fn factor_len(&self) -> usize {
-        self.symbolic.len_val()
+        self.forest.fronts.iter().map(Front::panel_len).sum()
     }
 
     /// Solves (A + D) x = b for the matrix A of `blocks` and the diagonal D of `diagonal` (N/m for each unknown vertex); `x`
@@ -120,16 +85,16 @@ impl Solver {
         positive: bool,
         x: &mut [DVec3],
     ) -> Result<(), SolveError> {
-        let shape = Shape { symbolic: &self.symbolic, starts: &self.starts, rows: &self.rows };
+        let matrix = Matrix { blocks, diagonal };
         if let Some(single) = &mut self.single {
-            match single.factorise(shape, pattern, blocks, diagonal) {
-                Ok(()) if mended(single, shape.symbolic, pattern, blocks, diagonal, x) => return Ok(()),
+            match single.factorise(&self.forest, matrix) {
+                Ok(()) if mended(single, &self.forest, pattern, matrix, x) => return Ok(()),
                 Err(lost) if !positive => return Err(lost),
                 _ => self.single = None,
             }
         }
-        self.double.factorise(shape, pattern, blocks, diagonal)?;
-        self.double.solve(&self.symbolic, x);
+        self.double.factorise(&self.forest, matrix)?;
+        self.double.solve(&self.forest, x);
         Ok(())
     }
 
@@ -145,15 +110,15 @@ impl Solver {
         diagonal: &[f64],
         x: &mut [DVec3],
     ) -> Result<(), SolveError> {
+        let matrix = Matrix { blocks, diagonal };
         if let Some(single) = &mut self.single {
-            if mended(single, &self.symbolic, pattern, blocks, diagonal, x) {
+            if mended(single, &self.forest, pattern, matrix, x) {
                 return Ok(());
             }
             self.single = None;
-            let shape = Shape { symbolic: &self.symbolic, starts: &self.starts, rows: &self.rows };
-            self.double.factorise(shape, pattern, blocks, diagonal)?;
+            self.double.factorise(&self.forest, matrix)?;
         }
-        self.double.solve(&self.symbolic, x);
+        self.double.solve(&self.forest, x);
         Ok(())
     }
 }
@@ -161,16 +126,15 @@ impl Solver {
 /// Solves with a factor in single precision and mends the solution; where that fails, `x` is left as it was.
 fn mended(
     single: &mut Factor<f32>,
-    symbolic: &SymbolicCholesky<u32>,
+    forest: &Forest,
     pattern: &Pattern,
-    blocks: &[DMat3],
-    diagonal: &[f64],
+    Matrix { blocks, diagonal }: Matrix<'_>,
     x: &mut [DVec3],
 ) -> bool {
     let side = x.to_vec();
     let most = REST * norm(&side);
     let mut rest = Vec::new();
-    single.solve(symbolic, x);
+    single.solve(forest, x);
     for _ in 0..=MENDS {
         pattern.multiply(blocks, x, &mut rest);
         for (((r, b), d), shift) in rest.iter_mut().zip(&side).zip(x.iter()).zip(diagonal) {
@@ -183,7 +147,7 @@ fn mended(
         if !left.is_finite() {
             break;
         }
-        single.solve(symbolic, &mut rest);
+        single.solve(forest, &mut rest);
         for (d, r) in x.iter_mut().zip(&rest) {
             *d += *r;
         }
@@ -195,25 +159,4 @@ fn mended(
 /// ‖x‖₂.
 fn norm(x: &[DVec3]) -> f64 {
     x.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
-}
-
-/// The pattern of the transposed matrix, rows ascending: faer analyses the upper half and factors the lower.
-fn transposed(starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let n = starts.len() - 1;
-    let mut out = vec![0u32; n + 1];
-    for &r in rows {
-        out[r as usize + 1] += 1;
-    }
-    for i in 0..n {
-        out[i + 1] += out[i];
-    }
-    let mut next = out.clone();
-    let mut columns = vec![0; rows.len()];
-    for j in 0..n {
-        for &r in &rows[starts[j] as usize..starts[j + 1] as usize] {
-            columns[next[r as usize] as usize] = j as u32;
-            next[r as usize] += 1;
-        }
-    }
-    (out, columns)
 }

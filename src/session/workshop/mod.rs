@@ -140,7 +140,8 @@ impl Workshop {
         if let (Some(levels), None, None) = (&levels, &target.rest, self.done.rested) {
             let asked = || ask(session, target.state);
             let scene = &sectioned.ground.loaded.scene;
-            let start = approach(scene, settings, levels, &stage.parts, &stage.positions, &asked);
+            let surface = &sectioned.ground.distances.surface;
+            let start = approach(scene, settings, levels, surface, &stage.parts, &stage.positions, &asked);
             return self.settle(session, target, sectioned, levels, start, false);
         }
         self.finish(session, target, sectioned, levels.as_deref());

@@ -45,7 +45,7 @@ impl Workshop {
             told: None,
             of: (settings.fabric.clone(), settings.refine),
         };
-        let refined = refine_from(scene, settings, &levels.cloth, start, &mut |step| {
+        let refined = refine_from(scene, settings, &levels.cloth, None, start, &mut |step| {
             if step.iteration > 0 {
                 let step = Arc::new(at(step.positions, step.residual_over_weight, step.iteration));
                 session.publish(target.state, |desk| desk.view.rest = Some(step));
@@ -60,7 +60,7 @@ impl Workshop {
             return Ok(());
         }
         let took = began.elapsed();
-        let (positions, state) = settled(scene, settings, &levels.cloth, refined);
+        let (positions, state) = settled(scene, settings, &levels.cloth, None, refined);
         let rest = Arc::new(AtRest {
             done: true,
             reaction_n: Arc::new(reactions(&levels.cloth, &positions, &state.fit.pressure_kpa)),

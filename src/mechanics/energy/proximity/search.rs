@@ -5,8 +5,8 @@
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
 //!
-//! What shares a triangle's edge path with the other side is near for that reason alone: a pair of neighbours is left out unless the
-//! garment as placed kept them well apart.
+//! Neighbours are near because they are neighbours: they are left out unless the garment as placed kept them well apart, and so is whatever
+//! it placed nearer than the offset (across a sliver, say).
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
@@ -162,7 +162,8 @@ impl Look<'_> {
             let around = self.skin.neighbours(*a);
             other.iter().any(|(b, _)| around.contains(b))
         };
-        one.iter().any(near) && gap.across(self.placed).length() < KEPT_APART * self.reach
+        let placed = gap.across(self.placed).length();
+        placed < self.offset || (placed < KEPT_APART * self.reach && one.iter().any(near))
     }
 }
 

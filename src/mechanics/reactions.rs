@@ -21,8 +21,8 @@
 
 use glam::DVec3;
 
+use super::energy::{Cloth, Contacts, Friction};
 use crate::distance::Body;
-use crate::mechanics::energy::{Cloth, Contacts, Friction};
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
 /// tenth of a millimetre.
@@ -36,7 +36,7 @@ const TURNS: usize = 500;
 const SETTLED: f64 = 1e-7;
 
 /// Share of μN from which a vertex counts as about to slip.
-pub(super) const SLIPPING: f64 = 0.999;
+const SLIPPING: f64 = 0.999;
 
 /// A place of the cloth that touches the body or another place of it, and what it is given there.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +100,7 @@ impl Forces {
         for (rest, _) in forces.rest.iter_mut().zip(&cloth.held).filter(|(_, held)| **held) {
             forces.held += std::mem::take(rest);
         }
-        forces.grant(&cloth.held, cloth.friction);
+        grant(&mut forces.touching, &mut forces.rest, cloth);
         forces.residual = forces.rest.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
         let mut met = vec![false; x.len()];
         for touching in &forces.touching {
@@ -118,38 +118,48 @@ impl Forces {
         forces.unbalanced += forces.carried + forces.held;
         forces
     }
+}
 
-    /// Gives all places what leaves least over: each in turn what lies nearest in its cone, as long as that changes anything. One turn is
-    /// enough where no two share a vertex.
-    fn grant(&mut self, held: &[bool], friction: f64) {
-        let weight: f64 = self.unbalanced.length();
-        for _ in 0..TURNS {
-            let mut changed = 0.0;
-            for touching in &mut self.touching {
-                let free = || touching.shares.iter().filter(|(v, _)| !held[*v as usize]);
-                let squares: f64 = free().map(|(_, w)| w * w).sum();
-                let left: DVec3 = free().map(|(v, w)| self.rest[*v as usize] * *w).sum();
-                if squares <= 0.0 {
-                    continue;
-                }
-                let given = within_cone(touching.reaction + left / squares, touching.normal, friction);
-                let more = given - touching.reaction;
-                for (v, w) in free() {
-                    self.rest[*v as usize] -= more * *w;
-                }
-                touching.reaction = given;
-                changed += more.length();
+/// Gives all places what leaves least of `rest` (N): each in turn what lies nearest in its cone, as long as that changes anything. One turn
+/// is enough where no two share a vertex.
+fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
+    let friction = cloth.friction;
+    for _ in 0..TURNS {
+        let mut changed = 0.0;
+        for touching in &mut *touching {
+            let free = || touching.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
+            let squares: f64 = free().map(|(_, w)| w * w).sum();
+            if squares <= 0.0 {
+                continue;
             }
-            if changed <= SETTLED * weight {
-                break;
+            let left: DVec3 = free().map(|(v, w)| rest[*v as usize] * *w).sum();
+            let given = within_cone(touching.reaction + left / squares, touching.normal, friction);
+            let more = given - touching.reaction;
+            for (v, w) in free() {
+                rest[*v as usize] -= more * *w;
             }
+            touching.reaction = given;
+            changed += more.length();
         }
-        for touching in &mut self.touching {
-            touching.normal_n = touching.reaction.dot(touching.normal);
-            let across = touching.reaction - touching.normal * touching.normal_n;
-            touching.sticks = across.length() < SLIPPING * friction * touching.normal_n;
+        if changed <= SETTLED * cloth.weight {
+            break;
         }
     }
+    for touching in touching {
+        touching.normal_n = touching.reaction.dot(touching.normal);
+        let across = touching.reaction - touching.normal * touching.normal_n;
+        touching.sticks = across.length() < SLIPPING * friction * touching.normal_n;
+    }
+}
+
+/// Takes from `rest` (N) what the cloth can give itself at `x`, and the body where it keeps vertices farther off than `contacts`, which have
+/// pushed already, know of.
+pub(crate) fn grant_beside(cloth: &Cloth, body: &Body, contacts: &Contacts<'_>, x: &[DVec3], rest: &mut [DVec3]) {
+    let mut pushed = vec![false; x.len()];
+    contacts.touches().iter().for_each(|t| pushed[t.vertex as usize] = true);
+    let mut beside = touching(cloth, body, x);
+    beside.retain(|t| !t.of_body || t.shares.iter().all(|(v, _)| !pushed[*v as usize]));
+    grant(&mut beside, rest, cloth);
 }
 
 /// Where the cloth touches the body at `x`, and then where it touches itself.
