@@ -2,7 +2,7 @@
 // error is told; takes pictures.
 //
 //     npm install --prefix target/browser playwright-core
-//     NODE_PATH=target/browser/node_modules node tests/browser/live.mjs target/release/partwise [FOLDER for pictures]
+//     node tests/browser/live.mjs target/release/partwise [FOLDER for pictures]
 //
 // CHROMIUM names the browser (default /usr/bin/chromium). It draws without a graphics card, so times are those of a slow machine.
 
@@ -11,9 +11,9 @@ import { spawn } from "node:child_process";
 import { createHash } from "node:crypto";
 import { createRequire } from "node:module";
 import { mkdirSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 
-const require = createRequire(join(process.env.NODE_PATH ?? process.cwd(), "x"));
+const require = createRequire(resolve(process.env.NODE_PATH ?? "target/browser/node_modules", "x"));
 const { chromium } = require("playwright-core");
 const [program = "target/release/partwise", pictures] = process.argv.slice(2);
 const DRAGS = Number(process.env.DRAGS ?? 10);

@@ -28,6 +28,7 @@ export class Dial {
   #gap = "extend-lower";
   #histogram = null;
   #counts = [];
+  #colours = [];
   #held = null;
   #gestures = Date.now();
 
@@ -43,6 +44,7 @@ export class Dial {
   show(state) {
     this.#histogram = state.histogram;
     this.#counts = state.parts?.levels ?? [];
+    this.#colours = state.parts?.colours ?? [];
     const table = state.job.table;
     if (!this.#held) {
       const quantile = table.quantile !== undefined;
@@ -77,6 +79,14 @@ export class Dial {
   #cm(clientX) {
     const share = (clientX - this.#svg.getBoundingClientRect().left) / this.#width();
     return Math.max(0, Math.min(1, share)) ** 2 * this.#far();
+  }
+
+  // The colour that PARTs at this distance have in the views; a bound under the hand is ahead of what the session says.
+  #colour(value) {
+    const ahead = this.#counts.length === this.#levels.length;
+    const lower = ahead ? this.#levels.map((row) => row[0]) : this.#counts.map((level) => level.lower_cm);
+    const level = lower.findLastIndex((bound) => bound <= value);
+    return this.#colours[Math.max(level, 0)];
   }
 
   // The bounds that can move: where it is, between which others, and what moving it does to the rows.
@@ -220,12 +230,14 @@ export class Dial {
       // By the density over the axis as drawn, so that areas are vertices.
       const bars = h.counts.map((count, i) => {
         const [from, to] = [this.#x(h.edges_cm[i]), this.#x(h.edges_cm[i + 1])];
-        return { from, wide: to - from, dense: count / Math.max(to - from, 1e-6) };
+        const fill = this.#colour((h.edges_cm[i] + h.edges_cm[i + 1]) / 2);
+        return { from, wide: to - from, dense: count / Math.max(to - from, 1e-6), fill };
       });
       const most = Math.max(...bars.map((bar) => bar.dense), 1e-9);
-      for (const { from, wide, dense } of bars) {
+      for (const { from, wide, dense, fill } of bars) {
         const tall = (dense / most) * (floor - TOP - 4);
-        drawn.push(node("rect", { class: "histogram", x: from, y: floor - tall, width: Math.max(wide - 0.5, 0.5), height: tall }));
+        const at = { x: from, y: floor - tall, width: Math.max(wide - 0.5, 0.5), height: tall };
+        drawn.push(node("rect", { class: "histogram", ...(fill && { fill }), ...at }));
       }
     }
     drawn.push(node("line", { class: "axis", x1: 0, x2: width, y1: floor, y2: floor }));
