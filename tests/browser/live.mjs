@@ -75,6 +75,12 @@ async function until(page, true_of) {
 const idle = (page) => until(page, (now) => now.idle);
 const number = (page, name) => page.locator(`#numbers dd[data-name="${name}"]`).textContent();
 
+// Some pictures later.
+const drawn = (page, pictures) =>
+  page.evaluate(async (n) => {
+    for (let i = 0; i < n; i += 1) await new Promise((done) => requestAnimationFrame(done));
+  }, pictures);
+
 // The middle of a bound's grip.
 async function grip(page, index) {
   const box = await page.locator(`[data-bound="${index}"] .grip`).boundingBox();
@@ -188,14 +194,14 @@ try {
   // A PART is picked where the garment is in the middle of the first view.
   const scene = await page.locator("#scene").boundingBox();
   for (const [across, down] of [[0.1, 0.45], [0.12, 0.5], [0.13, 0.4], [0.125, 0.6]]) {
-    // A slow machine draws the pointer's way before it hears of the click.
+    // The viewer looks for what is under the pointer while it draws, which takes a slow machine a second.
     await page.mouse.move(scene.x + across * scene.width, scene.y + down * scene.height);
-    await page.waitForTimeout(600);
+    await drawn(page, 6);
     await page.mouse.down();
-    await page.waitForTimeout(200);
+    await drawn(page, 3);
     await page.mouse.up();
-    await page.waitForTimeout(1500);
-    if (await page.locator('#part dd[data-name="level"]').count()) break;
+    const told = page.waitForSelector('#part dd[data-name="level"]', { timeout: 8000 });
+    if (await told.then(() => true, () => false)) break;
   }
   const part = await page.locator("#part").textContent();
   assert.match(part, /level/, "a click tells of a PART");
