@@ -67,7 +67,8 @@ pub(super) async fn respond(site: &Arc<Site>, request: Request<Incoming>) -> Res
 
 async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<Answer>, Refused> {
     site.access.check_origin(request.headers())?;
-    let path = request.uri().path().to_owned();
+    // The address as it is printed ends in a slash, and what is put behind it begins with one.
+    let path = format!("/{}", request.uri().path().trim_start_matches('/'));
     let Some(of_api) = path.strip_prefix("/api/") else { return file(&request, &path) };
     check_site(request.headers())?;
     let right = site.access.right(request.headers(), request.uri())?;
@@ -218,9 +219,11 @@ fn read(session: &Session, what: &str, uri: &Uri) -> Result<Response<Answer>, Re
             Ok(whole(StatusCode::OK, "application/toml", text))
         }
         "sweep.toml" => {
-            let pins: Vec<(String, Job)> = snapshot.pins.iter().map(|p| (p.label.clone(), Job::clone(&p.job))).collect();
+            let pins: Vec<(String, Job)> =
+                snapshot.pins.iter().map(|p| (p.label.clone(), Job::clone(&p.job))).collect();
             if pins.is_empty() {
-                let said = "nothing is pinned yet: a sweep file has a point for each pinned state; POST /api/pins pins one";
+                let said =
+                    "nothing is pinned yet: a sweep file has a point for each pinned state; POST /api/pins pins one";
                 return Err((StatusCode::CONFLICT, said.to_owned()));
             }
             let text = sweep_file("pinned states", &pins).map_err(|e| (StatusCode::CONFLICT, e.to_string()))?;

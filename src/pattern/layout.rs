@@ -34,7 +34,8 @@ pub fn laid_out(pattern: &SewingPattern) -> Vec<DVec2> {
     };
     let shown = |rows: &Rows| (ASPECT / rows.size.x).min(1.0 / rows.size.y);
     // A file may have thousands.
-    let candidates = (0..sizes.len().min(TRIED)).flat_map(|first| sums(first).take(TRIED)).map(|width| in_rows(&sizes, width));
+    let candidates =
+        (0..sizes.len().min(TRIED)).flat_map(|first| sums(first).take(TRIED)).map(|width| in_rows(&sizes, width));
     let Some(Rows { corners, size: DVec2 { y: height, .. } }) =
         candidates.reduce(|best, other| if shown(&other) > shown(&best) { other } else { best })
     else {

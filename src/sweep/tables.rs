@@ -57,7 +57,9 @@ fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRul
             let rows = table.remove("rows").unwrap_or(Value::Array(Vec::new()));
             table.insert("levels".to_owned(), rows);
             let read = table.try_into::<RangeTable>();
-            let wrong = |e: toml::de::Error| source.wrong(entry, "table", format!("{ROWS}; {}", e.message().replace('\n', ", ")));
+            let wrong = |e: toml::de::Error| {
+                source.wrong(entry, "table", format!("{ROWS}; {}", e.message().replace('\n', ", ")))
+            };
             return Ok(vec![TableRule::from(read.map_err(wrong)?)]);
         }
         Value::Table(table) => table.clone(),

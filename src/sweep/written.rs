@@ -119,7 +119,8 @@ fn body(scene: &SceneSpec) -> Result<Value, String> {
 
 fn fabric(fabric: &Fabric) -> Result<Value, String> {
     let constants = |fabric: &Fabric| Fabric { name: String::new(), source: String::new(), ..fabric.clone() };
-    let known = !names_a_file(&fabric.name) && Fabric::by_name(&fabric.name).is_ok_and(|k| constants(&k) == constants(fabric));
+    let known =
+        !names_a_file(&fabric.name) && Fabric::by_name(&fabric.name).is_ok_and(|k| constants(&k) == constants(fabric));
     if known {
         return Ok(Value::String(fabric.name.clone()));
     }
@@ -130,7 +131,9 @@ fn rows(rule: &TableRule, name: &str) -> Result<Value, String> {
     let name = if name.is_empty() { rule.name() } else { name };
     let mut table = Table::from_iter([("name".to_owned(), Value::String(name.to_owned()))]);
     match rule {
-        TableRule::Rows(rows) if rows.levels == RangeTable::table_3().levels && rows.gap == RangeTable::table_3().gap => {
+        TableRule::Rows(rows)
+            if rows.levels == RangeTable::table_3().levels && rows.gap == RangeTable::table_3().gap =>
+        {
             return Ok(Value::String(TABLE_3.to_owned()));
         }
         TableRule::Rows(rows) => {

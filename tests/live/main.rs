@@ -159,7 +159,8 @@ fn pinned_states_become_a_sweep_that_makes_them_again() {
     let (status, said) = live.get("/api/sweep.toml");
     assert!(status == 409 && said["error"].as_str().unwrap().contains("pinned"), "{said}");
     let mut counts = Vec::new();
-    for edit in [r#"{"refine": {"steps": 0}}"#, r#"{"table": {"levels": [[0, 2], [2, "inf", 12]]}, "fabric": "denim"}"#] {
+    for edit in [r#"{"refine": {"steps": 0}}"#, r#"{"table": {"levels": [[0, 2], [2, "inf", 12]]}, "fabric": "denim"}"#]
+    {
         live.patch(edit);
         counts.push(live.idle()["preview"]["count"].as_u64().unwrap().to_string());
         assert_eq!(live.ask("POST", "/api/pins", &[], "").0, 200);
@@ -206,6 +207,7 @@ fn elsewhere_a_token_steers_and_another_looks_on() {
     }
     assert_eq!(ask("PATCH", "/api/state", Some(&control)).0, 200);
     assert_eq!(live.get(&format!("/api/state?token={control}")).0, 200);
+    assert_eq!(live.get(&format!("//api/state?token={control}")).0, 200, "the printed address ends in a slash");
     // The page itself tells nothing.
     assert_eq!(live.text("GET", "/", &[], "").0, 200);
     let open = LiveOptions { address: "0.0.0.0:0".parse().unwrap(), ..options() };

@@ -262,7 +262,8 @@ fn jobs_written_as_a_sweep_file_are_its_points() {
     jobs[3].scene.garment = obj.to_str().unwrap().to_owned();
     jobs[3].scene.weld = true;
     jobs[3].settings.table = TableRule::Quantile { name: "quantile 9".to_owned(), levels: 9 };
-    let named: Vec<(String, Job)> = jobs.iter().enumerate().map(|(i, job)| (format!("state {i}"), job.clone())).collect();
+    let named: Vec<(String, Job)> =
+        jobs.iter().enumerate().map(|(i, job)| (format!("state {i}"), job.clone())).collect();
     let text = sweep_file("pinned", &named).unwrap();
     let found = parse(&text);
     let meant = Plan::of_jobs("pinned", jobs.clone()).unwrap();
