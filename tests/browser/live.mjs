@@ -266,8 +266,7 @@ try {
     await cdp.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: [{ x: tx - 2 * i, y: ty }] });
   }
   await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
-  await idle(touch);
-  assert.ok((await state(touch)).state > atFirst.state, "a finger drags too");
+  await until(touch, (now) => now.state > atFirst.state && now.idle);
   said("dragged by touch on a tablet");
   if (pictures) writeFileSync(join(pictures, "live-tablet.png"), await touch.screenshot());
   await touch.context().close();
