@@ -4,6 +4,8 @@ const SVG = "http://www.w3.org/2000/svg";
 const STEP = 0.05;
 const LEAST = 0.005;
 const TOP = 18;
+// Half the width of what can be touched of a handle, pixels.
+const REACH = 7;
 const BOTTOM = 16;
 
 export function node(name, attributes = {}, text) {
@@ -198,7 +200,15 @@ export class Dial {
     handle.focus();
     this.#svg.setPointerCapture(event.pointerId);
     this.#held = { index, gesture: ++this.#gestures };
-    const move = (e) => this.#move(index, this.#cm(e.clientX), this.#held.gesture);
+    let chosen = false;
+    const move = (e) => {
+      const way = Math.sign(e.clientX - event.clientX);
+      if (!chosen && way !== 0) {
+        chosen = true;
+        this.#held.index = this.#free(index, way);
+      }
+      this.#move(this.#held.index, this.#cm(e.clientX), this.#held.gesture);
+    };
     const drop = () => {
       this.#held = null;
       this.#gestures += 1;
@@ -208,6 +218,16 @@ export class Dial {
     this.#svg.addEventListener("pointermove", move);
     this.#svg.addEventListener("lostpointercapture", drop, { once: true });
     this.#draw();
+  }
+
+  // The bound that is meant where several lie on each other: the next one that can go this way.
+  #free(index, way) {
+    const bounds = this.#bounds();
+    const room = ({ value, least, most }) => Math.abs(this.#x(way < 0 ? least : most) - this.#x(value));
+    for (let i = index; bounds[i] && Math.abs(this.#x(bounds[i].value) - this.#x(bounds[index].value)) < REACH; i += way) {
+      if (room(bounds[i]) >= 2) return i;
+    }
+    return index;
   }
 
   #draw() {
@@ -262,7 +282,7 @@ export class Dial {
       const side = this.#x(bound.value) > width - 30 ? "end" : this.#x(bound.value) < 30 ? "start" : "middle";
       handle.append(
         node("line", { x1: 0, x2: 0, y1: TOP, y2: floor }),
-        node("rect", { class: "reach", x: -7, y: TOP, width: 14, height: floor - TOP }),
+        node("rect", { class: "reach", x: -REACH, y: TOP, width: 2 * REACH, height: floor - TOP }),
         node("rect", { class: "grip", x: -4, y: index % 2 ? TOP + 16 : TOP, width: 8, height: 14, rx: 3 }),
         node("text", { x: 0, y: 12, "text-anchor": side }, cm(bound.value)),
       );
