@@ -233,6 +233,7 @@ try {
     await timed.mouse.move(gx, gy);
     await timed.mouse.down();
     await timed.waitForTimeout(500);
+    for (const start = Date.now(); frames.length === 0 && Date.now() - start < 30000; ) await timed.waitForTimeout(100);
     const still = firstView(frames.at(-1).png);
     frames.length = 0;
     await timed.evaluate(() => window.watchNext());
