@@ -35,6 +35,16 @@ async function serve(...more) {
   return { address, said: () => said };
 }
 
+// The first group of what it says, once it has.
+async function until_said(server, words) {
+  for (const start = Date.now(); Date.now() - start < 10000; ) {
+    const found = words.exec(server.said());
+    if (found) return found[1];
+    await new Promise((done) => setTimeout(done, 50));
+  }
+  throw new Error(`never said ${words}: ${server.said()}`);
+}
+
 const { address } = await serve("--garment", garment);
 const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -274,7 +284,7 @@ try {
 
   // Who looks on sees all and changes nothing.
   const shared = await serve("--garment", "flared-skirt@900", "--token", TOKEN);
-  const link = /to look on only: (\S+)/.exec(shared.said())?.[1];
+  const link = await until_said(shared, /to look on only: (\S+)/);
   const looker = await open({ width: 1280, height: 800 }, "light", { at: link });
   await idle(looker);
   await looker.waitForTimeout(800);
