@@ -59,7 +59,7 @@ async function open(size, theme, { at = address, ...more } = {}) {
   const context = await browser.newContext({ viewport: size, colorScheme: theme, ...more });
   const page = await context.newPage();
   // The viewer's own remarks on a browser without a graphics card and on wishes a page cannot fulfil are no faults of the page.
-  const known = /egui_wgpu|Software rasterizer|Unhandled egui viewport command/;
+  const known = /egui_wgpu|Software rasterizer|Unhandled egui viewport command|performance warning: READ-usage|No available adapters/;
   page.on("console", (message) => {
     const fault = message.type() === "error" || (message.type() === "warning" && !known.test(message.text()));
     if (fault) faults.push(`console: ${message.text()}`);
