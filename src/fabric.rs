@@ -135,7 +135,11 @@ impl Fabric {
         // From far below gossamer to far above sheet steel: beyond, rounding decides and not the cloth.
         let density = ("density_kg_per_m2", self.density_kg_per_m2);
         if !(1e-4..=1e2).contains(&density.1) {
-            return Err(wrong(density.0, density.1, "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6"));
+            return Err(wrong(
+                density.0,
+                density.1,
+                "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6",
+            ));
         }
         for (key, value) in positive.into_iter().filter(|(key, _)| key.ends_with("n_per_m")) {
             if !(1e-3..=1e9).contains(&value) {
@@ -180,7 +184,9 @@ mod tests {
         assert!(said(&good.replace("poisson = 0.3", "poisson = 0.9")).contains("poisson is 0.9"));
         assert!(said(&good.replace("8.00e-04", "0.8")).contains("millimetres"));
         assert!(said(&good.replace("friction", "frction")).contains("frction"));
-        for (key, value) in [("stretch_warp_n_per_m", "1e200"), ("shear_n_per_m", "1e-9"), ("density_kg_per_m2", "1e-300")] {
+        for (key, value) in
+            [("stretch_warp_n_per_m", "1e200"), ("shear_n_per_m", "1e-9"), ("density_kg_per_m2", "1e-300")]
+        {
             let start = good.find(key).unwrap();
             let line = good[start..].lines().next().unwrap();
             let text = said(&good.replace(line, &format!("{key} = {value}")));
