@@ -132,6 +132,25 @@ impl Fabric {
                 return Err(wrong(key, value, "a positive, finite number"));
             }
         }
+        // From far below gossamer to far above sheet steel: beyond, rounding decides and not the cloth.
+        let density = ("density_kg_per_m2", self.density_kg_per_m2);
+        if !(1e-4..=1e2).contains(&density.1) {
+            return Err(wrong(
+                density.0,
+                density.1,
+                "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6",
+            ));
+        }
+        for (key, value) in positive.into_iter().filter(|(key, _)| key.ends_with("n_per_m")) {
+            if !(1e-3..=1e9).contains(&value) {
+                return Err(wrong(key, value, "newtons per metre, 0.001 to 1e9; most cloth has 5 to 10,000"));
+            }
+        }
+        for (key, value) in positive.into_iter().filter(|(key, _)| key.starts_with("bending_nm")) {
+            if !(1e-12..=1e3).contains(&value) {
+                return Err(wrong(key, value, "newton metres, 1e-12 to 1000; most cloth has 1e-6 to 1e-3"));
+            }
+        }
         // Beyond √(k_u k_v) the membrane's energy would have no lower bound; one half is the isotropic limit.
         if !(0.0..=0.5).contains(&self.poisson) {
             return Err(wrong("poisson", self.poisson, "0 to 0.5"));
@@ -165,6 +184,14 @@ mod tests {
         assert!(said(&good.replace("poisson = 0.3", "poisson = 0.9")).contains("poisson is 0.9"));
         assert!(said(&good.replace("8.00e-04", "0.8")).contains("millimetres"));
         assert!(said(&good.replace("friction", "frction")).contains("frction"));
+        for (key, value) in
+            [("stretch_warp_n_per_m", "1e200"), ("shear_n_per_m", "1e-9"), ("density_kg_per_m2", "1e-300")]
+        {
+            let start = good.find(key).unwrap();
+            let line = good[start..].lines().next().unwrap();
+            let text = said(&good.replace(line, &format!("{key} = {value}")));
+            assert!(text.contains(key) && text.contains("most cloth"), "{text}");
+        }
         assert!(said(&good.replace("density_kg_per_m2 = 0.187", "density_kg_per_m2 = nan")).contains("density"));
         assert!(Fabric::by_name("tweed").unwrap_err().to_string().contains("denim"));
     }

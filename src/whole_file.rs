@@ -51,6 +51,18 @@ impl WholeFile {
         Ok(Self { path, writer: BufWriter::new(file), beside: Some(beside) })
     }
 
+    /// Whether a file could begin at `path`; what is no plain file, a pipe or a device, is not tried.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn check(path: impl AsRef<Path>) -> io::Result<()> {
+        let found = fs::metadata(path.as_ref());
+        if found.is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return Ok(());
+        }
+        Self::create(path).map(drop)
+    }
+
     /// Writes `bytes` as the whole of `path`.
     ///
     /// # Errors

@@ -53,13 +53,13 @@ fn the_page_opens_its_recording_without_a_query_and_names_no_foreign_host() {
     let page = String::from_utf8(body).unwrap();
     let data = query.strip_prefix("?url=").unwrap().replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
     assert!(page.contains(&format!("data-recording=\"{data}\"")), "{page}");
-    let script = String::from_utf8(get(host, "/start.js").1).unwrap();
-    assert!(script.contains("dataset.recording") && script.contains("hide_welcome_screen: true"));
-    for text in [&page, &script] {
+    let [start, program] = ["/start.js", "/program.js"].map(|path| String::from_utf8(get(host, path).1).unwrap());
+    assert!(start.contains("dataset.recording") && program.contains("hide_welcome_screen: true"));
+    for text in [&page, &start, &program] {
         assert_eq!(foreign(text), [""; 0]);
     }
     // What the page asks for is there, and nothing else.
-    for path in ["/?url=anything", "/re_viewer.js", "/start.js", "/favicon.ico"] {
+    for path in ["/?url=anything", "/re_viewer.js", "/start.js", "/program.js", "/favicon.ico"] {
         assert!(get(host, path).0.starts_with("http/1.1 200"), "{path}");
     }
     for path in ["/sw.js", "/signed-in", "/../Cargo.toml", "/%2e%2e/Cargo.toml"] {

@@ -83,7 +83,9 @@ impl RunArgs {
             return self.keep_watching();
         }
         let start = Instant::now();
-        let mut solved = self.solve(self.job()?, start)?;
+        let job = self.job()?;
+        self.sinks.refuse_unwritable(&job.scene.garment_name(), &[self.export.as_deref()])?;
+        let mut solved = self.solve(job, start)?;
         let mut recorder = Recorder::open(solved.record_options(&self.sinks, !self.no_iterations, false))?;
         solved.record(&mut recorder, 0, !self.no_iterations)?;
         self.export(&mut solved)?;

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use partwise::mesh::MeshError;
 use partwise::record::Sink;
-use partwise::whole_file::same_place;
+use partwise::whole_file::{WholeFile, same_place};
 
 use super::failure::UserError;
 
@@ -88,6 +89,16 @@ impl SinkArgs {
                     "{path}: found both {other} and {flag} writing here, expected two files; give one of them another name"
                 )));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses a recording, or other outputs (`--export`), that could not be written, before anything is computed.
+    pub(crate) fn refuse_unwritable(&self, name: &str, outputs: &[Option<&Path>]) -> anyhow::Result<()> {
+        self.sinks(name).iter().try_for_each(Sink::check)?;
+        for path in outputs.iter().copied().flatten() {
+            let refused = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
+            WholeFile::check(path).map_err(refused)?;
         }
         Ok(())
     }

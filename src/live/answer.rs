@@ -22,6 +22,7 @@ use crate::job::Job;
 use crate::range_table::RangeTable;
 use crate::record::{Bundled, bundled};
 use crate::session::{Edit, EditError, Session, TableEdit};
+use crate::sweep::sweep_file;
 
 /// Bytes of the longest request.
 const LONGEST: usize = 1 << 20;
@@ -66,7 +67,8 @@ pub(super) async fn respond(site: &Arc<Site>, request: Request<Incoming>) -> Res
 
 async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<Answer>, Refused> {
     site.access.check_origin(request.headers())?;
-    let path = request.uri().path().to_owned();
+    // The address as it is printed ends in a slash, and what is put behind it begins with one.
+    let path = format!("/{}", request.uri().path().trim_start_matches('/'));
     let Some(of_api) = path.strip_prefix("/api/") else { return file(&request, &path) };
     check_site(request.headers())?;
     let right = site.access.right(request.headers(), request.uri())?;
@@ -80,7 +82,7 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
             None => flow(site, "application/octet-stream", stream),
             Some(why) => Err((StatusCode::INTERNAL_SERVER_ERROR, format!("nothing to show: {why}"))),
         },
-        (&Method::GET, "drape.obj" | "part" | "job.toml" | "table.toml") => {
+        (&Method::GET, "drape.obj" | "part" | "job.toml" | "table.toml" | "sweep.toml") => {
             let (site, uri, what) = (Arc::clone(site), request.uri().clone(), of_api.to_owned());
             apart(move || read(&site.session, &what, &uri)).await
         }
@@ -101,7 +103,7 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
             Err((StatusCode::NOT_FOUND, format!("found {path}, expected a pin there is")))
         }
         (_, "state" | "choices" | "events" | "stream" | "drape.obj" | "part" | "job.toml" | "table.toml" | "undo")
-        | (_, "redo" | "pins") => {
+        | (_, "redo" | "pins" | "sweep.toml") => {
             let expected =
                 if of_api == "state" { "GET or PATCH" } else { "another method; see `partwise live --help`" };
             Err((StatusCode::METHOD_NOT_ALLOWED, format!("found {method} {path}, expected {expected}")))
@@ -214,6 +216,17 @@ fn read(session: &Session, what: &str, uri: &Uri) -> Result<Response<Answer>, Re
         "part" => garment::part(&snapshot, uri).map(|found| json_of(&found)),
         "job.toml" => {
             let text = toml::to_string(&*snapshot.job).map_err(|e| unusable(&e))?;
+            Ok(whole(StatusCode::OK, "application/toml", text))
+        }
+        "sweep.toml" => {
+            let pins: Vec<(String, Job)> =
+                snapshot.pins.iter().map(|p| (p.label.clone(), Job::clone(&p.job))).collect();
+            if pins.is_empty() {
+                let said =
+                    "nothing is pinned yet: a sweep file has a point for each pinned state; POST /api/pins pins one";
+                return Err((StatusCode::CONFLICT, said.to_owned()));
+            }
+            let text = sweep_file("pinned states", &pins).map_err(|e| (StatusCode::CONFLICT, e.to_string()))?;
             Ok(whole(StatusCode::OK, "application/toml", text))
         }
         _ => match &snapshot.sectioned {

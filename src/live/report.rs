@@ -7,6 +7,7 @@ use crate::fabric;
 use crate::figures::LevelCount;
 use crate::job::Job;
 use crate::range_table::TableRule;
+use crate::record::level_colours;
 use crate::session::{AtRest, Finished, Ground, Pin, Preview, Sectioned, Snapshot, preset_names};
 use crate::shapes;
 
@@ -97,13 +98,17 @@ fn garment(ground: &Ground) -> Value {
 }
 
 fn sectioned(found: &Sectioned) -> Value {
+    let levels = LevelCount::all(&found.table, &found.parts);
+    let css = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
+    let colours: Vec<String> = level_colours(&levels).into_iter().map(css).collect();
     let strongest = found.force_n.iter().map(|f| f.length()).fold(0.0, f64::max);
     json!({
         "state": found.state,
         "count": found.parts.len(),
         "singletons": found.parts.singletons,
         "unassigned": found.parts.unassigned,
-        "levels": LevelCount::all(&found.table, &found.parts),
+        "levels": levels,
+        "colours": colours,
         "force_max_n": (!found.force_n.is_empty()).then_some(strongest),
         "segment_ms": found.segment_ms,
         "after_ms": found.after_ms,

@@ -11,6 +11,9 @@ use super::{Curve, EdgeAt, SewingPattern, laid_out};
 
 /// Margin about the panels, mm.
 const MARGIN: f64 = 30.0;
+/// Length of the arrow along the grain, mm, and the height of a panel below which it stands beside the name.
+const GRAIN: f64 = 60.0;
+const LOW: f64 = 150.0;
 
 /// Colours of seams in turn: Okabe and Ito's, which people tell apart who do not see red and green alike.
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7a5195"];
@@ -42,19 +45,25 @@ pub(super) fn svg(pattern: &SewingPattern) -> String {
         let _ = writeln!(out, "<path d=\"{path}Z\" fill=\"#f4f1ea\" stroke=\"#333\" stroke-width=\"1\"/>");
         let outline: Vec<DVec2> = panel.edges.iter().flat_map(|e| e.curve.divided(16)).collect();
         let middle = onto(middle(&outline) + offset);
-        // The grain: along y.
+        // The grain, along y: above the name, beside it where a panel is low.
+        let size = size(&outline);
+        let low = size.y < LOW;
+        let (x, y, length) = if low {
+            (middle.x - 0.25 * size.x, middle.y + 0.3 * size.y, 0.6 * size.y)
+        } else {
+            (middle.x, middle.y - 8.0, GRAIN)
+        };
         let _ = writeln!(
             out,
-            "<path d=\"M{0:.1} {1:.1}v-60m-4 8l4 -8l4 8M{0:.1} {1:.1}m-4 -8l4 8l4 -8\" fill=\"none\" stroke=\"#999\"/>",
-            middle.x,
-            middle.y - 8.0
+            "<path d=\"M{x:.1} {y:.1}v-{length:.1}m-4 8l4 -8l4 8M{x:.1} {y:.1}m-4 -8l4 8l4 -8\" fill=\"none\" stroke=\"#999\"/>"
         );
         let label = panel.label.as_ref().map(|l| format!(" ({})", escaped(l))).unwrap_or_default();
         let _ = writeln!(
             out,
-            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"14\" text-anchor=\"middle\">{}{label}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"{}\" text-anchor=\"middle\">{}{label}</text>",
             middle.x,
-            middle.y + 8.0,
+            middle.y + if low { 3.0 } else { 8.0 },
+            if low { 9 } else { 14 },
             escaped(&panel.name)
         );
         for edge in panel.edges.iter() {
@@ -126,7 +135,15 @@ fn inward(outline: &[DVec2], curve: &Curve, by: f64) -> DVec2 {
     let [a, p, b] = [0.49, 0.5, 0.51].map(|t| curve.at(t));
     let normal = (b - a).perp().normalize_or_zero();
     let positive = outline.windows(2).map(|w| w[0].perp_dot(w[1])).sum::<f64>() > 0.0;
+    // Off the name in the middle of a low panel.
+    let by = by.min(2e-4 * size(outline).y);
     p + normal * if positive { by } else { -by }
+}
+
+/// Width and height of a panel, mm.
+fn size(outline: &[DVec2]) -> DVec2 {
+    let (low, high) = outline.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+    1e3 * (high - low)
 }
 
 /// A point of the panel to write at: the middle of its box, or of its vertices where that lies outside.

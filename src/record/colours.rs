@@ -63,6 +63,12 @@ pub(super) fn shade(place: Option<f64>, shade: u8) -> Rgb {
     oklch(lightness, chroma, LEVEL_HUES[0] + place * (LEVEL_HUES[1] - LEVEL_HUES[0]))
 }
 
+/// The middle shade of each level's hue, red, green and blue, for a legend beside the views.
+#[must_use]
+pub fn level_colours(levels: &[LevelCount]) -> Vec<[u8; 3]> {
+    places(levels).into_iter().map(|place| shade(place, 1)).collect()
+}
+
 /// PARTs and how they are seen.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PartColours {

@@ -15,8 +15,10 @@ use super::step::StepView;
 
 /// More dots than this would hide the PARTs.
 const MOST: usize = 400;
-/// Radius on screen, points.
+/// Radius on screen, points, of so many; more are smaller, or they would look like a rash.
 const RADIUS: f32 = 1.4;
+const FEW: f32 = 100.0;
+const SMALLEST: f32 = 0.6;
 /// Height above the cloth, m.
 const ABOVE_M: f64 = 0.003;
 
@@ -70,7 +72,7 @@ pub(super) fn log(open: &Open, step: &StepView<'_>, told: Vec<String>) -> Result
         .with_labels(told)
         .with_show_labels(false)
         .with_colors([Color::from_rgb(22, 24, 28)])
-        .with_radii([Radius::new_ui_points(RADIUS)]);
+        .with_radii([Radius::new_ui_points((RADIUS * (FEW / parts as f32).sqrt()).clamp(SMALLEST, RADIUS))]);
     open.log(paths::PART_DOTS, &dots)
 }
 

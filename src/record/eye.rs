@@ -67,6 +67,11 @@ impl Eye {
         Some(eye.through(aspect))
     }
 
+    /// Half the height that is in the picture at the target, m.
+    pub(crate) fn half_seen(&self) -> f64 {
+        self.position.distance(self.target) * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan()
+    }
+
     /// The same, as near as a view of this width over height allows.
     pub(crate) fn through(&self, aspect: f64) -> Self {
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();

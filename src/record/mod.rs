@@ -38,6 +38,7 @@ use rerun::{Scalars, TextDocument};
 
 pub use blueprint::layout::{Layout, Tab};
 pub use colour_map::Range;
+pub use colours::level_colours;
 pub use compare::Chosen;
 pub use error::RecordError;
 pub use folds::FoldView;

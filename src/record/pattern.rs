@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rerun::Mesh3D;
 
+use super::blueprint::layout::Tab;
 use super::colour_map::ColourMap;
 use super::error::RecordError;
 use super::meshes::{self, CellMesh, singles};
@@ -58,7 +59,7 @@ pub(super) fn log(open: &Open, view: &PatternView<'_>) -> Result<(), RecordError
 fn facing_the_eye(open: &Open, flat: &TriMesh) -> Option<TriMesh> {
     let (low, high) = flat.bounds()?;
     let (middle, size) = (0.5 * (low + high), high - low);
-    let half = open.eye.half_height.max(open.eye.half_width / ASPECT);
+    let half = open.layout().eye(Tab::Pattern, &open.eye).half_seen();
     let scale = FILLED * (2.0 * half / size.z).min(2.0 * half * ASPECT / size.x);
     let toward = open.eye.toward;
     let right = DVec3::Z.cross(toward).normalize_or(DVec3::X);

@@ -20,7 +20,7 @@ use super::panel::RERUN_VERSION;
 use super::remote::Remote;
 use super::web::WebViewer;
 use super::writer::RrdWriter;
-use crate::whole_file::WholeFile;
+use crate::whole_file::{WholeFile, folder_of};
 
 /// How long a viewer has to answer.
 const ANSWER: Duration = Duration::from_secs(3);
@@ -47,6 +47,21 @@ pub enum Sink {
         /// History kept for viewers that connect late; beyond it the oldest steps go first, static data never.
         history_bytes: u64,
     },
+}
+
+impl Sink {
+    /// Whether a file could begin where this sink writes one, before anything is computed for it; nothing is left behind.
+    ///
+    /// # Errors
+    /// As [`Recorder::open`](super::Recorder::open).
+    pub fn check(&self) -> Result<(), RecordError> {
+        let Self::File(path) = self else { return Ok(()) };
+        // Folders that a relative path lacks will be made.
+        if path.is_relative() && !folder_of(path).exists() {
+            return Ok(());
+        }
+        WholeFile::check(path).map_err(unwritable(path))
+    }
 }
 
 /// A file in the making.
@@ -94,14 +109,17 @@ impl OpenSinks {
     }
 }
 
+fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> RecordError + '_ {
+    move |source| RecordError::Unwritable { path: path.to_owned(), source }
+}
+
 fn file(path: &Path) -> Result<Target, RecordError> {
-    let unwritable = |source: std::io::Error| RecordError::Unwritable { path: path.to_owned(), source };
     // Below where one works only: a slip in an absolute path would leave folders anywhere.
     if let Some(folder) = path.parent().filter(|_| path.is_relative()) {
-        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        std::fs::create_dir_all(folder).map_err(unwritable(path))?;
     }
-    let file = WholeFile::create(path).map_err(unwritable)?;
-    let writer = RrdWriter::new(file).map_err(|reason| unwritable(std::io::Error::other(reason)))?;
+    let file = WholeFile::create(path).map_err(unwritable(path))?;
+    let writer = RrdWriter::new(file).map_err(|reason| unwritable(path)(std::io::Error::other(reason)))?;
     Ok(Target { writer, path: path.to_owned() })
 }
 

@@ -142,8 +142,12 @@ impl Axis<'_> {
 }
 
 fn fabric(source: Source<'_>, value: &At, inputs: &Inputs) -> Result<Vec<Edit>, PlanError> {
-    let label = source.text(value, "fabric", "a built-in name or a file")?;
     let place = source.place(value);
+    if let Value::Table(constants) = value.get_ref() {
+        let fabric = Fabric::parse(&constants.to_string(), &place).map_err(PlanError::input(&place, "fabric"))?;
+        return Ok(one(move |point| point.job.settings.fabric = fabric.clone()));
+    }
+    let label = source.text(value, "fabric", "a built-in name, a file, or a table of all constants")?;
     let fabric = match names_a_file(&label) {
         true => Fabric::parse(&inputs.text(&label, &place)?, &label),
         false => Fabric::by_name(&label),

@@ -32,6 +32,9 @@ pub enum PlanError {
     /// More than anybody means.
     #[error("{name}: found {found} points, expected at most {limit}; split the sweep or shorten an axis")]
     TooMany { name: String, found: usize, limit: usize },
+    /// A job that a sweep file has no keys for.
+    #[error("{label}: a sweep file cannot say it: {why}")]
+    Unsayable { label: String, why: String },
     /// A shard that is none.
     #[error("shard: found \"{found}\", expected i/n with 1 <= i <= n, for example 2/3")]
     Shard { found: String },

@@ -22,7 +22,7 @@
 //! | `body` | `bodies` | `form`, OBJ, TOML of measurements, or `{ bust = 92, ... }` in cm with `of`, `name` | `form` |
 //! | `garment` | `garments` | `name@vertices` or file | `low-cut-dress` |
 //! | `size` | `sizes` | vertices, or `larger`, `smaller` of Table 4; for a garment built in and named without | – |
-//! | `fabric` | `fabrics` | built-in name or file | `interlock` |
+//! | `fabric` | `fabrics` | built-in name, file, or all its constants as a table | `interlock` |
 //! | `model` | `models` | `paper`, `coupled` | `coupled` |
 //! | `table` | `tables` | see [`tables`](super::tables) | `table-3` |
 //! | `extent_cm` | `extents_cm` | cm; 0 or `none` for not cut; a list for a cascade, coarse to fine | `none` |

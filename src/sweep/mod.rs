@@ -6,7 +6,7 @@
 //! were, timings aside.
 //!
 //! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points,
-//! [`point`] what their ids are made of, [`store`] the files.
+//! [`point`] what their ids are made of, [`store`] the files; [`sweep_file`] writes one of jobs.
 
 mod axes;
 mod bench;
@@ -27,6 +27,7 @@ mod run;
 pub mod store;
 pub mod tables;
 mod timing;
+mod written;
 
 pub use bench::{Bench, Pass, PointError, result_hash, row_of};
 pub use disk::Append;
@@ -40,3 +41,4 @@ pub use row::{Row, Status, cell, columns, csv_text};
 pub use run::{Maker, Outcome, Run, SweepProgress, run_missing, sweep};
 pub use store::{Existing, Store};
 pub use timing::Timing;
+pub use written::sweep_file;

@@ -7,6 +7,7 @@
 //! | `{ scale = [0.5, 2] }` | Table 3 with all bounds multiplied, one table a factor |
 //! | `{ levels = [8, 38] }` | Table 3 with so many levels, neighbours joined or the widest halved |
 //! | `{ of = "file.toml", scale = 0.5, levels = 8 }` | another table; first its levels, then its scale |
+//! | `{ name = "mine", rows = [[0, 0.5], [0.5, inf]], gap = "extend-lower" }` | these rows, cm, as in a range table file |
 //! | `{ quantile = [10, 20] }` | so many levels of equally many vertices, garment by garment |
 //! | `{ geometric = [10, 20], first_cm = 0.1, last_cm = 11 }` | bounds in geometric progression between the two |
 //!
@@ -24,8 +25,10 @@ use crate::range_table::{MOST_LEVELS, RangeTable, TABLE_3, TableError, TableRule
 
 /// Default ends of a geometric table, cm: the smallest bounds of Table 3 are about 0.1, its largest is 11.
 const GEOMETRIC_CM: (f64, f64) = (0.1, 11.0);
-const EXPECTED: &str = "\"table-3\", a file, { scale = ... }, { levels = ... } (both with an optional of = ...), \
+const EXPECTED: &str = "\"table-3\", a file, { name = ..., rows = ... }, { scale = ... }, { levels = ... } (both with an optional of = ...), \
                         { quantile = ... } or { geometric = ..., first_cm = ..., last_cm = ... }";
+
+const ROWS: &str = "{ name = \"...\", rows = [[lower, upper], ...] } in centimetres with an optional gap = \"...\"";
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -49,6 +52,16 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
 fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRule>, PlanError> {
     let table = match entry.get_ref() {
         Value::String(name) => return Ok(vec![TableRule::from(base(source, entry, name, inputs)?).named(name)]),
+        Value::Table(table) if table.contains_key("rows") => {
+            let mut table = table.clone();
+            let rows = table.remove("rows").unwrap_or(Value::Array(Vec::new()));
+            table.insert("levels".to_owned(), rows);
+            let read = table.try_into::<RangeTable>();
+            let wrong = |e: toml::de::Error| {
+                source.wrong(entry, "table", format!("{ROWS}; {}", e.message().replace('\n', ", ")))
+            };
+            return Ok(vec![TableRule::from(read.map_err(wrong)?)]);
+        }
         Value::Table(table) => table.clone(),
         _ => return Err(source.wrong(entry, "table", EXPECTED)),
     };

@@ -129,6 +129,7 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
         ("GET", "/api/part?at=0,0,nan", vec![], "", 400, "metres"),
         ("GET", "/api/drape.obj?of=all", vec![], "", 400, "preview"),
         ("GET", "/api/../../etc/passwd", vec![], "", 404, ""),
+        ("GET", "/api/sweep.toml", vec![], "", 409, "pinned"),
         ("GET", "/nothing", vec![], "", 404, "nothing"),
         ("PUT", "/", vec![], "", 405, "GET"),
     ];
@@ -150,6 +151,32 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
     stream.write_all(b"\x16\x03\x01\x02\x00 hello\r\n\r\n").unwrap();
     assert_eq!(live.get("/api/state").1["state"], 1);
     assert_eq!(live.patch(r#"{"fabric": "jersey"}"#).1["state"], 2);
+}
+
+#[test]
+fn pinned_states_become_a_sweep_that_makes_them_again() {
+    let live = Live::start(&options());
+    let (status, said) = live.get("/api/sweep.toml");
+    assert!(status == 409 && said["error"].as_str().unwrap().contains("pinned"), "{said}");
+    let mut counts = Vec::new();
+    for edit in [r#"{"refine": {"steps": 0}}"#, r#"{"table": {"levels": [[0, 2], [2, "inf", 12]]}, "fabric": "denim"}"#]
+    {
+        live.patch(edit);
+        counts.push(live.idle()["preview"]["count"].as_u64().unwrap().to_string());
+        assert_eq!(live.ask("POST", "/api/pins", &[], "").0, 200);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pinned.toml");
+    std::fs::write(&file, live.text("GET", "/api/sweep.toml", &[], "").1).unwrap();
+    let mut sweep = Command::new(env!("CARGO_BIN_EXE_partwise"));
+    sweep.args(["sweep", "--no-save", "--accuracy", "none", "--out"]).arg(folder.path().join("rows")).arg(&file);
+    let ended = sweep.output().unwrap();
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let rows = std::fs::read_to_string(folder.path().join("rows/rows.jsonl")).unwrap();
+    let rows: Vec<Value> = rows.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let found: Vec<String> = rows.iter().map(|row| row["part_count"].to_string()).collect();
+    assert_eq!(found, counts, "{rows:?}");
+    assert_eq!(rows[1]["fabric"], "denim");
 }
 
 #[test]
@@ -180,6 +207,7 @@ fn elsewhere_a_token_steers_and_another_looks_on() {
     }
     assert_eq!(ask("PATCH", "/api/state", Some(&control)).0, 200);
     assert_eq!(live.get(&format!("/api/state?token={control}")).0, 200);
+    assert_eq!(live.get(&format!("//api/state?token={control}")).0, 200, "the printed address ends in a slash");
     // The page itself tells nothing.
     assert_eq!(live.text("GET", "/", &[], "").0, 200);
     let open = LiveOptions { address: "0.0.0.0:0".parse().unwrap(), ..options() };

@@ -25,6 +25,21 @@ fn devices_stay_devices_and_a_full_one_is_said() {
 }
 
 #[test]
+fn an_output_that_cannot_be_is_refused_before_anything_is_read_or_solved() {
+    let bench = Bench::new();
+    let [rrd, obj] = ["missing/x.rrd", "missing/x.obj"].map(|name| bench.path(name).to_str().unwrap().to_owned());
+    // Solved first, the garment that is not there would be told.
+    for output in [["--save", &rrd], ["--export", &obj]] {
+        let mut arguments = vec!["--body", "body.obj", "--garment", "nowhere.obj"];
+        arguments.extend(output);
+        let ended = bench.run(&arguments);
+        ended.with(2, &[output[1], "cannot"]);
+        assert!(!ended.said.contains("nowhere.obj"), "{}", ended.said);
+    }
+    assert_eq!(bench.names(), ["body.obj", "garment.obj"]);
+}
+
+#[test]
 fn a_disk_that_fills_up_leaves_nothing_half_written_and_ends_the_run() {
     let bench = Bench::new();
     bench.write("old.rrd", "what was there");

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use partwise::Job;
 use partwise::drape::Refine;
-use partwise::range_table::TableRule;
-use partwise::sweep::Plan;
+use partwise::fabric::Fabric;
+use partwise::range_table::{RangeTable, TableRule};
+use partwise::sweep::{Plan, sweep_file};
 
 fn parse(text: &str) -> Plan {
     Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap()
@@ -239,4 +240,43 @@ fn the_sweeps_that_come_along_are_sound() {
         assert_eq!((plan.points.len(), plan.notes.len()), (count, 0), "{file}: {:?}", plan.notes);
         assert!(plan.about.contains(&format!("= {count} points")), "{file}");
     }
+}
+
+#[test]
+fn jobs_written_as_a_sweep_file_are_its_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let obj = folder.path().join("a shirt.obj");
+    fs::write(&obj, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let table = |levels: &str| {
+        let text = format!("name = \"mine\"\nunit = \"cm\"\ngap = \"own-level\"\nlevels = {levels}\n");
+        TableRule::from(RangeTable::parse(&text, "t.toml").unwrap())
+    };
+    let mut jobs = vec![Job::default(); 4];
+    jobs[1].settings.table = table("[[0, 0.1], [0.3, inf, 6, inf]]");
+    jobs[1].settings.model = jobs[1].settings.model.clone().with_extents_cm(&[24.0, 12.0]);
+    jobs[1].scene.measurements = jobs[1].scene.measurements.clone().with("waist", 76.5).unwrap();
+    jobs[2].settings.table = table("[[0, 0.7], [0.7, inf]]");
+    jobs[2].settings.fabric = Fabric { name: "my \"own\"".to_owned(), friction: 0.123, ..Fabric::default() };
+    jobs[2].settings.refine = Refine::Steps(3);
+    jobs[2].seed = 7;
+    jobs[3].scene.garment = obj.to_str().unwrap().to_owned();
+    jobs[3].scene.weld = true;
+    jobs[3].settings.table = TableRule::Quantile { name: "quantile 9".to_owned(), levels: 9 };
+    let named: Vec<(String, Job)> =
+        jobs.iter().enumerate().map(|(i, job)| (format!("state {i}"), job.clone())).collect();
+    let text = sweep_file("pinned", &named).unwrap();
+    let found = parse(&text);
+    let meant = Plan::of_jobs("pinned", jobs.clone()).unwrap();
+    let ids = |plan: &Plan| plan.points.iter().map(|p| p.id.clone()).collect::<Vec<_>>();
+    assert_eq!(ids(&found), ids(&meant), "{text}");
+    let names: Vec<&str> = found.points.iter().map(|p| p.job.settings.table.name()).collect();
+    assert_eq!(names, ["table-3", "mine", "mine, state 2", "quantile 9"], "one name, one table");
+    assert!(text.contains("[base]\nbody = ") || text.contains("[base]\nmin_part = 1"), "{text}");
+    // What has no key is not left out in silence.
+    let mut odd = jobs[0].clone();
+    odd.scene.rest = obj.to_str().unwrap().to_owned();
+    let said = sweep_file("pinned", &[("state 9".to_owned(), odd)]).unwrap_err().to_string();
+    assert!(said.contains("state 9") && said.contains("rest"), "{said}");
+    assert!(message("name = \"x\"\n[grid]\ntables = [{ name = \"t\", rows = [[1, 0]] }]").contains("row 1"));
+    assert!(message("name = \"x\"\n[grid]\nfabrics = [{ name = \"t\" }]").contains("s.toml:3"));
 }

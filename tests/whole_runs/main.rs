@@ -89,6 +89,8 @@ fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
         Some(2) => "refused",
         // A sweep of which points failed, each a row that says why.
         Some(1) if said.contains("points failed: the column `error`") => "failed points",
+        // A certificate that is not given, which names what it is that fails.
+        Some(1) if said.contains("not certified") => "not certified",
         other => return Err(format!("it ended with {other:?} ({status}): {said}")),
     };
     if outcome != "done" && !said.contains("error: ") {

@@ -4,6 +4,8 @@ const SVG = "http://www.w3.org/2000/svg";
 const STEP = 0.05;
 const LEAST = 0.005;
 const TOP = 18;
+// Half the width of what can be touched of a handle, pixels.
+const REACH = 7;
 const BOTTOM = 16;
 
 export function node(name, attributes = {}, text) {
@@ -28,6 +30,7 @@ export class Dial {
   #gap = "extend-lower";
   #histogram = null;
   #counts = [];
+  #colours = [];
   #held = null;
   #gestures = Date.now();
 
@@ -43,6 +46,7 @@ export class Dial {
   show(state) {
     this.#histogram = state.histogram;
     this.#counts = state.parts?.levels ?? [];
+    this.#colours = state.parts?.colours ?? [];
     const table = state.job.table;
     if (!this.#held) {
       const quantile = table.quantile !== undefined;
@@ -77,6 +81,14 @@ export class Dial {
   #cm(clientX) {
     const share = (clientX - this.#svg.getBoundingClientRect().left) / this.#width();
     return Math.max(0, Math.min(1, share)) ** 2 * this.#far();
+  }
+
+  // The colour that PARTs at this distance have in the views; a bound under the hand is ahead of what the session says.
+  #colour(value) {
+    const ahead = this.#counts.length === this.#levels.length;
+    const lower = ahead ? this.#levels.map((row) => row[0]) : this.#counts.map((level) => level.lower_cm);
+    const level = lower.findLastIndex((bound) => bound <= value);
+    return this.#colours[Math.max(level, 0)];
   }
 
   // The bounds that can move: where it is, between which others, and what moving it does to the rows.
@@ -188,7 +200,15 @@ export class Dial {
     handle.focus();
     this.#svg.setPointerCapture(event.pointerId);
     this.#held = { index, gesture: ++this.#gestures };
-    const move = (e) => this.#move(index, this.#cm(e.clientX), this.#held.gesture);
+    let chosen = false;
+    const move = (e) => {
+      const way = Math.sign(e.clientX - event.clientX);
+      if (!chosen && way !== 0) {
+        chosen = true;
+        this.#held.index = this.#free(index, way);
+      }
+      this.#move(this.#held.index, this.#cm(e.clientX), this.#held.gesture);
+    };
     const drop = () => {
       this.#held = null;
       this.#gestures += 1;
@@ -198,6 +218,16 @@ export class Dial {
     this.#svg.addEventListener("pointermove", move);
     this.#svg.addEventListener("lostpointercapture", drop, { once: true });
     this.#draw();
+  }
+
+  // The bound that is meant where several lie on each other: the next one that can go this way.
+  #free(index, way) {
+    const bounds = this.#bounds();
+    const room = ({ value, least, most }) => Math.abs(this.#x(way < 0 ? least : most) - this.#x(value));
+    for (let i = index; bounds[i] && Math.abs(this.#x(bounds[i].value) - this.#x(bounds[index].value)) < REACH; i += way) {
+      if (room(bounds[i]) >= 2) return i;
+    }
+    return index;
   }
 
   #draw() {
@@ -220,12 +250,14 @@ export class Dial {
       // By the density over the axis as drawn, so that areas are vertices.
       const bars = h.counts.map((count, i) => {
         const [from, to] = [this.#x(h.edges_cm[i]), this.#x(h.edges_cm[i + 1])];
-        return { from, wide: to - from, dense: count / Math.max(to - from, 1e-6) };
+        const fill = this.#colour((h.edges_cm[i] + h.edges_cm[i + 1]) / 2);
+        return { from, wide: to - from, dense: count / Math.max(to - from, 1e-6), fill };
       });
       const most = Math.max(...bars.map((bar) => bar.dense), 1e-9);
-      for (const { from, wide, dense } of bars) {
+      for (const { from, wide, dense, fill } of bars) {
         const tall = (dense / most) * (floor - TOP - 4);
-        drawn.push(node("rect", { class: "histogram", x: from, y: floor - tall, width: Math.max(wide - 0.5, 0.5), height: tall }));
+        const at = { x: from, y: floor - tall, width: Math.max(wide - 0.5, 0.5), height: tall };
+        drawn.push(node("rect", { class: "histogram", ...(fill && { fill }), ...at }));
       }
     }
     drawn.push(node("line", { class: "axis", x1: 0, x2: width, y1: floor, y2: floor }));
@@ -250,7 +282,7 @@ export class Dial {
       const side = this.#x(bound.value) > width - 30 ? "end" : this.#x(bound.value) < 30 ? "start" : "middle";
       handle.append(
         node("line", { x1: 0, x2: 0, y1: TOP, y2: floor }),
-        node("rect", { class: "reach", x: -7, y: TOP, width: 14, height: floor - TOP }),
+        node("rect", { class: "reach", x: -REACH, y: TOP, width: 2 * REACH, height: floor - TOP }),
         node("rect", { class: "grip", x: -4, y: index % 2 ? TOP + 16 : TOP, width: 8, height: 14, rx: 3 }),
         node("text", { x: 0, y: 12, "text-anchor": side }, cm(bound.value)),
       );

@@ -27,6 +27,7 @@ function showChoices(state) {
   options(at("garment"), choices.garments, garment);
   const sizes = choices.sizes[choices.garments.indexOf(garment)] ?? [];
   options(at("vertices"), ["as is", ...sizes.map(String)], vertices ?? "as is");
+  at("size").textContent = state.garment ? `${state.garment.vertices} vertices` : "";
   options(at("fabric"), choices.fabrics, typeof job.fabric === "string" ? job.fabric : job.fabric.name);
   const name = job.table.name ?? `${job.table.quantile} quantile levels`;
   const preset = choices.tables.find((known) => known === name || (known === "table-3" && name.toLowerCase() === "table 3"));
@@ -176,7 +177,9 @@ at("load").addEventListener("change", async () => {
   at("load").value = "";
 });
 // Links carry no token, so what is saved is asked for here.
-for (const [id, path] of [["save-table", "api/table.toml"], ["save-job", "api/job.toml"], ["save-obj", "api/drape.obj"]]) {
+const SAVED = { "save-table": "table.toml", "save-job": "job.toml", "save-obj": "drape.obj", "save-sweep": "sweep.toml" };
+for (const [id, name] of Object.entries(SAVED)) {
+  const path = `api/${name}`;
   const link = at(id);
   link.href = path;
   link.addEventListener("click", async (event) => {

@@ -19,7 +19,7 @@ function list(id, rows) {
 }
 
 export function showNumbers(state) {
-  const { parts, preview, rest, figures, garment, job } = state;
+  const { parts, preview, rest, figures, garment } = state;
   const old = (found) => found && found.state !== state.state;
   const error = figures?.preview_error_mm;
   const bound = figures?.bound_mm;
@@ -34,15 +34,14 @@ export function showNumbers(state) {
     ["PARTs could hold it to", bound === null || bound === undefined ? "–" : `${digits(bound)} mm`, old(figures)],
     ["strain, 95 % / most", figures?.strain_p95 ? `${digits(100 * figures.strain_p95)} / ${digits(100 * figures.strain_max)} %` : "–", old(figures)],
     ["inside the body", figures ? `${figures.penetrating_vertices} vertices` : "–", old(figures)],
-    ["garment", garment ? `${garment.vertices} vertices, ${job.model}` : "–"],
   ]);
   const warnings = [...(figures?.warnings ?? garment?.warnings ?? [])];
   at("warnings").replaceChildren(...warnings.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
-  perLevel(parts?.levels ?? []);
+  perLevel(parts?.levels ?? [], parts?.colours ?? []);
   spark(state.trail ?? []);
 }
 
-function perLevel(levels) {
+function perLevel(levels, colours) {
   const svg = at("per-level");
   const [width, height] = [svg.clientWidth || 370, 44];
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
@@ -51,7 +50,8 @@ function perLevel(levels) {
   svg.replaceChildren(
     ...levels.flatMap((level, i) => {
       const tall = (level.parts / most) * 24;
-      const bar = node("rect", { class: "parts-bar", x: i * wide + 1, y: 36 - tall, width: Math.max(1, wide - 2), height: tall });
+      const at = { x: i * wide + 1, y: 36 - tall, width: Math.max(1, wide - 2), height: tall };
+      const bar = node("rect", { class: "parts-bar", fill: colours[i], ...at });
       const upper = level.upper_cm === null ? "∞" : cm(level.upper_cm);
       bar.append(node("title", {}, `level ${i + 1}, ${cm(level.lower_cm)} to ${upper} cm: ${level.parts} PARTs, ${level.vertices} vertices`));
       const middle = { x: (i + 0.5) * wide, "text-anchor": "middle" };
@@ -103,6 +103,9 @@ export function showPins(state, letGo) {
     return row;
   });
   at("pins").tBodies[0].replaceChildren(...rows);
+  at("pins").hidden = rows.length === 0;
+  at("save-sweep").hidden = rows.length === 0;
+  at("no-pins").hidden = rows.length > 0;
 }
 
 export function showPart(part) {

@@ -87,6 +87,10 @@ export class Session extends EventTarget {
 
   // A request that changes something, answered by the state or by a sentence.
   async send(path, method, body, kind) {
+    if (this.state?.may_steer === false) {
+      this.#tell("refused", "This address looks on; the one with the token for control steers.");
+      return;
+    }
     try {
       const response = await ask(path, { method, body, headers: kind ? { "Content-Type": kind } : {} });
       const answer = await response.json();

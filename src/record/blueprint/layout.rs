@@ -105,7 +105,7 @@ impl Layout {
     }
 
     /// The eye for the views of a tab, which share its width.
-    pub(super) fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
+    pub(crate) fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
         eye.through(match tab {
             Tab::Stages | Tab::Numbers => self.stage_grid(eye).1,
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),

@@ -24,6 +24,8 @@ use tokio::sync::oneshot;
 
 const INDEX: &str = include_str!("index.html");
 const START: &str = include_str!("start.js");
+/// What every page round the viewer needs.
+const PROGRAM: &str = include_str!("program.js");
 /// How long a browser has to ask once it has connected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -108,6 +110,7 @@ impl Files {
         let (kind, bytes) = match request.uri().path() {
             "/" | "/index.html" => ("text/html; charset=utf-8", self.index.clone()),
             "/start.js" => ("text/javascript", Bytes::from_static(START.as_bytes())),
+            "/program.js" => ("text/javascript", Bytes::from_static(PROGRAM.as_bytes())),
             "/re_viewer.js" => ("text/javascript", Bytes::from_static(viewer.viewer_js())),
             "/favicon.ico" => ("image/x-icon", Bytes::from_static(viewer.favicon())),
             "/re_viewer_bg.wasm" => return self.program(request),
@@ -147,7 +150,7 @@ pub struct Bundled {
     pub whole: usize,
 }
 
-/// The viewer's file at this path (`/re_viewer.js`, `/re_viewer_bg.wasm`, `/favicon.ico`); none elsewhere, or where this
+/// The viewer's file at this path (`/program.js`, `/re_viewer.js`, `/re_viewer_bg.wasm`, `/favicon.ico`); none elsewhere, or where this
 /// program was built without the viewer.
 #[must_use]
 pub fn bundled(path: &str, packed: bool) -> Option<Bundled> {
@@ -159,6 +162,7 @@ pub fn bundled(path: &str, packed: bool) -> Option<Bundled> {
         whole: bytes.len(),
     };
     match path {
+        "/program.js" => Some(plain("text/javascript", PROGRAM.as_bytes())),
         "/re_viewer.js" => Some(plain("text/javascript", viewer.viewer_js())),
         "/re_viewer_bg.wasm" => Some(program(viewer, packed)),
         "/favicon.ico" => Some(plain("image/x-icon", viewer.favicon())),
