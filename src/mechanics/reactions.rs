@@ -32,7 +32,7 @@ const TOUCHING: f64 = 2e-4;
 const COVERED: f64 = 4e-3;
 
 /// Turns in which reactions are given, at most, and the change of all of them, over the weight, that ends it.
-const TURNS: usize = 500;
+const TURNS: usize = 3000;
 const SETTLED: f64 = 1e-7;
 
 /// Share of μN from which a vertex counts as about to slip.
@@ -124,6 +124,10 @@ impl Forces {
 /// is enough where no two share a vertex.
 fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
     let friction = cloth.friction;
+    for touching in &*touching {
+        let free = touching.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
+        free.for_each(|(v, w)| rest[*v as usize] -= touching.reaction * *w);
+    }
     for _ in 0..TURNS {
         let mut changed = 0.0;
         for touching in &mut *touching {
@@ -175,7 +179,11 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let mut itself = cloth.proximity();
     itself.refresh(x);
     let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
-    all.extend(gaps.map(|gap| Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), false)));
+    // What the solver's law pushes with is near to what is needed.
+    all.extend(gaps.map(|gap| Touching {
+        reaction: gap.normal() * (gap.stiffness() * gap.depth(x).max(0.0)),
+        ..Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), false)
+    }));
     all
 }
 

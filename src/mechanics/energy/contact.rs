@@ -64,13 +64,13 @@ pub(super) enum Met<'b> {
 pub struct Contacts<'b> {
     pub(super) met: Met<'b>,
     /// h of each vertex, m.
-    offsets: Vec<f64>,
+    pub(super) offsets: Vec<f64>,
     areas: Vec<f64>,
     pub(super) held: Vec<bool>,
     pub(super) asked_at: Vec<DVec3>,
     pub(super) answer: Vec<f64>,
     /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
-    leave: Vec<f64>,
+    pub(super) leave: Vec<f64>,
     /// The vertices that may be near, of the last [`update`](Self::update).
     near: Vec<u32>,
     stiffness: f64,
@@ -257,14 +257,6 @@ impl<'b> Contacts<'b> {
             Met::Planes(body, _) => Some(*body),
             Met::Rounded(field) => Some(field.body()),
         }
-    }
-
-    /// Raises the distance that a vertex keeps by so much, m; takes effect with the next [`update`](Self::update).
-    pub(super) fn raise(&mut self, v: usize, by: f64) {
-        self.offsets[v] += by;
-        // What was far enough from the old distance may be near to the new one.
-        self.answer[v] = f64::NEG_INFINITY;
-        self.leave[v] = if self.held[v] { f64::INFINITY } else { f64::NEG_INFINITY };
     }
 
     /// Vertices inside the body at the positions `x` last updated, and the deepest's depth (m), by the exact distance.

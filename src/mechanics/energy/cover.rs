@@ -68,4 +68,12 @@ impl Contacts<'_> {
         }
         count
     }
+
+    /// Raises the distance that a vertex keeps by so much, m; takes effect with the next [`update`](Self::update).
+    fn raise(&mut self, v: usize, by: f64) {
+        self.offsets[v] += by;
+        // What was far enough from the old distance may be near to the new one.
+        self.answer[v] = f64::NEG_INFINITY;
+        self.leave[v] = if self.held[v] { f64::INFINITY } else { f64::NEG_INFINITY };
+    }
 }

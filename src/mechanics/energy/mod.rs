@@ -23,6 +23,7 @@ pub mod fan;
 pub mod field;
 pub mod friction;
 pub mod gravity;
+mod hessian;
 mod known;
 mod layout;
 pub mod membrane;
