@@ -81,7 +81,7 @@ fn couple(
     let uncut = [f64::INFINITY];
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
-        let result = through_levels(scene, fabric, levels, surface, &stage.parts, &stage.positions, options, asked)?;
+        let result = through_levels(scene, fabric, levels, surface, (&stage.parts, &stage.positions), options, asked)?;
         stage.outcomes = result.parts.iter().map(told).collect();
         stage.positions = result.positions;
         stage.warnings.extend(result.warnings);
@@ -121,8 +121,7 @@ fn through_levels(
     fabric: &Fabric,
     levels: &Levels,
     surface: &[SurfacePoint],
-    parts: &Parts,
-    start: &[DVec3],
+    (parts, start): (&Parts, &[DVec3]),
     options: &CoupledOptions,
     asked: Asked<'_>,
 ) -> Result<CoupledResult, CoupledError> {
