@@ -72,15 +72,16 @@ fn rests(mesh: &TriMesh, held: &[u32], body: Option<&Body>, start: Vec<DVec3>) -
     end
 }
 
-/// Two sheets half an offset apart, all vertices a little off their places.
+/// Two sheets that were placed apart and are half an offset apart now, all vertices a little off their places.
 fn near_sheets() -> (Cloth, Vec<DVec3>) {
     let lower = sheet(6, 6, DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01);
     let upper =
-        sheet(5, 5, DVec3::new(0.004, 0.003, 5e-4), DVec3::new(0.01, 0.001, 0.0), DVec3::new(-0.001, 0.01, 0.0));
+        sheet(5, 5, DVec3::new(0.004, 0.003, 6e-3), DVec3::new(0.01, 0.001, 0.0), DVec3::new(-0.001, 0.01, 0.0));
     let mesh = both(lower, upper);
     let cloth = cloth(&mesh, &[0]);
     let off = |i: usize| DVec3::new((1.3 * i as f64).sin(), (2.1 * i as f64).sin(), (0.7 * i as f64).sin()) * 1e-4;
-    let x = mesh.positions.iter().enumerate().map(|(i, p)| *p + off(i)).collect();
+    let down = |i: usize| if i < 49 { DVec3::ZERO } else { DVec3::NEG_Z * 5.5e-3 };
+    let x = mesh.positions.iter().enumerate().map(|(i, p)| *p + off(i) + down(i)).collect();
     (cloth, x)
 }
 

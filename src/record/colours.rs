@@ -10,6 +10,7 @@
 
 use super::colour_map::{Rgb, oklch};
 use crate::figures::LevelCount;
+use crate::mesh::{Topology, TriMesh};
 
 /// The body: darker than any cloth and than the pale end of the colour maps, lighter than the ground.
 pub(super) const BODY: Rgb = [118, 109, 103];
@@ -17,6 +18,8 @@ pub(super) const BODY: Rgb = [118, 109, 103];
 pub(super) const CLOTH: Rgb = [196, 202, 210];
 /// The displaced garment.
 pub(super) const DRAPED: Rgb = [118, 176, 228];
+/// Connected parts of it besides the first, garments over each other for one.
+const OVER: [Rgb; 3] = [[226, 190, 132], [158, 196, 150], [206, 148, 172]];
 /// What lies in no level.
 const OUTSIDE: Rgb = [128, 128, 128];
 
@@ -30,6 +33,16 @@ const CLEAR: u32 = 5_000;
 const LEVEL_HUES: [f64; 2] = [280.0, -15.0];
 /// Lightness and chroma of the shades of a level.
 const SHADES: [(f64, f64); 5] = [(0.76, 0.125), (0.60, 0.14), (0.88, 0.08), (0.50, 0.12), (0.68, 0.07)];
+
+/// A colour for each vertex of the displaced garment: its connected parts are told apart where there are few enough.
+pub(super) fn by_part(garment: &TriMesh) -> Vec<Rgb> {
+    let (part, count) = Topology::new(garment).components();
+    let of = |part: u32| match part.checked_sub(1) {
+        Some(next) if count <= 1 + OVER.len() => OVER[next as usize % OVER.len()],
+        _ => DRAPED,
+    };
+    part.into_iter().map(of).collect()
+}
 
 /// Twelve hues of one lightness for the lines of a plot and the dots of a scatter; neighbouring entries lie far apart.
 pub(super) fn palette() -> Vec<Rgb> {

@@ -178,9 +178,7 @@ impl Open {
         self.log_mesh(paths::PARTS, &self.cells.shape())?;
         self.log_mesh(paths::FORCE, &self.cells.shape())?;
         self.triangles_once(paths::DRAPE)?;
-        let [r, g, b] = colours::DRAPED;
-        let colour = rerun::Mesh3D::update_fields().with_albedo_factor(rerun::Rgba32::from_rgb(r, g, b));
-        self.log_mesh(paths::DRAPE, &colour)
+        self.log_mesh(paths::DRAPE, &meshes::colours(colours::by_part(garment)))
     }
 
     /// Logs the garment's triangles to a path that does not have them yet.

@@ -90,7 +90,15 @@ impl Passage {
     pub(super) fn anew(&mut self, x: &[DVec3]) -> Vec<[u32; 2]> {
         self.mesh.positions.clear();
         self.mesh.positions.extend_from_slice(x);
-        self_intersecting_pairs(&self.mesh)
+        let mut pairs = self_intersecting_pairs(&self.mesh);
+        // A sliver turns over at a breath, and then crosses its neighbours by as much as it is high.
+        pairs.retain(|pair| {
+            let [a, b] = pair.map(|t| self.skin.triangles[t as usize]);
+            let frail = |corners: [u32; 3]| corners.iter().any(|&v| self.skin.frail[v as usize]);
+            let near = a.iter().any(|v| b.contains(v) || self.skin.neighbours(*v).iter().any(|w| b.contains(w)));
+            !(near && (frail(a) || frail(b)))
+        });
+        pairs
     }
 
     /// The corners of some triangles and so many rings of neighbours, ascending.

@@ -5,8 +5,8 @@
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
 //!
-//! Neighbours are near because they are neighbours: they are left out unless the garment as placed kept them well apart, and so is whatever
-//! it placed nearer than the offset (across a sliver, say).
+//! Neighbours are near because they are neighbours: they are left out unless the garment as placed kept them well apart, and so is what
+//! is near across a sliver.
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
@@ -163,7 +163,8 @@ impl Look<'_> {
             other.iter().any(|(b, _)| around.contains(b))
         };
         let placed = gap.across(self.placed).length();
-        placed < self.offset || (placed < KEPT_APART * self.reach && one.iter().any(near))
+        placed < KEPT_APART * self.reach
+            && (one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize]))
     }
 }
 

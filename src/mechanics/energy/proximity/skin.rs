@@ -24,6 +24,8 @@ pub(crate) struct Skin {
     pub(super) own_vertices: Vec<[u32; 3]>,
     /// The edges that a triangle owns, [`NONE`] behind.
     pub(super) own_edges: Vec<[u32; 3]>,
+    /// Whether a sliver is at each vertex.
+    pub(super) frail: Vec<bool>,
     /// First of each vertex's neighbours, and one past the last.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -51,6 +53,7 @@ impl Skin {
             vertex_triangles: vec![0; vertices],
             own_vertices: vec![[NONE; 3]; triangles.len()],
             own_edges: vec![[NONE; 3]; triangles.len()],
+            frail: vec![false; vertices],
             starts: Vec::new(),
             neighbours: Vec::new(),
             edge_m: 0.0,
@@ -69,6 +72,7 @@ impl Skin {
         }
         for (t, triangle) in triangles.iter().enumerate() {
             for &v in &triangle.vertices {
+                skin.frail[v as usize] |= triangle.sliver;
                 if skin.vertex_triangles[v as usize] == 0 {
                     push(&mut skin.own_vertices[t], v);
                 }
