@@ -32,10 +32,9 @@ pub(super) fn gaps(skin: &Skin, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64)
         for (one, other) in [(t, u), (u, t)] {
             let [a, b, c] = skin.triangles[one as usize];
             for side in [[a, b], [b, c], [c, a]] {
-                if let Ok(edge) = skin.edges.binary_search(&[side[0].min(side[1]), side[0].max(side[1])]) {
-                    if let Some(gap) = crossing(skin, x, edge, other as usize, stiffness) {
-                        found.insert(gap.key, gap);
-                    }
+                let edge = skin.edges.binary_search(&[side[0].min(side[1]), side[0].max(side[1])]).ok();
+                if let Some(gap) = edge.and_then(|edge| crossing(skin, x, edge, other as usize, stiffness)) {
+                    found.insert(gap.key, gap);
                 }
             }
         }
@@ -58,7 +57,7 @@ fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f
     let of = |u: DVec3, v: DVec3| (u - at).cross(v - at).dot(n) / double_area.length();
     let shares = [of(b, c), of(c, a), of(a, b)];
     // What a rounded sum says of a corner does not matter here: its neighbour crosses as well.
-    if !(0.0..=1.0).contains(&share) || shares.iter().any(|s| !(*s >= 0.0)) {
+    if !(0.0..=1.0).contains(&share) || !shares.iter().all(|s| *s >= 0.0) {
         return None;
     }
     let e = along.normalize_or_zero();
