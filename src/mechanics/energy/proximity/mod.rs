@@ -12,7 +12,7 @@
 //!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
-//! back towards how it was placed, if it did not cross there ([`clear`](Proximity::clear)), or finds its own way out (`untangle.rs`).
+//! back towards how it was placed, if it did not cross there (`clear`), or finds its own way out (`untangle.rs`).
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
