@@ -46,7 +46,7 @@ impl Upper {
         }
         for i in 0..n {
             // The diagonal is no part of it.
-            starts[i + 1] += starts[i] - 1;
+            starts[i + 1] = starts[i] + starts[i + 1] - 1;
         }
         let mut next = starts.clone();
         let mut entries = vec![(0, 0); pattern.rows.len() - n];
