@@ -35,11 +35,6 @@ pub(super) fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Res
     let refused = |e| SceneError::from(DistanceError::Refused(format!("{e:?}")));
     let below = ParryMesh::new(inner.positions.clone(), inner.triangles.clone()).map_err(refused)?;
     let topology = Topology::new(outer);
-    let mut around = vec![Vec::new(); outer.vertex_count()];
-    for &[a, b] in &topology.edges {
-        around[a as usize].push(b);
-        around[b as usize].push(a);
-    }
     let mut moves = vec![DVec3::ZERO; outer.vertex_count()];
     for _ in 0..ROUNDS {
         let there: Vec<DVec3> = outer.positions.iter().zip(&moves).map(|(x, m)| *x + *m).collect();
@@ -51,7 +46,7 @@ pub(super) fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Res
         moves.clone_from(&bound);
         for _ in 0..SWEEPS {
             let mean = |v: usize| {
-                let neighbours: &[u32] = &around[v];
+                let neighbours = topology.neighbours(v as u32);
                 neighbours.iter().map(|&w| moves[w as usize]).sum::<DVec3>() / neighbours.len().max(1) as f64
             };
             moves = (0..moves.len()).map(|v| 0.5 * (moves[v] + mean(v))).collect();

@@ -30,7 +30,7 @@ pub const ELASTIC_SLIP: f64 = 5e-4;
 
 /// Share of ε from which a hold counts as slipping in the Hessian: a dragged anchor is left at ε exactly, up to rounding,
 /// and as a spring it would let the vertex creep by a fraction of ε a step.
-pub(super) const YIELDED: f64 = 0.999;
+const YIELDED: f64 = 0.999;
 
 /// One vertex's hold on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,16 +107,19 @@ impl Friction {
     /// Each hold's Hessian block, N/m.
     pub fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DMat3)> + 'a {
         self.holds.iter().map(|h| {
-            let u = h.slip(x);
-            let y = u.length();
             let tangent = DMat3::IDENTITY - outer(h.normal, h.normal);
-            let block = if y < YIELDED * ELASTIC_SLIP {
-                tangent * (h.limit / ELASTIC_SLIP)
-            } else {
-                (tangent - outer(u / y, u / y)) * (h.limit / y)
-            };
-            (h.vertex, block)
+            (h.vertex, stiffening(h.limit, tangent, h.slip(x)))
         })
+    }
+}
+
+/// How the force stiffens with the slip u (m) along a plane with this `tangent` projection, N/m.
+pub(super) fn stiffening(limit: f64, tangent: DMat3, u: DVec3) -> DMat3 {
+    let y = u.length();
+    if y < YIELDED * ELASTIC_SLIP {
+        tangent * (limit / ELASTIC_SLIP)
+    } else {
+        (tangent - outer(u / y, u / y)) * (limit / y)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::mechanics::energy::friction::{ELASTIC_SLIP, YIELDED, huber};
+use crate::mechanics::energy::friction::{ELASTIC_SLIP, huber, stiffening};
 use crate::mechanics::energy::membrane::outer;
 
 /// No vertex: fills up a place that needs fewer.
@@ -51,6 +51,12 @@ pub struct Gap {
 }
 
 impl Gap {
+    /// A gap without a past, no plane in it yet.
+    pub(super) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
+        let (normal, from, slip) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        Self { key, weights, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
+    }
+
     /// Σ w x, m: from the second place to the first.
     pub(super) fn across(&self, x: &[DVec3]) -> DVec3 {
         self.members().map(|(v, w)| x[v as usize] * w).sum()
@@ -107,14 +113,7 @@ impl Gap {
         let nn = outer(self.normal, self.normal);
         let mut block = if pressed { nn * self.stiffness } else { DMat3::ZERO };
         if self.limit > 0.0 {
-            let u = self.slipped(across);
-            let y = u.length();
-            let tangent = DMat3::IDENTITY - nn;
-            block += if y < YIELDED * ELASTIC_SLIP {
-                tangent * (self.limit / ELASTIC_SLIP)
-            } else {
-                (tangent - outer(u / y, u / y)) * (self.limit / y)
-            };
+            block += stiffening(self.limit, DMat3::IDENTITY - nn, self.slipped(across));
         }
         Some(block)
     }

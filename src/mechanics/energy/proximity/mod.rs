@@ -187,12 +187,6 @@ impl Proximity {
         self.gaps.iter().map(|gap| gap.normal * (gap.stiffness * gap.depth(x).max(0.0)))
     }
 
-    /// The distance it keeps, m.
-    #[must_use]
-    pub fn offset(&self) -> f64 {
-        self.offset
-    }
-
     /// Looks at the step from `from`, where the last one ended, to `to`: see [`Looked`].
     pub(crate) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
         self.passage.look(from, to)

@@ -1,11 +1,12 @@
 //! Steps that take no cloth through cloth.
 //!
-//! Where a step from x to x' ends, and a few times on its way where it is long, all pairs of triangles that cross are found, exactly (`mesh::self_intersection`). If one did not cross
-//! at x, a long step is refused, and tried again half as long; a short one is cut: the corners that cross go back towards where they
-//! came from, half the way each time, and after a few times all the way, their neighbours with them. As x has no crossing, this
-//! ends.
+//! Where a step from x to x' ends, and a few times on its way where it is long, all pairs of triangles that cross are found, exactly
+//! (`mesh::self_intersection`). If one did not cross at x, a long step is refused, and tried again half as long; a short one is cut: the
+//! corners that cross go back towards where they came from, half the way each time, and after a few times all the way, their
+//! neighbours with them. As x has no crossing, this ends.
 //!
-//! Limits: what passes through whole between two looks, a few centimetres apart, is not seen. Where x crosses already, about what crosses there new crossings are let be: they are on their way out ([`untangle`](super::untangle)).
+//! Limits: what passes through whole between two looks, a few centimetres apart, is not seen. Where x crosses already, about what
+//! crosses there new crossings are let be: they are on their way out ([`untangle`](super::untangle)).
 
 use std::sync::Arc;
 
@@ -150,9 +151,8 @@ impl Passage {
         for ((to, from), share) in to.iter_mut().zip(from).zip(&share).filter(|(_, s)| **s < 1.0) {
             *to = from.lerp(*to, *share);
         }
-        let back = share.iter().filter(|s| **s < 1.0).count();
         self.begin(crossing);
-        if back > 0 { Looked::Cut } else { Looked::Clear }
+        if share.iter().any(|s| *s < 1.0) { Looked::Cut } else { Looked::Clear }
     }
 
     /// Triangles of pairs that are not on their way out.

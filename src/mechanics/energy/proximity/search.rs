@@ -138,17 +138,7 @@ impl Look<'_> {
     }
 
     fn gap(&self, key: Key, weights: [f64; 5], area: f64) -> Option<Gap> {
-        let mut gap = Gap {
-            key,
-            weights,
-            normal: DVec3::ZERO,
-            goal: self.offset,
-            stiffness: self.stiffness * area,
-            first: self.stiffness * area,
-            from: DVec3::ZERO,
-            slip: DVec3::ZERO,
-            limit: 0.0,
-        };
+        let mut gap = Gap::new(key, weights, self.offset, self.stiffness * area);
         gap.from = gap.across(self.x);
         let distance = gap.from.length();
         gap.normal = gap.from / distance;

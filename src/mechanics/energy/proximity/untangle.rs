@@ -72,17 +72,10 @@ fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f
     }
     let length = g.length();
     let stride = STRIDE * skin.edge_m * length / (length * length + HALF_AT).sqrt();
-    let mut gap = Gap {
-        key: Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]] },
-        weights: [1.0 - share, share, -shares[0], -shares[1], -shares[2]],
-        normal: g / length,
-        goal: 0.0,
-        stiffness: stiffness * skin.edge_areas[edge],
-        first: stiffness * skin.edge_areas[edge],
-        from: DVec3::ZERO,
-        slip: DVec3::ZERO,
-        limit: 0.0,
-    };
+    let key = Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]] };
+    let weights = [1.0 - share, share, -shares[0], -shares[1], -shares[2]];
+    let mut gap = Gap::new(key, weights, 0.0, stiffness * skin.edge_areas[edge]);
+    gap.normal = g / length;
     gap.goal = gap.normal.dot(gap.across(x)) + stride;
     (length > 1e-6 && gap.goal.is_finite()).then_some(gap)
 }
