@@ -3,18 +3,19 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use partwise::drape::{Refine, Scene, drape, unobserved};
 use partwise::fabric::Fabric;
 use partwise::figures::Figures;
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::self_intersection::crossing_pairs;
-use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::mesh::{Axis, RestShape, Topology, TriMesh, Unit};
 use partwise::sweep::{Bench, Plan, Status};
-use partwise::{Job, Settings};
+use partwise::{Job, SceneSpec, Settings};
 
 /// Rings of `around` points from the top down, closed by a point at each end where `ends` are given.
 fn turned(profile: &[(f64, f64)], around: u32, ends: Option<[f64; 2]>) -> TriMesh {
@@ -175,4 +176,82 @@ fn a_seam_of_slivers_bears_like_cloth_and_opens_by_no_more_than_a_fiftieth() {
     let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &Fabric::by_name("denim").unwrap(), &[]).unwrap();
     let area: f64 = cloth.areas.iter().sum();
     assert!((area - 0.1 * (0.2 + seam)).abs() < 1e-12, "{area}");
+}
+
+/// SplitMix64, for numbers that are the same everywhere.
+fn random(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[test]
+fn a_rest_shape_drawn_far_too_large_or_small_is_solved_all_the_same() {
+    let seeds = std::env::var("PARTWISE_REST_SEEDS").map_or(24, |n| n.parse().unwrap());
+    let mut wrong = Vec::new();
+    for seed in 0..seeds {
+        let mut state: u64 = seed;
+        let profile = [(0.03, 1.03), (0.12, 0.98), (0.21, 0.93), (0.3, 0.88)];
+        let mut scene = Scene::of_meshes(&cone(), turned(&profile, 8, None)).unwrap();
+        scene.held = (0..8).collect();
+        for _ in 0..=(3.0 * random(&mut state)) as usize {
+            // One corner of the pattern, wherever triangles meet it, off by up to a hundred thousand kilometres.
+            let v = (32.0 * random(&mut state)) as u32;
+            let off = DVec2::new(random(&mut state) - 0.5, random(&mut state) - 0.5)
+                * 10f64.powf(13.0 * random(&mut state) - 5.0);
+            for (t, rest) in scene.garment.triangles.iter().zip(&mut scene.rest.corners) {
+                let Some(corner) = t.iter().position(|&w| w == v) else { continue };
+                rest[corner] += off;
+                let [a, b, c] = *rest;
+                if (b - a).perp_dot(c - a) < 0.0 {
+                    *rest = rest.map(|p| DVec2::new(-p.x, p.y));
+                }
+            }
+        }
+        for fabric in ["interlock", "denim"] {
+            let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
+            let found = drape(&scene, &settings, &mut |step| match step.iteration {
+                0..40 => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            });
+            match found {
+                Ok(found) if found.positions.iter().all(|p| p.is_finite()) => {}
+                Ok(_) => wrong.push(format!("{seed} in {fabric}: not finite")),
+                Err(e) => wrong.push(format!("{seed} in {fabric}: {e}")),
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), 2 * seeds);
+}
+
+#[test]
+fn a_pattern_torn_in_one_corner_is_told_with_its_face() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    write_mesh(&folder.path().join("body.obj"), &cone()).unwrap();
+    let cape = turned(&[(0.03, 1.03), (0.12, 0.98), (0.21, 0.93), (0.3, 0.88)], 8, None);
+    let text: String = (cape.positions.iter())
+        .enumerate()
+        .map(|(v, p)| format!("v {} {} {}\nvt {} {}\n", p.x, p.y, p.z, if v == 17 { 4.0 } else { p.x }, p.y))
+        .chain(cape.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|v| v + 1);
+            format!("f {a}/{a} {b}/{b} {c}/{c}\n")
+        }))
+        .collect();
+    std::fs::write(place("cape.obj"), text).unwrap();
+    let spec = SceneSpec {
+        unit: Some(Unit::M),
+        up: Some(Axis::Z),
+        rest: "texture".to_owned(),
+        ..SceneSpec::new(place("body.obj"), place("cape.obj"))
+    };
+    let loaded = spec.load().unwrap();
+    let notes = loaded.notes().join("\n");
+    let face = cape.triangles.iter().position(|t| t.contains(&17)).unwrap() + 1;
+    assert!(notes.contains("6 triangles are of another size at rest than as worn"), "{notes}");
+    assert!(notes.contains(&format!("farthest off in face {face}: 4.")) || notes.contains("m long at rest"), "{notes}");
+    let (figures, warnings, x) = draped(&loaded.scene);
+    assert!(x.iter().all(|p| p.is_finite()) && figures.strain_max.is_some(), "{warnings:?}");
 }

@@ -3,8 +3,13 @@
 use super::health::Findings;
 use super::import::Imported;
 use super::report::{Remark, Repair};
+use super::rest::RestShape;
 use super::topology::{NONE, Topology};
 use super::{retain, winding};
+
+/// A triangle that at rest is so many times as long as worn, or as many times shorter, was not cut for where it is: what is stretched or
+/// gathered is off by tens of percent.
+const OTHER_SIZE: f64 = 4.0;
 
 impl Imported {
     /// Turns the triangles that face inward, whole connected parts of them, and says so.
@@ -63,6 +68,30 @@ impl Imported {
         let triangles = drop.iter().filter(|&&drop| drop).count();
         self.report.repairs.push(Repair::NoAreaDropped { triangles, first });
         self.look();
+    }
+
+    /// Notes what solvers will find odd in its rest shape.
+    pub(crate) fn remark_on(&mut self, rest: &RestShape) {
+        let slivers = rest.slivers();
+        if slivers > 0 {
+            self.report.remarks.push(Remark::Slivers { triangles: slivers });
+        }
+        let longest = |sides: [f64; 3]| sides.into_iter().fold(0.0, f64::max);
+        let at_rest = rest.corners.iter().map(|c| longest([0, 1, 2].map(|i| c[i].distance(c[(i + 1) % 3]))));
+        let mesh = &self.mesh;
+        let worn = (0..mesh.triangles.len()).map(|t| {
+            let c = mesh.corners(t);
+            longest([0, 1, 2].map(|i| c[i].distance(c[(i + 1) % 3])))
+        });
+        let pairs = at_rest.zip(worn).enumerate();
+        let off: Vec<(f64, usize, f64, f64)> = pairs
+            .map(|(t, (rest, worn))| ((rest / worn).max(worn / rest), t, rest, worn))
+            .filter(|(ratio, ..)| *ratio > OTHER_SIZE)
+            .collect();
+        if let Some(&(_, t, rest_m, worn_m)) = off.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let first = self.source.faces[self.face[t] as usize].number as usize + 1;
+            self.report.remarks.push(Remark::OtherThanWorn { triangles: off.len(), first, rest_m, worn_m });
+        }
     }
 
     /// Notes what the topology shows.

@@ -76,6 +76,8 @@ pub enum Remark {
     NoArea { triangles: usize },
     /// Triangles much longer than high.
     Slivers { triangles: usize },
+    /// Triangles of another size at rest than as worn; `first` is the file's face, from 1, of the one that is farthest off.
+    OtherThanWorn { triangles: usize, first: usize, rest_m: f64, worn_m: f64 },
     /// The body has a boundary.
     Open { edges: usize, loops: usize },
     /// Points and lines, passed over.
@@ -102,6 +104,12 @@ impl fmt::Display for Remark {
                 f,
                 "{triangles} triangles are slivers, less than a fiftieth of their longest side high; they bear loads as if they \
                  were that high"
+            ),
+            Self::OtherThanWorn { triangles, first, rest_m, worn_m } => write!(
+                f,
+                "{triangles} triangles are of another size at rest than as worn, the farthest off in face {first}: {:.3} m \
+                 long at rest, {:.3} m as worn; is the pattern torn there?",
+                rest_m, worn_m
             ),
             Self::Open { edges, loops } => write!(
                 f,

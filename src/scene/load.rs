@@ -13,7 +13,7 @@ use crate::mesh::export::{write_imported, write_mesh, write_textured};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::glb::write_glb;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::report::{MeshReport, Remark};
+use crate::mesh::report::MeshReport;
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
 use crate::pattern::{SewingPattern, SewnGarment};
 use crate::sewing::{PutOn, put_on};
@@ -224,10 +224,7 @@ impl SceneSpec {
         }
         imported.drop_triangles(&flat);
         retain(&mut rest.corners, |t| !flat[t]);
-        let slivers = rest.slivers();
-        if slivers > 0 {
-            imported.report.remarks.push(Remark::Slivers { triangles: slivers });
-        }
+        imported.remark_on(&rest);
         Ok(rest)
     }
 }

@@ -152,6 +152,18 @@ fn agrees(folder: &Path, told: &str, converged: bool) -> Result<(), String> {
     Ok(())
 }
 
+/// Keeps a run's files and command line, and says how it ended.
+fn keep(case: &Case, number: u32, reason: &str) {
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("../whole-runs/{number}"));
+    fs::create_dir_all(&kept).unwrap();
+    for (name, bytes) in &case.files {
+        fs::write(kept.join(name.replace('/', "-")), bytes).unwrap();
+    }
+    let told = format!("run {number}: partwise {}\n{reason}\n", case.arguments.join(" "));
+    fs::write(kept.join("told.txt"), &told).unwrap();
+    eprintln!("{told}");
+}
+
 #[test]
 fn whatever_it_is_given_it_ends_well() {
     let runs = std::env::var("PARTWISE_FUZZ_RUNS").map_or(120, |text| text.parse::<u32>().unwrap());
@@ -175,19 +187,14 @@ fn whatever_it_is_given_it_ends_well() {
             let folder = seeds.folder.path().join(format!("{worker}/a/b/c"));
             let _ = fs::remove_dir_all(seeds.folder.path().join(worker.to_string()));
             fs::create_dir_all(&folder).unwrap();
-            match judge(&case, &folder) {
+            let ended = judge(&case, &folder);
+            // A run asked for alone is kept whatever comes of it, to be looked at.
+            if let (Err(reason), _) | (Ok(reason), 1) = (ended.as_deref().map_err(String::as_str), runs) {
+                keep(&case, number, reason);
+            }
+            match ended {
                 Ok(outcome) => *counts.lock().unwrap().entry((case.kind.name, outcome)).or_insert(0_u32) += 1,
-                Err(reason) => {
-                    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("../whole-runs/{number}"));
-                    fs::create_dir_all(&kept).unwrap();
-                    for (name, bytes) in &case.files {
-                        fs::write(kept.join(name.replace('/', "-")), bytes).unwrap();
-                    }
-                    let told = format!("run {number}: partwise {}\n{reason}\n", case.arguments.join(" "));
-                    fs::write(kept.join("told.txt"), &told).unwrap();
-                    eprintln!("{told}");
-                    wrong.lock().unwrap().push(told);
-                }
+                Err(reason) => wrong.lock().unwrap().push(format!("run {number}: {reason}")),
             }
         }
     };

@@ -47,9 +47,6 @@ const SHORTEST_STEP: f64 = 1e-6;
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
 const RELAXED_TRIALS: usize = 2;
 
-/// Times the damping is raised tenfold for a Hessian that is not positive before the step is given up.
-const DAMPED_AGAIN: usize = 10;
-
 /// Where a step is taken from.
 pub(crate) struct State<'a> {
     pub(crate) cloth: &'a Cloth,
@@ -221,7 +218,8 @@ impl<'c, 'b> Descent<'c, 'b> {
 
     /// One iteration. The damping is the caller's to change afterwards.
     pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: Pace) -> Result<Advance, SolveError> {
-        self.direct(tangent)?;
+        let Self { cloth, x, contacts, gradient, direction, blocks, damping, .. } = self;
+        tangent.step(&State { cloth, x, contacts, gradient, damping: *damping }, direction, blocks)?;
         let Self {
             cloth, contacts, x, relaxation, direction, trial, gradient, energy, trial_gradient, scratch, ..
         } = self;
@@ -271,21 +269,6 @@ impl<'c, 'b> Descent<'c, 'b> {
         self.contacts.refresh(&self.x);
         self.evaluate();
         Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m })
-    }
-
-    /// Fills the direction and the blocks; a Hessian that is not positive gets more damping.
-    fn direct(&mut self, tangent: &mut dyn Tangent) -> Result<(), SolveError> {
-        let mut damping = self.damping;
-        for again in 0.. {
-            let Self { cloth, x, contacts, gradient, direction, blocks, .. } = self;
-            let here = State { cloth, x, contacts, gradient, damping };
-            match tangent.step(&here, direction, blocks) {
-                Ok(()) => break,
-                Err(SolveError::NotPositive { .. }) if again < DAMPED_AGAIN => damping = 10.0 * damping.max(0.1),
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
     }
 }
 

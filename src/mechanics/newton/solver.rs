@@ -1,12 +1,15 @@
 //! Direct solve of (∇²E + ε M) d = b: sparse Cholesky, analysed once a garment, refactored in place.
 //!
-//! faer's supernodal LLᵀ in the garment's own elimination order. One thread does it all, so the bits do not depend on
-//! how many there are.
+//! LLᵀ by fronts in the garment's own elimination order (`factor.rs`), with the same bits on any number of threads.
 //!
 //! It factors in single precision, which takes half the time, and mends the solution in double: d ← d + S⁻¹ (b − A d) until
 //! what is left of b is under [`REST`] (iterative refinement; Higham: "Accuracy and Stability of Numerical Algorithms",
 //! chapter 12). That works while the matrix's condition is under some 1e7: for knits, and for wovens while they are soft. The
 //! first time it does not, or a pivot is lost that double precision holds, the solver takes double from then on.
+//!
+//! A positive matrix may lose a pivot in double, too: triangles drawn a thousand times too large beside their neighbours. A share of its own
+//! diagonal is then added to it. Scaled to a unit diagonal, a matrix is factorised wherever its least eigenvalue is over some n times
+//! the rounding (Demmel; Higham, theorem 10.7), and that share is what the least eigenvalue becomes.
 
 use glam::{DMat3, DVec3};
 
@@ -26,7 +29,10 @@ pub enum SolveError {
         reason: String,
     },
     /// A pivot was not positive.
-    #[error("the Hessian is not positive definite at unknown {index}: is a position not finite?")]
+    #[error(
+        "the forces of the cloth are no finite numbers (unknown {index}): are rest shape and garment as worn of different orders of \
+         magnitude?"
+    )]
     NotPositive {
         /// Scalar unknown in elimination order.
         index: usize,
@@ -38,6 +44,9 @@ const REST: f64 = 1e-3;
 
 /// Times a solution in single precision is mended at most: each takes off a factor of the condition times 1e-7.
 const MENDS: usize = 4;
+
+/// Shares of its own diagonal that are added to a positive matrix which double precision loses, one after the other.
+const RIDGES: [f64; 6] = [1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 1.0];
 
 /// A factorisation whose pattern is fixed.
 pub struct Solver {
@@ -75,8 +84,9 @@ impl Solver {
     /// holds b, then the solution, in elimination order. Double precision takes over where single does not do.
     ///
     /// # Errors
-    /// [`SolveError::NotPositive`] where a pivot is zero, negative or not a number in double precision; where only
-    /// `positive` matrices are expected, one that single precision loses is tried in double first.
+    /// [`SolveError::NotPositive`] where a pivot is zero, negative or not a number; where only `positive` matrices are expected, one that
+    /// single precision loses is tried in double, and then with a share of its diagonal added, so that numbers alone are refused which
+    /// are not finite.
     pub fn solve(
         &mut self,
         pattern: &Pattern,
@@ -93,9 +103,26 @@ impl Solver {
                 _ => self.single = None,
             }
         }
-        self.double.factorise(&self.forest, matrix)?;
+        self.factorise_in_double(pattern, matrix, positive)?;
         self.double.solve(&self.forest, x);
         Ok(())
+    }
+
+    fn factorise_in_double(&mut self, pattern: &Pattern, matrix: Matrix<'_>, positive: bool) -> Result<(), SolveError> {
+        let mut done = self.double.factorise(&self.forest, matrix);
+        for share in RIDGES.into_iter().filter(|_| positive) {
+            if done.is_ok() {
+                break;
+            }
+            let raised = |(&shift, &own): (&f64, &u32)| {
+                let block = matrix.blocks[own as usize];
+                let trace = block.x_axis.x + block.y_axis.y + block.z_axis.z;
+                shift + share * (trace + shift) + f64::MIN_POSITIVE.sqrt()
+            };
+            let diagonal: Vec<f64> = matrix.diagonal.iter().zip(&pattern.starts).map(raised).collect();
+            done = self.double.factorise(&self.forest, Matrix { diagonal: &diagonal, ..matrix });
+        }
+        done
     }
 
     /// Solves once more with the matrix of the last [`solve`](Self::solve), whose factor is kept; where single precision does not do for
@@ -116,7 +143,7 @@ impl Solver {
                 return Ok(());
             }
             self.single = None;
-            self.double.factorise(&self.forest, matrix)?;
+            self.factorise_in_double(pattern, matrix, true)?;
         }
         self.double.solve(&self.forest, x);
         Ok(())
@@ -159,4 +186,52 @@ fn mended(
 /// ‖x‖₂.
 fn norm(x: &[DVec3]) -> f64 {
     x.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fabric::Fabric;
+    use crate::mechanics::energy::{Cloth, Contacts};
+    use crate::mesh::{RestShape, Topology, TriMesh};
+
+    /// Nothing holds a sheet that has no mass in the matrix either: it may go anywhere, and the matrix is singular.
+    #[test]
+    fn what_double_precision_loses_is_solved_and_what_is_no_number_is_refused() {
+        let n = 6;
+        let at = |i: u32| DVec3::new(f64::from(i % n), 0.0, f64::from(i / n)) * 0.01;
+        let quads = (0..n * n).filter(|i| i % n + 1 < n && i / n + 1 < n);
+        let triangles = quads.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
+        let mesh = TriMesh::new((0..n * n).map(at).collect(), triangles);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let fabric = Fabric::by_name("denim").unwrap();
+        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
+        let mut blocks = Vec::new();
+        cloth.hessian(&mesh.positions, &Contacts::none(), &mut blocks);
+        let (pattern, none) = (cloth.pattern(), vec![0.0; mesh.vertex_count()]);
+        // Forces that add up to nothing, turning included: some displacement balances them.
+        let mut pull = vec![DVec3::ZERO; mesh.vertex_count()];
+        for (i, &v) in cloth.order().iter().enumerate() {
+            let row = (mesh.positions[v as usize].z / 0.01).round();
+            pull[i].z = if row == 0.0 {
+                -1e-2
+            } else if row == 5.0 {
+                1e-2
+            } else {
+                0.0
+            };
+        }
+        let mut x = pull.clone();
+        let mut solver = Solver::new(pattern).unwrap();
+        let lost = solver.solve(pattern, &blocks, &none, false, &mut x);
+        assert!(matches!(lost, Err(SolveError::NotPositive { .. })), "{lost:?}");
+        solver.solve(pattern, &blocks, &none, true, &mut x).unwrap();
+        let mut back = Vec::new();
+        pattern.multiply(&blocks, &x, &mut back);
+        let off = back.iter().zip(&pull).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+        assert!(off < 1e-6, "{off} N of a hundredth");
+        blocks[0].x_axis.x = f64::NAN;
+        let refused = solver.solve(pattern, &blocks, &none, true, &mut pull);
+        assert!(matches!(refused, Err(SolveError::NotPositive { .. })), "{refused:?}");
+    }
 }
