@@ -19,6 +19,7 @@ use parry3d_f64::query::{PointProjection, PointQueryWithLocation};
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
 use rayon::prelude::*;
 
+use crate::mesh::winding::signed_volumes;
 use crate::mesh::{Topology, TriMesh};
 
 /// Closer than this to the surface (m), the direction to the closest point is rounding noise and the pseudo-normal is
@@ -27,6 +28,10 @@ const ON_SURFACE: f64 = 1e-9;
 
 /// Points that are asked for one after the other: in one task, and each with the one before as a hint.
 const CHUNK: usize = 128;
+
+/// A volume under this share of the area to the power of one and a half (a sphere's is a tenth) is rounding: a sheet of two square metres is
+/// then thinner than a micrometre, and neither side of it is inside.
+const FLAT: f64 = 1e-6;
 
 /// Above 1 by more than a distance is rounded.
 const ROUNDED: f64 = 1.0 + 1e-12;
@@ -41,6 +46,12 @@ pub enum DistanceError {
     /// A boundary edge: the surface does not separate inside from outside.
     #[error("the body is not closed: {count} boundary edges, the first between vertices {a} and {b}")]
     Open { count: usize, a: u32, b: u32 },
+    /// Nothing between one side and the other.
+    #[error(
+        "the body encloses no volume, though it is closed: expected a solid, found {area_m2:.3} m² of surface about {litres:.2e} litres; \
+         are vertices at the wrong place, or is it a sheet?"
+    )]
+    Flat { area_m2: f64, litres: f64 },
     /// The query structure refused the mesh.
     #[error("the body cannot be searched: {0}")]
     Refused(String),
@@ -79,6 +90,12 @@ impl Body {
         let mut open = topology.boundary_edges();
         if let Some([a, b]) = open.next() {
             return Err(DistanceError::Open { count: open.count() + 1, a, b });
+        }
+        let (component, components) = topology.components();
+        let volume: f64 = signed_volumes(mesh, &component, components).iter().map(|v| v.abs()).sum();
+        let area: f64 = mesh.triangle_areas().iter().sum();
+        if !mesh.triangles.is_empty() && volume <= FLAT * area.powf(1.5) {
+            return Err(DistanceError::Flat { area_m2: area, litres: 1e3 * volume });
         }
         Self::new_open(mesh)
     }
@@ -195,6 +212,16 @@ mod tests {
         assert!(matches!(error, DistanceError::Open { count: 3, .. }), "{error}");
         assert!(Body::new_open(&open).is_ok());
         assert!(matches!(Body::new(&TriMesh::default()), Err(DistanceError::Empty)));
+    }
+
+    #[test]
+    fn a_sheet_of_two_sides_encloses_nothing_and_is_refused() {
+        let mut flat = cube();
+        flat.positions.iter_mut().for_each(|p| p.z *= 1e-9);
+        let error = Body::new(&flat).unwrap_err();
+        assert!(matches!(error, DistanceError::Flat { .. }), "{error}");
+        flat.positions.iter_mut().for_each(|p| p.z *= 1e6);
+        assert!(Body::new(&flat).is_ok(), "a millimetre is enough");
     }
 
     #[test]

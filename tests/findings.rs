@@ -255,3 +255,54 @@ fn a_pattern_torn_in_one_corner_is_told_with_its_face() {
     let (figures, warnings, x) = draped(&loaded.scene);
     assert!(x.iter().all(|p| p.is_finite()) && figures.strain_max.is_some(), "{warnings:?}");
 }
+
+#[test]
+fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
+    // Two tubes about a cone, far too wide to stay where they are.
+    let tube = |top: f64| turned(&[(0.35, top), (0.35, top - 0.05), (0.35, top - 0.1)], 24, None);
+    let mut both = tube(0.9);
+    let lower = tube(0.6);
+    let first = both.positions.len() as u32;
+    both.positions.extend(&lower.positions);
+    both.triangles.extend(lower.triangles.iter().map(|t| t.map(|v| v + first)));
+    both.groups = ["upper", "inside", "lower"].map(str::to_owned).to_vec();
+    both.triangle_group = (0..both.triangles.len()).map(|t| if t < 96 { 0 } else { 2 }).collect();
+    let mut scene = Scene::of_meshes(&cone(), both).unwrap();
+    let ring = |from: u32| (from..from + 24).collect::<Vec<u32>>();
+    assert_eq!(scene.edge("top").unwrap(), ring(0));
+    assert_eq!(scene.edge("top:2").unwrap(), ring(first));
+    assert_eq!(scene.edges("top:2, top:1").unwrap(), [ring(0), ring(first)].concat());
+    assert_eq!(scene.edge("upper").unwrap(), [ring(0), ring(48)].concat());
+    for (what, expected) in
+        [("top:3", "`top:1` to `top:2`"), ("top:x", "2 connected parts"), ("inside", "no edge"), ("hem", "upper")]
+    {
+        let said = scene.edges(what).unwrap_err().to_string();
+        assert!(said.contains("--hold") && said.contains(expected), "{said}");
+    }
+    scene.held = scene.edges("top:1,top:2").unwrap();
+    let (figures, _, x) = draped(&scene);
+    assert!(figures.residual_over_weight.unwrap() < 1e-3 && figures.top_sank_mm == 0.0);
+    assert!(scene.held.iter().all(|&v| x[v as usize] == scene.garment.positions[v as usize]));
+}
+
+#[test]
+fn a_body_that_goes_through_itself_is_draped_over() {
+    // Two spheres through each other, one of them turned inside out: inside and outside change from point to point.
+    let mut body = sphere();
+    let mut other = sphere();
+    let first = body.positions.len() as u32;
+    other.positions.iter_mut().for_each(|p| *p += DVec3::new(0.02, 0.01, 0.005));
+    body.positions.extend(other.positions);
+    body.triangles.extend(other.triangles.iter().map(|t| [t[0] + first, t[2] + first, t[1] + first]));
+    let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
+    let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
+    for fabric in ["interlock", "denim"] {
+        let scene = Scene::of_meshes(&body, cape.clone()).unwrap();
+        let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
+        let found = drape(&scene, &settings, &mut |step| match step.iteration {
+            0..60 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        });
+        assert!(found.unwrap().positions.iter().all(|p| p.is_finite()));
+    }
+}

@@ -262,3 +262,17 @@ fn a_thread_works_until_the_session_is_closed() {
     worker.join().unwrap();
     assert_eq!(now.finished.unwrap().state, 1);
 }
+
+#[test]
+fn what_is_held_until_it_rests_is_let_go_as_run_does_it_and_reported() {
+    let garment = format!("{}/assets/patterns/skirt.json", env!("CARGO_MANIFEST_DIR"));
+    let job = Job { scene: SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", garment) }, ..Job::default() };
+    let session = Session::new(job.clone(), false);
+    let mut workshop = Workshop::new(MeshCache::in_user_cache());
+    let done = work(&session, &mut workshop);
+    let run = drape::drape(&job.scene.load().unwrap().scene, &job.settings, &mut drape::unobserved).unwrap();
+    let finished = &done.finished.as_ref().unwrap().drape;
+    assert!(run.let_go.is_some());
+    assert_eq!((finished.let_go, &finished.positions), (run.let_go, &run.positions));
+    assert_eq!(finished.warnings, run.warnings);
+}

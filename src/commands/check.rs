@@ -57,7 +57,10 @@ fn verdict(body: &Health, garment: &Health, fit: &Placement) -> String {
         (body.self_intersecting_pairs, "pairs of body triangles that cross"),
         (garment.non_manifold_edges, "garment edges of three triangles or more"),
         (garment.no_area, "garment triangles without area"),
-        (garment.self_intersecting_pairs, "pairs of garment triangles that cross, and stay crossed"),
+        (
+            garment.self_intersecting_pairs,
+            "pairs of garment triangles that cross, which a drape takes apart as far as it can",
+        ),
         (fit.penetrating_vertices, "garment vertices inside the body, which a drape pushes out first"),
         (fit.crossing_pairs, "pairs of a garment and a body triangle that cross"),
     ];
@@ -68,6 +71,26 @@ fn verdict(body: &Health, garment: &Health, fit: &Placement) -> String {
     } else {
         format!("look at {}", found.join("; "))
     }
+}
+
+/// Connected parts that are listed, at most.
+const LISTED: usize = 12;
+
+/// The connected parts of a garment that has several, by the names that `--hold` takes.
+fn connected_parts(scene: &Scene) -> Vec<(String, String)> {
+    let (part_of, count) = scene.topology.components();
+    if count < 2 {
+        return Vec::new();
+    }
+    let mut parts = vec![(0, f64::INFINITY, f64::NEG_INFINITY); count];
+    for (&part, p) in part_of.iter().zip(&scene.garment.positions) {
+        let (vertices, low, high) = &mut parts[part as usize];
+        (*vertices, *low, *high) = (*vertices + 1, low.min(p.z), high.max(p.z));
+    }
+    let row = |(part, (vertices, low, high))| {
+        (format!("  part {part} (--hold top:{part})"), format!("{vertices} vertices, {low:.2} to {high:.2} m high"))
+    };
+    (1..).zip(parts).take(LISTED).map(row).collect()
 }
 
 impl CheckArgs {
@@ -94,6 +117,9 @@ impl CheckArgs {
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["", &loaded.body_name, &loaded.garment_name]);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);
+        }
+        for (name, value) in connected_parts(scene) {
+            table.add_row([name, String::new(), value]);
         }
         for (name, value) in report.fit.rows() {
             table.add_row([name.to_owned(), String::new(), value]);

@@ -49,9 +49,9 @@ pub(crate) struct InputArgs {
     /// texture coordinates where they are the flat pattern it was cut by, in whatever unit, else its own edges
     #[arg(long, value_name = "auto|own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
     rest: String,
-    /// Hold an edge of the garment where it is: `top` (its highest edge, a waistband, say) or the edges that a group of
-    /// its file lies on [default: the waistband of a built-in skirt; of a file nothing]
-    #[arg(long, value_name = "top|GROUP")]
+    /// Hold edges of the garment where they are: `top` (its highest edge, a waistband, say), `top:2` (the highest of its second connected
+    /// part) or those that a group of its file lies on; several with commas [default: the waistband of a built-in skirt; of a file nothing]
+    #[arg(long, value_name = "top|top:N|GROUP")]
     hold: Option<String>,
     /// Leave garment vertices that start inside the body where they are
     #[arg(long)]

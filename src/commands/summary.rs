@@ -10,7 +10,7 @@ use partwise::accuracy::Accuracy;
 use partwise::certificate::Certificate;
 use partwise::drape::Drape;
 use partwise::fabric::Fabric;
-use partwise::figures::{Figures, LevelCount};
+use partwise::figures::{GirthEase, Figures, LevelCount};
 use partwise::job::Measured;
 use partwise::record::Panel;
 use partwise::scene::Loaded;
@@ -35,6 +35,8 @@ pub(crate) struct Summary {
     vertices_per_level: Vec<usize>,
     #[serde(skip)]
     levels: Vec<LevelCount>,
+    /// Garment and body at bust, waist and hip.
+    ease: Vec<GirthEase>,
     /// What came of letting go what was held until it rested.
     let_go: Option<String>,
     /// Every figure against the own continuation, under `--accuracy`.
@@ -80,6 +82,7 @@ impl Summary {
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
+            ease: GirthEase::all(&loaded.scene, loaded.girths_at_m, &drape.positions),
             let_go: drape.let_go.map(|let_go| let_go.to_string()),
             accuracy,
             timings_ms: BTreeMap::new(),
@@ -141,6 +144,9 @@ impl Summary {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let _ = writeln!(out, "\n{}", self.levels_table());
+        if self.covered().next().is_some() {
+            let _ = writeln!(out, "{}", self.ease_table());
+        }
         let order =
             ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
         let times: Vec<String> =
@@ -155,7 +161,9 @@ impl Summary {
     /// For the recording's text panel.
     pub(crate) fn panel(&self, fabric: &Fabric) -> Panel {
         let of_model = [("model", self.model.to_owned()), ("motion", self.motion.to_owned())];
-        let facts = of_model.into_iter().chain(self.figures.facts());
+        let ease: Vec<String> = self.covered().map(|(e, _, cm)| format!("{} {cm:+.1} cm", e.at)).collect();
+        let ease = (!ease.is_empty()).then(|| ("ease", ease.join(", ")));
+        let facts = of_model.into_iter().chain(self.figures.facts()).chain(ease);
         Panel {
             title: format!("{} on {}", self.garment, self.body),
             table: self.table.clone(),
@@ -169,6 +177,25 @@ impl Summary {
             warnings: self.warnings.clone(),
             command_line: self.command_line.clone(),
         }
+    }
+
+    /// Where the garment goes round the body: its girth and its ease, cm.
+    fn covered(&self) -> impl Iterator<Item = (&GirthEase, f64, f64)> {
+        self.ease.iter().filter_map(|ease| Some((ease, ease.garment_cm?, ease.ease_cm?)))
+    }
+
+    fn ease_table(&self) -> Table {
+        let mut table = Table::new();
+        let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+        for (ease, garment_cm, ease_cm) in self.covered() {
+            let lengths = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
+            table.add_row([ease.at.to_owned()].into_iter().chain(lengths).chain([format!("{ease_cm:+.1}")]));
+        }
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        table
     }
 
     fn levels_table(&self) -> Table {

@@ -24,7 +24,7 @@ use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
 pub use error::DrapeError;
 pub use let_go::LetGo;
-use let_go::Released;
+pub(crate) use let_go::{Released, let_go};
 pub(crate) use levels::Levels;
 pub(crate) use parts::{ENOUGH, StageTwo, approach, stage_one, stage_two, told};
 pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
@@ -166,7 +166,7 @@ fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<
             let released = timed(&mut times.refine, || {
                 let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
                 let refined = refine_from(scene, settings, &levels.cloth, Some(&ground), start, observer)?;
-                let_go::let_go(scene, settings, refined, observer)
+                let_go(scene, settings, refined, observer)
             })?;
             let Released { cloth, refined, let_go } = released;
             let cloth = cloth.as_ref().unwrap_or(&levels.cloth);

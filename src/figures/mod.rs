@@ -3,9 +3,11 @@
 //! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
 //! reference drape is there where somebody asked for one.
 
+mod ease;
 mod levels;
 mod warnings;
 
+pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
 

@@ -15,9 +15,15 @@ impl Figures {
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         let mut found = Vec::new();
         if self.top_sank_mm > SANK_MM && scene.held.is_empty() {
+            let parts = scene.topology.components().1;
+            let parts = if parts > 1 {
+                format!(", of its {parts} connected parts top:1 to top:{parts}")
+            } else {
+                String::new()
+            };
             let groups = match scene.garment.groups.as_slice() {
-                [] => String::new(),
-                groups => format!(", or one of its groups: {}", groups.join(", ")),
+                [] => parts,
+                groups => format!("{parts}, or one of its groups: {}", groups.join(", ")),
             };
             found.push(format!(
                 "the garment has slid down: its highest edge sank by {:.0} cm, and nothing holds it; if it has a waistband, hold \

@@ -26,7 +26,7 @@ pub mod self_intersection;
 mod source;
 mod topology;
 mod triangle_crossing;
-mod winding;
+pub(crate) mod winding;
 
 use glam::DVec3;
 

@@ -95,7 +95,7 @@ pub(super) fn disagreeing_edges(mesh: &TriMesh, topology: &Topology) -> usize {
 
 /// Signed volume of each vertex-connected component about its own middle, m³; positive where it faces outward. For an
 /// open component, the volume of the cone from its middle, whose sign still tells the outside of a bowl.
-pub(super) fn signed_volumes(mesh: &TriMesh, component: &[u32], count: usize) -> Vec<f64> {
+pub(crate) fn signed_volumes(mesh: &TriMesh, component: &[u32], count: usize) -> Vec<f64> {
     let mut middle = vec![(DVec3::ZERO, 0.0); count];
     for (p, &c) in mesh.positions.iter().zip(component) {
         middle[c as usize].0 += p;

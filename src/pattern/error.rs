@@ -45,7 +45,7 @@ pub enum PatternError {
     #[error("stitch {stitch}: found no panel \"{found}\", expected one of {}", listed(known))]
     NoPanel { stitch: usize, found: String, known: Vec<String> },
     /// A stitch to what is not there.
-    #[error("stitch {stitch}: panel {panel} has no edge {found}, its edges are 0 to {last}")]
+    #[error("stitch {stitch}: found edge {found} of panel {panel}, expected one of its edges 0 to {last}")]
     NoEdge { stitch: usize, panel: String, found: u64, last: usize },
     /// An edge twice in stitches.
     #[error(

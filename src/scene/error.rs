@@ -53,10 +53,15 @@ pub enum SceneError {
     )]
     NotNear { nearest: f64, limit: f64 },
     /// Nothing to hold.
-    #[error("--hold top: the garment has no edge to hold")]
-    NoEdge,
+    #[error(
+        "--hold {what}: found no edge there, only cloth that goes on; expected an open edge to hold, as a waistband has"
+    )]
+    NoEdge { what: String },
+    /// A connected part that is not there.
+    #[error("--hold: found \"{found}\", expected `top:1` to `top:{parts}`: the garment has {parts} connected parts")]
+    UnknownPart { found: String, parts: usize },
     /// A group to hold that is not there.
-    #[error("--hold: found no group \"{found}\" in the garment, expected `top`{}", or_one_of(known))]
+    #[error("--hold: found no group \"{found}\" in the garment, expected `top`, `top:N`{}", or_one_of(known))]
     UnknownGroup { found: String, known: Vec<String> },
     /// Any of these, where it does not say itself which body, garment or file it is about.
     #[error("{name}: {source}")]

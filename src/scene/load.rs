@@ -36,6 +36,8 @@ pub struct Loaded {
     pub tailored: Option<Tailored>,
     /// The pattern that was found in its texture coordinates.
     pub flat_pattern: Option<FlatPattern>,
+    /// Heights at which the built-in form has its bust, waist and hip girths, m.
+    pub girths_at_m: Option<[f64; 3]>,
     imported: Option<Imported>,
 }
 
@@ -99,8 +101,9 @@ impl SceneSpec {
                 scene.let_go = unplaced.tailored.is_some();
                 unplaced.held
             }
-            Some(what) => scene.edge(what).map_err(SceneError::about(&self.garment))?,
+            Some(what) => scene.edges(what).map_err(SceneError::about(&self.garment))?,
         };
+        let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
         let reports = of_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
         Ok(Loaded {
             scene,
@@ -110,6 +113,7 @@ impl SceneSpec {
             pushed_out,
             tailored: unplaced.tailored,
             flat_pattern: unplaced.pattern,
+            girths_at_m: form.map(|m| [m.bust_height, m.waist_height, m.hip_height]),
             imported: unplaced.imported,
         })
     }
@@ -267,29 +271,5 @@ impl Loaded {
             }
             (None, None) => write_mesh(path.as_ref(), &self.scene.garment.with_positions(positions.to_vec())),
         }
-    }
-}
-
-impl Scene {
-    /// The vertices of the garment's highest edge (`top`), or of the edges that a group lies on.
-    pub fn edge(&self, what: &str) -> Result<Vec<u32>, SceneError> {
-        let Self { garment: mesh, topology, .. } = self;
-        let height = |edge: &[u32]| edge.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() / edge.len() as f64;
-        if what == "top" {
-            let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
-            return highest.ok_or(SceneError::NoEdge);
-        }
-        let Some(group) = mesh.groups.iter().position(|g| g == what) else {
-            return Err(SceneError::UnknownGroup { found: what.to_owned(), known: mesh.groups.clone() });
-        };
-        let on_edge = topology.boundary_vertices();
-        let mut held: Vec<u32> = (mesh.triangles.iter().zip(&mesh.triangle_group))
-            .filter(|&(_, &g)| g as usize == group)
-            .flat_map(|(triangle, _)| *triangle)
-            .filter(|&v| on_edge[v as usize])
-            .collect();
-        held.sort_unstable();
-        held.dedup();
-        Ok(held)
     }
 }

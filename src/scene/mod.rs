@@ -5,6 +5,7 @@
 //! body, and what starts inside is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
 mod error;
+mod hold;
 mod load;
 mod over;
 mod placement;

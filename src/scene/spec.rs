@@ -45,7 +45,8 @@ pub struct SceneSpec {
     /// Rest shape of a garment from a file: `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`: the
     /// texture coordinates where they are the flat pattern, in whatever unit, else its own edges.
     pub rest: String,
-    /// An edge held where it is: `top` (the highest) or the edges of a group; without it what a built-in garment holds.
+    /// Edges held where they are, separated by commas: `top` (the highest), `top:2` (the highest of the second connected part) or those of a
+    /// group; without it what a built-in garment holds.
     pub hold: Option<String>,
     /// Whether garment vertices that start inside the body are pushed out.
     pub push_out: bool,

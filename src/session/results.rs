@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::drape::{ClothState, Distances, Drape, PartOutcome, Refine};
+use crate::drape::{ClothState, Distances, Drape, LetGo, PartOutcome, Refine};
 use crate::fabric::Fabric;
 use crate::figures::Figures;
 use crate::job::Job;
@@ -103,6 +103,8 @@ pub struct AtRest {
     pub ms: f64,
     /// Milliseconds from the edit to here.
     pub after_ms: f64,
+    /// What came of letting go what was held until it rested.
+    pub let_go: Option<LetGo>,
     pub(crate) reaction_n: Arc<Vec<DVec3>>,
     pub(crate) told: Option<Arc<ClothState>>,
     pub(crate) of: (Fabric, Refine),

@@ -1,9 +1,9 @@
-//! Where a standing body has its middle, neck, waist, crotch, armpits and arms, found from its shape.
+//! Where a standing body has its middle, neck, bust, waist, hip, crotch, armpits and arms, found from its shape.
 //!
 //! The body is cut by level planes a centimetre apart. The curve that goes round the middle is the trunk (or the neck, or the head),
 //! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck
 //! end the first height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between
-//! crotch and armpit; arms are straight lines through the middles of their curves. Toes tell the front.
+//! crotch and armpit, hip and bust the largest below and above it; arms are straight lines through the middles of their curves. Toes tell the front.
 //!
 //! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk; what is not found is `None`, and then
 //! nothing is moved to it.
@@ -35,6 +35,10 @@ pub struct Landmarks {
     pub shoulder_z: Option<f64>,
     /// Height of the smallest girth of the trunk.
     pub waist_z: Option<f64>,
+    /// Height of the largest girth between crotch and waist.
+    pub hip_z: Option<f64>,
+    /// Height of the largest girth between waist and armpits.
+    pub bust_z: Option<f64>,
     /// Height of the armpits: where the arms' curves join the trunk's.
     pub armpit_z: Option<f64>,
     /// How far the arms point below the horizontal, radians.
@@ -72,13 +76,9 @@ impl Landmarks {
         let between = |from: f64, to: f64| {
             levels.iter().filter(move |l| l.z >= low.z + from * height && l.z <= low.z + to * height)
         };
-        let narrowest = |from: f64, to: f64| {
-            let girth = |l: &Level| l.trunk.as_ref().map(SectionLoop::tape_length);
-            between(from, to)
-                .filter_map(|l| girth(l).map(|girth| (girth, l)))
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .map(|(_, l)| l)
-        };
+        let girths = |from: f64, to: f64| between(from, to).filter_map(|l| Some((l.trunk.as_ref()?.tape_length(), l)));
+        let narrowest = |from: f64, to: f64| girths(from, to).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l);
+        let widest_z = |from: f64, to: f64| girths(from, to).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l.z);
         let crotch = between(0.25, 0.7).find(|l| l.trunk.is_some()).map(|l| (l.z - low.z) / height);
         let width = |l: &Level| l.trunk.as_ref().map_or(0.0, |c| extent(c, across));
         let neck = narrowest(0.78, 0.95);
@@ -94,9 +94,12 @@ impl Landmarks {
         let arm_fall = armpit_z.and_then(|_| arm_fall(&arms, across));
         let waist_to = armpit_z.map_or(0.7, |z| (z - low.z) / height - 0.03);
         let waist_z = narrowest(from + 0.06, waist_to).map(|l| l.z);
+        let share = |z: f64| (z - low.z) / height;
+        let hip_z = waist_z.and_then(|waist| widest_z(from, share(waist)));
+        let bust_z = waist_z.zip(armpit_z).and_then(|(waist, armpit)| widest_z(share(waist), share(armpit)));
         let half = |l: &Level| Some((l.z, extent_from(l.trunk.as_ref()?, middle, across)));
         let trunk = levels.iter().filter(|l| l.z < armpit_z.unwrap_or(top)).filter_map(half).collect();
-        Self { middle, facing, shoulder_z, waist_z, armpit_z, arm_fall, trunk }
+        Self { middle, facing, shoulder_z, waist_z, hip_z, bust_z, armpit_z, arm_fall, trunk }
     }
 
     /// The body without its arms, open where they were: what is worn below them hangs inside of them. `None` for a body without arms that

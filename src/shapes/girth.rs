@@ -97,51 +97,69 @@ pub fn hull_length(mut points: Vec<DVec2>) -> f64 {
     length(&lower) + length(&upper)
 }
 
+/// One curve in which a plane cuts a mesh, by what it crosses.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Cut {
+    /// The crossed edges in order, each with its end above the plane first, and how far from there the crossing is, as a share of the edge.
+    pub(crate) crossings: Vec<([u32; 2], f64)>,
+    /// The triangle between each crossing and the next; of a closed curve also that from the last to the first.
+    pub(crate) triangles: Vec<u32>,
+    /// Whether the last crossing joins the first.
+    pub(crate) closed: bool,
+}
+
 /// All curves in which `plane` cuts `mesh`, in the order of their first crossed edge.
 #[must_use]
 pub fn section(mesh: &TriMesh, plane: Plane) -> Vec<SectionLoop> {
+    let point = |&([a, b], share): &([u32; 2], f64)| mesh.positions[a as usize].lerp(mesh.positions[b as usize], share);
+    let of = |cut: Cut| SectionLoop { points: cut.crossings.iter().map(point).collect(), closed: cut.closed, plane };
+    cuts(mesh, plane).into_iter().map(of).collect()
+}
+
+/// The curves of a [`section`].
+pub(crate) fn cuts(mesh: &TriMesh, plane: Plane) -> Vec<Cut> {
     let height: Vec<f64> = mesh.positions.iter().map(|&p| (p - plane.origin).dot(plane.normal)).collect();
     let above = |v: u32| height[v as usize] >= 0.0;
     // Consistent winding makes every segment run from an edge going down to an edge going up, and its successor's first edge
     // is its last.
-    let mut links: BTreeMap<(u32, u32), (u32, u32)> = BTreeMap::new();
-    for &[a, b, c] in &mesh.triangles {
+    let mut links: BTreeMap<[u32; 2], ([u32; 2], u32)> = BTreeMap::new();
+    for (t, &[a, b, c]) in (0..).zip(&mesh.triangles) {
         let (mut down, mut up) = (None, None);
         for (i, j) in [(a, b), (b, c), (c, a)] {
             match (above(i), above(j)) {
-                (true, false) => down = Some((i, j)),
-                (false, true) => up = Some((j, i)),
+                (true, false) => down = Some([i, j]),
+                (false, true) => up = Some([j, i]),
                 _ => {}
             }
         }
         if let (Some(down), Some(up)) = (down, up) {
-            links.insert(down, up);
+            links.insert(down, (up, t));
         }
     }
-    let point = |(a, b): (u32, u32)| {
-        let (ha, hb) = (height[a as usize], height[b as usize]);
-        mesh.positions[a as usize].lerp(mesh.positions[b as usize], ha / (ha - hb))
+    let crossing = |edge: [u32; 2]| {
+        let [above, below] = edge.map(|v| height[v as usize]);
+        (edge, above / (above - below))
     };
     // Open chains first, from the edges nothing leads to; what is left are loops.
-    let ends: std::collections::BTreeSet<(u32, u32)> = links.values().copied().collect();
-    let starts: Vec<(u32, u32)> = links.keys().filter(|k| !ends.contains(k)).copied().collect();
-    let mut loops = Vec::new();
+    let ends: std::collections::BTreeSet<[u32; 2]> = links.values().map(|(next, _)| *next).collect();
+    let starts: Vec<[u32; 2]> = links.keys().filter(|k| !ends.contains(*k)).copied().collect();
+    let mut found = Vec::new();
     let mut starts = starts.into_iter();
     while let Some(start) = starts.next().or_else(|| links.keys().next().copied()) {
-        let mut points = vec![point(start)];
+        let mut cut = Cut { crossings: vec![crossing(start)], triangles: Vec::new(), closed: false };
         let mut at = start;
-        let mut closed = false;
-        while let Some(next) = links.remove(&at) {
+        while let Some((next, triangle)) = links.remove(&at) {
+            cut.triangles.push(triangle);
             if next == start {
-                closed = true;
+                cut.closed = true;
                 break;
             }
-            points.push(point(next));
+            cut.crossings.push(crossing(next));
             at = next;
         }
-        loops.push(SectionLoop { points, closed, plane });
+        found.push(cut);
     }
-    loops
+    found
 }
 
 /// The closed curve of a section whose centre is nearest to the plane's origin.

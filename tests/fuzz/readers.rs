@@ -53,6 +53,7 @@ pub(crate) const TELLING: &[&str] = &[
     "out of range",
     "cannot be read",
     "are missing",
+    "recursion limit",
 ];
 
 pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Said, String> {

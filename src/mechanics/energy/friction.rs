@@ -32,6 +32,9 @@ pub const ELASTIC_SLIP: f64 = 5e-4;
 /// and as a spring it would let the vertex creep by a fraction of ε a step.
 const YIELDED: f64 = 0.999;
 
+/// Square of a gradient's length over which it is no distance's, but rounding.
+const STEEP: f64 = 1.0 + 1e-9;
+
 /// One vertex's hold on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hold {
@@ -81,7 +84,10 @@ impl Friction {
             while old.next_if(|h| h.vertex < t.vertex).is_some() {}
             let position = x[t.vertex as usize];
             let anchor = old.next_if(|h| h.vertex == t.vertex).map_or(position, |h| h.anchor);
-            let mut hold = Hold { vertex: t.vertex, anchor, normal: t.normal, limit: self.coefficient * t.force() };
+            // Where a body goes through itself its distance jumps, and the rounded one is steeper than any distance.
+            let steep = t.normal.length_squared() > STEEP;
+            let normal = if steep { t.normal.normalize_or_zero() } else { t.normal };
+            let mut hold = Hold { vertex: t.vertex, anchor, normal, limit: self.coefficient * t.force() };
             let slip = hold.slip(x);
             // The anchor stays in the tangent plane through the vertex; only the slip within ε is elastic.
             hold.anchor = position - slip.clamp_length_max(ELASTIC_SLIP);
@@ -126,4 +132,26 @@ pub(super) fn stiffening(limit: f64, tangent: DMat3, u: DVec3) -> DMat3 {
 /// φ, m.
 pub(super) fn huber(y: f64) -> f64 {
     if y < ELASTIC_SLIP { y * y / (2.0 * ELASTIC_SLIP) } else { y - 0.5 * ELASTIC_SLIP }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gradient_steeper_than_a_distance_leaves_the_hessian_positive_and_the_slip_along_the_surface() {
+        let normal = DVec3::new(12.0, -30.0, 20.0);
+        let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
+        let mut friction = Friction::new(0.3);
+        friction.refresh(&[touch], &[DVec3::ZERO]);
+        let x = [DVec3::new(3e-4, 1e-4, -2e-4)];
+        let (_, block) = friction.hessian(&x).next().unwrap();
+        let along = normal.normalize();
+        for d in [DVec3::X, DVec3::Y, DVec3::Z, along, DVec3::new(1.0, 2.0, -1.0)] {
+            assert!(d.dot(block * d) > -1e-12, "{d}: {}", d.dot(block * d));
+        }
+        let mut gradient = [DVec3::ZERO];
+        friction.add_gradient(&x, &mut gradient);
+        assert!(gradient[0].dot(along).abs() < 1e-15 && gradient[0].length() < 0.3 * touch.force() + 1e-12);
+    }
 }

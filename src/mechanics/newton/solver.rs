@@ -7,9 +7,10 @@
 //! chapter 12). That works while the matrix's condition is under some 1e7: for knits, and for wovens while they are soft. The
 //! first time it does not, or a pivot is lost that double precision holds, the solver takes double from then on.
 //!
-//! A positive matrix may lose a pivot in double, too: triangles drawn a thousand times too large beside their neighbours. A share of its own
-//! diagonal is then added to it. Scaled to a unit diagonal, a matrix is factorised wherever its least eigenvalue is over some n times
-//! the rounding (Demmel; Higham, theorem 10.7), and that share is what the least eigenvalue becomes.
+//! A positive matrix may lose a pivot in double, too: by rounding, where triangles are drawn a thousand times too large beside their neighbours,
+//! or because a body that goes through itself is no body to its gradients. Shares of the sum of each row are then added to the diagonal.
+//! Scaled to a unit diagonal, a matrix is factorised wherever its least eigenvalue is over some n times the rounding (Higham, theorem 10.7),
+//! which the first share is; with the last one, the diagonal outweighs its row, and any finite matrix is positive (Gershgorin).
 
 use glam::{DMat3, DVec3};
 
@@ -45,8 +46,8 @@ const REST: f64 = 1e-3;
 /// Times a solution in single precision is mended at most: each takes off a factor of the condition times 1e-7.
 const MENDS: usize = 4;
 
-/// Shares of its own diagonal that are added to a positive matrix which double precision loses, one after the other.
-const RIDGES: [f64; 6] = [1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 1.0];
+/// Shares of the sums of its rows that are added to the diagonal of a matrix which double precision loses, one after the other.
+const RIDGES: [f64; 6] = [1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 2.0];
 
 /// A factorisation whose pattern is fixed.
 pub struct Solver {
@@ -85,8 +86,8 @@ impl Solver {
     ///
     /// # Errors
     /// [`SolveError::NotPositive`] where a pivot is zero, negative or not a number; where only `positive` matrices are expected, one that
-    /// single precision loses is tried in double, and then with a share of its diagonal added, so that numbers alone are refused which
-    /// are not finite.
+    /// single precision loses is tried in double, and then with more on its diagonal, so that numbers alone are refused which are not
+    /// finite.
     pub fn solve(
         &mut self,
         pattern: &Pattern,
@@ -110,17 +111,18 @@ impl Solver {
 
     fn factorise_in_double(&mut self, pattern: &Pattern, matrix: Matrix<'_>, positive: bool) -> Result<(), SolveError> {
         let mut done = self.double.factorise(&self.forest, matrix);
-        for share in RIDGES.into_iter().filter(|_| positive) {
+        if done.is_ok() || !positive {
+            return done;
+        }
+        let sums = row_sums(pattern, matrix);
+        for share in RIDGES {
+            let raised =
+                matrix.diagonal.iter().zip(&sums).map(|(shift, sum)| shift + share * sum + f64::MIN_POSITIVE.sqrt());
+            let diagonal: Vec<f64> = raised.collect();
+            done = self.double.factorise(&self.forest, Matrix { diagonal: &diagonal, ..matrix });
             if done.is_ok() {
                 break;
             }
-            let raised = |(&shift, &own): (&f64, &u32)| {
-                let block = matrix.blocks[own as usize];
-                let trace = block.x_axis.x + block.y_axis.y + block.z_axis.z;
-                shift + share * (trace + shift) + f64::MIN_POSITIVE.sqrt()
-            };
-            let diagonal: Vec<f64> = matrix.diagonal.iter().zip(&pattern.starts).map(raised).collect();
-            done = self.double.factorise(&self.forest, Matrix { diagonal: &diagonal, ..matrix });
         }
         done
     }
@@ -183,6 +185,22 @@ fn mended(
     false
 }
 
+/// For each unknown a bound on what stands in each of its rows, N/m: added to the diagonal, it outweighs all beside it.
+fn row_sums(pattern: &Pattern, Matrix { blocks, diagonal }: Matrix<'_>) -> Vec<f64> {
+    let mut sums = diagonal.to_vec();
+    for (column, range) in pattern.starts.windows(2).enumerate() {
+        for block in range[0] as usize..range[1] as usize {
+            let sum: f64 = blocks[block].to_cols_array().iter().map(|entry| entry.abs()).sum();
+            let row = pattern.rows[block] as usize;
+            sums[row] += sum;
+            if row != column {
+                sums[column] += sum;
+            }
+        }
+    }
+    sums
+}
+
 /// ‖x‖₂.
 fn norm(x: &[DVec3]) -> f64 {
     x.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
@@ -230,6 +248,12 @@ mod tests {
         pattern.multiply(&blocks, &x, &mut back);
         let off = back.iter().zip(&pull).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{off} N of a hundredth");
+        // One that is not positive at all still gives a way to go, along which the energy falls.
+        let own = pattern.starts[7] as usize;
+        blocks[own] -= DMat3::from_diagonal(DVec3::splat(1e7));
+        let mut way = pull.clone();
+        solver.solve(pattern, &blocks, &none, true, &mut way).unwrap();
+        assert!(way.iter().zip(&pull).map(|(d, b)| d.dot(*b)).sum::<f64>() > 0.0);
         blocks[0].x_axis.x = f64::NAN;
         let refused = solver.solve(pattern, &blocks, &none, true, &mut pull);
         assert!(matches!(refused, Err(SolveError::NotPositive { .. })), "{refused:?}");

@@ -7,11 +7,13 @@ use glam::DVec3;
 
 use super::{Target, Workshop, ask};
 use crate::accuracy::{self, representable::representable};
-use crate::drape::{ClothState, Drape, Levels, Made, Refine, Settings, StageTimes, folds_of, refine_from, settled};
+use crate::drape::{
+    ClothState, Drape, Levels, Made, Refine, Released, Settings, StageTimes, folds_of, let_go, refine_from, settled,
+};
 use crate::figures::Figures;
 use crate::mechanics::coupled::Motion;
 use crate::mechanics::energy::{Cloth, Contacts};
-use crate::mechanics::refine::Stop;
+use crate::mechanics::refine::{Step, Stop};
 use crate::scene::Scene;
 use crate::session::desk::ms_since;
 use crate::session::results::{AtRest, Finished, Sectioned};
@@ -43,32 +45,35 @@ impl Workshop {
             after_ms: ms_since(target.accepted),
             reaction_n: Arc::default(),
             told: None,
+            let_go: None,
             of: (settings.fabric.clone(), settings.refine),
         };
-        let refined = refine_from(scene, settings, &levels.cloth, None, start, &mut |step| {
+        let mut show = |step: &Step<'_>| {
             if step.iteration > 0 {
                 let step = Arc::new(at(step.positions, step.residual_over_weight, step.iteration));
                 session.publish(target.state, |desk| desk.view.rest = Some(step));
             }
             ask(session, target.state)
-        });
-        let refined = refined?;
-        let generation = sectioned.ground.generation;
+        };
+        let refined = refine_from(scene, settings, &levels.cloth, None, start, &mut show)?;
+        // What is held is held where it was placed: the next drape goes on from before it is let go.
+        self.rest = Some((sectioned.ground.generation, Arc::new(refined.positions.clone())));
+        let Released { cloth, refined, let_go } = let_go(scene, settings, refined, &mut show)?;
         if refined.stop == Stop::Interrupted && session.overtaken(target.state) {
             // A drape that falls off is interrupted too, and shown.
-            self.rest = Some((generation, Arc::new(refined.positions)));
             return Ok(());
         }
         let took = began.elapsed();
-        let (positions, state) = settled(scene, settings, &levels.cloth, None, refined);
+        let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
+        let (positions, state) = settled(scene, settings, cloth, None, refined);
         let rest = Arc::new(AtRest {
             done: true,
-            reaction_n: Arc::new(reactions(&levels.cloth, &positions, &state.fit.pressure_kpa)),
+            reaction_n: Arc::new(reactions(cloth, &positions, &state.fit.pressure_kpa)),
+            let_go,
             ms: took.as_secs_f64() * 1e3,
             told: Some(Arc::new(state.clone())),
             ..at(&positions, state.residual_over_weight, state.steps)
         });
-        self.rest = Some((generation, Arc::clone(&rest.positions)));
         self.done.rested = Some(took);
         session.publish(target.state, |desk| {
             desk.add_to_trail(|point| point.rest_ms = Some(rest.ms));
@@ -110,7 +115,7 @@ impl Workshop {
             folds: folds_of(settings, levels, &stage),
             stage,
             state,
-            let_go: None,
+            let_go: target.rest.as_ref().and_then(|rest| rest.let_go),
         };
         let drape = made.judged(scene, settings, times);
         let figures = Figures::of(scene, &drape);
