@@ -79,7 +79,7 @@ pub enum FabricError {
     #[error("{file}: {reason}; see assets/fabrics/ for examples")]
     Syntax { file: String, reason: String },
     /// A constant no cloth can have.
-    #[error("{file}: {key} is {found}; expected {expected}")]
+    #[error("{file}: {key} is {}; expected {expected}", plain(*found))]
     Constant { file: String, key: &'static str, found: f64, expected: &'static str },
 }
 
@@ -92,6 +92,11 @@ impl Default for Fabric {
         // The text is part of the program and a test reads it, so it always parses.
         Self::parse(FILES[0].1, DEFAULT_FABRIC).unwrap_or_else(|e| unreachable!("{e}"))
     }
+}
+
+/// A number with as few digits as it needs: 1e200 has two hundred zeros.
+fn plain(x: f64) -> String {
+    if x == 0.0 || (1e-6..1e10).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
 impl Fabric {

@@ -17,7 +17,7 @@ use super::sinks::{SeenFrom, SinkArgs};
 use super::solved::Solved;
 use super::stages::StageArgs;
 use super::work::use_threads;
-use super::{console, interrupt};
+use super::{browser, console, interrupt};
 
 /// How long to wait for news before Ctrl-C is looked at.
 const GLANCE: Duration = Duration::from_millis(100);
@@ -49,6 +49,9 @@ pub(crate) struct LiveArgs {
     /// Token for control, 16 characters at least [default: made anew where --bind needs one]
     #[arg(long, value_name = "TOKEN", env = "PARTWISE_TOKEN", hide_env_values = true, help_heading = "Page")]
     token: Option<String>,
+    /// Open the page in your browser
+    #[arg(long, help_heading = "Page")]
+    open: bool,
     /// Begin every drape at the undraped garment, as `run` does: slower, and the same bits
     #[arg(long, help_heading = "Stages")]
     cold: bool,
@@ -125,18 +128,20 @@ impl LiveArgs {
             Some(name) => format!("{name}:{}", address.port()),
             None => address.to_string(),
         };
-        match &options.control {
-            None => console::result(&format!("http://{name}/")),
-            Some(control) => {
-                console::result(&format!("http://{name}/?token={control}"));
-                if let Some(onlooker) = &options.onlooker {
-                    console::note(&format!("to look on only: http://{name}/?token={onlooker}"));
-                }
-            }
+        let page = match &options.control {
+            None => format!("http://{name}/"),
+            Some(control) => format!("http://{name}/?token={control}"),
+        };
+        console::result(&page);
+        if let (Some(_), Some(onlooker)) = (&options.control, &options.onlooker) {
+            console::note(&format!("to look on only: http://{name}/?token={onlooker}"));
         }
         console::note("open this address in a browser, or see `partwise live --help` for curl; Ctrl-C ends");
         if address.ip().is_unspecified() {
             console::note("0.0.0.0 is every address of this machine: others need one of these instead");
+        }
+        if self.open {
+            browser::open(&page);
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod assets;
 mod bench;
+mod browser;
 mod certified;
 mod check;
 mod compare;

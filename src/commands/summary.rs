@@ -10,7 +10,7 @@ use partwise::accuracy::Accuracy;
 use partwise::certificate::Certificate;
 use partwise::drape::Drape;
 use partwise::fabric::Fabric;
-use partwise::figures::{GirthEase, Figures, LevelCount};
+use partwise::figures::{Figures, GirthEase, LevelCount};
 use partwise::job::Measured;
 use partwise::record::Panel;
 use partwise::scene::Loaded;

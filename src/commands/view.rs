@@ -7,7 +7,7 @@ use clap::Args;
 use partwise::record::web;
 
 use super::failure::UserError;
-use super::{console, interrupt};
+use super::{browser, console, interrupt};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -21,6 +21,9 @@ pub(crate) struct ViewArgs {
     /// Port the page reads the recording from [default: any free one]
     #[arg(long, value_name = "PORT")]
     grpc_port: Option<u16>,
+    /// Open the page in your browser
+    #[arg(long)]
+    open: bool,
     /// Read the recording and end: what `view` itself runs first
     #[arg(long, hide = true)]
     check: bool,
@@ -42,6 +45,9 @@ impl ViewArgs {
         let served = served?;
         console::result(served.url());
         console::note("open this address in a browser; Ctrl-C ends");
+        if self.open {
+            browser::open(served.url());
+        }
         interrupt::wait();
         Ok(())
     }

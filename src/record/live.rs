@@ -116,13 +116,13 @@ impl LiveEncoder {
         let seen =
             |name: String, body: &str, path: &str| (1.0, Node::from(View::spatial(name, &[body, path], &self.eye)));
         let mut row = vec![
-            seen("PARTs and forces".to_owned(), paths::BODY, PARTS),
+            seen("PARTs".to_owned(), paths::BODY, PARTS),
             seen("Two stages".to_owned(), paths::BODY, "/preview"),
             seen("At rest".to_owned(), paths::BODY, "/rest"),
         ];
         for (i, pin) in pins.iter().enumerate() {
             let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
-            row.push(seen(format!("Pinned: {}", pin.label), &body, &garment));
+            row.push(seen(format!("Pin: {}", pin.label), &body, &garment));
         }
         // The layout first: a slow viewer takes seconds to read the triangles, and would lay out by itself what it has.
         blueprint::send(&stream, &Node::Row("Live", row), TimePanel { timeline: paths::TABLE, follow: false })?;

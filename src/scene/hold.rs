@@ -42,7 +42,7 @@ impl Scene {
             return Ok(held);
         }
         let (part_of, parts) = topology.components();
-        let part = match what.strip_prefix("top:").map(str::parse) {
+        let part = match what.strip_prefix("top:").map(str::parse::<usize>) {
             _ if what == "top" => None,
             Some(Ok(part)) if (1..=parts).contains(&part) => Some(part as u32 - 1),
             Some(_) => return Err(SceneError::UnknownPart { found: what.to_owned(), parts }),

@@ -112,8 +112,18 @@ pub(super) const KINDS: [Kind; 10] = [
 ];
 
 /// Flags that wait for somebody, or are asked of the window system.
-const NOT_HERE: [&str; 9] =
-    ["--serve", "--watch", "--spawn", "--connect", "--web-port", "--grpc-port", "--repeats", "--spread", "--accuracy"];
+const NOT_HERE: [&str; 10] = [
+    "--serve",
+    "--watch",
+    "--spawn",
+    "--connect",
+    "--web-port",
+    "--grpc-port",
+    "--repeats",
+    "--spread",
+    "--accuracy",
+    "--open",
+];
 
 /// Everything that runs begin from.
 pub(super) struct Seeds {
