@@ -211,6 +211,9 @@ fn garment(kind: &str, (top, radius): (f64, f64), vertices: usize, defect: &str,
     mesh
 }
 
+/// Steps after which a garment counts as one that does not come to rest.
+const STEPS: usize = 600;
+
 /// How a garment ended.
 fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, usize, &str, &str)) -> String {
     let (kind, on, top, radius) = PAIRS[pair];
@@ -236,17 +239,23 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         Err(e) => return format!("refused: {e}"),
     };
     let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
+    let mut residual = f64::NAN;
     let found = drape(&scene, &settings, &mut |step| {
-        if step.iteration > 600 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        residual = step.residual_over_weight;
+        if step.iteration > STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     match found {
         Err(e) => format!("failed: {e}"),
         Ok(found) if !found.positions.iter().all(|p| p.is_finite()) => "not finite".to_owned(),
         Ok(found) if found.warnings.iter().any(|w| w.contains("fallen")) => "fell".to_owned(),
         Ok(found) if found.penetrating_vertices > 0 => format!("inside: {}", found.penetrating_vertices),
-        Ok(found) => match found.state.map(|state| state.stop) {
+        Ok(found) => match found.state.as_ref().map(|state| state.stop) {
             Some(Stop::Converged) => "rest".to_owned(),
-            other => format!("{other:?}"),
+            // Why not is in the numbers: of a cloth that is nearly there, or of one whose layers cannot be told apart.
+            _ => format!(
+                "unsettled after {STEPS} steps, residual {residual:.0e}, {} pairs cross",
+                found.self_intersecting_pairs
+            ),
         },
     }
 }
@@ -289,14 +298,15 @@ fn chosen<'a>(variable: &str, all: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-#[ignore = "an hour: `cargo test --release --no-default-features --test families -- --ignored --nocapture`"]
+#[ignore = "hours, with 60,000 vertices; PARTWISE_FAMILIES_VERTICES, _DEFECTS, _FABRICS and _ONLY choose: `cargo test --release --no-default-features --test families -- --ignored --nocapture`"]
 fn all_come_to_rest() {
     let sizes = chosen("PARTWISE_FAMILIES_VERTICES", &["60", "250", "1000", "4000", "10000", "60000"]);
     let defects = chosen("PARTWISE_FAMILIES_DEFECTS", &DEFECTS);
+    let fabrics = chosen("PARTWISE_FAMILIES_FABRICS", &FABRICS);
     let ends = family(sizes.iter().map(|n| n.parse().unwrap()).flat_map(|vertices| {
-        let defects = &defects;
+        let (defects, fabrics) = (&defects, &fabrics);
         (0..PAIRS.len()).flat_map(move |pair| {
-            defects.iter().flat_map(move |&defect| FABRICS.map(|fabric| (pair, vertices, defect, fabric)))
+            defects.iter().flat_map(move |&defect| fabrics.iter().map(move |&fabric| (pair, vertices, defect, fabric)))
         })
     }));
     assert_eq!(ends.keys().collect::<Vec<_>>(), ["rest"], "{ends:?}");
