@@ -15,6 +15,8 @@ use crate::shapes::girth::{Plane, SectionLoop, section};
 
 /// Between two planes, m.
 const STEP: f64 = 0.01;
+/// What is taller is nobody's body, and would be cut for hours, m.
+const TALLEST: f64 = 5.0;
 /// How much wider than the neck a curve is where the shoulder begins.
 const SPREAD: f64 = 1.5;
 /// Arms are told from fingers by their girth, m.
@@ -66,7 +68,7 @@ impl Landmarks {
         let facing = facing(body, low.z, height);
         // Left and right as the body has them.
         let across = DVec2::from_angle(facing);
-        let count = (height / STEP) as usize;
+        let count = if height <= TALLEST { (height / STEP) as usize } else { 0 };
         let levels: Vec<Level> = (1..count)
             .map(|i| {
                 let z = low.z + STEP * i as f64;

@@ -30,6 +30,9 @@ fn the_forms_marks_are_found() {
     let turned = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| turn * p).collect()));
     assert!((turned.facing - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{turned:?}");
     near(turned.arm_fall, f64::to_radians(50.0), 0.05);
+    // A mountain is no body, and not cut into a thousand million slices.
+    let mountain = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| 1e7 * p).collect()));
+    assert_eq!((mountain.waist_z, mountain.hip_z, mountain.bust_z, mountain.shoulder_z), (None, None, None, None));
 }
 
 #[test]
