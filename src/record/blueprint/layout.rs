@@ -3,6 +3,7 @@
 
 use super::super::eye::Eye;
 use super::super::legend::visible;
+use super::super::outfit::{self, Worn};
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
 use super::view::View;
@@ -36,6 +37,8 @@ pub struct Layout {
     pub fit: Vec<String>,
     /// The flat panels of a sewing pattern will come.
     pub pattern: bool,
+    /// The garments of an outfit, inner to outer, where there are several.
+    pub outfit: Vec<Worn>,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -62,6 +65,8 @@ pub enum Tab {
     Fit,
     /// The flat panels of a sewing pattern beside the drape.
     Pattern,
+    /// Garments worn over each other, each by itself and all together.
+    Outfit,
     /// Jumps at the PARTs' seams, and mean curvature.
     Wrinkles,
     /// Energy and residual over the iterations.
@@ -90,6 +95,9 @@ impl Layout {
         if self.pattern {
             tabs.push((Tab::Pattern, self.panels(eye)));
         }
+        if !self.outfit.is_empty() {
+            tabs.push((Tab::Outfit, self.wardrobe(eye)));
+        }
         if self.wrinkles {
             tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
@@ -111,6 +119,7 @@ impl Layout {
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
             Tab::Pattern => over_bars(pattern::ASPECT),
+            Tab::Outfit => 0.5 * ASPECT,
             Tab::Wrinkles => over_bars(0.5 * ASPECT),
             Tab::Solver => ASPECT / 3.0,
         })
@@ -205,6 +214,27 @@ impl Layout {
             (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
         });
         over("Side by side", views.collect(), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
+    }
+
+    /// A row for each garment, its PARTs, forces and drape, beside all of them.
+    fn wardrobe(&self, eye: &Eye) -> Node {
+        let all = self.eye(Tab::Outfit, eye);
+        let rows = self.outfit.len() as f64;
+        let one = eye.through(ASPECT / 6.0 * rows);
+        let stages = [("PARTs", "parts"), ("force", "force"), ("drape", "drape")];
+        let row = |(k, worn): (usize, &Worn)| {
+            let branch = outfit::branch(k, worn);
+            let view = |(title, leaf): (&str, &str)| {
+                let path = format!("{branch}/{leaf}");
+                (1.0, View::spatial(format!("{}: {title}", worn.name), &[paths::BODY, &path], &one).into())
+            };
+            (1.0, Node::Row("Garment", stages.map(view).into()))
+        };
+        let garments = Node::Column("Garments", self.outfit.iter().enumerate().map(row).collect());
+        let mut shown = vec![paths::BODY.to_owned()];
+        shown.extend(self.outfit.iter().enumerate().map(|(k, worn)| format!("{}/drape", outfit::branch(k, worn))));
+        let shown: Vec<&str> = shown.iter().map(String::as_str).collect();
+        Node::Row("Outfit", vec![(1.0, garments), (1.0, View::spatial("Outfit", &shown, &all).into())])
     }
 
     fn fit(&self, eye: &Eye) -> Node {
