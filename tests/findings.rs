@@ -306,3 +306,46 @@ fn a_body_that_goes_through_itself_is_draped_over() {
         assert!(found.unwrap().positions.iter().all(|p| p.is_finite()));
     }
 }
+
+#[test]
+fn what_is_stretched_beyond_what_fabrics_bear_and_what_presses_is_told() {
+    let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
+    let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
+    let mut scene = Scene::of_meshes(&sphere(), cape).unwrap();
+    // A preview that rests on the body presses on it.
+    let job = Job::preview();
+    let preview = drape(&scene, &job.settings, &mut unobserved).unwrap();
+    let figures = job.measure(&scene, &preview, None, &mut unobserved).unwrap().figures;
+    assert!(figures.contact_parts > 0 && figures.pressure_max_kpa.unwrap() > 0.0, "{:?}", figures.pressure_max_kpa);
+    // Cut for somebody half as wide.
+    scene.rest.corners.iter_mut().flatten().for_each(|p| p.x *= 0.4);
+    let (figures, warnings, _) = draped(&scene);
+    assert!(figures.strain_max.unwrap() > 0.5, "{:?}", figures.strain_max);
+    assert!(warnings.iter().any(|w| w.contains("more than fabrics bear")), "{warnings:?}");
+}
+
+#[test]
+fn a_stray_triangle_in_an_open_body_does_not_end_the_drape() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let mut body = sphere();
+    body.triangles.retain(|t| t.iter().all(|&v| body.positions[v as usize].z > 0.9));
+    let first = body.positions.len() as u32;
+    body.positions.extend([DVec3::new(0.1, 0.0, 1.36), DVec3::new(-0.05, 0.08, 1.3), DVec3::new(-0.05, -0.08, 1.25)]);
+    body.triangles.push([first, first + 1, first + 2]);
+    write_mesh(&folder.path().join("body.obj"), &body).unwrap();
+    let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
+    write_mesh(&folder.path().join("cape.obj"), &turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None)).unwrap();
+    let spec = SceneSpec {
+        unit: Some(Unit::M),
+        up: Some(Axis::Z),
+        open_body: true,
+        ..SceneSpec::new(place("body.obj"), place("cape.obj"))
+    };
+    let scene = spec.load().unwrap().scene;
+    let found = drape(&scene, &Settings::default(), &mut |step| match step.iteration {
+        0..60 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    });
+    assert!(found.unwrap().positions.iter().all(|p| p.is_finite()));
+}

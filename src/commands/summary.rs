@@ -37,6 +37,9 @@ pub(crate) struct Summary {
     levels: Vec<LevelCount>,
     /// Garment and body at bust, waist and hip.
     ease: Vec<GirthEase>,
+    /// What has changed since the save before, under `--watch`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) since_last: Option<String>,
     /// What came of letting go what was held until it rested.
     let_go: Option<String>,
     /// Every figure against the own continuation, under `--accuracy`.
@@ -83,6 +86,7 @@ impl Summary {
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
             ease: GirthEase::all(&loaded.scene, loaded.girths_at_m, &drape.positions),
+            since_last: None,
             let_go: drape.let_go.map(|let_go| let_go.to_string()),
             accuracy,
             timings_ms: BTreeMap::new(),
@@ -140,7 +144,8 @@ impl Summary {
         if let Some(let_go) = &self.let_go {
             let _ = writeln!(out, "{:<20}{let_go}", "let go");
         }
-        for (name, value) in figures.findings() {
+        let since = self.since_last.iter().map(|since| ("since the last save", since.clone()));
+        for (name, value) in figures.findings().into_iter().chain(since) {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let _ = writeln!(out, "\n{}", self.levels_table());
@@ -164,6 +169,7 @@ impl Summary {
         let ease: Vec<String> = self.covered().map(|(e, _, cm)| format!("{} {cm:+.1} cm", e.at)).collect();
         let ease = (!ease.is_empty()).then(|| ("ease", ease.join(", ")));
         let facts = of_model.into_iter().chain(self.figures.facts()).chain(ease);
+        let facts = facts.chain(self.since_last.iter().map(|since| ("since the last save", since.clone())));
         Panel {
             title: format!("{} on {}", self.garment, self.body),
             table: self.table.clone(),

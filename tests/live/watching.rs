@@ -51,16 +51,22 @@ fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_i
                 }
             }
         });
-        let next = || results.recv_timeout(Duration::from_secs(120)).unwrap()["part_count"].as_u64().unwrap();
-        let first = next();
+        let next = || {
+            let told = results.recv_timeout(Duration::from_secs(120)).unwrap();
+            (told["part_count"].as_u64().unwrap(), told["since_last"].as_str().map(str::to_owned))
+        };
+        let (first, since) = next();
+        assert_eq!(since, None);
         save(&table, "[[0, 2], [2, inf]]");
-        let second = next();
+        let (second, since) = next();
         assert!(second > first, "{second} PARTs after {first}");
+        let since = since.unwrap();
+        assert!(since.starts_with(&format!("{second} PARTs after {first}; the drape moved by ")), "{since}");
         // One that cannot be is told, and the next one counts.
         save(&table, "[[0, 2], [1, inf]]");
         std::thread::sleep(Duration::from_millis(500));
         save(&table, "[[0, inf]]");
-        assert_eq!(next(), first);
+        assert_eq!(next().0, first);
         over.store(true, Ordering::SeqCst);
     });
     let asked = Instant::now();

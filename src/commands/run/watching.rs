@@ -2,9 +2,11 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use partwise::Job;
+use partwise::accuracy::rms_mm;
 use partwise::job::{Against, Measured};
 use partwise::record::Recorder;
 use partwise::session::{Finished, Session, Snapshot, Workshop};
@@ -27,6 +29,8 @@ struct Told {
     /// The state that was recorded last, and the one that was said to be impossible.
     recorded: u64,
     refused: u64,
+    /// What was told last.
+    last: Option<Arc<Finished>>,
 }
 
 impl RunArgs {
@@ -108,6 +112,8 @@ impl RunArgs {
         told.recorded = finished.state;
         let Some(measured) = self.measure(session, &now.job, finished)? else { return Ok(()) };
         let mut solved = Solved::of_session((*now.job).clone(), finished, measured)?;
+        solved.summary.since_last = told.last.as_ref().map(|last| since(last, finished));
+        told.last = Some(Arc::clone(finished));
         if told.recorder.is_none() {
             told.recorder = Some(Recorder::open(solved.record_options(&self.sinks, false, true))?);
         }
@@ -146,6 +152,20 @@ impl RunArgs {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// What has changed from one save to the next.
+fn since(before: &Finished, now: &Finished) -> String {
+    let parts = match (before.drape.parts.len(), now.drape.parts.len()) {
+        (before, now) if before == now => format!("{now} PARTs as before"),
+        (before, now) => format!("{now} PARTs after {before}"),
+    };
+    let [was, is] = [&before.drape.positions, &now.drape.positions];
+    if before.ground.loaded.scene.garment.triangles != now.ground.loaded.scene.garment.triangles {
+        return format!("{parts}; another garment");
+    }
+    let most = was.iter().zip(is).map(|(a, b)| 1e3 * a.distance(*b)).fold(0.0, f64::max);
+    format!("{parts}; the drape moved by {:.1} mm RMS, {most:.1} mm at most", rms_mm(is, was))
 }
 
 impl Told {
