@@ -107,9 +107,8 @@ impl fmt::Display for Remark {
             ),
             Self::OtherThanWorn { triangles, first, rest_m, worn_m } => write!(
                 f,
-                "{triangles} triangles are of another size at rest than as worn, the farthest off in face {first}: {:.3} m \
-                 long at rest, {:.3} m as worn; is the pattern torn there?",
-                rest_m, worn_m
+                "{triangles} triangles are of another size at rest than as worn, the farthest off in face {first}: {rest_m:.3} m \
+                 long at rest, {worn_m:.3} m as worn; is the pattern torn there?"
             ),
             Self::Open { edges, loops } => write!(
                 f,

@@ -189,11 +189,11 @@ fn mended(
 fn row_sums(pattern: &Pattern, Matrix { blocks, diagonal }: Matrix<'_>) -> Vec<f64> {
     let mut sums = diagonal.to_vec();
     for (column, range) in pattern.starts.windows(2).enumerate() {
-        for block in range[0] as usize..range[1] as usize {
-            let sum: f64 = blocks[block].to_cols_array().iter().map(|entry| entry.abs()).sum();
-            let row = pattern.rows[block] as usize;
-            sums[row] += sum;
-            if row != column {
+        let range = range[0] as usize..range[1] as usize;
+        for (block, &row) in blocks[range.clone()].iter().zip(&pattern.rows[range]) {
+            let sum: f64 = block.to_cols_array().iter().map(|entry| entry.abs()).sum();
+            sums[row as usize] += sum;
+            if row as usize != column {
                 sums[column] += sum;
             }
         }
