@@ -64,10 +64,17 @@ pub type Spectator<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Se
 /// What a method has to show besides the garment.
 #[derive(Debug, Clone)]
 pub enum Exhibit {
-    /// Lines in space, m: fitted quadrics, bounding surfaces.
-    Lines(Vec<Vec<DVec3>>),
-    /// A surface, m: laid pieces, a limit surface.
+    /// Lines in space, m: fitted quadrics, bounding surfaces. Lines of one index belong together.
+    Lines(Vec<(usize, Vec<DVec3>)>),
+    /// A surface, m: a limit surface.
     Surface(TriMesh),
+    /// Pieces on their way: triangles in groups, and where they are at which step, m.
+    Moving {
+        /// Triangles, in a group for each piece.
+        mesh: TriMesh,
+        /// Steps, counted as the [`Moment`]s count them, and positions.
+        frames: Vec<(usize, Vec<DVec3>)>,
+    },
 }
 
 /// What came out of a method.
@@ -139,12 +146,12 @@ pub trait ReferenceMethod: Sync {
 /// Names of the methods, in the order of the paper's references.
 pub const METHODS: [&str; 2] = [zhu2016::NAME, thomaszewski2006::NAME];
 
-/// The method of a name, with its defaults.
+/// The method of a name, with its defaults; `exhibit` asks for what it has to show besides the garment.
 #[must_use]
-pub fn by_name(name: &str) -> Option<Box<dyn ReferenceMethod>> {
+pub fn by_name(name: &str, exhibit: bool) -> Option<Box<dyn ReferenceMethod>> {
     match name {
-        zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016::default())),
-        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006::default())),
+        zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016 { exhibit, ..Default::default() })),
+        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006 { exhibit, ..Default::default() })),
         _ => None,
     }
 }

@@ -42,6 +42,8 @@ pub struct Layout {
     pub compare: Vec<String>,
     /// A scatter of time against error will come.
     pub scatter: bool,
+    /// A reference method, with the names of what it shows besides the garment: its tab stands for the stages.
+    pub method: Option<Vec<String>>,
     /// The recording is watched while it grows: the cursor follows the newest step.
     pub follow: bool,
     /// The tab shown when the recording opens.
@@ -77,7 +79,8 @@ impl Layout {
 
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
-        let mut tabs = vec![(Tab::Stages, self.stages(eye))];
+        let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
+        let mut tabs = vec![(Tab::Stages, first)];
         if !self.compare.is_empty() {
             tabs.push((Tab::SideBySide, self.side_by_side(eye)));
         }
@@ -93,7 +96,7 @@ impl Layout {
         if self.wrinkles {
             tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
-        if self.iterations {
+        if self.iterations && self.method.is_none() {
             tabs.push((Tab::Solver, solver(&self.eye(Tab::Solver, eye))));
         }
         let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);

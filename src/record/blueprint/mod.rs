@@ -5,6 +5,7 @@
 //! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
 pub(crate) mod layout;
+mod method;
 mod panels;
 pub(crate) mod view;
 
