@@ -15,6 +15,7 @@
 //!
 //! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
 
+pub mod grip;
 pub mod linear;
 pub mod march;
 pub mod rest;
