@@ -271,7 +271,7 @@ fn in_time(
     rule: &RestRule,
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
-    let method = methods::by_name(name, false).ok_or_else(|| format!("there is no method {name}"))?;
+    let method = methods::by_name(name, false, None).ok_or_else(|| format!("there is no method {name}"))?;
     let made = method.drape(dressing, rule, &mut |_| go_on()).map_err(|e| e.to_string())?;
     let ended = match made.ended {
         Ended::AtRest => "at-rest",

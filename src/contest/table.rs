@@ -215,7 +215,7 @@ mod tests {
             assert!(table.rows.iter().all(|cells| cells.len() == table.header.len()), "{}", table.title);
             assert_eq!(table.rows[0][3], "–");
         }
-        assert_eq!(tables(&rows)[0].rows[0][7..], ["824", "929", "979", "686"]);
+        assert_eq!(tables(&rows)[0].rows[0][8..], ["824", "929", "979", "686"]);
         let csv = csv_lines(&rows).unwrap();
         assert_eq!(csv.lines().count(), 1 + 2 * ENTRANTS.len());
         assert!(csv.contains("\"cannot, as it is\"") || csv.contains("cannot"), "{csv}");

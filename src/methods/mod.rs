@@ -3,10 +3,8 @@
 //! | name | source |
 //! |---|---|
 //! | [`zhu2016`] | \[19\] Zhu, Li 2016: hybrid bounding volume hierarchy, masses and springs |
+//! | [`gross2003`] | \[20\] Groß, Fuhrmann, Luckas 2003: pieces laid on developable surfaces, edge-length constraints |
 //! | [`thomaszewski2006`] | \[21\] Thomaszewski, Wacker, Straßer 2006: corotational subdivision finite elements |
-//!
-//! The paper's third, \[20\] (Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003), is not
-//! built.
 //!
 //! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its
 //! timings and counters. They all move the cloth in time until it rests, by the same rule; each file's head says what
@@ -16,9 +14,12 @@
 //! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
 
 pub mod grip;
+pub mod gross2003;
 pub mod linear;
 pub mod march;
 pub mod rest;
+pub mod segment;
+pub mod spring_list;
 pub mod thomaszewski2006;
 pub mod zhu2016;
 
@@ -30,6 +31,7 @@ use glam::DVec3;
 use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::TriMesh;
+use crate::pattern::SewnGarment;
 use crate::scene::Scene;
 pub use rest::{Ended, RestRule};
 
@@ -145,12 +147,14 @@ pub trait ReferenceMethod: Sync {
 }
 
 /// Names of the methods, in the order of the paper's references.
-pub const METHODS: [&str; 2] = [zhu2016::NAME, thomaszewski2006::NAME];
+pub const METHODS: [&str; 3] = [zhu2016::NAME, gross2003::NAME, thomaszewski2006::NAME];
 
-/// The method of a name, with its defaults; `exhibit` asks for what it has to show besides the garment.
+/// The method of a name, with its defaults; `exhibit` asks for what it has to show besides the garment, and `sewn` are the panels
+/// of a garment that was sewn of any.
 #[must_use]
-pub fn by_name(name: &str, exhibit: bool) -> Option<Box<dyn ReferenceMethod>> {
+pub fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<Box<dyn ReferenceMethod>> {
     match name {
+        gross2003::NAME => Some(Box::new(gross2003::Gross2003 { exhibit, sewn: sewn.cloned(), ..Default::default() })),
         zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016 { exhibit, ..Default::default() })),
         thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006 { exhibit, ..Default::default() })),
         _ => None,

@@ -134,7 +134,7 @@ fn the_quadrics_can_be_shown() {
     let quadrics = made.counts.iter().find(|c| c.0 == "quadrics").unwrap().1;
     assert_eq!(lines.len() as u64, 2 * quadrics);
     // Each slice's lines, at 1 + ε, go around the body: none of its vertices is outside all of them by height and breadth.
-    let reach = lines.iter().flatten().map(|p| p.z).fold(0.0, f64::max);
+    let reach = lines.iter().flat_map(|(_, line)| line).map(|p| p.z).fold(0.0, f64::max);
     let top = scene.body.mesh().positions.iter().map(|p| p.z).fold(0.0, f64::max);
     assert!(reach > top, "{reach} {top}");
 }

@@ -88,7 +88,8 @@ impl RunArgs {
         self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
         let loaded = self.input.load(&spec)?;
         let load = began.elapsed();
-        let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty());
+        let sewn = loaded.tailored.as_ref().map(|tailored| &tailored.put_on.garment);
+        let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty(), sewn);
         let method = method.with_context(|| format!("there is no method {}", self.method))?;
         let scene = loaded.scene.clone();
         let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held)?;

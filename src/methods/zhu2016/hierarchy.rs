@@ -16,11 +16,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::closest::closest;
-use super::segment::Segments;
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
 use crate::mesh::Topology;
 use crate::methods::march::Obstacle;
+use crate::methods::segment::Segments;
 use crate::methods::{Dressing, MethodError};
 
 /// Vertices of one task.

@@ -18,7 +18,6 @@
 mod closest;
 pub mod hierarchy;
 pub mod quadric;
-mod segment;
 pub mod springs;
 pub mod units;
 

@@ -10,6 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
 use crate::mesh::TriMesh;
+use crate::methods::segment::longest;
 
 /// Height of a slice h, m.
 const HEIGHT: f64 = 0.04;
@@ -186,19 +187,6 @@ fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVe
     let all =
         corners.flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     (all.0 - offset, all.1 + offset)
-}
-
-/// The direction of largest spread, by power iteration on the covariance.
-fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
-    let mut covariance = DMat3::ZERO;
-    for (p, w) in points {
-        covariance += DMat3::from_cols(p * p.x, p * p.y, p * p.z) * w;
-    }
-    let mut axis = DVec3::new(0.31, 0.17, 1.0);
-    for _ in 0..200 {
-        axis = (covariance * axis).normalize_or(DVec3::Z);
-    }
-    axis
 }
 
 /// A rotation whose third row is `axis`.
