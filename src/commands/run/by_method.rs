@@ -17,7 +17,7 @@ use partwise::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Record
 use partwise::scene::Loaded;
 use serde::Serialize;
 
-use super::{Format, MESH_EVERY, RunArgs};
+use super::{Format, RunArgs};
 use crate::commands::failure::UserError;
 use crate::commands::summary::{command_line, fabric_facts};
 use crate::commands::{certified, console, interrupt};
@@ -33,6 +33,9 @@ pub(super) fn method(name: &str) -> Result<&'static str, String> {
         format!("found `{name}`, expected one of {}", names.join(", "))
     })
 }
+
+/// The mesh is recorded so often, s of simulated time: enough to see it settle, a few megabytes at most.
+const MESH_S: f64 = 0.05;
 
 /// A moment of a run in time: step, RMS speed in m/s, and the mesh every so often.
 type Kept = (usize, f64, Option<Vec<DVec3>>);
@@ -95,10 +98,12 @@ impl RunArgs {
         let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held)?;
         let dressing = Dressing { scene: &scene, fabric: &fabric, cloth: &cloth };
         let bar = console::progress(None, self.method);
-        let mut kept: Vec<Kept> = Vec::new();
+        let (mut kept, mut meshes): (Vec<Kept>, f64) = (Vec::new(), 0.0);
         interrupt::keep();
         let drape = method.drape(&dressing, &RestRule::default(), &mut |moment| {
-            let mesh = moment.step.is_multiple_of(MESH_EVERY).then(|| moment.positions.to_vec());
+            let due = moment.time_s > MESH_S * (meshes - 1e-6);
+            meshes += f64::from(u8::from(due));
+            let mesh = due.then(|| moment.positions.to_vec());
             kept.push((moment.step, moment.rms_speed_m_per_s, mesh));
             let speed = 100.0 * moment.rms_speed_m_per_s;
             bar.set_message(format!("{}: {}, {:.2} s, {speed:.1} cm/s", self.method, moment.stage, moment.time_s));
@@ -113,7 +118,7 @@ impl RunArgs {
         timings.extend(drape.times.iter().copied());
         timings.extend([("method", drape.total), ("measure", measured.elapsed())]);
         let mut warnings = [loaded.warnings(), figures.warnings(&dressing)].concat();
-        if scene.let_go {
+        if scene.let_go && !scene.held.is_empty() {
             warnings.push(format!("{} does not let go: what is held stays held", self.method));
         }
         let made = Made { drape: &drape, figures: &figures, fit: &fit, fabric: &fabric, kept: &kept };
