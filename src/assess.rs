@@ -40,6 +40,15 @@ pub enum AssessError {
     /// The two cannot be compared.
     #[error(transparent)]
     Accuracy(#[from] AccuracyError),
+    /// No drape is everybody's reference.
+    #[error(
+        "garments worn over each other have no canonical drape, as each waits for what is below it: found {garments} of them, expected \
+         one; leave --accuracy out, or measure each by itself"
+    )]
+    Layers {
+        /// How many there are.
+        garments: usize,
+    },
     /// Nothing keeps the garment on the body.
     #[error(
         "the garment falls off the body where it goes on to rest, so it has no reference; hold an edge of it (--hold)"
@@ -88,6 +97,7 @@ pub fn assess(
     options: &AssessOptions,
     observer: Observer<'_>,
 ) -> Result<Assessment, AssessError> {
+    of_one_garment(scene)?;
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
     let self_contact = settings.self_contact;
     let solver = RefineOptions { self_contact, ..RefineOptions::default() };
@@ -137,11 +147,19 @@ pub fn canonical(
     options: &AssessOptions,
     observer: Observer<'_>,
 ) -> Result<(Reference, Vec<String>), AssessError> {
+    of_one_garment(scene)?;
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
     let solver = RefineOptions::default();
     let mut references = References { scene, fabric, cloth: &cloth, solver, options, warnings: Vec::new() };
     let reference = references.from(&scene.garment.positions, observer)?;
     Ok((reference, references.warnings))
+}
+
+fn of_one_garment(scene: &Scene) -> Result<(), AssessError> {
+    match scene.layers.len() {
+        garments @ 2.. => Err(AssessError::Layers { garments }),
+        _ => Ok(()),
+    }
 }
 
 /// Start positions moved as if the garment had been put on a little differently: by a smooth random field of 5 mm RMS, the same

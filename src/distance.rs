@@ -14,6 +14,8 @@
 //! Limits: the sign is exact for closed, consistently wound surfaces without self-intersections; where a body intersects
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
+mod worn;
+
 use glam::DVec3;
 use parry3d_f64::query::{PointProjection, PointQueryWithLocation};
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
@@ -64,6 +66,7 @@ pub struct SurfacePoint {
 pub struct Body {
     mesh: TriMesh,
     shape: ParryMesh,
+    worn: Option<worn::Worn>,
 }
 
 impl std::fmt::Debug for Body {
@@ -92,10 +95,10 @@ impl Body {
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
         let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: mesh.clone(), shape })
+        Ok(Self { mesh: mesh.clone(), shape, worn: None })
     }
 
-    /// The surface, m.
+    /// The surface, m, without what it wears.
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
@@ -104,7 +107,8 @@ impl Body {
     /// The nearest surface point to a finite `x`.
     #[must_use]
     pub fn nearest(&self, x: DVec3) -> SurfacePoint {
-        self.found(x, self.shape.project_local_point_and_get_location(x, false))
+        let bare = self.found(x, self.shape.project_local_point_and_get_location(x, false));
+        self.worn.as_ref().map_or(bare, |worn| worn.outermost(x, bare))
     }
 
     /// The same where it is known to be no farther than `most` (m), which spares most of the search.
@@ -137,7 +141,9 @@ impl Body {
     fn one_after_the_other(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
         let mut all: Vec<SurfacePoint> = Vec::with_capacity(points.len());
         for (i, &x) in points.iter().enumerate() {
-            let most = all.last().map(|before| before.signed_distance.abs() + x.distance(points[i - 1]));
+            // Behind what it wears the distance leaps.
+            let before = all.last().filter(|_| self.worn.is_none());
+            let most = before.map(|before| before.signed_distance.abs() + x.distance(points[i - 1]));
             all.push(most.map_or_else(|| self.nearest(x), |most| self.nearest_within(x, most * ROUNDED + ON_SURFACE)));
         }
         all

@@ -104,7 +104,7 @@ impl Job {
             return drape(scene, &self.settings, observer);
         }
         // A table by rule is the undisturbed garment's, so that starts are compared by one table.
-        let settings = self.settings.resolved(&scene.distances_m())?;
+        let settings = self.settings.resolved(&scene.distances_m()?)?;
         let positions = perturbed(&scene.garment.positions, &scene.held, self.seed);
         let moved = Scene { garment: scene.garment.with_positions(positions), ..scene.clone() };
         drape(&moved, &settings, observer)

@@ -42,8 +42,7 @@ fn jersey() -> Fabric {
 
 fn scene(body: &TriMesh, garment: TriMesh) -> Scene {
     let rest = RestShape::from_edges(&garment).unwrap();
-    let topology = Topology::new(&garment);
-    Scene { body: Body::new(body).unwrap(), garment, topology, rest, held: Vec::new(), let_go: false }
+    Scene::new(Body::new(body).unwrap(), garment, rest)
 }
 
 /// The distance that the cloth keeps from what it lies on, m.

@@ -108,7 +108,7 @@ fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
     let mut job = Job { accuracy: Against::Canonical, ..Job::preview() };
     job.settings.table = TableRule::Quantile { name: "thirds".into(), levels: 3 };
     let draped = job.drape(&scene, &mut unobserved).unwrap();
-    assert_eq!(draped.table, job.settings.table.resolve(&scene.distances_m()).unwrap());
+    assert_eq!(draped.table, job.settings.table.resolve(&scene.distances_m().unwrap()).unwrap());
     assert_eq!(draped.table.name, "thirds");
     let measured = job.measure(&scene, &draped, None, &mut unobserved).unwrap();
     let figures = &measured.figures;

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
-use partwise::scene::{Loaded, SceneError};
+use partwise::scene::{DistanceTo, Loaded, SceneError};
 use partwise::shapes::MeshCache;
 
 use super::measurements::MeasurementArgs;
@@ -21,6 +21,9 @@ pub(crate) struct InputArgs {
     /// spec, an OBJ file, or a sewing pattern (JSON). Given several times, garments are worn over each other, inner to outer
     #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
     garment: Vec<String>,
+    /// What distances count to where garments are worn over each other: the `body`, or what lies `below`, whichever is nearer
+    #[arg(long, value_name = "body|below", default_value_t = SceneSpec::default().distance_to)]
+    distance_to: DistanceTo,
     /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
     #[arg(long, value_name = "FILE.json", conflicts_with = "garment")]
     pattern: Option<String>,
@@ -70,6 +73,7 @@ impl InputArgs {
             body: self.body.clone(),
             garment: self.pattern.as_ref().or(self.garment.first()).cloned().unwrap_or_default(),
             over: self.garment.iter().skip(1).cloned().collect(),
+            distance_to: self.distance_to,
             edge_cm: self.edge_length,
             body_group: self.body_group.clone(),
             garment_group: self.garment_group.clone(),

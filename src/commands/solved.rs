@@ -7,8 +7,10 @@ use glam::DVec3;
 use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::Measured;
-use partwise::record::{FoldView, Layout, Overlay, PatternView, RecordOptions, Recorder, StepView, WrinkleView};
-use partwise::scene::{Loaded, Tailored};
+use partwise::record::{
+    FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Worn, WrinkleView,
+};
+use partwise::scene::{Layer, Loaded, Tailored};
 use partwise::session::Finished;
 
 use super::sinks::SinkArgs;
@@ -44,6 +46,7 @@ impl Solved {
     /// How to record it; `live` where more steps follow, whose meshes may be others.
     pub(super) fn record_options(&self, sinks: &SinkArgs, iterations: bool, live: bool) -> RecordOptions {
         let overlays = self.overlays();
+        let several = self.loaded.scene.layers.len() > 1;
         let of_cloth = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
         RecordOptions {
             sinks: sinks.sinks(&self.loaded.garment_name),
@@ -54,13 +57,27 @@ impl Solved {
                 iterations: iterations && self.snapshots.len() > 1,
                 error: self.measured.assessment.is_some(),
                 pattern: self.loaded.tailored.is_some(),
+                outfit: self.garments(),
                 wrinkles: self.measured.assessment.is_some(),
                 fit: of_cloth.map(str::to_owned).collect(),
+                // Who drapes an outfit looks at that first.
+                opens_on: if several { Tab::Outfit } else { Tab::Stages },
                 ..Layout::default()
             },
             replaceable: live,
             front: sinks.seen_from.direction(),
         }
+    }
+
+    /// The garments, where several are worn over each other.
+    fn garments(&self) -> Vec<Worn> {
+        let layers = self.loaded.scene.layers.iter();
+        let all = layers.map(|Layer { name, vertices, triangles }| Worn {
+            name: name.clone(),
+            vertices: vertices.clone(),
+            triangles: triangles.clone(),
+        });
+        if self.loaded.scene.layers.len() > 1 { all.collect() } else { Vec::new() }
     }
 
     /// What is shown on the draped garment: fit, and the error where it was measured.
@@ -103,6 +120,11 @@ impl Solved {
             let fit: Vec<Overlay<'_>> =
                 self.overlays().into_iter().filter(|o| ["strain", "pressure"].contains(&o.name)).collect();
             recorder.pattern(&PatternView { index, flat: &flat, garment_vertex: &garment_vertex, overlays: &fit })?;
+        }
+        if scene.layers.len() > 1 {
+            let of_part = |&p: &u32| forces.get(p as usize).map_or(0.0, |force| force.length());
+            let force_n: Vec<f64> = self.drape.parts.part_of_vertex.iter().map(of_part).collect();
+            recorder.outfit(&OutfitView { index, force_n: &force_n, draped: &self.drape.positions })?;
         }
         if let Some(folds) = &self.drape.folds {
             let draped = &self.drape.positions;

@@ -5,6 +5,7 @@ use crate::mechanics::energy::EnergyError;
 use crate::mechanics::paper::PaperError;
 use crate::mechanics::refine::SolveError;
 use crate::range_table::TableError;
+use crate::scene::SceneError;
 
 /// Why nothing came out.
 #[derive(Debug, thiserror::Error)]
@@ -12,6 +13,9 @@ pub enum DrapeError {
     /// The distances make no table.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// A garment cannot be put over another.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The equations refused their input.
     #[error(transparent)]
     Paper(#[from] PaperError),

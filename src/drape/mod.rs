@@ -4,6 +4,7 @@
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
 mod error;
+mod layers;
 mod let_go;
 mod levels;
 mod parts;
@@ -135,53 +136,75 @@ pub fn unobserved(_: &refine::Step<'_>) -> ControlFlow<()> {
 }
 
 fn stages(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    if scene.layers.len() > 1 {
+        return layers::in_order(scene, settings, observer);
+    }
     let began = Instant::now();
     let mut times = StageTimes::default();
-    let needs_cloth = matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0);
     let StageTimes { distance: distance_time, segment: segment_time, .. } = &mut times;
     let (first, cloth) = rayon::join(
         || -> Result<_, DrapeError> {
-            let ground = timed(distance_time, || Distances::of(scene));
+            let ground = timed(distance_time, || Distances::of(scene))?;
             let table = settings.table.resolve(&ground.unsigned_m)?;
             let parts = timed(segment_time, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
             Ok((ground, table, parts))
         },
         || {
             let began = Instant::now();
-            let cloth = needs_cloth.then(|| Levels::new(scene, &settings.fabric)).transpose();
+            let cloth = needs_cloth(settings).then(|| Levels::new(scene, &settings.fabric)).transpose();
             cloth.map(|cloth| (cloth, began.elapsed()))
         },
     );
     let (ground, table, parts) = first?;
     let (cloth, cloth_time) = cloth?;
     let level_part_count = parts.len();
-    let on = || ControlFlow::Continue(());
-    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &ground.surface, parts, cloth.as_ref(), &on));
+    let Moved { stage, folds, state, let_go } =
+        moved(scene, settings, &ground, parts, cloth.as_ref(), &mut times, observer)?;
     times.mechanics += cloth_time;
-    let stage = stage?;
-    let folds = folds_of(settings, cloth.as_ref(), &stage);
-    let state = match &cloth {
-        None => None,
-        Some(levels) => {
-            let released = timed(&mut times.refine, || {
-                let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
-                let refined = refine_from(scene, settings, &levels.cloth, Some(&ground), start, observer)?;
-                let_go::let_go(scene, settings, refined, observer)
-            })?;
-            let Released { cloth, refined, let_go } = released;
-            let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
-            let (positions, state) = settled(scene, settings, cloth, Some(&ground), refined);
-            Some((positions, state, let_go))
-        }
-    };
-    let (state, let_go) = state.map_or((None, None), |(positions, state, let_go)| (Some((positions, state)), let_go));
-    if settings.refine == Refine::Steps(0) {
-        times.refine = Duration::ZERO;
-    }
     let made = Made { ground, table, level_part_count, stage, folds, state, let_go };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();
     Ok(drape)
+}
+
+/// Whether any of it needs the cloth at full resolution.
+fn needs_cloth(settings: &Settings) -> bool {
+    matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0)
+}
+
+/// What stage two and the steps after it make of the PARTs.
+struct Moved {
+    stage: StageTwo,
+    folds: Option<Folds>,
+    state: Option<(Vec<DVec3>, ClothState)>,
+    let_go: Option<LetGo>,
+}
+
+/// Stage two, and as many steps at full resolution as the settings ask for.
+fn moved(
+    scene: &Scene,
+    settings: &Settings,
+    ground: &Distances,
+    parts: Parts,
+    cloth: Option<&Levels>,
+    times: &mut StageTimes,
+    observer: Observer<'_>,
+) -> Result<Moved, DrapeError> {
+    let on = || ControlFlow::Continue(());
+    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &ground.surface, parts, cloth, &on))?;
+    let folds = folds_of(settings, cloth, &stage);
+    let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
+    let Released { cloth, refined, let_go } = timed(&mut times.refine, || {
+        let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
+        let refined = refine_from(scene, settings, &levels.cloth, Some(ground), start, observer)?;
+        let_go::let_go(scene, settings, refined, observer)
+    })?;
+    let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
+    let state = Some(settled(scene, settings, cloth, Some(ground), refined));
+    if settings.refine == Refine::Steps(0) {
+        times.refine = Duration::ZERO;
+    }
+    Ok(Moved { stage, folds, state, let_go })
 }
 
 fn timed<T>(slot: &mut Duration, work: impl FnOnce() -> T) -> T {

@@ -13,20 +13,28 @@ use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::Parts;
 use crate::range_table::RangeTable;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 
-/// How far the garment as placed is from the body.
+/// How far the garment as placed is from what it is over.
 #[derive(Debug, Clone)]
 pub(crate) struct Distances {
-    /// Closest points on the body.
+    /// Closest points on it.
     pub(crate) surface: Vec<SurfacePoint>,
     /// Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
     pub(crate) unsigned_m: Vec<f64>,
 }
 
 impl Distances {
-    pub(crate) fn of(scene: &Scene) -> Self {
-        let surface = scene.body.nearest_all(&scene.garment.positions);
+    pub(crate) fn of(scene: &Scene) -> Result<Self, SceneError> {
+        Ok(Self::from_surface(scene.surface()?))
+    }
+
+    /// To the body, and what it wears.
+    pub(super) fn to_body(scene: &Scene) -> Self {
+        Self::from_surface(scene.body.nearest_all(&scene.garment.positions))
+    }
+
+    fn from_surface(surface: Vec<SurfacePoint>) -> Self {
         Self { unsigned_m: surface.iter().map(|s| s.signed_distance.abs()).collect(), surface }
     }
 }

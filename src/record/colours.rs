@@ -44,6 +44,11 @@ pub(super) fn by_part(garment: &TriMesh) -> Vec<Rgb> {
     part.into_iter().map(of).collect()
 }
 
+/// The colour of garment number `k` of an outfit, inner to outer.
+pub(super) fn of_layer(k: usize) -> Rgb {
+    k.checked_sub(1).map_or(DRAPED, |next| OVER[next % OVER.len()])
+}
+
 /// Twelve hues of one lightness for the lines of a plot and the dots of a scatter; neighbouring entries lie far apart.
 pub(super) fn palette() -> Vec<Rgb> {
     // 5 and 12 share no factor, so this visits every hue, 150° at a time.

@@ -19,6 +19,7 @@ mod meshes;
 mod method;
 mod native;
 mod open;
+mod outfit;
 mod page;
 mod panel;
 pub mod paths;
@@ -45,6 +46,7 @@ pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
 pub use method::MethodView;
+pub use outfit::{OutfitView, Worn};
 pub(crate) use page::takes_gzip;
 pub use page::{Bundled, bundled};
 pub use panel::Panel;
@@ -207,6 +209,11 @@ impl Recorder {
     /// Lines along the folds that no PART shows.
     pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
         self.timed(|open| folds::log(open, view))
+    }
+
+    /// Garments worn over each other, in the colours of the step before.
+    pub fn outfit(&mut self, view: &OutfitView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| outfit::log(open, view))
     }
 
     /// The flat panels of a sewing pattern in the colours of the step before.

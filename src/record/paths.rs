@@ -15,6 +15,7 @@
 //! | `/fit/<name>/garment` | Mesh3D | strain, pressure: per-vertex values on the drape | `table` |
 //! | `/fit/folds/lines` | LineStrips3D | directions of the folds that no PART shows | `table` |
 //! | `/pattern/parts/panels`, `/pattern/<name>/panels` | Mesh3D | the flat panels in the same colours | `table` |
+//! | `/outfit/<k>-<name>/parts`, `.../force`, `.../drape` | Mesh3D | garments worn over each other, each by itself | `table` |
 //! | `/wrinkles/seams/garment`, `.../lines` | Mesh3D, LineStrips3D | jump of the displacement at each seam | `table` |
 //! | `/wrinkles/curvature/garment` | Mesh3D | mean curvature of the drape | `table` |
 //! | `/error/garment` | Mesh3D | distance to the reference drape | `table` |
@@ -45,6 +46,7 @@ pub const FORCE_ARROWS: &str = "/force/arrows";
 pub const DRAPE: &str = "/drape/garment";
 pub const FIT: &str = "/fit";
 pub const PATTERN: &str = "/pattern";
+pub const OUTFIT: &str = "/outfit";
 pub const SEAMS: &str = "/wrinkles/seams";
 pub const CURVATURE: &str = "/wrinkles/curvature";
 pub const ERROR: &str = "/error";

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::over::{join, put_over};
+use super::layers::join;
 use super::spec::REST_AUTO;
-use super::{PushOutReport, Scene, SceneError, SceneSpec, facing_body};
+use super::{Layer, PushOutReport, Scene, SceneError, SceneSpec, facing_body};
 use crate::distance::Body;
 use crate::files::{has_ending, names_a_file, stem};
 use crate::mesh::export::{write_imported, write_mesh, write_textured};
@@ -59,13 +59,16 @@ struct Unplaced {
 }
 
 impl Unplaced {
-    /// Puts another garment over it; what came of files and patterns is then that of several, and is left behind.
-    fn put_on(&mut self, mut outer: Self, body: &Body) -> Result<(), SceneError> {
-        put_over(&mut outer.mesh, &self.mesh, body)?;
+    /// What follows on so many vertices and triangles.
+    fn layer(&self, name: String, (vertices, triangles): (usize, usize)) -> Layer {
+        Layer { name, vertices: vertices..self.mesh.vertex_count(), triangles: triangles..self.mesh.triangles.len() }
+    }
+
+    /// Adds another garment, worn over it; what came of files and patterns is then that of several, and is left behind.
+    fn put_on(&mut self, outer: Self) {
         let before = join(&mut self.mesh, &mut self.rest, outer.mesh, outer.rest);
         self.held.extend(outer.held.iter().map(|v| v + before));
         (self.tailored, self.imported, self.pattern) = (None, None, None);
-        Ok(())
     }
 }
 
@@ -88,12 +91,16 @@ impl SceneSpec {
         let (body, made) = rayon::join(|| self.load_body(meshes), || self.make_garment(meshes));
         let (body, of_body) = body?;
         let mut unplaced = self.unplaced(&body, of_body.as_ref(), made)?;
-        for layer in self.layers().skip(1) {
-            let outer = layer.unplaced(&body, of_body.as_ref(), layer.make_garment(meshes))?;
-            unplaced.put_on(outer, &body)?;
+        let mut layers = vec![unplaced.layer(self.layer_name(), (0, 0))];
+        for spec in self.layers().skip(1) {
+            let outer = spec.unplaced(&body, of_body.as_ref(), spec.make_garment(meshes))?;
+            let before = (unplaced.mesh.vertex_count(), unplaced.mesh.triangles.len());
+            unplaced.put_on(outer);
+            layers.push(unplaced.layer(spec.layer_name(), before));
         }
         let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
+        (scene.layers, scene.distance_to) = (layers, self.distance_to);
         scene.held = match &self.hold {
             None => {
                 scene.let_go = unplaced.tailored.is_some();

@@ -5,13 +5,14 @@
 //! body, and what starts inside is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
 mod error;
+mod layers;
 mod load;
-mod over;
 mod placement;
 mod push_out;
 mod spec;
 
 pub use error::SceneError;
+pub use layers::{DistanceTo, Layer};
 pub use load::{Loaded, Tailored};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
@@ -19,7 +20,7 @@ pub use spec::{DRESS_FORM, SceneSpec};
 
 use glam::DVec3;
 
-use crate::distance::Body;
+use crate::distance::{Body, SurfacePoint};
 use crate::mesh::{RestShape, Topology, TriMesh};
 use placement::check_near;
 
@@ -41,6 +42,10 @@ pub struct Scene {
     pub held: Vec<u32>,
     /// Whether they are let go once the garment rests, to see whether it stays up by itself.
     pub let_go: bool,
+    /// The garments that it is made of, inner to outer; mostly one.
+    pub layers: Vec<Layer>,
+    /// What its distances count to.
+    pub distance_to: DistanceTo,
 }
 
 impl Scene {
@@ -56,13 +61,22 @@ impl Scene {
         Ok(Self::place(body, garment, rest, true)?.0)
     }
 
+    /// One garment as it is, where it is, nothing held.
+    #[must_use]
+    pub fn new(body: Body, garment: TriMesh, rest: RestShape) -> Self {
+        let name = "garment".to_owned();
+        let layer = Layer { name, vertices: 0..garment.vertex_count(), triangles: 0..garment.triangles.len() };
+        let (layers, distance_to) = (vec![layer], DistanceTo::Body);
+        let topology = Topology::new(&garment);
+        Self { body, topology, garment, rest, held: Vec::new(), let_go: false, layers, distance_to }
+    }
+
     /// Puts them together, nothing held; what starts inside the body is pushed out if asked.
     fn place(body: Body, garment: TriMesh, rest: RestShape, push: bool) -> Result<(Self, PushOutReport), SceneError> {
         check_near(&garment, &body)?;
         let (garment, report) =
             if push { push_out(&garment, &body, PUSHED_CLEARANCE) } else { (garment, PushOutReport::default()) };
-        let topology = Topology::new(&garment);
-        Ok((Self { body, garment, topology, rest, held: Vec::new(), let_go: false }, report))
+        Ok((Self::new(body, garment, rest), report))
     }
 
     /// Whether each garment vertex is held.
@@ -84,10 +98,28 @@ impl Scene {
         self.body.mesh().bounds().is_some_and(|(low, _)| x.iter().all(|x| x.z < low.z))
     }
 
-    /// Unsigned distance of each garment vertex to the body, m: equation (1) takes it without its sign, as a vertex inside is
+    /// The nearest point of what each garment vertex, as placed, is over: the body, or what [`DistanceTo`] says.
+    ///
+    /// # Errors
+    /// [`SceneError`] where a garment is no surface that a distance can be measured to.
+    pub fn surface(&self) -> Result<Vec<SurfacePoint>, SceneError> {
+        let placed = &self.garment.positions;
+        if self.distance_to == DistanceTo::Body {
+            return Ok(self.body.nearest_all(placed));
+        }
+        let mut surface = Vec::with_capacity(placed.len());
+        for (k, layer) in self.layers.iter().enumerate() {
+            surface.extend(self.below(k, placed)?.nearest_all(&placed[layer.vertices.clone()]));
+        }
+        Ok(surface)
+    }
+
+    /// Unsigned distance of each garment vertex to what it is over, m: equation (1) takes it without its sign, as a vertex inside is
     /// as far from the surface as one outside.
-    #[must_use]
-    pub fn distances_m(&self) -> Vec<f64> {
-        self.body.nearest_all(&self.garment.positions).iter().map(|s| s.signed_distance.abs()).collect()
+    ///
+    /// # Errors
+    /// As [`surface`](Self::surface).
+    pub fn distances_m(&self) -> Result<Vec<f64>, SceneError> {
+        Ok(self.surface()?.iter().map(|s| s.signed_distance.abs()).collect())
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::SceneError;
+use super::{DistanceTo, SceneError};
 use crate::files::{has_ending, names_a_file, read_text, stem};
 use crate::mesh::import::ImportOptions;
 use crate::mesh::{Axis, Unit};
@@ -28,6 +28,8 @@ pub struct SceneSpec {
     pub garment: String,
     /// Garments worn over it, inner to outer, each named as it is.
     pub over: Vec<String>,
+    /// What distances count to where garments are worn over each other.
+    pub distance_to: DistanceTo,
     /// One group or object of the body's file alone.
     pub body_group: Option<String>,
     /// One group or object of the garment's file alone.
@@ -59,6 +61,7 @@ impl Default for SceneSpec {
             body: DRESS_FORM.to_owned(),
             garment: "low-cut-dress".to_owned(),
             over: Vec::new(),
+            distance_to: DistanceTo::default(),
             body_group: None,
             garment_group: None,
             edge_cm: 100.0 * DEFAULT_EDGE_M,
@@ -93,8 +96,13 @@ impl SceneSpec {
     #[must_use]
     pub fn garment_name(&self) -> String {
         if !self.over.is_empty() {
-            return self.layers().map(|layer| layer.garment_name()).collect::<Vec<_>>().join("-under-");
+            return self.layers().map(|layer| layer.layer_name()).collect::<Vec<_>>().join("-under-");
         }
+        self.layer_name()
+    }
+
+    /// What the garment itself is called, whatever is worn over it.
+    pub(super) fn layer_name(&self) -> String {
         if names_a_file(&self.garment) {
             let stem = stem(&self.garment);
             return stem.strip_suffix("_specification").map_or(stem.clone(), str::to_owned);

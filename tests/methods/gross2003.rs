@@ -114,8 +114,7 @@ fn a_skirt_is_sewn_and_comes_to_rest_outside_the_body_with_the_same_bits_every_t
 #[test]
 fn a_pattern_brings_its_own_panels() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/patterns/tshirt.json");
-    let loaded =
-        SceneSpec { edge_cm: 3.0, ..SceneSpec::new("form", file.display().to_string()) }.load().unwrap();
+    let loaded = SceneSpec { edge_cm: 3.0, ..SceneSpec::new("form", file.display().to_string()) }.load().unwrap();
     let sewn = &loaded.tailored.as_ref().unwrap().put_on.garment;
     let pieces = of_pattern(sewn, &loaded.scene.garment).unwrap();
     assert_eq!(pieces.len(), sewn.panels.len());

@@ -29,9 +29,9 @@ fn elsewhere() -> TriMesh {
 
 /// Cloth that hangs free, held at `held`.
 pub(crate) fn hanging(garment: TriMesh, held: Vec<u32>) -> Scene {
-    let (topology, rest) = (Topology::new(&garment), RestShape::from_edges(&garment).unwrap());
+    let rest = RestShape::from_edges(&garment).unwrap();
     let body = partwise::distance::Body::new(&elsewhere()).unwrap();
-    Scene { body, garment, topology, rest, held, let_go: false }
+    Scene { held, ..Scene::new(body, garment, rest) }
 }
 
 /// A fabric alike in all directions.

@@ -164,7 +164,7 @@ fn compared(plan: &Plan, rows: &[Row], bench: &Bench<'_>) -> anyhow::Result<Vec<
     for row in rows {
         let point = &plan.points[row.index];
         let loaded = bench.scene(point)?;
-        let (scene, distances_m) = (&loaded.scene, loaded.scene.distances_m());
+        let (scene, distances_m) = (&loaded.scene, loaded.scene.distances_m()?);
         let table = point.job.settings.table.resolve(&distances_m)?;
         let parts = segment(&scene.topology, &distances_m, &table);
         let parts = parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, &table);

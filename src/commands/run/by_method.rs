@@ -88,6 +88,13 @@ impl RunArgs {
         self.refuse_beside_a_method()?;
         let began = Instant::now();
         let (spec, fabric) = (self.input.spec()?, self.stages.fabric()?);
+        if !spec.over.is_empty() {
+            return Err(UserError::new(format!(
+                "--method {}: found {} garments over each other, expected one: it keeps no cloth off cloth",
+                self.method,
+                1 + spec.over.len()
+            )));
+        }
         self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
         let loaded = self.input.load(&spec)?;
         let load = began.elapsed();

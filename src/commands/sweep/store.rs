@@ -65,9 +65,9 @@ pub(crate) struct KeptPoint {
 }
 
 impl KeptScene {
-    fn of(scene: &Scene) -> Self {
+    fn of(scene: &Scene) -> io::Result<Self> {
         let (body, garment) = (scene.body.mesh().clone(), scene.garment.clone());
-        Self { body, garment, distance_m: scene.distances_m() }
+        Ok(Self { body, garment, distance_m: scene.distances_m().map_err(io::Error::other)? })
     }
 
     /// Whether every index points at something: a file may be somebody else's.
@@ -148,20 +148,22 @@ impl PointStore {
         self.put_both(id, point, || KeptScene::of(scene))
     }
 
-    fn put_both(&self, id: &str, point: KeptPoint, scene: impl FnOnce() -> KeptScene) -> io::Result<()> {
+    fn put_both(&self, id: &str, point: KeptPoint, scene: impl FnOnce() -> io::Result<KeptScene>) -> io::Result<()> {
         match self {
             Self::Folder(folder, lock) => {
                 let writing = lock.lock().unwrap_or_else(PoisonError::into_inner);
                 // One that is there and damaged is written again: for ever in the way of --resume otherwise.
                 if self.scene(&point.scene).is_none() {
-                    write(&scene_path(folder, &point.scene), SCENE, &scene())?;
+                    write(&scene_path(folder, &point.scene), SCENE, &scene()?)?;
                 }
                 drop(writing);
                 write(&point_path(folder, id), POINT, &point)
             }
             Self::Memory(kept) => {
                 let (scenes, points) = &mut *open(kept);
-                scenes.entry(point.scene.clone()).or_insert_with(scene);
+                if !scenes.contains_key(&point.scene) {
+                    scenes.insert(point.scene.clone(), scene()?);
+                }
                 points.insert(id.to_owned(), point);
                 Ok(())
             }
@@ -204,7 +206,7 @@ impl PointStore {
     pub(crate) fn adopt(&self, from: &Self, id: &str) -> io::Result<bool> {
         let Some(point) = from.point(id) else { return Ok(false) };
         let Some(scene) = from.scene(&point.scene) else { return Ok(false) };
-        self.put_both(id, point, || scene).map(|()| true)
+        self.put_both(id, point, || Ok(scene)).map(|()| true)
     }
 }
 

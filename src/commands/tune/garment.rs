@@ -95,7 +95,7 @@ impl Garment {
         let mut garment = Self {
             name: name.to_owned(),
             grain: Grain::new(&scene.garment, &scene.topology, &scene.rest),
-            distances_m: scene.distances_m(),
+            distances_m: scene.distances_m()?,
             scene,
             reference: reference.positions,
             displacement,

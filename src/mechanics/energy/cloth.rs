@@ -92,6 +92,8 @@ pub struct Cloth {
     /// The triangles by fours.
     pub(super) packs: Vec<TrianglePack>,
     placed: Arc<Vec<DVec3>>,
+    /// Where to go back to where a start crosses.
+    clear: Arc<Vec<DVec3>>,
     layout: Arc<OnceLock<HessianLayout>>,
     skin: Arc<OnceLock<Arc<Skin>>>,
 }
@@ -138,6 +140,7 @@ impl Cloth {
         if !is_held.contains(&false) {
             return Err(EnergyError::NothingFree { count: n });
         }
+        let placed = Arc::new(mesh.positions.clone());
         Ok(Self {
             packs: TrianglePack::all(&triangles),
             weight: GRAVITY * masses.iter().sum::<f64>(),
@@ -149,7 +152,8 @@ impl Cloth {
             triangles,
             bending: Arc::new(bending),
             stiffness: Stiffness::new(fabric),
-            placed: Arc::new(mesh.positions.clone()),
+            clear: Arc::clone(&placed),
+            placed,
             layout: Arc::new(OnceLock::new()),
             skin: Arc::new(OnceLock::new()),
             thickness: fabric.thickness_m,
@@ -195,6 +199,12 @@ impl Cloth {
         self
     }
 
+    /// The same cloth, which goes back towards `x` (m) where a start crosses itself, instead of how it was placed.
+    #[must_use]
+    pub(crate) fn clear_at(self, x: Vec<DVec3>) -> Self {
+        Self { clear: Arc::new(x), ..self }
+    }
+
     /// Number of vertices, held or free.
     #[must_use]
     pub fn vertex_count(&self) -> usize {
@@ -223,7 +233,7 @@ impl Cloth {
     #[must_use]
     pub fn proximity(&self) -> Proximity {
         let skin = self.skin.get_or_init(|| Arc::new(Skin::new(&self.triangles, self.vertex_count())));
-        Proximity::new(Arc::clone(skin), Arc::clone(&self.placed), self.thickness, self.friction)
+        Proximity::new(Arc::clone(skin), [&self.placed, &self.clear].map(Arc::clone), self.thickness, self.friction)
     }
 
     /// The layout of a Hessian with blocks for these pairs of vertices as well, ordered as the cloth lies at `x`.

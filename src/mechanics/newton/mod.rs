@@ -126,6 +126,8 @@ pub(crate) struct Descent<'c, 'b> {
     pub(crate) residual: f64,
     /// ε, 1/s².
     pub(crate) damping: f64,
+    /// Share that is gone of every step: less than all where what stays as it is between steps makes them go to and fro.
+    pub(crate) stride: f64,
     gradient: Vec<DVec3>,
     relaxation: Relaxation,
     blocks: Vec<DMat3>,
@@ -146,6 +148,7 @@ impl<'c, 'b> Descent<'c, 'b> {
             energy: 0.0,
             residual: 0.0,
             damping,
+            stride: 1.0,
             gradient: Vec::new(),
             relaxation: Relaxation::default(),
             blocks: Vec::new(),
@@ -223,7 +226,18 @@ impl<'c, 'b> Descent<'c, 'b> {
     pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: Pace) -> Result<Advance, SolveError> {
         self.direct(tangent)?;
         let Self {
-            cloth, contacts, x, relaxation, direction, trial, gradient, energy, trial_gradient, scratch, ..
+            cloth,
+            contacts,
+            x,
+            relaxation,
+            direction,
+            trial,
+            gradient,
+            energy,
+            trial_gradient,
+            scratch,
+            stride,
+            ..
         } = self;
         let cloth = *cloth;
         relaxation.prepare(cloth, contacts, &self.blocks);
@@ -246,6 +260,10 @@ impl<'c, 'b> Descent<'c, 'b> {
             }
             if falls {
                 relaxation.run(cloth, contacts, trial, pace.relaxing);
+                if *stride < 1.0 {
+                    trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *stride));
+                    contacts.update(trial);
+                }
                 match contacts.proximity.as_mut().map(|p| p.look(x, trial)) {
                     None | Some(Looked::Clear) => break true,
                     Some(Looked::Cut) => {

@@ -3,8 +3,10 @@
 
 use super::super::eye::Eye;
 use super::super::legend::visible;
+use super::super::outfit::{self, Worn};
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
+use super::closer;
 use super::view::View;
 use super::{Node, TimePanel};
 
@@ -36,6 +38,8 @@ pub struct Layout {
     pub fit: Vec<String>,
     /// The flat panels of a sewing pattern will come.
     pub pattern: bool,
+    /// The garments of an outfit, inner to outer, where there are several.
+    pub outfit: Vec<Worn>,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -64,6 +68,8 @@ pub enum Tab {
     Fit,
     /// The flat panels of a sewing pattern beside the drape.
     Pattern,
+    /// Garments worn over each other, each by itself and all together.
+    Outfit,
     /// Jumps at the PARTs' seams, and mean curvature.
     Wrinkles,
     /// Energy and residual over the iterations.
@@ -93,11 +99,14 @@ impl Layout {
         if self.pattern {
             tabs.push((Tab::Pattern, self.panels(eye)));
         }
+        if !self.outfit.is_empty() {
+            tabs.push((Tab::Outfit, self.wardrobe(eye)));
+        }
         if self.wrinkles {
-            tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
+            tabs.push((Tab::Wrinkles, closer::wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
         if self.iterations && self.method.is_none() {
-            tabs.push((Tab::Solver, solver(&self.eye(Tab::Solver, eye))));
+            tabs.push((Tab::Solver, closer::solver(&self.eye(Tab::Solver, eye))));
         }
         let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
         let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
@@ -114,6 +123,7 @@ impl Layout {
             Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
             Tab::Pattern => over_bars(pattern::ASPECT),
+            Tab::Outfit => 0.5 * ASPECT,
             Tab::Wrinkles => over_bars(0.5 * ASPECT),
             Tab::Solver => ASPECT / 3.0,
         })
@@ -210,6 +220,27 @@ impl Layout {
         over("Side by side", views.collect(), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
     }
 
+    /// A row for each garment, its PARTs, forces and drape, beside all of them.
+    fn wardrobe(&self, eye: &Eye) -> Node {
+        let all = self.eye(Tab::Outfit, eye);
+        let rows = self.outfit.len() as f64;
+        let one = eye.through(ASPECT / 6.0 * rows);
+        let stages = [("PARTs", "parts"), ("force", "force"), ("drape", "drape")];
+        let row = |(k, worn): (usize, &Worn)| {
+            let branch = outfit::branch(k, worn);
+            let view = |(title, leaf): (&str, &str)| {
+                let path = format!("{branch}/{leaf}");
+                (1.0, View::spatial(format!("{}: {title}", worn.name), &[paths::BODY, &path], &one).into())
+            };
+            (1.0, Node::Row("Garment", stages.map(view).into()))
+        };
+        let garments = Node::Column("Garments", self.outfit.iter().enumerate().map(row).collect());
+        let mut shown = vec![paths::BODY.to_owned()];
+        shown.extend(self.outfit.iter().enumerate().map(|(k, worn)| format!("{}/drape", outfit::branch(k, worn))));
+        let shown: Vec<&str> = shown.iter().map(String::as_str).collect();
+        Node::Row("Outfit", vec![(1.0, garments), (1.0, View::spatial("Outfit", &shown, &all).into())])
+    }
+
     fn fit(&self, eye: &Eye) -> Node {
         let eye = &self.eye(Tab::Fit, eye);
         let mut views: Vec<(f32, Node)> = Vec::new();
@@ -221,16 +252,8 @@ impl Layout {
     }
 }
 
-fn wrinkles(eye: &Eye) -> Node {
-    let views = vec![
-        (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
-        (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
-    ];
-    over("Wrinkles", views, "Colours", paths::WRINKLES_LEGEND, 2)
-}
-
 /// Views side by side over a row of colour bars or texts, one for each.
-fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, columns: usize) -> Node {
+pub(super) fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, columns: usize) -> Node {
     let bars = View::plane(name, &[path], visible([columns, 1])).into();
     Node::Column(tab, vec![(1.0 - BARS_HEIGHT, Node::Row(tab, views)), (BARS_HEIGHT, bars)])
 }
@@ -238,17 +261,6 @@ fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, colu
 /// Width over height of a view that has a row of bars below.
 fn over_bars(aspect: f64) -> f64 {
     aspect / (1.0 - f64::from(BARS_HEIGHT))
-}
-
-fn solver(eye: &Eye) -> Node {
-    let plots = vec![
-        (1.0, View::plot("Energy, J", &[paths::ENERGY], true).into()),
-        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], true).into()),
-    ];
-    Node::Row(
-        "Solver",
-        vec![(1.0, View::spatial("Drape", &[paths::BODY, "/drape"], eye).into()), (2.0, Node::Column("Solver", plots))],
-    )
 }
 
 pub(super) fn capital(name: &str) -> String {

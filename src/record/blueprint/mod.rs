@@ -4,6 +4,7 @@
 //! written by hand: `view/{id}` and its properties, `container/{id}`, `viewport`, and the panels, on the sequence timeline
 //! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
+mod closer;
 pub(crate) mod layout;
 mod method;
 mod panels;

@@ -1,6 +1,7 @@
 //! The work on the newest state, piece by piece: whoever drives it may look up between two pieces, and a step within a piece
 //! looks whether a newer state has come.
 
+mod outfit;
 mod rest;
 mod stages;
 
@@ -108,6 +109,9 @@ impl Workshop {
     fn piece(&mut self, session: &Session, target: &Target) -> Result<(), EditError> {
         let Some(sectioned) = &target.sectioned else { return self.load(session, target) };
         let settings = &target.job.settings;
+        if sectioned.ground.loaded.scene.layers.len() > 1 {
+            return self.outfit(session, target, sectioned);
+        }
         let generation = sectioned.ground.generation;
         let needs_cloth = matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0);
         let sewn = self.cloth.as_ref().filter(|c| c.generation == generation && c.fabric == settings.fabric);

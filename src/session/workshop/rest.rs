@@ -112,9 +112,15 @@ impl Workshop {
             state,
             let_go: None,
         };
-        let drape = made.judged(scene, settings, times);
+        self.show(session, target, sectioned, made.judged(scene, settings, times));
+    }
+
+    /// A whole drape of the state, with its figures.
+    pub(super) fn show(&mut self, session: &Session, target: &Target, sectioned: &Sectioned, drape: Drape) {
+        let (settings, ground) = (&target.job.settings, &sectioned.ground);
+        let scene = &ground.loaded.scene;
         let figures = Figures::of(scene, &drape);
-        let rested = target.rest.is_some() && settings.refine != Refine::Steps(0);
+        let rested = drape.state.is_some() && settings.refine != Refine::Steps(0);
         let preview_error_mm = rested.then(|| accuracy::rms_mm(&drape.preview, &drape.positions));
         let bound_mm = rested.then(|| bound(settings, scene, &drape));
         let bound_mm = bound_mm.filter(|mm| mm.is_finite());
@@ -142,7 +148,7 @@ fn bound(settings: &Settings, scene: &Scene, drape: &Drape) -> f64 {
 }
 
 /// Force of the body on each vertex that it touches where the cloth rests, N: what its weight and the cloth pull with, friction included.
-fn reactions(cloth: &Cloth, x: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
+pub(super) fn reactions(cloth: &Cloth, x: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
     let mut gradient = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut gradient);
     let carried = cloth.held.iter().zip(pressure_kpa).map(|(held, kpa)| !held && *kpa > 0.0);

@@ -26,7 +26,7 @@ impl Workshop {
         let began = Instant::now();
         let loaded = target.job.scene.load_with(&self.meshes)?;
         let (load_ms, began) = (ms_since(began), Instant::now());
-        let distances = Distances::of(&loaded.scene);
+        let distances = Distances::of(&loaded.scene)?;
         self.generations += 1;
         let ground = Arc::new(Ground {
             generation: self.generations,

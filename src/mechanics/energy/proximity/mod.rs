@@ -75,6 +75,7 @@ const PATIENCE: usize = 40;
 pub struct Proximity {
     skin: Arc<Skin>,
     placed: Arc<Vec<DVec3>>,
+    clear: Arc<Vec<DVec3>>,
     offset: f64,
     stiffness: f64,
     friction: f64,
@@ -86,13 +87,14 @@ pub struct Proximity {
 }
 
 impl Proximity {
-    /// None looked for yet: `thickness` in m.
-    pub(super) fn new(skin: Arc<Skin>, placed: Arc<Vec<DVec3>>, thickness: f64, friction: f64) -> Self {
+    /// None looked for yet: how the cloth was placed, and where it goes back to where a start crosses; `thickness` in m.
+    pub(super) fn new(skin: Arc<Skin>, [placed, clear]: [Arc<Vec<DVec3>>; 2], thickness: f64, friction: f64) -> Self {
         let offset = thickness.clamp(LEAST_OF_EDGE * skin.edge_m, MOST_OF_EDGE * skin.edge_m);
         let passage = Passage::new(Arc::clone(&skin));
         Self {
             skin,
             placed,
+            clear,
             offset,
             stiffness: HALF_OFFSET_PRESSURE / (0.5 * offset),
             friction,
@@ -192,23 +194,23 @@ impl Proximity {
         self.passage.look(from, to)
     }
 
-    /// Takes `x` (m) back towards how the garment was placed until nothing crosses, if nothing did there; leaves it where it did.
+    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses, if nothing did there; leaves it where it did.
     pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
-        if self.passage.known(x).is_empty() || !self.passage.anew(&self.placed).is_empty() {
+        if self.passage.known(x).is_empty() || !self.passage.anew(&self.clear).is_empty() {
             return;
         }
         let end = std::mem::take(x);
         let mut share = 1.0;
         while share > LEAST_SHARE {
             share *= BACK;
-            let there: Vec<DVec3> = self.placed.iter().zip(&end).map(|(a, b)| a.lerp(*b, share)).collect();
+            let there: Vec<DVec3> = self.clear.iter().zip(&end).map(|(a, b)| a.lerp(*b, share)).collect();
             if self.passage.anew(&there).is_empty() {
                 *x = there;
                 break;
             }
         }
         if x.is_empty() {
-            x.clone_from(&self.placed);
+            x.clone_from(&self.clear);
         }
         self.passage.begin(Vec::new());
     }
