@@ -8,7 +8,7 @@ use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::distance::Body;
 use partwise::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
-use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::mesh::{RestShape, TriMesh};
 
 /// Squares along each side of the cloth, and the length of one, m.
 const SQUARES: u32 = 8;

@@ -83,7 +83,8 @@ fn bounding_surfaces_bound_the_body_and_pieces_lie_on_them_at_their_own_lengths(
                     (sum, count) = (sum + 1.0 - share, count + 1.0);
                 }
             }
-            assert!(sum / count < 5e-3, "{garment}: {}", sum / count);
+            // Edges of 3 cm on an arm of 5 cm: a chord misses (e/r)²/24 of its arc, 1.5 %.
+            assert!(sum / count < 1e-2, "{garment}: {}", sum / count);
             assert!(worst < 0.2, "{garment}: {worst}");
         }
     }

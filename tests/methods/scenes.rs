@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use partwise::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
-use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::mesh::{RestShape, TriMesh};
 use partwise::methods::{Dressing, MethodDrape, MethodError, ReferenceMethod, RestRule};
 use partwise::{DVec3, Scene};
 

@@ -31,6 +31,7 @@ use super::{Dressing, Exhibit, MethodDrape, MethodError, Moment, ReferenceMethod
 use crate::mechanics::energy::Cloth;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::pattern::SewnGarment;
+use crate::scene::Scene;
 use developable::Developable;
 use pieces::{Piece, distortion, parts};
 use verlet::{Sheet, Tempo};
@@ -241,7 +242,7 @@ fn moment<'a>(
 }
 
 impl Apart {
-    fn new(pieces: &[Piece], laid: Vec<Vec<DVec3>>, scene: &crate::Scene) -> Self {
+    fn new(pieces: &[Piece], laid: Vec<Vec<DVec3>>, scene: &Scene) -> Self {
         let mut mesh = TriMesh::default();
         let (mut of, mut corners) = (Vec::new(), Vec::new());
         for (number, (piece, places)) in pieces.iter().zip(laid).enumerate() {

@@ -277,10 +277,23 @@ pub fn distortion(pieces: &[Piece], rest: &RestShape) -> [f64; 2] {
     [crate::quantile::nearest_rank(&off, 0.95), off.iter().copied().fold(0.0, f64::max)]
 }
 
-/// The direction in which points spread most about their mean.
+/// The direction in which the points of a limb spread most about their mean, upwards; without the upper third, where it joins the
+/// trunk, and what counts as its own differs from left to right.
 fn spread(points: &[DVec3]) -> DVec3 {
-    let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-    longest(points.iter().map(|p| (*p - mean, 1.0)))
+    let along = |points: &[DVec3]| {
+        let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+        let axis = longest(points.iter().map(|p| (*p - mean, 1.0)));
+        if axis.z < 0.0 { -axis } else { axis }
+    };
+    let first = along(points);
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a.dot(first).total_cmp(&b.dot(first)));
+    let (low, high) = match sorted.as_slice() {
+        [low, .., high] => (low.dot(first), high.dot(first)),
+        _ => return first,
+    };
+    sorted.retain(|p| p.dot(first) < low + (high - low) * 2.0 / 3.0);
+    along(&sorted)
 }
 
 /// The parts of the body that the pieces are for.
@@ -326,7 +339,6 @@ pub fn parts(dressing: &Dressing<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>,
         }
         let points: Vec<DVec3> = body.positions.iter().zip(inside).filter(|(_, i)| *i).map(|(p, _)| *p).collect();
         let axis = if limb < count { spread(&points) } else { DVec3::Z };
-        let axis = if axis.z < 0.0 { -axis } else { axis };
         let along =
             of.iter().flat_map(|&p| &pieces[p].vertices).map(|&v| scene.garment.positions[v as usize].dot(axis));
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
