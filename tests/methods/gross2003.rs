@@ -4,8 +4,9 @@ use std::path::Path;
 
 use partwise::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
+use partwise::methods::gross2003::cut::cut;
 use partwise::methods::gross2003::developable::Developable;
-use partwise::methods::gross2003::pieces::{BodyPart, Piece, cut, distortion, of_pattern, parts};
+use partwise::methods::gross2003::pieces::{BodyPart, Piece, distortion, of_pattern, parts};
 use partwise::methods::gross2003::{Gross2003, lay};
 use partwise::methods::{Dressing, Ended, Exhibit, MethodError, RestRule};
 use partwise::{DVec3, Scene, SceneSpec};

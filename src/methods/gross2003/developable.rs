@@ -145,11 +145,6 @@ impl Developable {
         self.stands_off(self.local(x))
     }
 
-    /// What angles or sides add up to all around.
-    fn whole(&self) -> f64 {
-        self.sums[self.base.len()]
-    }
-
     /// Ω of the point that a point of the world has before it on the surface.
     #[must_use]
     pub fn sum_at(&self, x: DVec3) -> f64 {
@@ -174,7 +169,7 @@ impl Developable {
     pub fn unrolled(&self, x: DVec3, middle: f64) -> DVec2 {
         let p = self.local(x);
         let way = self.sum_at(x) - middle;
-        let way = way - self.whole() * (way / self.whole()).round();
+        let way = way - self.sums[self.base.len()] * (way / self.sums[self.base.len()]).round();
         if self.taper == 0.0 {
             return DVec2::new(way, p.z);
         }
@@ -192,7 +187,7 @@ impl Developable {
         let height = if self.taper == 0.0 { 0.0 } else { 1.0 / self.taper };
         let from_apex = DVec2::new(flat.x, (height - flat.y) * height.signum());
         let way = if self.taper == 0.0 { flat.x } else { from_apex.x.atan2(from_apex.y) };
-        let sum = (middle + way).rem_euclid(self.whole());
+        let sum = (middle + way).rem_euclid(self.sums[self.base.len()]);
         let i = (self.sums.partition_point(|&s| s <= sum).max(1) - 1).min(n - 1);
         let (a, b, rest) = (self.base[i], self.base[(i + 1) % n], sum - self.sums[i]);
         let local = if self.taper == 0.0 {
@@ -244,11 +239,15 @@ mod tests {
 
     #[test]
     fn a_round_cone_unrolls_to_its_sector() {
-        for taper in [0.0, 0.8, -1.1] {
+        for taper in [0.0, 0.8, -1.1_f64] {
             let cone = Developable::with_taper(&rings(0.2, taper), taper, 0.0, FRAME, [-0.3, 0.3]).unwrap();
             // The whole angle is 2π sin α, of a cylinder the girth.
             let exact = if taper == 0.0 { 0.2 } else { 0.2 / 0.2f64.hypot(1.0 / taper) } * std::f64::consts::TAU;
-            assert!((cone.whole() / exact - 1.0).abs() < 1e-4, "{taper}: {} expected {exact}", cone.whole());
+            assert!(
+                (cone.sums[cone.base.len()] / exact - 1.0).abs() < 1e-4,
+                "{taper}: {} expected {exact}",
+                cone.sums[cone.base.len()]
+            );
         }
     }
 
@@ -269,7 +268,6 @@ mod tests {
                     let length = there.distance(cone.rolled(flat + by * 1e-5, middle)) / 1e-5;
                     assert!((length - 1.0).abs() < 1e-3, "{taper}: {flat} {length}");
                 }
-                // None is longer: a chord is no longer than the way on the surface.
                 for &other in &spots {
                     let chord = there.distance(cone.rolled(other, middle));
                     assert!(chord <= flat.distance(other) + 1e-12);
@@ -297,7 +295,6 @@ mod tests {
         let found = Developable::around(&points, DVec3::Z, &worn, 0.01).unwrap();
         let nearest = points.iter().map(|p| -found.outside(*p)).fold(f64::INFINITY, f64::min);
         assert!((0.0099..0.03).contains(&nearest), "{nearest}");
-        // It narrows as they do.
         assert!(found.taper > 0.1, "{}", found.taper);
     }
 }

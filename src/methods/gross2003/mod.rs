@@ -6,8 +6,8 @@
 //! model of masses with edge-length constraints in place of stiff forces, in large steps, until the speed falls under a tolerance;
 //! collision by a distance field.
 //!
-//! Our reading: sections of the bounding surfaces ([`developable`]); how a garment without seams is cut and where a piece belongs
-//! ([`pieces`]); how a piece finds its place ([`lay`]); the band of the constraints, bending, friction ([`verlet`]). Gravity begins when
+//! Our reading: sections of the bounding surfaces ([`developable`]); how a garment without seams is cut ([`cut`](mod@cut)) and where a piece
+//! belongs ([`pieces`]); how a piece finds its place ([`lay`]); the band of the constraints, bending, friction ([`verlet`]). Gravity begins when
 //! the seams are shut. What is held (a waistband) is drawn to where it is worn as the seams are. The distance is this project's own, by
 //! tangent planes. Steps of 1 ms and 2 sweeps: the source speaks of large steps, but sweeps that have not converged let cloth sag, and at
 //! the same cost a pullover of 4,710 vertices ended 51 mm from the canonical drape in steps of 10 ms with 20 sweeps, 13 mm in steps of
@@ -16,6 +16,7 @@
 //! Limits: cloth of constraints bears no shear of its own and does not stretch by its stiffness; it ends where the pieces were sewn
 //! together on the body, which need not be where it was placed.
 
+pub mod cut;
 pub mod developable;
 pub mod lay;
 pub mod pieces;
@@ -99,10 +100,10 @@ impl Gross2003 {
         onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         let Dressing { scene, fabric, cloth } = dressing;
-        let cut = Instant::now();
+        let cutting = Instant::now();
         let pieces = match &self.sewn {
             Some(sewn) => pieces::of_pattern(sewn, &scene.garment)?,
-            None => pieces::cut(dressing)?,
+            None => cut::cut(dressing)?,
         };
         let mut notes = Vec::new();
         if self.sewn.is_none() {
@@ -111,7 +112,7 @@ impl Gross2003 {
                 "cut into {} pieces and laid flat in {:.0} ms, not counted; their edges are {p95:.1} % (P95), {most:.0} % at most off \
                  the rest shape, which has no exact plane pattern",
                 pieces.len(),
-                1e3 * cut.elapsed().as_secs_f64()
+                1e3 * cutting.elapsed().as_secs_f64()
             ));
         }
         let began = Instant::now();
