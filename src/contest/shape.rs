@@ -1,8 +1,8 @@
 //! Where a drape hangs and how wide it is: what a tailor measures of it, besides distances of vertices.
 //!
 //! The hem is the garment's lowest edge as placed, its height the mean of its vertices'. Girths are lengths of the largest closed curve
-//! in which a level plane cuts the cloth: [`ABOVE_HEM`] over the hem, half way, and at [`BELOW_TOP`] under the armpits, or under the
-//! garment's top where that is lower. The planes are those of the canonical drape for all entrants of a row.
+//! in which a level plane cuts the cloth: [`ABOVE_HEM`] over the hem, half way, and [`BELOW_ARMPITS`] under the armpits, or
+//! [`BELOW_TOP`] under the garment's top where that is lower. The planes are those of the canonical drape for all entrants of a row.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -13,8 +13,10 @@ use crate::shapes::girth::{Plane, section};
 
 /// Height of the first girth over the hem, m.
 const ABOVE_HEM: f64 = 0.02;
-/// Depth of the last girth under armpits or top, m.
+/// Depth of the last girth under the garment's top, m.
 const BELOW_TOP: f64 = 0.03;
+/// Depth of the last girth under the body's armpits, m: a sleeve leaves its bodice lower than the arm its trunk.
+const BELOW_ARMPITS: f64 = 0.08;
 
 /// Where a drape hangs and how wide it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -43,7 +45,7 @@ impl Tape {
             canonical.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.z), h.max(p.z)));
         let bottom = if hem.is_empty() { low } else { mean(&hem, canonical) } + ABOVE_HEM;
         let armpit = Landmarks::of(scene.body.mesh()).armpit_z.unwrap_or(high);
-        let top = high.min(armpit) - BELOW_TOP;
+        let top = (high - BELOW_TOP).min(armpit - BELOW_ARMPITS);
         Self { hem, heights: [bottom, 0.5 * (bottom + top), top] }
     }
 
