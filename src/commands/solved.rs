@@ -8,7 +8,7 @@ use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::Measured;
 use partwise::record::{
-    FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Worn, WrinkleView,
+    FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Tab, Worn, WrinkleView,
 };
 use partwise::scene::{Layer, Loaded, Tailored};
 use partwise::session::Finished;
