@@ -1,5 +1,6 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
+mod by_method;
 mod watching;
 
 use std::path::PathBuf;
@@ -46,6 +47,10 @@ pub(crate) struct RunArgs {
     /// Leave the solver's steps out of the recording, for a small file
     #[arg(long, help_heading = "Recording")]
     no_iterations: bool,
+    /// Drape by one of the paper's reference methods instead, to its stopping rule: `zhu2016` [19], `gross2003` [20],
+    /// `thomaszewski2006` [21]
+    #[arg(long, value_name = "METHOD", default_value = by_method::TWO_STAGE, value_parser = by_method::method, help_heading = "Stages")]
+    method: &'static str,
     /// Measure the drape against its own continuation and the canonical drape; references are cached between runs
     #[arg(long, help_heading = "Stages")]
     accuracy: bool,
@@ -79,6 +84,9 @@ impl RunArgs {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
         interrupt::listen_at_once();
+        if self.method != by_method::TWO_STAGE {
+            return self.run_by_method();
+        }
         if self.watch {
             return self.keep_watching();
         }

@@ -79,6 +79,28 @@ impl DialArgs {
 }
 
 impl StageArgs {
+    /// The flags that were set and act on the two stages or on what follows them: no reference method has them.
+    pub(crate) fn of_two_stages(&self) -> Vec<&'static str> {
+        let DialArgs { min_part, model, max_extent, motion, readings, no_self_contact, .. } = &self.dials;
+        let all = [
+            ("--table", self.table != TABLE_3),
+            ("--refine", self.refine.is_some()),
+            ("--gap", self.gap.is_some()),
+            ("--min-part", *min_part != 1),
+            ("--model", *model != Model::default()),
+            ("--max-extent", !max_extent.is_empty()),
+            ("--motion", *motion != Motion::default()),
+            ("--reading", !readings.is_empty()),
+            ("--no-self-contact", *no_self_contact),
+        ];
+        all.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect()
+    }
+
+    /// The fabric alone.
+    pub(crate) fn fabric(&self) -> anyhow::Result<Fabric> {
+        Ok(Fabric::by_name(&self.dials.fabric)?)
+    }
+
     /// The files behind the arguments, for `--watch`.
     pub(crate) fn files(&self) -> Vec<&Path> {
         [&self.table, &self.dials.fabric].into_iter().filter(|v| names_a_file(v)).map(Path::new).collect()

@@ -235,7 +235,7 @@ pub(crate) fn command_line() -> String {
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
+pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let [weft, bias, warp] = fabric.bending_nm.map(|b| b * 1e6);
     vec![

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ContestOptions, ContestRow};
+use super::{ContestOptions, ContestRow, ENTRANTS};
 use crate::files::read_text;
 use crate::whole_file::WholeFile;
 
@@ -27,6 +27,9 @@ pub struct Conditions {
     pub threads: usize,
     /// What the machine calls itself.
     pub machine: String,
+    /// Who takes part.
+    #[serde(default)]
+    pub entrants: Vec<String>,
 }
 
 impl Conditions {
@@ -46,6 +49,7 @@ impl Conditions {
             rest: [options.rule.speed_m_per_s, options.rule.over_s],
             threads: rayon::current_num_threads(),
             machine,
+            entrants: ENTRANTS.map(|e| e.name().to_owned()).to_vec(),
         }
     }
 
@@ -118,8 +122,8 @@ impl Journal {
         let journal: Self = serde_json::from_str(&text)
             .map_err(|e| JournalError::Syntax { file: file.clone(), reason: e.to_string() })?;
         if journal.conditions != conditions {
-            let [found, expected] =
-                [&journal.conditions, &conditions].map(|c| format!("version {}, {}", c.version, c.said()));
+            let [found, expected] = [&journal.conditions, &conditions]
+                .map(|c| format!("version {}, {}; {}", c.version, c.said(), c.entrants.join(", ")));
             return Err(JournalError::Other { file, found, expected });
         }
         Ok(journal)

@@ -1,6 +1,6 @@
 //! Who takes part, on what, and what the paper printed.
 
-use crate::methods::{thomaszewski2006, zhu2016};
+use crate::methods::{gross2003, thomaszewski2006, zhu2016};
 use crate::shapes::garment::{BUILT_IN, TABLE_4_SIZES};
 
 /// A way to drape.
@@ -30,8 +30,9 @@ impl Entrant {
 }
 
 /// In the order of the columns.
-pub const ENTRANTS: [Entrant; 5] = [
+pub const ENTRANTS: [Entrant; 6] = [
     Entrant::Method(zhu2016::NAME),
+    Entrant::Method(gross2003::NAME),
     Entrant::Method(thomaszewski2006::NAME),
     Entrant::Paper,
     Entrant::Preview,

@@ -14,6 +14,7 @@
 //! | ratio | median of its time over the converged drape's, round by round, with its interquartile range |
 //! | canonical error | RMS distance of the vertices to the canonical drape, which is refined from the undraped start, mm |
 //! | own error | RMS distance to the equilibrium that Newton's method reaches from the result, mm |
+//! | hem, girths | height of the lowest edge, lengths of level sections, cm; beside those of the canonical drape |
 //! | residual | ‖∇E‖ of this project's energy over the weight, friction holding what it can |
 //!
 //! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told
@@ -21,6 +22,7 @@
 
 mod journal;
 mod lineup;
+mod shape;
 mod table;
 
 use std::ops::ControlFlow;
@@ -40,6 +42,8 @@ use crate::quantile::interpolated;
 use crate::scene::Scene;
 pub use journal::{Conditions, Journal, JournalError};
 pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
+pub use shape::Silhouette;
+use shape::Tape;
 pub use table::{Cells, csv_lines, exponents, tables};
 
 /// How a contest is run.
@@ -98,6 +102,9 @@ pub struct Entry {
     pub penetrating_vertices: usize,
     /// Depth of the deepest, mm.
     pub penetration_mm: f64,
+    /// Hem and girths.
+    #[serde(default)]
+    pub silhouette: Silhouette,
     /// What the method counted.
     pub counts: Vec<(String, u64)>,
 }
@@ -113,6 +120,9 @@ pub struct ContestRow {
     pub vertices: usize,
     /// RMS between canonical drapes of perturbed starts and the canonical one, mm; `None` where none were asked for.
     pub spread_mm: Option<f64>,
+    /// Hem and girths of the canonical drape.
+    #[serde(default)]
+    pub canonical: Silhouette,
     /// One for each entrant.
     pub entries: Vec<Entry>,
 }
@@ -193,6 +203,7 @@ pub fn row(
     }
     let spread_mm = (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
     let base = ENTRANTS.iter().position(|e| *e == Entrant::Converged).map(|i| times[i].clone()).unwrap_or_default();
+    let tape = Tape::new(scene, &canonical);
     let mut entries = Vec::new();
     for ((entrant, times_ms), outcome) in ENTRANTS.into_iter().zip(times).zip(last) {
         let mut entry = Entry { entrant: entrant.name().to_owned(), ..Entry::default() };
@@ -200,6 +211,7 @@ pub fn row(
             Some(Ok(outcome)) => {
                 let own = settle(&outcome.positions, "own continuations")?;
                 entry.own_rms_mm = accuracy::rms_mm(&outcome.positions, &own);
+                entry.silhouette = tape.measure(scene, &outcome.positions);
                 entry.canonical_rms_mm = accuracy::rms_mm(&outcome.positions, &canonical);
                 measure(&mut entry, outcome, times_ms, &base, &cloth, scene);
             }
@@ -209,7 +221,8 @@ pub fn row(
         entries.push(entry);
     }
     let vertices = scene.garment.vertex_count();
-    Ok(ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, entries })
+    let canonical = tape.measure(scene, &canonical);
+    Ok(ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, canonical, entries })
 }
 
 /// Fills in what needs no reference.
@@ -271,7 +284,7 @@ fn in_time(
     rule: &RestRule,
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
-    let method = methods::by_name(name).ok_or_else(|| format!("there is no method {name}"))?;
+    let method = methods::by_name(name, false, None).ok_or_else(|| format!("there is no method {name}"))?;
     let made = method.drape(dressing, rule, &mut |_| go_on()).map_err(|e| e.to_string())?;
     let ended = match made.ended {
         Ended::AtRest => "at-rest",

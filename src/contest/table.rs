@@ -1,6 +1,6 @@
 //! A contest as text: times beside the paper's, errors, and how costs grow; and as CSV.
 
-use super::{ContestRow, ENTRANTS, Entry, printed_ms};
+use super::{ContestRow, ENTRANTS, Entry, Silhouette, printed_ms};
 
 /// Text of a table: header and rows of cells.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -66,8 +66,20 @@ pub fn tables(rows: &[ContestRow]) -> Vec<Cells> {
             },
             &nothing,
         ),
+        table(
+            "hem height; girths near the hem, half way and below armpits or top, cm",
+            &["canonical"],
+            &|e| measured(&e.silhouette),
+            &|row| vec![measured(&row.canonical)],
+        ),
         table("how it ended, and after how many steps", &[], &|e| format!("{}, {}", e.ended, e.steps), &nothing),
     ]
+}
+
+/// Hem and girths, cm.
+fn measured(of: &Silhouette) -> String {
+    let cm = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.1}"));
+    format!("{}; {}", cm(of.hem_cm), of.girths_cm.map(cm).join(", "))
 }
 
 /// Three digits.
@@ -103,21 +115,22 @@ pub fn exponents(rows: &[ContestRow]) -> Option<Cells> {
                 let entry = row.entries.iter().find(|e| e.entrant == entrant.name() && e.error.is_none())?;
                 Some(((row.vertices as f64).ln(), entry.median_ms.ln()))
             });
-            slope(&points.collect::<Vec<_>>()).map_or("–".to_owned(), |p| format!("{p:.2}"))
+            slope(&points.collect::<Vec<_>>()).map_or("–".to_owned(), |[p, error]| format!("{p:.2} ± {error:.2}"))
         }));
         found.push(cells);
     }
     let header = ["garment", "sizes"].into_iter().chain(ENTRANTS.iter().map(|e| e.name())).map(str::to_owned).collect();
-    let title = "exponent of time over vertices".to_owned();
+    let title = "exponent p of time ~ verticesᵖ, least squares in logarithms ± standard error".to_owned();
     (!found.is_empty()).then_some(Cells { title, header, rows: found })
 }
 
-/// Slope of the line through points by least squares.
-fn slope(points: &[(f64, f64)]) -> Option<f64> {
+/// Slope of the line through points by least squares, and its standard error.
+fn slope(points: &[(f64, f64)]) -> Option<[f64; 2]> {
     let n = points.len() as f64;
     let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
     let (xx, xy) = points.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + (x - mx).powi(2), xy + (x - mx) * (y - my)));
-    (points.len() > 2 && xx > 0.0).then_some(xy / xx)
+    let left: f64 = points.iter().map(|(x, y)| (y - my - xy / xx * (x - mx)).powi(2)).sum();
+    (points.len() > 2 && xx > 0.0).then(|| [xy / xx, (left / (n - 2.0) / xx).sqrt()])
 }
 
 /// A line of CSV for every entrant of every row, with a header.
@@ -140,6 +153,11 @@ pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
         "residual_over_weight",
         "strain_p95",
         "strain_max",
+        "hem_cm",
+        "girth_near_hem_cm",
+        "girth_half_way_cm",
+        "girth_near_top_cm",
+        "canonical_hem_cm",
         "penetrating_vertices",
         "penetration_mm",
         "ended",
@@ -166,6 +184,11 @@ pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
                 number(e.residual_over_weight),
                 number(e.strain_p95),
                 number(e.strain_max),
+                optional(e.silhouette.hem_cm),
+                optional(e.silhouette.girths_cm[0]),
+                optional(e.silhouette.girths_cm[1]),
+                optional(e.silhouette.girths_cm[2]),
+                optional(row.canonical.hem_cm),
                 number(e.penetrating_vertices as f64),
                 number(e.penetration_mm),
                 e.ended.clone(),
@@ -196,6 +219,7 @@ mod tests {
             asked: vertices,
             vertices,
             spread_mm: Some(3.0),
+            canonical: Silhouette { hem_cm: Some(61.25), girths_cm: [Some(190.0), Some(120.0), None] },
             entries: entries.collect(),
         }
     }
@@ -204,7 +228,7 @@ mod tests {
     fn exponents_are_those_of_the_powers() {
         let rows = [row(1000), row(4000), row(16000)];
         let found = exponents(&rows).unwrap();
-        assert_eq!(found.rows[0][..5], ["flared-skirt", "3", "1.00", "–", "1.50"]);
+        assert_eq!(found.rows[0][..5], ["flared-skirt", "3", "1.00 ± 0.00", "–", "1.50 ± 0.00"]);
         assert!(exponents(&rows[..2]).is_none());
     }
 
@@ -215,7 +239,9 @@ mod tests {
             assert!(table.rows.iter().all(|cells| cells.len() == table.header.len()), "{}", table.title);
             assert_eq!(table.rows[0][3], "–");
         }
-        assert_eq!(tables(&rows)[0].rows[0][7..], ["824", "929", "979", "686"]);
+        let hem = tables(&rows).into_iter().find(|t| t.title.starts_with("hem")).unwrap();
+        assert_eq!(hem.rows[0].last().unwrap(), "61.2; 190.0, 120.0, –");
+        assert_eq!(tables(&rows)[0].rows[0][8..], ["824", "929", "979", "686"]);
         let csv = csv_lines(&rows).unwrap();
         assert_eq!(csv.lines().count(), 1 + 2 * ENTRANTS.len());
         assert!(csv.contains("\"cannot, as it is\"") || csv.contains("cannot"), "{csv}");

@@ -67,7 +67,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         let Scene { garment, topology, rest, held, .. } = scene;
         let cloth = Cloth::new(garment, topology, rest, &settings.fabric, held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
-        let start = worn.positions.clone();
+        let start = scene.lifted_off(worn.positions.clone());
         let refined = refine_from(scene, settings, &cloth, None, start, &mut |step| {
             if stopped {
                 return ControlFlow::Break(());

@@ -3,13 +3,16 @@
 //! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
 //! reference drape is there where somebody asked for one.
 
+mod by_method;
 mod ease;
 mod levels;
 mod warnings;
 
+pub use by_method::MethodFigures;
 pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
+use warnings::top_sank_mm;
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
@@ -113,7 +116,7 @@ impl Figures {
                 scene.body.mesh(),
             )
             .len(),
-            top_sank_mm: warnings::top_sank_mm(scene, &drape.positions),
+            top_sank_mm: top_sank_mm(scene, &drape.positions),
             self_intersecting_pairs: drape.self_intersecting_pairs,
             energy_j: state.map(|s| s.energy),
             residual_over_weight: state.map(|s| s.residual_over_weight),

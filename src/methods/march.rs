@@ -6,7 +6,7 @@
 //! (M (1/h² + c/h) + K) d = f(x) + M v/h,  x ← x + d,  v ← d/h.
 //!
 //! The body pushes with κ A (h_o − q) along its normal, as everywhere in this project, and holds by Coulomb's friction
-//! with anchors ([`Friction`]). A vertex that touches has no velocity off the body after the step: cloth does not
+//! ([`Grip`]). A vertex that touches has no velocity off the body after the step: cloth does not
 //! bounce.
 //!
 //! | symbol | meaning | unit |
@@ -18,11 +18,11 @@
 
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
+use super::grip::Grip;
 use super::linear::{ConjugateGradients, Operator, System};
 use super::rest::{Ended, Rest, RestRule};
 use super::{Dressing, MethodError, Moment, Spectator, Stopwatch};
 use crate::GRAVITY;
-use crate::mechanics::energy::Friction;
 use crate::mechanics::energy::contact::Touch;
 
 /// How a garment is moved in time.
@@ -132,12 +132,12 @@ pub(super) fn march(
         d: vec![Vec3A::ZERO; n],
     };
     let mut solver = ConjugateGradients::default();
-    let mut friction = Friction::new(course.friction);
+    let mut friction = Grip::new(course.friction);
     let (mut steps, mut iterations, mut corrections) = (0, 0, 0);
     let h = course.pacing.step_s;
     loop {
         let touches = watch.time("contact", || obstacle.touches(&state.x));
-        friction.refresh(touches, &state.x);
+        friction.refresh(touches, &state.x, |v| state.v[v] * h);
         watch.time("forces", || state.assemble(dressing, elastic, touches, &friction, course.pacing));
         let limits = (course.pacing.tolerance, course.pacing.iterations);
         let State { added, own, side, d, .. } = &mut state;
@@ -175,7 +175,7 @@ impl State {
         dressing: &Dressing<'_>,
         elastic: &mut dyn Elastic,
         touches: &[Touch],
-        friction: &Friction,
+        friction: &Grip,
         pacing: &Pacing,
     ) {
         let cloth = dressing.cloth;
@@ -185,16 +185,14 @@ impl State {
         self.added.extend(cloth.masses.iter().map(|m| Mat3A::from_diagonal(glam::Vec3::splat((m * inertia) as f32))));
         self.force.clear();
         self.force.resize(self.x.len(), DVec3::ZERO);
-        // Friction's gradient, then its sign: everything else is a force.
-        friction.add_gradient(&self.x, &mut self.force);
-        self.force.iter_mut().for_each(|f| *f = -*f);
         elastic.linearise(&self.x, &mut self.force);
         for t in touches {
             self.force[t.vertex as usize] += t.normal * t.force();
             let n = t.normal.as_vec3a();
             self.added[t.vertex as usize] += Mat3A::from_cols(n * n.x, n * n.y, n * n.z) * t.stiffness as f32;
         }
-        for (v, block) in friction.hessian(&self.x) {
+        for (v, force, block) in friction.terms(&self.x) {
+            self.force[v as usize] += force;
             self.added[v as usize] += single(block);
         }
         self.own.clone_from(&self.added);

@@ -3,10 +3,8 @@
 //! | name | source |
 //! |---|---|
 //! | [`zhu2016`] | \[19\] Zhu, Li 2016: hybrid bounding volume hierarchy, masses and springs |
+//! | [`gross2003`] | \[20\] Groß, Fuhrmann, Luckas 2003: pieces laid on developable surfaces, edge-length constraints |
 //! | [`thomaszewski2006`] | \[21\] Thomaszewski, Wacker, Straßer 2006: corotational subdivision finite elements |
-//!
-//! The paper's third, \[20\] (Groß, Fuhrmann, Luckas: "Automatic pre-positioning of virtual clothing", SCCG 2003), is not
-//! built.
 //!
 //! A [`ReferenceMethod`] takes the scene, the fabric and a [`RestRule`], and returns the draped garment with its
 //! timings and counters. They all move the cloth in time until it rests, by the same rule; each file's head says what
@@ -15,9 +13,13 @@
 //!
 //! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
 
+pub mod grip;
+pub mod gross2003;
 pub mod linear;
 pub mod march;
 pub mod rest;
+pub mod segment;
+pub mod spring_list;
 pub mod thomaszewski2006;
 pub mod zhu2016;
 
@@ -29,6 +31,7 @@ use glam::DVec3;
 use crate::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::TriMesh;
+use crate::pattern::SewnGarment;
 use crate::scene::Scene;
 pub use rest::{Ended, RestRule};
 
@@ -64,10 +67,17 @@ pub type Spectator<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Se
 /// What a method has to show besides the garment.
 #[derive(Debug, Clone)]
 pub enum Exhibit {
-    /// Lines in space, m: fitted quadrics, bounding surfaces.
-    Lines(Vec<Vec<DVec3>>),
-    /// A surface, m: laid pieces, a limit surface.
+    /// Lines in space, m: fitted quadrics, bounding surfaces. Lines of one index belong together.
+    Lines(Vec<(usize, Vec<DVec3>)>),
+    /// A surface, m: a limit surface.
     Surface(TriMesh),
+    /// Pieces on their way: triangles in groups, and where they are at which step, m.
+    Moving {
+        /// Triangles, in a group for each piece.
+        mesh: TriMesh,
+        /// Steps, counted as the [`Moment`]s count them, and positions.
+        frames: Vec<(usize, Vec<DVec3>)>,
+    },
 }
 
 /// What came out of a method.
@@ -137,14 +147,16 @@ pub trait ReferenceMethod: Sync {
 }
 
 /// Names of the methods, in the order of the paper's references.
-pub const METHODS: [&str; 2] = [zhu2016::NAME, thomaszewski2006::NAME];
+pub const METHODS: [&str; 3] = [zhu2016::NAME, gross2003::NAME, thomaszewski2006::NAME];
 
-/// The method of a name, with its defaults.
+/// The method of a name, with its defaults; `exhibit` asks for what it has to show besides the garment, and `sewn` are the panels
+/// of a garment that was sewn of any.
 #[must_use]
-pub fn by_name(name: &str) -> Option<Box<dyn ReferenceMethod>> {
+pub fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<Box<dyn ReferenceMethod>> {
     match name {
-        zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016::default())),
-        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006::default())),
+        gross2003::NAME => Some(Box::new(gross2003::Gross2003 { exhibit, sewn: sewn.cloned(), ..Default::default() })),
+        zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016 { exhibit, ..Default::default() })),
+        thomaszewski2006::NAME => Some(Box::new(thomaszewski2006::Thomaszewski2006 { exhibit, ..Default::default() })),
         _ => None,
     }
 }

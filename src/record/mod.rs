@@ -16,6 +16,7 @@ mod legend;
 mod levels;
 mod live;
 mod meshes;
+mod method;
 mod native;
 mod open;
 mod outfit;
@@ -44,6 +45,7 @@ pub use compare::Chosen;
 pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
+pub use method::MethodView;
 pub use outfit::{OutfitView, Worn};
 pub(crate) use page::takes_gzip;
 pub use page::{Bundled, bundled};
@@ -187,6 +189,16 @@ impl Recorder {
                 _ => Ok(()),
             }
         })
+    }
+
+    /// The garment after a step in time of a reference method, m/s and m.
+    pub fn moment(&mut self, step: i64, rms_speed: f64, positions: Option<&[DVec3]>) -> Result<(), RecordError> {
+        self.timed(|open| method::moment(open, step, rms_speed, positions))
+    }
+
+    /// What a reference method made.
+    pub fn method(&mut self, view: &MethodView<'_>) -> Result<(), RecordError> {
+        self.timed(|open| method::log(open, view))
     }
 
     /// The jumps at the PARTs' seams beside the mean curvature.

@@ -174,9 +174,11 @@ impl Open {
         }
         self.at(index, 1);
         self.log_mesh(paths::GARMENT, &meshes::plain(garment, colours::CLOTH))?;
-        self.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
-        self.log_mesh(paths::PARTS, &self.cells.shape())?;
-        self.log_mesh(paths::FORCE, &self.cells.shape())?;
+        if self.layout().method.is_none() {
+            self.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
+            self.log_mesh(paths::PARTS, &self.cells.shape())?;
+            self.log_mesh(paths::FORCE, &self.cells.shape())?;
+        }
         self.triangles_once(paths::DRAPE)?;
         self.log_mesh(paths::DRAPE, &meshes::colours(colours::by_part(garment)))
     }

@@ -25,6 +25,8 @@
 //! | `/numbers/<name>` | Scalars | PART count, error, ... | `table` |
 //! | `/numbers/ms/<stage>` | Scalars | time of each stage, ms | `table` |
 //! | `/solver/energy`, `/solver/residual`, `.../residual_log10` | Scalars | J; residual over weight | `iteration` |
+//! | `/method/<number>` | LineStrips3D, Mesh3D | what a reference method made on its way: quadrics, flying pieces, a limit surface | `iteration` |
+//! | `/solver/speed` | Scalars | RMS speed of the vertices of a reference method, cm/s | `iteration` |
 //! | `/rows` | a component per column | the same numbers with the table's name: a row per table | `table` |
 //! | `/compare/<slot>/garment` | Mesh3D | 2–6 chosen tables side by side | `table` |
 //! | `/legend/compare/<slot>` | Points2D | what each of them costs | `table` |
@@ -54,6 +56,8 @@ pub const LEVEL_PARTS: &str = "/levels/parts";
 pub const NUMBERS: &str = "/numbers";
 pub const ROWS: &str = "/rows";
 pub const STAGE_MS: &str = "/numbers/ms";
+pub const METHOD: &str = "/method";
+pub const SPEED: &str = "/solver/speed";
 pub const ENERGY: &str = "/solver/energy";
 pub const RESIDUAL: &str = "/solver/residual";
 pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Scene, SceneError};
 use crate::distance::{Body, DistanceError, SurfacePoint};
+use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::word::word;
 
@@ -36,12 +37,20 @@ const FARTHEST: f64 = 0.5;
 /// A way out goes through no more sheets than this.
 const SHEETS: usize = 16;
 
+/// Share of the way to a sheet that its distance from the body is at least, where the way is its own: all of it but for rounding where the
+/// body is convex.
+const ITS_OWN: f64 = 0.8;
+
 /// The next sheet is looked for so far behind the last, m.
 const BEHIND: f64 = 1e-6;
 
 /// Rounds of moving out and smoothing, and averages in each.
 const ROUNDS: usize = 12;
 const SWEEPS: usize = 3;
+
+/// What is through a garment below is lifted by so much at a time, m, at most so many times.
+const LIFT: f64 = 1.5e-3;
+const LIFTS: usize = 40;
 
 /// One of the garments of a scene: its share of the mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -111,6 +120,32 @@ impl Scene {
         })
     }
 
+    /// Where the vertices are once each garment, at `x` (m), is lifted off those below it where it was through them.
+    #[must_use]
+    pub fn lifted_off(&self, mut x: Vec<DVec3>) -> Vec<DVec3> {
+        for k in 1..self.layers.len() {
+            let mut outer = self.cut_out(&self.layers[k], &x);
+            lift_off(&mut outer, &self.cut_out(&self.all_below(k), &x));
+            x[self.layers[k].vertices.clone()].copy_from_slice(&outer.positions);
+        }
+        x
+    }
+
+    /// Takes the nearest point of the garments below, as placed, where that is nearer than what is there.
+    pub(super) fn nearer_below(&self, surface: &mut [SurfacePoint]) -> Result<(), SceneError> {
+        let placed = &self.garment.positions;
+        for k in 1..self.layers.len() {
+            let own = self.layers[k].vertices.clone();
+            let below = Body::new_open(&self.cut_out(&self.all_below(k), placed))?.nearest_all(&placed[own.clone()]);
+            for (there, found) in surface[own].iter_mut().zip(below) {
+                if found.signed_distance.abs() < there.signed_distance.abs() {
+                    *there = found;
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn all_below(&self, k: usize) -> Layer {
         let (vertices, triangles) = (self.layers[k].vertices.start, self.layers[k].triangles.start);
         Layer { name: String::new(), vertices: 0..vertices, triangles: 0..triangles }
@@ -123,7 +158,8 @@ impl Scene {
     }
 }
 
-/// Moves `outer` out of the way of `inner`, both placed around `body`.
+/// Moves `outer` out of the way of `inner`, both placed around `body`: its vertices along the way out, their neighbours with them, and then
+/// what of its triangles meets those below all the same.
 fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Result<(), SceneError> {
     let refused = |e| SceneError::from(DistanceError::Refused(format!("{e:?}")));
     let below = ParryMesh::new(inner.positions.clone(), inner.triangles.clone()).map_err(refused)?;
@@ -138,11 +174,7 @@ fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Result<(), Sce
         let bound: Vec<DVec3> = moves.iter().zip(&missing).map(|(m, more)| *m + *more).collect();
         moves.clone_from(&bound);
         for _ in 0..SWEEPS {
-            let mean = |v: usize| {
-                let neighbours = topology.neighbours(v as u32);
-                neighbours.iter().map(|&w| moves[w as usize]).sum::<DVec3>() / neighbours.len().max(1) as f64
-            };
-            moves = (0..moves.len()).map(|v| 0.5 * (moves[v] + mean(v))).collect();
+            moves = (0..moves.len()).map(|v| 0.5 * (moves[v] + mean(&topology, &moves, v))).collect();
         }
         // What had to move moves at least as far.
         for ((m, bound), missing) in moves.iter_mut().zip(&bound).zip(&missing) {
@@ -152,32 +184,59 @@ fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Result<(), Sce
         }
     }
     outer.positions.iter_mut().zip(moves).for_each(|(x, m)| *x += m);
+    lift_off(outer, inner);
     Ok(())
+}
+
+/// Moves what of `outer` is through `inner` to its outer side, a little at a time, neighbours with it.
+fn lift_off(outer: &mut TriMesh, inner: &TriMesh) {
+    let topology = Topology::new(outer);
+    for _ in 0..LIFTS {
+        let crossing = crossing_pairs(outer, inner);
+        if crossing.is_empty() {
+            break;
+        }
+        let mut out = vec![DVec3::ZERO; outer.vertex_count()];
+        for [t, u] in crossing {
+            let normal = inner.double_area_vector(u as usize).normalize_or_zero();
+            outer.triangles[t as usize].iter().for_each(|&v| out[v as usize] += normal);
+        }
+        let moves: Vec<DVec3> = out.iter().map(|out| out.normalize_or_zero() * LIFT).collect();
+        for (v, x) in outer.positions.iter_mut().enumerate() {
+            *x += if moves[v] == DVec3::ZERO { 0.5 * mean(&topology, &moves, v) } else { moves[v] };
+        }
+    }
+}
+
+fn mean(topology: &Topology, of: &[DVec3], v: usize) -> DVec3 {
+    let neighbours = topology.neighbours(v as u32);
+    neighbours.iter().map(|&w| of[w as usize]).sum::<DVec3>() / neighbours.len().max(1) as f64
 }
 
 /// What each vertex has to move outward, m.
 fn missing(x: &[DVec3], inner: &TriMesh, below: &ParryMesh, body: &Body) -> Vec<DVec3> {
     let found = body.nearest_all(x);
     let missing = |nearest: &SurfacePoint| {
-        let left = leaves(nearest.point, nearest.normal, inner, below);
+        let left = leaves(nearest.point, nearest.normal, (inner, below), body);
         nearest.normal * (left + CLEARANCE - nearest.signed_distance).max(0.0)
     };
     found.iter().map(missing).collect()
 }
 
 /// How far from `c` the way out leaves the last of the sheets it goes through, m. One met from its outside ends the way: out of an arm
-/// one may come upon a skirt.
-fn leaves(c: DVec3, out: DVec3, inner: &TriMesh, below: &ParryMesh) -> f64 {
+/// one may come upon a skirt; and so does one that is another place's, to which the body is nearer by another way.
+fn leaves(c: DVec3, out: DVec3, (inner, below): (&TriMesh, &ParryMesh), body: &Body) -> f64 {
     let (mut last, mut from) = (f64::NEG_INFINITY, 0.0);
     for _ in 0..SHEETS {
         let ray = Ray::new(c + out * from, out);
         let Some(met) = below.cast_local_ray_and_get_normal(&ray, FARTHEST - from, false) else { break };
         let FeatureId::Face(t) = met.feature else { break };
-        if inner.double_area_vector(t as usize % inner.triangles.len()).dot(out) <= 0.0 {
+        let at = from + met.time_of_impact;
+        let outward = inner.double_area_vector(t as usize % inner.triangles.len()).dot(out) > 0.0;
+        if !outward || body.nearest(c + out * at).signed_distance < ITS_OWN * at {
             break;
         }
-        last = from + met.time_of_impact;
-        from = last + BEHIND;
+        (last, from) = (at, at + BEHIND);
         if from >= FARTHEST {
             break;
         }

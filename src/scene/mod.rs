@@ -104,13 +104,9 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] where a garment is no surface that a distance can be measured to.
     pub fn surface(&self) -> Result<Vec<SurfacePoint>, SceneError> {
-        let placed = &self.garment.positions;
-        if self.distance_to == DistanceTo::Body {
-            return Ok(self.body.nearest_all(placed));
-        }
-        let mut surface = Vec::with_capacity(placed.len());
-        for (k, layer) in self.layers.iter().enumerate() {
-            surface.extend(self.below(k, placed)?.nearest_all(&placed[layer.vertices.clone()]));
+        let mut surface = self.body.nearest_all(&self.garment.positions);
+        if self.distance_to == DistanceTo::Below {
+            self.nearer_below(&mut surface)?;
         }
         Ok(surface)
     }

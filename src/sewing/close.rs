@@ -46,6 +46,9 @@ const HANGING: f64 = 0.1;
 /// Weight of staying of what is held.
 const HELD: f64 = 1e3;
 
+/// Steps of laying flat at most, and how far none goes any more, m.
+const FLATTENING: (usize, f64) = (100, 2e-5);
+
 /// How a garment is drawn shut.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Closing<'a> {
@@ -109,7 +112,7 @@ impl Shape {
     }
 
     /// Right side: Σ A ∇ᵀ R + m x'.
-    fn right_side(&self, x: &[DVec3]) -> Vec<DVec3> {
+    fn right_side(&self, x: &[DVec3], nearest: fn(DVec3, DVec3) -> [DVec3; 2]) -> Vec<DVec3> {
         let mut side: Vec<DVec3> = x.iter().map(|x| STAY * *x).collect();
         for ((triangle, of), area) in self.triangles.iter().zip(&self.gradients).zip(&self.areas) {
             let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
@@ -117,7 +120,7 @@ impl Shape {
                 u += x[i as usize] * of.x;
                 v += x[i as usize] * of.y;
             }
-            let [u, v] = nearest_isometry(u, v);
+            let [u, v] = nearest(u, v);
             for (&i, of) in triangle.iter().zip(of) {
                 side[i as usize] += *area * (u * of.x + v * of.y);
             }
@@ -157,7 +160,7 @@ pub(super) fn close(
     let mut x = start.to_vec();
     let mut symbolic: Option<SymbolicLlt<u32>> = None;
     for step in 0..how.steps {
-        let mut side = shape.right_side(&x);
+        let mut side = shape.right_side(&x, nearest_isometry);
         how.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
         if !how.held.is_empty() {
             shape.hang(&mut side);
@@ -183,6 +186,31 @@ pub(super) fn close(
     (x, how.steps)
 }
 
+/// A surface laid flat as isometrically as possible: E without contacts, from places in the plane z = 0 (m), with the nearest turns
+/// in the plane for R, which open out what the start has turned over.
+#[must_use]
+pub fn laid_flat(mesh: &TriMesh, rest: &RestShape, start: &[DVec3]) -> Vec<DVec3> {
+    let shape = Shape::new(mesh, rest, &[]);
+    let mut x = start.to_vec();
+    let mut symbolic = None;
+    for _ in 0..FLATTENING.0 {
+        let side = shape.right_side(&x, nearest_turn);
+        let Some(next) = solve(&shape.entries, x.len(), &side, &mut symbolic) else { return x };
+        let farthest = x.iter().zip(&next).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        x = next;
+        if farthest < FLATTENING.1 {
+            break;
+        }
+    }
+    x
+}
+
+/// The turn in the plane nearest to F: its angle is that of (tr F, F₂₁ − F₁₂).
+fn nearest_turn(u: DVec3, v: DVec3) -> [DVec3; 2] {
+    let turn = DVec2::new(u.x + v.y, u.y - v.x).normalize_or(DVec2::X);
+    [turn.extend(0.0), turn.perp().extend(0.0)]
+}
+
 /// One solve for three right sides; `None` where the matrix is not positive.
 fn solve(
     entries: &[Triplet<u32, u32, f64>],
@@ -203,6 +231,34 @@ fn solve(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_strip_of_a_cylinder_lies_flat_at_its_own_lengths() {
+        // A third of a cylinder of 10 cm, as the eye sees it from the front, a few triangles turned over.
+        let (nu, nv) = (12usize, 8usize);
+        let at = |i: usize, j: usize| (0.2 * (i as f64 / nu as f64 - 0.5), 0.02 * j as f64);
+        let around = |(s, z): (f64, f64)| DVec3::new(0.1 * (s / 0.1).sin(), -0.1 * (s / 0.1).cos(), z);
+        let id = |i: usize, j: usize| (j * (nu + 1) + i) as u32;
+        let places: Vec<(f64, f64)> = (0..=nv).flat_map(|j| (0..=nu).map(move |i| at(i, j))).collect();
+        let cell = |i: usize, j: usize| {
+            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        };
+        let triangles: Vec<[u32; 3]> = (0..nv).flat_map(|j| (0..nu).flat_map(move |i| cell(i, j))).collect();
+        let mesh = TriMesh::new(places.iter().map(|p| around(*p)).collect(), triangles);
+        let corners = mesh.triangles.iter().map(|t| t.map(|v| DVec2::new(places[v as usize].0, places[v as usize].1)));
+        let rest = RestShape { corners: corners.collect() };
+        let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
+        seen.swap(30, 31);
+        let flat = laid_flat(&mesh, &rest, &seen);
+        for (t, own) in mesh.triangles.iter().zip(&rest.corners) {
+            for k in 0..3 {
+                let (a, b) = (t[k] as usize, t[(k + 1) % 3] as usize);
+                let off = flat[a].distance(flat[b]) / own[k].distance(own[(k + 1) % 3]) - 1.0;
+                assert!(off.abs() < 2e-3, "{off}");
+            }
+        }
+    }
 
     #[test]
     fn the_nearest_isometry_is_one_and_leaves_rotations_alone() {

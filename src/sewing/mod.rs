@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 pub use arrange::Arranged;
+pub use close::laid_flat;
 pub use landmarks::Landmarks;
 
 use crate::distance::Body;

@@ -73,7 +73,22 @@ impl SectionLoop {
 
 /// Perimeter of the convex hull of points in a plane, m.
 #[must_use]
-pub fn hull_length(mut points: Vec<DVec2>) -> f64 {
+pub fn hull_length(points: Vec<DVec2>) -> f64 {
+    let [lower, upper] = chains(points);
+    let length = |chain: &[DVec2]| chain.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
+    length(&lower) + length(&upper)
+}
+
+/// Corners of the convex hull of points in a plane, counter-clockwise.
+#[must_use]
+pub fn hull(points: Vec<DVec2>) -> Vec<DVec2> {
+    // Each chain ends where the other begins.
+    let without_last = |chain: &Vec<DVec2>| chain[..chain.len().saturating_sub(1)].to_vec();
+    chains(points).iter().flat_map(without_last).collect()
+}
+
+/// The lower and the upper chain of the hull.
+fn chains(mut points: Vec<DVec2>) -> [Vec<DVec2>; 2] {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
     let mut half = |reverse: bool| -> Vec<DVec2> {
@@ -92,9 +107,7 @@ pub fn hull_length(mut points: Vec<DVec2>) -> f64 {
         }
         chain
     };
-    let (lower, upper) = (half(false), half(true));
-    let length = |chain: &[DVec2]| chain.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
-    length(&lower) + length(&upper)
+    [half(false), half(true)]
 }
 
 /// One curve in which a plane cuts a mesh, by what it crosses.

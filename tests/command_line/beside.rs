@@ -16,7 +16,7 @@ fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     let first = json(&contest("1"));
     let entries = first["rows"][0]["entries"].as_array().unwrap();
     let names: Vec<&str> = entries.iter().map(|e| e["entrant"].as_str().unwrap()).collect();
-    assert_eq!(names, ["zhu2016", "thomaszewski2006", "paper", "preview", "converged"]);
+    assert_eq!(names, ["zhu2016", "gross2003", "thomaszewski2006", "paper", "preview", "converged"]);
     assert!(entries.iter().all(|e| e["error"].is_null() && e["median_ms"].as_f64().unwrap() > 0.0));
     // The very times of the first run: nothing was draped again.
     assert_eq!(json(&contest("1")), first);
@@ -24,6 +24,34 @@ fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));
     bench.refuses(&["bench", "table-4", "--rows", "pullover-1"], &["pullover-1@VERTICES"]);
+    bench.refuses(&["bench", "table-4", "--growth", "pullover-1@600"], &["--growth pullover-1@600", "--rows"]);
+}
+
+#[test]
+fn a_reference_method_drapes_and_is_recorded_and_has_no_parts() {
+    let bench = Bench::new();
+    for method in ["zhu2016", "gross2003", "thomaszewski2006"] {
+        let file = format!("{method}.rrd");
+        let of = ["--garment", "flared-skirt@600", "--method", method, "--save", &file, "--format", "json"];
+        let report = json(&bench.run(&of));
+        assert_eq!((report["method"].as_str(), report["ended"].as_str()), (Some(method), Some("at-rest")));
+        assert_eq!(report["penetrating_vertices"], 0);
+        assert!(report["timings_ms"]["method"].as_f64().unwrap() > 0.0 && report["part_count"].is_null());
+        assert!(!report["counts"].as_object().unwrap().is_empty());
+        assert!(fs::metadata(bench.path(&file)).unwrap().len() > 10_000);
+    }
+    let skirt = ["--garment", "flared-skirt@600", "--method", "zhu2016"];
+    for (more, word) in [
+        (&["--accuracy"][..], "--accuracy"),
+        (&["--refine", "3"], "--refine"),
+        (&["--model", "paper"], "--model"),
+        (&["--garment", "pullover-1@600"], "2 garments"),
+    ] {
+        bench.refuses(&[&skirt[..], more].concat(), &[word, "zhu2016"]);
+    }
+    // A sheet has no seams, and so no pieces.
+    let frame = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z"];
+    bench.refuses(&[&frame[..], &["--method", "gross2003"]].concat(), &["gross2003 cannot run here", "--pattern"]);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod contest;
+mod gross2003;
 mod scenes;
 mod thomaszewski2006;
 mod zhu2016;

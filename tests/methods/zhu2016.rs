@@ -130,11 +130,11 @@ fn the_quadrics_can_be_shown() {
     let method = Zhu2016 { exhibit: true, ..Zhu2016::default() };
     let made = drape(&method, &scene, &partwise::fabric::Fabric::default(), &rule).unwrap();
     assert_eq!(made.ended, Ended::TimeOver);
-    let [("quadrics", partwise::methods::Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
+    let [("units and quadrics", partwise::methods::Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
     let quadrics = made.counts.iter().find(|c| c.0 == "quadrics").unwrap().1;
     assert_eq!(lines.len() as u64, 2 * quadrics);
     // Each slice's lines, at 1 + ε, go around the body: none of its vertices is outside all of them by height and breadth.
-    let reach = lines.iter().flatten().map(|p| p.z).fold(0.0, f64::max);
+    let reach = lines.iter().flat_map(|(_, line)| line).map(|p| p.z).fold(0.0, f64::max);
     let top = scene.body.mesh().positions.iter().map(|p| p.z).fold(0.0, f64::max);
     assert!(reach > top, "{reach} {top}");
 }

@@ -235,7 +235,9 @@ fn bad_files_are_told_where_what_and_what_to_do() {
 
 #[test]
 fn the_sweeps_that_come_along_are_sound() {
-    for (file, count) in [("table-3-variations", 50), ("extents-and-refinement", 49), ("tables-by-kind", 52)] {
+    for (file, count) in
+        [("table-3-variations", 50), ("extents-and-refinement", 49), ("tables-by-kind", 52), ("figure-8", 10)]
+    {
         let plan = Plan::read(Path::new(&format!("assets/sweeps/{file}.toml")), &Job::preview()).unwrap();
         assert_eq!((plan.points.len(), plan.notes.len()), (count, 0), "{file}: {:?}", plan.notes);
         assert!(plan.about.contains(&format!("= {count} points")), "{file}");

@@ -96,3 +96,75 @@ impl Cloth {
         self.pattern().multiply(blocks, d, out);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fabric::Fabric;
+    use crate::mesh::{RestShape, Topology, TriMesh};
+
+    /// A triangle and another over it, half an offset apart.
+    fn one_over_the_other() -> (Cloth, Vec<DVec3>) {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let positions = vec![
+            at(0.0, 0.0, 0.0),
+            at(0.02, 0.0, 0.0),
+            at(0.0, 0.02, 0.0),
+            at(0.004, 0.003, 0.01),
+            at(0.021, 0.006, 0.01),
+            at(0.005, 0.023, 0.01),
+        ];
+        let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]);
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let fabric = Fabric::by_name("jersey").unwrap();
+        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[0]).unwrap();
+        let down = |(v, x): (usize, &DVec3)| if v < 3 { *x } else { *x - DVec3::Z * 9.2e-3 };
+        let x = mesh.positions.iter().enumerate().map(down).collect();
+        (cloth, x)
+    }
+
+    #[test]
+    fn blocks_between_strangers_are_those_of_the_gradients_change() {
+        let (cloth, at) = one_over_the_other();
+        let mut contacts = Contacts::none();
+        contacts.proximity = Some(cloth.proximity());
+        contacts.refresh(&at);
+        // Slid since, so that friction has something to say.
+        let slid = |(v, x): (usize, &DVec3)| if v < 3 { *x } else { *x + DVec3::new(1.1e-4, 0.7e-4, -2e-5) };
+        let x: Vec<DVec3> = at.iter().enumerate().map(slid).collect();
+        let proximity = contacts.proximity.as_ref().unwrap();
+        assert!(proximity.pressing(&x) > 2);
+        let layout = cloth.layout_with(&x, proximity.pairs());
+        assert!(layout.pattern.rows.len() > cloth.pattern().rows.len(), "no block was added for them");
+        let (mut blocks, mut without) = (Vec::new(), Vec::new());
+        cloth.hessian_in(&layout, &x, &contacts, &mut blocks);
+        cloth.hessian_in(&layout, &x, &Contacts::none(), &mut without);
+        blocks.iter_mut().zip(without).for_each(|(a, b)| *a -= b);
+        let force = |x: &[DVec3]| -> Vec<DVec3> {
+            let (mut with, mut without) = (Vec::new(), Vec::new());
+            cloth.gradient(x, &contacts, &mut with);
+            cloth.gradient(x, &Contacts::none(), &mut without);
+            with.iter().zip(&without).map(|(a, b)| *a - *b).collect()
+        };
+        let step = 1e-9;
+        for (i, &v) in layout.order.iter().enumerate() {
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let at = |s: f64| {
+                    let mut x = x.clone();
+                    x[v as usize] += axis * s;
+                    force(&x)
+                };
+                let (ahead, behind) = (at(step), at(-step));
+                let mut d = vec![DVec3::ZERO; layout.order.len()];
+                d[i] = axis;
+                let mut told = Vec::new();
+                layout.pattern.multiply(&blocks, &d, &mut told);
+                let scale = told.iter().map(|f| f.length()).fold(1.0, f64::max);
+                for (&w, told) in layout.order.iter().zip(&told) {
+                    let measured = (ahead[w as usize] - behind[w as usize]) / (2.0 * step);
+                    assert!(measured.distance(*told) < 1e-4 * scale, "{v} {w}: {measured} and {told}");
+                }
+            }
+        }
+    }
+}

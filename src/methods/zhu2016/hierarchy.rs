@@ -16,11 +16,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::closest::closest;
-use super::segment::Segments;
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
 use crate::mesh::Topology;
 use crate::methods::march::Obstacle;
+use crate::methods::segment::Segments;
 use crate::methods::{Dressing, MethodError};
 
 /// Vertices of one task.
@@ -139,10 +139,11 @@ impl Hierarchy {
         self.units.iter().flat_map(|u| &u.slices).flatten().count()
     }
 
-    /// The quadrics as closed lines, m.
+    /// The quadrics as closed lines, m, each with the index of its unit.
     #[must_use]
-    pub fn outlines(&self) -> Vec<Vec<DVec3>> {
-        self.units.iter().flat_map(BodyUnit::outlines).collect()
+    pub fn outlines(&self) -> Vec<(usize, Vec<DVec3>)> {
+        let of = |(i, unit): (usize, &BodyUnit)| unit.outlines().into_iter().map(move |line| (i, line));
+        self.units.iter().enumerate().flat_map(of).collect()
     }
 
     /// What the user should know of the fit.

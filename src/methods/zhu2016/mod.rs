@@ -18,7 +18,6 @@
 mod closest;
 pub mod hierarchy;
 pub mod quadric;
-mod segment;
 pub mod springs;
 pub mod units;
 
@@ -82,7 +81,8 @@ impl Zhu2016 {
         let total = began.elapsed();
         let Marched { positions, ended, steps, simulated_s, rms_speed, iterations, corrections } = marched;
         let counts = hierarchy.counts();
-        let exhibits = if self.exhibit { vec![("quadrics", Exhibit::Lines(hierarchy.outlines()))] } else { Vec::new() };
+        let exhibits =
+            if self.exhibit { vec![("units and quadrics", Exhibit::Lines(hierarchy.outlines()))] } else { Vec::new() };
         Ok(MethodDrape {
             positions,
             ended,

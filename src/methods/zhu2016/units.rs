@@ -1,6 +1,7 @@
 //! A unit of the body: its frame, its slices with their quadrics, and the leaf triangles of each slice by sectors.
 //!
-//! The frame's z runs along the unit: the direction in which its triangles spread most, for a limb and a trunk alike.
+//! The frame's z runs along the unit: for a limb the direction in which its triangles spread most; for trunk and hip, which
+//! may be wider than high, the vertical.
 //! Slices are 4 cm high. A slice lists every triangle of the unit that comes within [`REACH`] of it, so that a point
 //! which has gone up to that deep into the body still finds the nearest one; a sector of a slice lists those of them
 //! that come within the same of the sector.
@@ -9,6 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
 use crate::mesh::TriMesh;
+use crate::methods::segment::longest;
 
 /// Height of a slice h, m.
 const HEIGHT: f64 = 0.04;
@@ -61,7 +63,8 @@ impl BodyUnit {
             return None;
         }
         let origin = weighted.iter().map(|(p, w)| *p * *w).sum::<DVec3>() / weight;
-        let turn = frame(weighted.iter().map(|(p, w)| (*p - origin, *w / weight)));
+        let axis = if is_limb { longest(weighted.iter().map(|(p, w)| (*p - origin, *w / weight))) } else { DVec3::Z };
+        let turn = frame(axis);
         let local: Vec<[DVec3; 3]> = triangles.iter().map(|&t| corners(t).map(|p| turn * (p - origin))).collect();
         let z = |c: &[DVec3; 3]| {
             (
@@ -186,16 +189,8 @@ fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVe
     (all.0 - offset, all.1 + offset)
 }
 
-/// The rotation whose third row is the direction of largest spread, by power iteration on the covariance.
-fn frame(points: impl Iterator<Item = (DVec3, f64)>) -> DMat3 {
-    let mut covariance = DMat3::ZERO;
-    for (p, w) in points {
-        covariance += DMat3::from_cols(p * p.x, p * p.y, p * p.z) * w;
-    }
-    let mut axis = DVec3::new(0.31, 0.17, 1.0);
-    for _ in 0..200 {
-        axis = (covariance * axis).normalize_or(DVec3::Z);
-    }
+/// A rotation whose third row is `axis`.
+fn frame(axis: DVec3) -> DMat3 {
     let x = axis.any_orthonormal_vector();
     DMat3::from_cols(x, axis.cross(x), axis).transpose()
 }

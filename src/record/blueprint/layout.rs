@@ -6,6 +6,7 @@ use super::super::legend::visible;
 use super::super::outfit::{self, Worn};
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
+use super::closer;
 use super::view::View;
 use super::{Node, TimePanel};
 
@@ -45,6 +46,8 @@ pub struct Layout {
     pub compare: Vec<String>,
     /// A scatter of time against error will come.
     pub scatter: bool,
+    /// A reference method, with the names of what it shows besides the garment: its tab stands for the stages.
+    pub method: Option<Vec<String>>,
     /// The recording is watched while it grows: the cursor follows the newest step.
     pub follow: bool,
     /// The tab shown when the recording opens.
@@ -82,7 +85,8 @@ impl Layout {
 
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
-        let mut tabs = vec![(Tab::Stages, self.stages(eye))];
+        let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
+        let mut tabs = vec![(Tab::Stages, first)];
         if !self.compare.is_empty() {
             tabs.push((Tab::SideBySide, self.side_by_side(eye)));
         }
@@ -99,10 +103,10 @@ impl Layout {
             tabs.push((Tab::Outfit, self.wardrobe(eye)));
         }
         if self.wrinkles {
-            tabs.push((Tab::Wrinkles, wrinkles(&self.eye(Tab::Wrinkles, eye))));
+            tabs.push((Tab::Wrinkles, closer::wrinkles(&self.eye(Tab::Wrinkles, eye))));
         }
-        if self.iterations {
-            tabs.push((Tab::Solver, solver(&self.eye(Tab::Solver, eye))));
+        if self.iterations && self.method.is_none() {
+            tabs.push((Tab::Solver, closer::solver(&self.eye(Tab::Solver, eye))));
         }
         let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
         let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
@@ -248,16 +252,8 @@ impl Layout {
     }
 }
 
-fn wrinkles(eye: &Eye) -> Node {
-    let views = vec![
-        (1.0, View::spatial("PARTs' displacements differ", &[paths::BODY, paths::SEAMS], eye).into()),
-        (1.0, View::spatial("Mean curvature", &[paths::BODY, paths::CURVATURE], eye).into()),
-    ];
-    over("Wrinkles", views, "Colours", paths::WRINKLES_LEGEND, 2)
-}
-
 /// Views side by side over a row of colour bars or texts, one for each.
-fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, columns: usize) -> Node {
+pub(super) fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, columns: usize) -> Node {
     let bars = View::plane(name, &[path], visible([columns, 1])).into();
     Node::Column(tab, vec![(1.0 - BARS_HEIGHT, Node::Row(tab, views)), (BARS_HEIGHT, bars)])
 }
@@ -265,17 +261,6 @@ fn over(tab: &'static str, views: Vec<(f32, Node)>, name: &str, path: &str, colu
 /// Width over height of a view that has a row of bars below.
 fn over_bars(aspect: f64) -> f64 {
     aspect / (1.0 - f64::from(BARS_HEIGHT))
-}
-
-fn solver(eye: &Eye) -> Node {
-    let plots = vec![
-        (1.0, View::plot("Energy, J", &[paths::ENERGY], true).into()),
-        (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], true).into()),
-    ];
-    Node::Row(
-        "Solver",
-        vec![(1.0, View::spatial("Drape", &[paths::BODY, "/drape"], eye).into()), (2.0, Node::Column("Solver", plots))],
-    )
 }
 
 pub(super) fn capital(name: &str) -> String {

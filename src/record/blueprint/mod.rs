@@ -4,7 +4,9 @@
 //! written by hand: `view/{id}` and its properties, `container/{id}`, `viewport`, and the panels, on the sequence timeline
 //! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
+mod closer;
 pub(crate) mod layout;
+mod method;
 mod panels;
 pub(crate) mod view;
 

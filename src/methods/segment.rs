@@ -11,6 +11,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
+use glam::{DMat3, DVec3};
 use ordered_float::OrderedFloat;
 
 use crate::mesh::{NONE, Topology, TriMesh};
@@ -24,9 +25,11 @@ const LEAST_SHARE: f64 = 0.02;
 
 /// Which unit each triangle is in, and whether each unit is a limb: one that ends.
 #[derive(Debug, Clone)]
-pub(super) struct Segments {
-    pub(super) of_triangle: Vec<u32>,
-    pub(super) is_limb: Vec<bool>,
+pub struct Segments {
+    /// Unit of each triangle.
+    pub of_triangle: Vec<u32>,
+    /// Whether each unit ends.
+    pub is_limb: Vec<bool>,
 }
 
 /// A ring: a connected piece of a band.
@@ -40,7 +43,8 @@ struct Ring {
 
 impl Segments {
     /// Cuts a connected body; further components are units of their own.
-    pub(super) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
+    #[must_use]
+    pub fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let distance = geodesics(mesh, topology);
         let farthest = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
         let edge =
@@ -201,6 +205,19 @@ fn units(rings: &[Ring]) -> Vec<usize> {
         }
     });
     chain.iter().map(|&c| number[c]).collect()
+}
+
+/// The direction in which weighted points about the origin spread most, by power iteration on their covariance.
+pub fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
+    let mut covariance = DMat3::ZERO;
+    for (p, w) in points {
+        covariance += DMat3::from_cols(p * p.x, p * p.y, p * p.z) * w;
+    }
+    let mut axis = DVec3::new(0.31, 0.17, 1.0);
+    for _ in 0..200 {
+        axis = (covariance * axis).normalize_or(DVec3::Z);
+    }
+    axis
 }
 
 /// Chains of few bands go to a neighbour: the one before them, else one after.

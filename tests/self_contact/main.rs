@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod knot;
+mod layers;
+
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
@@ -196,6 +199,44 @@ fn a_sheet_folded_over_itself_stays_folded() {
     let top = (0..6).map(|j| end.positions[j * 25 + 24].z).fold(0.0, f64::max);
     let under = (0..6).map(|j| end.positions[j * 25].z).fold(0.0, f64::max);
     assert!(top > under + 3e-4 && top < 0.009, "{top} over {under}");
+}
+
+/// A sphere of radius `r` on the plane z = 0.
+fn ball(r: f64) -> TriMesh {
+    let (rings, around) = (16u32, 32u32);
+    let at = |ring: u32, i: u32| {
+        let (a, b) = (0.5 * TAU * f64::from(ring) / f64::from(rings), TAU * f64::from(i) / f64::from(around));
+        DVec3::new(a.sin() * b.cos(), a.sin() * b.sin(), 1.0 + a.cos()) * r
+    };
+    let mut positions = vec![at(0, 0), at(rings, 0)];
+    positions.extend((1..rings).flat_map(|ring| (0..around).map(move |i| at(ring, i))));
+    let index = |ring: u32, i: u32| match ring {
+        0 => 0,
+        ring if ring == rings => 1,
+        ring => 2 + (ring - 1) * around + i % around,
+    };
+    let quads = (0..rings).flat_map(|ring| (0..around).map(move |i| (ring, i)));
+    let mut triangles = Vec::new();
+    for (ring, i) in quads {
+        let [a, b, c, d] = [index(ring, i), index(ring + 1, i), index(ring + 1, i + 1), index(ring, i + 1)];
+        triangles.extend([[a, b, c], [a, c, d]].into_iter().filter(|[a, b, c]| a != b && b != c && c != a));
+    }
+    TriMesh::new(positions, triangles)
+}
+
+#[test]
+fn a_cloth_on_a_ball_and_the_floor_lies_in_folds() {
+    let lift = DVec3::Z * 2e-3;
+    let ball = ball(0.05);
+    let ball = ball.with_positions(ball.positions.iter().map(|x| *x + lift).collect());
+    let body = Body::new(&both(plate().mesh().clone(), ball)).unwrap();
+    let h = 0.0125;
+    let mesh = sheet(24, 24, DVec3::new(-0.148, -0.151, 0.12), DVec3::X * h, DVec3::Y * h);
+    let end = rests(&mesh, &[], Some(&body), mesh.positions.clone());
+    assert!(end.positions.iter().all(|x| body.nearest(*x).signed_distance > 0.0));
+    let highest = end.positions.iter().map(|x| x.z).fold(0.0, f64::max);
+    let on_floor = end.positions.iter().filter(|x| x.z < 0.01).count();
+    assert!(highest > 0.1 && highest < 0.11 && on_floor > 50, "{highest} {on_floor}");
 }
 
 #[test]

@@ -1,0 +1,268 @@
+//! `--method`: a garment draped by one of the paper's reference methods, recorded and summed up as our own are.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use partwise::DVec3;
+use partwise::certificate::{Certificate, certify};
+use partwise::fabric::Fabric;
+use partwise::figures::MethodFigures;
+use partwise::mechanics::energy::Cloth;
+use partwise::mechanics::fit::Fit;
+use partwise::methods::{self, Dressing, METHODS, MethodDrape, RestRule};
+use partwise::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
+use partwise::scene::Loaded;
+use serde::Serialize;
+
+use super::{Format, RunArgs};
+use crate::commands::failure::UserError;
+use crate::commands::summary::{command_line, fabric_facts};
+use crate::commands::{certified, console, interrupt};
+
+/// Our own: PARTs and what follows.
+pub(super) const TWO_STAGE: &str = "two-stage";
+
+/// The name of a method, or of ours.
+pub(super) fn method(name: &str) -> Result<&'static str, String> {
+    let known = std::iter::once(TWO_STAGE).chain(METHODS);
+    known.clone().find(|known| *known == name).ok_or_else(|| {
+        let names: Vec<&str> = known.collect();
+        format!("found `{name}`, expected one of {}", names.join(", "))
+    })
+}
+
+/// The mesh is recorded so often, s of simulated time: enough to see it settle, a few megabytes at most.
+const MESH_S: f64 = 0.05;
+
+/// A moment of a run in time: step, RMS speed in m/s, and the mesh every so often.
+type Kept = (usize, f64, Option<Vec<DVec3>>);
+
+/// What a run says. Field names are the keys of `--format json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    version: &'static str,
+    command_line: String,
+    body: &'a str,
+    garment: &'a str,
+    method: &'static str,
+    fabric: &'a str,
+    #[serde(flatten)]
+    figures: &'a MethodFigures,
+    /// What the method counted: tests, elements, iterations.
+    counts: BTreeMap<&'static str, u64>,
+    /// Milliseconds of `load`, of each part of the method, of all `method`, of `measure`, `record` and `total`.
+    timings_ms: BTreeMap<&'static str, f64>,
+    notes: &'a [String],
+    warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<&'a Certificate>,
+    outputs: Vec<String>,
+}
+
+impl RunArgs {
+    /// Refuses what acts on PARTs or on our own solver alone.
+    fn refuse_beside_a_method(&self) -> anyhow::Result<()> {
+        let own = [
+            ("--accuracy", self.accuracy),
+            ("--spread", self.spread > 0),
+            ("--cache", self.cache.is_some()),
+            ("--watch", self.watch),
+        ];
+        let mut given: Vec<&str> = own.into_iter().filter(|(_, given)| *given).map(|(flag, _)| flag).collect();
+        given.extend(self.stages.of_two_stages());
+        if given.is_empty() {
+            return Ok(());
+        }
+        Err(UserError::new(format!(
+            "--method {}: found {}, which only {TWO_STAGE} has; leave it out, or take --method {TWO_STAGE}",
+            self.method,
+            given.join(", ")
+        )))
+    }
+
+    /// Drapes by the reference method that was asked for.
+    pub(super) fn run_by_method(&self) -> anyhow::Result<()> {
+        self.refuse_beside_a_method()?;
+        let began = Instant::now();
+        let (spec, fabric) = (self.input.spec()?, self.stages.fabric()?);
+        if !spec.over.is_empty() {
+            return Err(UserError::new(format!(
+                "--method {}: found {} garments over each other, expected one: it keeps no cloth off cloth",
+                self.method,
+                1 + spec.over.len()
+            )));
+        }
+        self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
+        let loaded = self.input.load(&spec)?;
+        let load = began.elapsed();
+        let sewn = loaded.tailored.as_ref().map(|tailored| &tailored.put_on.garment);
+        let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty(), sewn);
+        let method = method.with_context(|| format!("there is no method {}", self.method))?;
+        let scene = loaded.scene.clone();
+        let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held)?;
+        let dressing = Dressing { scene: &scene, fabric: &fabric, cloth: &cloth };
+        let bar = console::progress(None, self.method);
+        let (mut kept, mut meshes): (Vec<Kept>, f64) = (Vec::new(), 0.0);
+        interrupt::keep();
+        let drape = method.drape(&dressing, &RestRule::default(), &mut |moment| {
+            let due = moment.time_s > MESH_S * (meshes - 1e-6);
+            meshes += f64::from(u8::from(due));
+            let mesh = due.then(|| moment.positions.to_vec());
+            kept.push((moment.step, moment.rms_speed_m_per_s, mesh));
+            let speed = 100.0 * moment.rms_speed_m_per_s;
+            bar.set_message(format!("{}: {}, {:.2} s, {speed:.1} cm/s", self.method, moment.stage, moment.time_s));
+            if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        bar.finish_and_clear();
+        let drape = drape.map_err(|e| UserError::new(e.to_string()))?;
+        let measured = Instant::now();
+        let (figures, fit) = MethodFigures::of(&dressing, &drape);
+        let certificate = self.certify.then(|| certify(&scene, &fabric, &drape.positions)).transpose()?;
+        let mut timings = vec![("load", load)];
+        timings.extend(drape.times.iter().copied());
+        timings.extend([("method", drape.total), ("measure", measured.elapsed())]);
+        let mut warnings = [loaded.warnings(), figures.warnings(&dressing)].concat();
+        if scene.let_go && !scene.held.is_empty() {
+            warnings.push(format!("{} does not let go: what is held stays held", self.method));
+        }
+        let made = Made { drape: &drape, figures: &figures, fit: &fit, fabric: &fabric, kept: &kept };
+        let (recorder, spent) = self.record_method(&loaded, &made, &timings, &warnings)?;
+        timings.push(("record", spent));
+        let mut outputs = Vec::new();
+        if let Some(path) = &self.export {
+            loaded.write(path, &drape.positions)?;
+            outputs.push(format!("displaced garment: {}", path.display()));
+        }
+        let url = recorder.web_url().map(str::to_owned);
+        let mut recorder = Some(recorder);
+        if url.is_none() {
+            let path = recorder.take().map(Recorder::finish).transpose()?.and_then(|summary| summary.path);
+            outputs.extend(path.map(|path| format!("recording: {}", path.display())));
+        }
+        timings.push(("total", began.elapsed()));
+        loaded.notes().iter().chain(&drape.notes).for_each(|note| console::note(note));
+        warnings.iter().for_each(|warning| console::warning(warning));
+        let report = Report {
+            version: env!("CARGO_PKG_VERSION"),
+            command_line: command_line(),
+            body: &loaded.body_name,
+            garment: &loaded.garment_name,
+            method: self.method,
+            fabric: &fabric.name,
+            figures: &figures,
+            counts: drape.counts.iter().copied().collect(),
+            timings_ms: timings.iter().map(|(name, time)| (*name, 1e3 * time.as_secs_f64())).collect(),
+            notes: &drape.notes,
+            warnings,
+            certificate: certificate.as_ref(),
+            outputs,
+        };
+        match self.format {
+            Format::Json => console::result(&serde_json::to_string(&report)?),
+            Format::Text => {
+                console::result(&report.text(&drape, &timings));
+                if let Some(certificate) = &certificate {
+                    console::result(&certified::text(certificate));
+                }
+            }
+        }
+        if let (Some(recorder), Some(url)) = (recorder, url) {
+            console::note(&format!("look at it: {url}"));
+            interrupt::wait();
+            if let Some(path) = recorder.finish()?.path {
+                console::note(&format!("recording: {}", path.display()));
+            }
+        }
+        certified::verified(certificate.as_ref())
+    }
+
+    fn record_method(
+        &self,
+        loaded: &Loaded,
+        made: &Made<'_>,
+        timings: &[(&'static str, Duration)],
+        warnings: &[String],
+    ) -> anyhow::Result<(Recorder, Duration)> {
+        let began = Instant::now();
+        let overlays = [
+            Overlay { name: "strain", unit: "%", values: &made.fit.strain_percent },
+            Overlay { name: "pressure", unit: "kPa", values: &made.fit.pressure_kpa },
+        ];
+        let exhibits: Vec<String> = made.drape.exhibits.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let mut recorder = Recorder::open(RecordOptions {
+            sinks: self.sinks.sinks(&loaded.garment_name),
+            name: format!("{} by {}", loaded.garment_name, self.method),
+            layout: Layout {
+                iterations: true,
+                method: Some(exhibits),
+                fit: overlays.iter().map(|o| o.name.to_owned()).collect(),
+                ..Layout::default()
+            },
+            replaceable: false,
+            front: self.sinks.seen_from.direction(),
+        })?;
+        recorder.body(0, loaded.scene.body.mesh())?;
+        recorder.garment(0, &loaded.scene.garment)?;
+        for (step, speed, mesh) in made.kept {
+            // The mesh every so often; speed at every step.
+            let step = i64::try_from(*step).unwrap_or(i64::MAX);
+            if !self.no_iterations {
+                recorder.moment(step, *speed, mesh.as_deref())?;
+            }
+        }
+        let facts = [("method".to_owned(), self.method.to_owned())];
+        let counts = made.drape.counts.iter().map(|(name, count)| ((*name).to_owned(), count.to_string()));
+        let found = made.figures.findings().into_iter().map(|(name, value)| (name.to_owned(), value));
+        let notes = made.drape.notes.iter().map(|note| ("note".to_owned(), note.clone()));
+        let panel = Panel {
+            title: format!("{} on {}, by {}", loaded.garment_name, loaded.body_name, self.method),
+            facts: facts.into_iter().chain(counts).chain(found).chain(notes).collect(),
+            fabric: fabric_facts(made.fabric),
+            timings_ms: timings.iter().map(|(name, time)| ((*name).to_owned(), 1e3 * time.as_secs_f64())).collect(),
+            warnings: warnings.to_vec(),
+            command_line: command_line(),
+            ..Panel::default()
+        };
+        recorder.method(&MethodView {
+            exhibits: &made.drape.exhibits,
+            draped: &made.drape.positions,
+            steps: made.drape.steps,
+            panel: &panel,
+            overlays: &overlays,
+        })?;
+        Ok((recorder, began.elapsed()))
+    }
+}
+
+/// What there is to record.
+struct Made<'a> {
+    drape: &'a MethodDrape,
+    figures: &'a MethodFigures,
+    fit: &'a Fit,
+    fabric: &'a Fabric,
+    kept: &'a [Kept],
+}
+
+impl Report<'_> {
+    /// For the terminal.
+    fn text(&self, drape: &MethodDrape, timings: &[(&'static str, Duration)]) -> String {
+        let MethodFigures { vertices, triangles, .. } = self.figures;
+        let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
+        let _ = writeln!(out, "{:<20}{} in {}", "method", self.method, self.fabric);
+        for (name, value) in self.figures.findings() {
+            let _ = writeln!(out, "{name:<20}{value}");
+        }
+        let counts: Vec<String> = drape.counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        let _ = writeln!(out, "{:<20}{}", "counted", counts.join(", "));
+        let times: Vec<String> =
+            timings.iter().map(|(name, time)| format!("{name} {:.1}", 1e3 * time.as_secs_f64())).collect();
+        let _ = writeln!(out, "milliseconds: {}", times.join(", "));
+        for output in &self.outputs {
+            let _ = writeln!(out, "{output}");
+        }
+        out
+    }
+}
