@@ -28,7 +28,7 @@ const SOFT_TOLERANCE: f64 = 1e-2;
 /// again, it does (Krasnoselskii's iteration, 1955).
 const TO_AND_FRO: usize = 6;
 const LESS: f64 = 0.9;
-const LEAST_STRIDE: f64 = 0.25;
+const LEAST_STRIDE: f64 = 0.125;
 
 /// Iterations of a relaxation at the start and after a step.
 const RELAXING: usize = 20;
@@ -153,6 +153,7 @@ fn settle(
         }
         if descent.residual < LESS * least.0 || descent.residual > CLOSE {
             least = (descent.residual, iteration);
+            descent.stride = (2.0 * descent.stride).min(1.0);
         } else if iteration - least.1 >= TO_AND_FRO {
             descent.stride = (0.5 * descent.stride).max(LEAST_STRIDE);
             least.1 = iteration;

@@ -49,6 +49,9 @@ const REACH: f64 = 2.5;
 /// Share of the mean edge that the offset is at least, so that what touches is told from what crosses.
 const LEAST_OF_EDGE: f64 = 0.1;
 
+/// But no mesh is so coarse that its cloth keeps farther off itself than this, m, if it is thinner.
+const LEAST_OF_ANY: f64 = 4e-3;
+
 /// Share of it that the offset is at most: two triangles apart, a cloth is no nearer to itself.
 const MOST_OF_EDGE: f64 = 0.25;
 
@@ -77,6 +80,7 @@ pub struct Proximity {
     placed: Arc<Vec<DVec3>>,
     clear: Arc<Vec<DVec3>>,
     offset: f64,
+    thickness: f64,
     stiffness: f64,
     friction: f64,
     gaps: Vec<Gap>,
@@ -89,13 +93,15 @@ pub struct Proximity {
 impl Proximity {
     /// None looked for yet: how the cloth was placed, and where it goes back to where a start crosses; `thickness` in m.
     pub(super) fn new(skin: Arc<Skin>, [placed, clear]: [Arc<Vec<DVec3>>; 2], thickness: f64, friction: f64) -> Self {
-        let offset = thickness.clamp(LEAST_OF_EDGE * skin.edge_m, MOST_OF_EDGE * skin.edge_m);
+        let least = (LEAST_OF_EDGE * skin.edge_m).min(LEAST_OF_ANY);
+        let offset = thickness.clamp(least, (MOST_OF_EDGE * skin.edge_m).max(least));
         let passage = Passage::new(Arc::clone(&skin));
         Self {
             skin,
             placed,
             clear,
             offset,
+            thickness,
             stiffness: HALF_OFFSET_PRESSURE / (0.5 * offset),
             friction,
             gaps: Vec::new(),
@@ -107,8 +113,8 @@ impl Proximity {
 
     /// Looks for gaps at `x` (m); those that were there before go on.
     pub fn refresh(&mut self, x: &[DVec3]) {
-        let Self { skin, placed, offset, stiffness, friction, passage, .. } = self;
-        let mut gaps = search::gaps(skin, x, placed, REACH * *offset, *offset, *stiffness);
+        let Self { skin, placed, offset, thickness, stiffness, friction, passage, .. } = self;
+        let mut gaps = search::gaps(skin, x, placed, [REACH * *offset, *offset, *thickness], *stiffness);
         let crossing = passage.known(x);
         self.since = if crossing.len() < self.fewest { 0 } else { self.since + 1 };
         self.fewest = self.fewest.min(crossing.len());
@@ -133,7 +139,7 @@ impl Proximity {
             let depth = gap.depth(x);
             gap.limit = *friction * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
-            if depth > (1.0 - NARROW) * *offset {
+            if depth > (1.0 - NARROW) * gap.goal {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
             }
             gap.slip =

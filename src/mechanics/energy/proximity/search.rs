@@ -25,14 +25,26 @@ const COINCIDENT: f64 = 1e-9;
 /// Neighbours count as far apart where the garment as placed keeps them this many times as far as they are looked for.
 const KEPT_APART: f64 = 2.0;
 
+/// Neighbours press where they are nearer than this share of how far apart they were placed,
+const OF_NEIGHBOURS: f64 = 0.5;
+
+/// and not at all where that is less than this, m.
+const LEAST_GOAL: f64 = 1e-5;
+
 /// A share of a vertex's area that its edges stand for, of which it has some three and each faces several others.
 const OF_EDGES: f64 = 0.25;
 
 /// All gaps under `reach` (m) at `x`, sorted by key; `placed` is where nothing was folded yet. Same bits on any number of threads.
-pub(super) fn gaps(skin: &Skin, x: &[DVec3], placed: &[DVec3], reach: f64, offset: f64, stiffness: f64) -> Vec<Gap> {
+pub(super) fn gaps(
+    skin: &Skin,
+    x: &[DVec3],
+    placed: &[DVec3],
+    [reach, offset, thickness]: [f64; 3],
+    stiffness: f64,
+) -> Vec<Gap> {
     let boxes: Vec<Aabb> = skin.triangles.iter().map(|t| bounds(t, x)).collect();
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let look = Look { skin, x, placed, reach, offset, stiffness };
+    let look = Look { skin, x, placed, reach, offset, thickness, stiffness };
     let mut found: Vec<Found> = (0..skin.triangles.len())
         .into_par_iter()
         .with_min_len(64)
@@ -64,6 +76,7 @@ struct Look<'a> {
     placed: &'a [DVec3],
     reach: f64,
     offset: f64,
+    thickness: f64,
     stiffness: f64,
 }
 
@@ -139,10 +152,16 @@ impl Look<'_> {
 
     fn gap(&self, key: Key, weights: [f64; 5], area: f64) -> Option<Gap> {
         let mut gap = Gap::new(key, weights, self.offset, self.stiffness * area);
+        // What was placed nearer than that is not pushed farther apart than it was.
+        let placed = gap.across(self.placed).length();
+        gap.goal = gap.goal.min(placed.max(self.thickness));
+        if placed < KEPT_APART * self.reach && self.belongs(&gap) {
+            gap.goal = gap.goal.min(OF_NEIGHBOURS * placed);
+        }
         gap.from = gap.across(self.x);
         let distance = gap.from.length();
         gap.normal = gap.from / distance;
-        (distance > COINCIDENT && !self.belongs(&gap)).then_some(gap)
+        (distance > COINCIDENT && gap.goal > LEAST_GOAL).then_some(gap)
     }
 
     /// Whether the two places are near because they are neighbours.
@@ -152,9 +171,7 @@ impl Look<'_> {
             let around = self.skin.neighbours(*a);
             other.iter().any(|(b, _)| around.contains(b))
         };
-        let placed = gap.across(self.placed).length();
-        placed < KEPT_APART * self.reach
-            && (one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize]))
+        one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize])
     }
 }
 
