@@ -244,14 +244,14 @@ mod tests {
     fn what_is_kept_reads_back_and_a_truncated_scene_is_written_again() {
         let folder = tempfile::tempdir().unwrap();
         let store = PointStore::in_folder(folder.path());
-        store.put_both("a", point(), scene).unwrap();
+        store.put_both("a", point(), || Ok(scene())).unwrap();
         assert_eq!((store.scene(SCENE_ID), store.point("a")), (Some(scene()), Some(point())));
         assert_eq!(store.scene_of("a").as_deref(), Some(SCENE_ID));
         let path = scene_path(folder.path(), SCENE_ID);
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         assert_eq!(store.scene(SCENE_ID), None);
-        store.put_both("a", point(), scene).unwrap();
+        store.put_both("a", point(), || Ok(scene())).unwrap();
         assert_eq!(store.scene(SCENE_ID), Some(scene()), "--resume would fail for ever");
     }
 
