@@ -44,6 +44,9 @@ const ARMIJO: f64 = 1e-4;
 /// Shorter steps than this are rounding.
 const SHORTEST_STEP: f64 = 1e-6;
 
+/// A step goes back where its cosine with the one before is under minus this.
+const BACK: f64 = 0.3;
+
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
 const RELAXED_TRIALS: usize = 2;
 
@@ -88,6 +91,8 @@ pub(crate) struct Advance {
     pub(crate) step_length: f64,
     /// Largest move of a vertex, m.
     pub(crate) largest_move_m: f64,
+    /// Whether all moved back by and large, against the step before.
+    pub(crate) back: bool,
 }
 
 /// One line of the history.
@@ -131,6 +136,8 @@ pub(crate) struct Descent<'c, 'b> {
     direction: Vec<DVec3>,
     trial: Vec<DVec3>,
     trial_gradient: Vec<DVec3>,
+    /// The last step, m.
+    moved: Vec<DVec3>,
     scratch: Scratch,
 }
 
@@ -151,6 +158,7 @@ impl<'c, 'b> Descent<'c, 'b> {
             blocks: Vec::new(),
             direction: Vec::new(),
             trial_gradient: Vec::new(),
+            moved: Vec::new(),
             scratch: Scratch::default(),
         };
         descent.evaluate();
@@ -278,15 +286,20 @@ impl<'c, 'b> Descent<'c, 'b> {
             }
         };
         let mut largest_move_m = 0.0;
+        let mut back = false;
         if accepted {
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
+            let moves: Vec<DVec3> = x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect();
+            let along: f64 = moves.iter().zip(&self.moved).map(|(a, b)| a.dot(*b)).sum();
+            back = along < -BACK * norm(&moves) * norm(&self.moved);
+            self.moved = moves;
         } else {
             contacts.update(x);
         }
         self.contacts.refresh(&self.x);
         self.evaluate();
-        Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m })
+        Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m, back })
     }
 }
 

@@ -23,10 +23,10 @@ const CLOSE: f64 = 1e-2;
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
-/// Near rest, so many steps without a residual less than a share of the least so far go to and fro: normals of gaps, anchors of friction stay
+/// Near rest, so many steps back, each against the one before, without a residual less than a share of the least so far, go to and fro: normals of gaps, anchors of friction stay
 /// as they are during a step and follow it, and what two states ask of each other may never agree. Half the way between them, and half
 /// again, it does (Krasnoselskii's iteration, 1955).
-const TO_AND_FRO: usize = 6;
+const TO_AND_FRO: usize = 3;
 const LESS: f64 = 0.9;
 const LEAST_STRIDE: f64 = 0.125;
 
@@ -109,7 +109,7 @@ fn settle(
     let mut fresh = true;
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
-    let mut least = (f64::INFINITY, 0);
+    let (mut least, mut back) = (f64::INFINITY, 0);
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
             break Stop::Interrupted;
@@ -151,12 +151,13 @@ fn settle(
         } else if advance.share < 0.3 {
             descent.damping = (descent.damping * 2.0).min(MOST_DAMPING);
         }
-        if descent.residual < LESS * least.0 || descent.residual > CLOSE {
-            least = (descent.residual, iteration);
+        back = if advance.back { back + 1 } else { 0 };
+        if descent.residual < LESS * least || descent.residual > CLOSE {
+            (least, back) = (descent.residual, 0);
             descent.stride = (2.0 * descent.stride).min(1.0);
-        } else if iteration - least.1 >= TO_AND_FRO {
+        } else if back >= TO_AND_FRO {
             descent.stride = (0.5 * descent.stride).max(LEAST_STRIDE);
-            least.1 = iteration;
+            back = 0;
         }
         if advance.accepted {
             history.push(descent.record(iteration, Some(advance), soft));
