@@ -40,6 +40,8 @@ fn a_reference_method_drapes_and_is_recorded_and_has_no_parts() {
         assert!(!report["counts"].as_object().unwrap().is_empty());
         assert!(fs::metadata(bench.path(&file)).unwrap().len() > 10_000);
     }
+    // Where nothing is recorded yet: a refusal leaves nothing.
+    let bench = Bench::new();
     let skirt = ["--garment", "flared-skirt@600", "--method", "zhu2016"];
     for (more, word) in [
         (&["--accuracy"][..], "--accuracy"),
