@@ -1,6 +1,7 @@
 //! Mechanics: what moves the PARTs and the cloth.
 
 pub mod coupled;
+pub(crate) mod curvature;
 pub mod cusick;
 pub mod energy;
 pub mod fit;

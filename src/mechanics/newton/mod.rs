@@ -14,7 +14,7 @@
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | d | step | m |
-//! | t | step length, at most 1 | – |
+//! | t | step length, at most 1, or 2 where steps go on alike | – |
 //! | ε | damping | 1/s² |
 //! | M | lumped masses | kg |
 
@@ -23,19 +23,23 @@ mod factor;
 mod flat;
 mod forest;
 mod groves;
+mod onward;
 pub(crate) mod relax;
 mod solver;
 mod substitute;
 mod supernodes;
 mod vectors;
+mod ways_out;
 mod whole;
 
 use glam::{DMat3, DVec3};
 
 use super::energy::proximity::Looked;
 use super::energy::{Cloth, Contacts, Scratch};
+use onward::Onward;
 use relax::Relaxation;
 pub use solver::{SolveError, Solver};
+pub(crate) use ways_out::Rest;
 pub(crate) use whole::Whole;
 
 /// Armijo's constant: the share of the predicted decrease that a step must bring.
@@ -43,9 +47,6 @@ const ARMIJO: f64 = 1e-4;
 
 /// Shorter steps than this are rounding.
 const SHORTEST_STEP: f64 = 1e-6;
-
-/// A step goes back where its cosine with the one before is under minus this.
-const BACK: f64 = 0.3;
 
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
 const RELAXED_TRIALS: usize = 2;
@@ -87,7 +88,7 @@ pub(crate) struct Advance {
     pub(crate) accepted: bool,
     /// Its length t over the longest that was tried.
     pub(crate) share: f64,
-    /// Its length t.
+    /// Its length t; over one where it goes on like the one before.
     pub(crate) step_length: f64,
     /// Largest move of a vertex, m.
     pub(crate) largest_move_m: f64,
@@ -136,8 +137,9 @@ pub(crate) struct Descent<'c, 'b> {
     direction: Vec<DVec3>,
     trial: Vec<DVec3>,
     trial_gradient: Vec<DVec3>,
-    /// The last step, m.
-    moved: Vec<DVec3>,
+    /// Times its length that a step may go where it goes on like the one before (`onward.rs`).
+    pub(crate) farthest: f64,
+    onward: Onward,
     scratch: Scratch,
 }
 
@@ -158,7 +160,8 @@ impl<'c, 'b> Descent<'c, 'b> {
             blocks: Vec::new(),
             direction: Vec::new(),
             trial_gradient: Vec::new(),
-            moved: Vec::new(),
+            farthest: 1.0,
+            onward: Onward::default(),
             scratch: Scratch::default(),
         };
         descent.evaluate();
@@ -243,6 +246,8 @@ impl<'c, 'b> Descent<'c, 'b> {
             trial_gradient,
             scratch,
             stride,
+            farthest,
+            onward,
             ..
         } = self;
         let cloth = *cloth;
@@ -250,7 +255,7 @@ impl<'c, 'b> Descent<'c, 'b> {
         let slope: f64 = gradient.iter().zip(&*direction).map(|(g, d)| g.dot(*d)).sum();
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (pace.longest_move_m / longest).min(1.0);
-        let mut t = first;
+        let mut t = (first * onward.reach(direction, *farthest)).min(pace.longest_move_m / longest);
         let mut relaxed = 0;
         let accepted = loop {
             trial.clear();
@@ -259,7 +264,7 @@ impl<'c, 'b> Descent<'c, 'b> {
             let most = *energy + ARMIJO * t * slope;
             let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= most;
             if !falls {
-                relaxed += 1;
+                relaxed += usize::from(t <= first);
                 falls = relaxed <= RELAXED_TRIALS
                     && pace.relaxing_trial > 0
                     && relaxation.run(cloth, contacts, trial, pace.relaxing_trial) <= most;
@@ -279,27 +284,25 @@ impl<'c, 'b> Descent<'c, 'b> {
                     Some(Looked::Crosses) => {}
                 }
             }
-            t *= 0.5;
+            t = if t > first { first } else { 0.5 * t };
             // Also where t is not a number: nothing pulls any more.
             if t.is_nan() || t < SHORTEST_STEP {
                 break false;
             }
         };
+        onward.keep(direction, if accepted { t } else { 0.0 });
         let mut largest_move_m = 0.0;
         let mut back = false;
         if accepted {
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
-            let moves: Vec<DVec3> = x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect();
-            let along: f64 = moves.iter().zip(&self.moved).map(|(a, b)| a.dot(*b)).sum();
-            back = along < -BACK * norm(&moves) * norm(&self.moved);
-            self.moved = moves;
+            back = onward.back(x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect());
         } else {
             contacts.update(x);
         }
         self.contacts.refresh(&self.x);
         self.evaluate();
-        Ok(Advance { accepted, share: t / first, step_length: t, largest_move_m, back })
+        Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m, back })
     }
 }
 

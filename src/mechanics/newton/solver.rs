@@ -150,6 +150,14 @@ impl Solver {
         self.double.solve(&self.forest, x);
         Ok(())
     }
+
+    /// L⁻ᵀ L⁻¹ x, in place, with the factor of the last [`solve`](Self::solve) as it is: a positive matrix near to that one.
+    pub(crate) fn substitute(&mut self, x: &mut [DVec3]) {
+        match &mut self.single {
+            Some(single) => single.solve(&self.forest, x),
+            None => self.double.solve(&self.forest, x),
+        }
+    }
 }
 
 /// Solves with a factor in single precision and mends the solution; where that fails, `x` is left as it was.

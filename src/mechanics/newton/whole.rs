@@ -18,12 +18,12 @@ pub(crate) struct Whole {
     /// Analysed with the first step, if not before: a preview takes none.
     pub(crate) solver: Option<Solver>,
     /// Where the blocks are once gaps of the cloth with itself couple vertices that are no neighbours.
-    coupled: Option<HessianLayout>,
-    blocks: Vec<DMat3>,
+    pub(super) coupled: Option<HessianLayout>,
+    pub(super) blocks: Vec<DMat3>,
     damped: Vec<f64>,
-    unknowns: Vec<DVec3>,
+    pub(super) unknowns: Vec<DVec3>,
     /// Whether the last factorisation was of the bearing Hessian.
-    bearing: bool,
+    pub(super) bearing: bool,
     /// Steps yet to be taken with the positive Hessian.
     waiting: usize,
     /// How many those were the last time.
@@ -32,7 +32,7 @@ pub(crate) struct Whole {
 
 impl Whole {
     /// Solves with `blocks`; the solution is in `unknowns`.
-    fn solve(&mut self, here: &State<'_>, positive: bool) -> Result<(), SolveError> {
+    pub(super) fn solve(&mut self, here: &State<'_>, positive: bool) -> Result<(), SolveError> {
         let State { cloth, gradient, damping, .. } = *here;
         let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
         let solver = match &mut self.solver {
@@ -47,7 +47,7 @@ impl Whole {
     }
 
     /// Makes a place for every pair of vertices that a gap couples, if there is none yet.
-    fn couple(&mut self, here: &State<'_>) {
+    pub(super) fn couple(&mut self, here: &State<'_>) {
         let State { cloth, x, contacts, .. } = *here;
         let Some(proximity) = &contacts.proximity else { return };
         let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());

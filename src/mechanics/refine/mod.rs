@@ -1,7 +1,9 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
 //! The steps are those of `mechanics::newton` in all vertices. Stops where the residual ‖∇E‖₂ over the free vertices, divided
-//! by the garment's weight, is under the tolerance and no vertex is inside the body.
+//! by the garment's weight, is under the tolerance and no vertex is inside the body, and where that rest lasts: a residual is as small on
+//! a saddle of the energy, and where cloth slides slowly. A rest is therefore looked at, and left where it is none
+//! (`newton::ways_out`); that costs one to two steps, and what it takes to come to rest again.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
 //! in thousands, so it creeps into its folds a millimetre at a time. Far from rest it is therefore first settled with its stiffness
@@ -32,6 +34,8 @@ pub struct RefineOptions {
     pub soft_strain: f64,
     /// Whether cloth keeps off cloth: see [`proximity`](super::energy::proximity).
     pub self_contact: bool,
+    /// Whether a rest must last: hardly anything moves by the next step, and no way leads out on which the energy falls.
+    pub lasting: bool,
 }
 
 /// No run takes more steps than this.
@@ -46,6 +50,7 @@ impl Default for RefineOptions {
             longest_move_m: 0.1,
             soft_strain: 0.005,
             self_contact: true,
+            lasting: true,
         }
     }
 }

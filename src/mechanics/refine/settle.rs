@@ -6,7 +6,7 @@ use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts, Covered};
-use crate::mechanics::newton::{Descent, Pace, SolveError, Solver, Tangent, Whole};
+use crate::mechanics::newton::{Descent, Pace, Rest, SolveError, Solver, Tangent, Whole};
 
 /// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
 /// under gravity is a millimetre.
@@ -29,6 +29,13 @@ const SOFT_TOLERANCE: f64 = 1e-2;
 const TO_AND_FRO: usize = 3;
 const LESS: f64 = 0.9;
 const LEAST_STRIDE: f64 = 0.125;
+
+/// Times the length of a step that one may go which goes on like the one before, near rest: see `newton::onward`. With 2 the five garments
+/// at ten sizes, knit and woven, take 334 steps together, with 1 356, with 4 359.
+const FARTHEST: f64 = 2.0;
+
+/// Looks at a rest whether it lasts, at most: see `newton::ways_out`.
+const LOOKS: usize = 8;
 
 /// Iterations of a relaxation at the start and after a step.
 const RELAXING: usize = 20;
@@ -109,6 +116,7 @@ fn settle(
     let mut fresh = true;
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
+    let mut looks = 0;
     let (mut least, mut back) = (f64::INFINITY, 0);
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
@@ -118,7 +126,16 @@ fn settle(
             if descent.contacts.penetration(&descent.x).0 > 0 {
                 descent.contacts.stiffen(4.0);
             } else if !options.self_contact || descent.contacts.cover(&triangles, &descent.x, &mut covered) == 0 {
-                break Stop::Converged;
+                if !options.lasting || looks == LOOKS || iteration >= limit {
+                    break Stop::Converged;
+                }
+                looks += 1;
+                match descent.look(&mut tangent, looks > 1, RELAXING)? {
+                    Rest::Lasts => break Stop::Converged,
+                    Rest::Moves => {}
+                    Rest::Left => (least, back) = (f64::INFINITY, 0),
+                }
+                descent.damping = LEAST_DAMPING;
             }
             descent.contacts.update(&descent.x);
             descent.contacts.refresh(&descent.x);
@@ -132,6 +149,7 @@ fn settle(
             let analyse = || analysed.map_or_else(|| Solver::new(cloth.pattern()), Ok);
             tangent.solver = Some(descent.relax(RELAXING, analyse)?);
         }
+        descent.farthest = if !soft && descent.residual < CLOSE { FARTHEST } else { 1.0 };
         let advance = descent.advance(&mut tangent, pace)?;
         iteration += usize::from(advance.accepted);
         // A bearing Hessian may point nowhere useful, and the softened cloth need not settle.
