@@ -65,8 +65,10 @@ impl State {
 fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
     for touch in contacts.touches() {
         let g = &mut gradient[touch.vertex as usize];
-        let tangential = *g - touch.normal * touch.normal.dot(*g);
-        *g -= tangential.clamp_length_max(cloth.friction * touch.force());
+        // Flatter in a crease than a distance, where the body pushes less.
+        let (normal, slope) = (touch.normal.normalize_or_zero(), touch.normal.length().min(1.0));
+        let tangential = *g - normal * normal.dot(*g);
+        *g -= tangential.clamp_length_max(cloth.friction * touch.force() * slope);
     }
 }
 

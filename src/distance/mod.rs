@@ -17,8 +17,9 @@
 mod worn;
 
 use glam::DVec3;
-use parry3d_f64::query::{PointProjection, PointQueryWithLocation};
-use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
+use parry3d_f64::math::Pose;
+use parry3d_f64::query::{PointProjection, PointQueryWithLocation, distance};
+use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
 use crate::mesh::winding::signed_volumes;
@@ -132,6 +133,12 @@ impl Body {
     fn nearest_within(&self, x: DVec3, most: f64) -> SurfacePoint {
         let found = self.shape.project_local_point_and_get_location_with_max_dist(x, false, most);
         found.map_or_else(|| self.nearest(x), |found| self.found(x, found))
+    }
+
+    /// How far a triangle is from the surface, without what that wears, m: zero where they cross.
+    pub(crate) fn distance_to(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+        let (here, triangle) = (Pose::IDENTITY, Triangle::new(a, b, c));
+        distance(&here, &self.shape, &here, &triangle).unwrap_or(f64::INFINITY)
     }
 
     fn found(

@@ -172,7 +172,7 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let mut contacts =
         Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset + COVERED, stiffness, Friction::none());
     contacts.update(x);
-    let spans = spanned(cloth, body, x);
+    let spans = spanned(cloth, body, x, &contacts);
     let of_body = contacts.touches().iter().filter(|t| t.depth > COVERED - TOUCHING || spans[t.vertex as usize]);
     let mut all: Vec<Touching> =
         of_body.map(|t| Touching::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, true)).collect();
@@ -187,18 +187,25 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     all
 }
 
-/// Whether a triangle of each vertex is nearer to the body between its corners than these keep by themselves: they may then be kept
-/// farther off, so that it does not poke through.
-fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<bool> {
+/// Whether a triangle of each vertex touches the body between its corners: these may then be kept farther off than by themselves, so that
+/// it does not poke through. Asked of triangles that are `near` it with a corner.
+fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3], near: &Contacts<'_>) -> Vec<bool> {
+    let mut close = vec![false; x.len()];
+    near.touches().iter().for_each(|t| close[t.vertex as usize] = true);
     let mut spans = vec![false; x.len()];
     let inner = |v: [u32; 3]| {
         let [a, b, c] = v.map(|v| x[v as usize]);
         [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
     };
-    let points: Vec<DVec3> = cloth.triangles.iter().flat_map(|t| inner(t.vertices)).collect();
-    for (t, near) in cloth.triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
-        if near.iter().any(|p| p.signed_distance < cloth.offset) {
-            t.vertices.iter().for_each(|&v| spans[v as usize] = true);
+    let triangles: Vec<[u32; 3]> =
+        cloth.triangles.iter().map(|t| t.vertices).filter(|t| t.iter().any(|&v| close[v as usize])).collect();
+    let points: Vec<DVec3> = triangles.iter().flat_map(|t| inner(*t)).collect();
+    for (t, near) in triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
+        // What the body wears is asked at these points alone.
+        let touches = near.iter().any(|p| p.signed_distance < cloth.offset)
+            || body.distance_to(t.map(|v| x[v as usize])) < cloth.offset + TOUCHING;
+        if touches {
+            t.iter().for_each(|&v| spans[v as usize] = true);
         }
     }
     spans

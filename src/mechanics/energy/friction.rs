@@ -32,9 +32,6 @@ pub const ELASTIC_SLIP: f64 = 5e-4;
 /// and as a spring it would let the vertex creep by a fraction of ε a step.
 const YIELDED: f64 = 0.999;
 
-/// Square of a gradient's length over which it is no distance's, but rounding.
-const STEEP: f64 = 1.0 + 1e-9;
-
 /// One vertex's hold on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hold {
@@ -84,10 +81,12 @@ impl Friction {
             while old.next_if(|h| h.vertex < t.vertex).is_some() {}
             let position = x[t.vertex as usize];
             let anchor = old.next_if(|h| h.vertex == t.vertex).map_or(position, |h| h.anchor);
-            // Where a body goes through itself its distance jumps, and the rounded one is steeper than any distance.
-            let steep = t.normal.length_squared() > STEEP;
-            let normal = if steep { t.normal.normalize_or_zero() } else { t.normal };
-            let mut hold = Hold { vertex: t.vertex, anchor, normal, limit: self.coefficient * t.force() };
+            // The rounded distance is flatter than a distance in a crease, and pushes less; where a body goes through itself it is
+            // steeper than any.
+            let slope = t.normal.length();
+            let normal = t.normal / if slope > 0.0 { slope } else { 1.0 };
+            let mut hold =
+                Hold { vertex: t.vertex, anchor, normal, limit: self.coefficient * t.force() * slope.min(1.0) };
             let slip = hold.slip(x);
             // The anchor stays in the tangent plane through the vertex; only the slip within ε is elastic.
             hold.anchor = position - slip.clamp_length_max(ELASTIC_SLIP);
@@ -137,6 +136,18 @@ pub(super) fn huber(y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn in_a_crease_it_holds_along_the_surface_as_much_as_the_body_pushes() {
+        let normal = DVec3::new(0.3, 0.0, 0.4);
+        let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
+        let mut friction = Friction::new(0.3);
+        friction.refresh(&[touch], &[DVec3::ZERO]);
+        let mut gradient = [DVec3::ZERO];
+        friction.add_gradient(&[DVec3::new(4e-3, 0.0, -3e-3)], &mut gradient);
+        let pushed = touch.force() * normal.length();
+        assert!(gradient[0].dot(normal).abs() < 1e-15 && (gradient[0].length() - 0.3 * pushed).abs() < 1e-12);
+    }
 
     #[test]
     fn a_gradient_steeper_than_a_distance_leaves_the_hessian_positive_and_the_slip_along_the_surface() {
