@@ -2,12 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use std::ops::ControlFlow;
+
 use glam::{DMat3, DVec3};
 use partwise::Scene;
 use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::distance::Body;
 use partwise::fabric::Fabric;
-use partwise::mechanics::energy::Cloth;
+use partwise::mechanics::energy::{Cloth, Contacts};
+use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine_with};
 use partwise::mesh::{RestShape, TriMesh};
 
 /// Squares along each side of the cloth, and the length of one, m.
@@ -122,6 +125,68 @@ fn compressed_between_two_held_edges_it_would_buckle() {
     assert!(flat.passes && flat.value > 0.0, "{flat:?}");
     let squeezed = finding(0.05);
     assert!(!squeezed.passes && squeezed.remark.contains("ways out"), "{squeezed:?}");
+}
+
+/// A cloth that hangs free over the table, its vertices at which `holds` is true held.
+fn hanging(holds: impl Fn(DVec3) -> bool) -> (Scene, Vec<DVec3>) {
+    let (mut scene, _) = lying();
+    let upright = |x: &DVec3| DVec3::new(x.x, 0.0, x.y + 0.2);
+    let x: Vec<DVec3> = scene.garment.positions.iter().map(upright).collect();
+    scene.held = (0u32..).zip(&x).filter(|(_, x)| holds(**x)).map(|(v, _)| v).collect();
+    (scene, x)
+}
+
+/// Where it comes to rest, whether that must last or not.
+fn rests(scene: &Scene, start: &[DVec3], lasting: bool) -> Refined {
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &jersey(), &scene.held).unwrap();
+    let options = RefineOptions { lasting, ..RefineOptions::default() };
+    let mut go_on = |_: &partwise::mechanics::refine::Step<'_>| ControlFlow::Continue(());
+    let end = refine_with(&cloth, Contacts::none(), start.to_vec(), &options, &mut go_on).unwrap();
+    assert_eq!(end.stop, Stop::Converged);
+    end
+}
+
+#[test]
+fn a_strip_pressed_along_its_plane_stands_straight_until_it_is_looked_at() {
+    let half = 0.5 * f64::from(SQUARES) * SIDE;
+    let (scene, flat) = hanging(|x| x.x.abs() > half - 1e-9);
+    let by = 0.05;
+    let start: Vec<DVec3> = flat.iter().map(|x| DVec3::new(x.x * (1.0 - by), x.y, x.z)).collect();
+    let deepest = |x: &[DVec3]| x.iter().map(|x| x.y.abs()).fold(0.0, f64::max);
+    let (straight, buckled) = (rests(&scene, &start, false), rests(&scene, &start, true));
+    assert!(deepest(&straight.positions) < 1e-9, "{}", deepest(&straight.positions));
+    fails(&certified(&scene, &straight.positions), "lowest curvature");
+    assert!(buckled.energy < straight.energy);
+    // As deep as a sine shorter by that much, its span less whatever the cloth takes up in its plane.
+    let sine = 2.0 / std::f64::consts::PI * by.sqrt() * 2.0 * half;
+    let deep = deepest(&buckled.positions);
+    assert!(deep > 0.5 * sine && deep < 1.3 * sine, "{deep} m, a sine {sine} m");
+    let certificate = certified(&scene, &buckled.positions);
+    assert!(certificate.passes, "{:#?}", certificate.findings);
+}
+
+#[test]
+fn a_cloth_that_leans_by_half_a_degree_still_swings() {
+    let half = 0.5 * f64::from(SQUARES) * SIDE;
+    let top = 0.2 + half;
+    let (scene, flat) = hanging(|x| x.z > top - 1e-9);
+    let straight = rests(&scene, &flat, true).positions;
+    let turn = DMat3::from_rotation_x(8e-3);
+    let hinge = DVec3::Z * top;
+    let leaning: Vec<DVec3> = straight.iter().map(|x| hinge + turn * (*x - hinge)).collect();
+    let tip = |x: &[DVec3]| x.iter().map(|x| x.y.abs()).fold(0.0, f64::max);
+    assert!(tip(&leaning) > 1e-3);
+    let left = rests(&scene, &leaning, false);
+    assert_eq!(
+        (left.steps, left.positions == leaning),
+        (0, true),
+        "its residual is small: {}",
+        left.residual_over_weight
+    );
+    fails(&certified(&scene, &leaning), "still moving");
+    let swung = rests(&scene, &leaning, true);
+    assert!(swung.steps > 0 && tip(&swung.positions) < 2e-4, "{} steps, {} m", swung.steps, tip(&swung.positions));
+    assert!(certified(&scene, &swung.positions).passes);
 }
 
 #[test]
