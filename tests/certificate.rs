@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use glam::{DMat3, DVec3};
 use partwise::Scene;
-use partwise::certificate::{Certificate, CertifyError, certify};
+use partwise::certificate::{Certificate, CertifyError, Forces, certify};
 use partwise::distance::Body;
 use partwise::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts};
@@ -208,6 +208,30 @@ fn a_column_through_a_triangle_shows_without_a_vertex_inside() {
     let certificate = certified(&scene, &x);
     fails(&certificate, "skin through cloth");
     assert!(certificate.finding("inside the body").unwrap().passes);
+}
+
+#[test]
+fn a_point_under_a_triangle_touches_its_corners_and_no_others() {
+    // Away from its middle and those of its sides: a shallow pyramid, its top under six tenths of one corner.
+    let flat = sheet();
+    let triangle = flat.triangles[20];
+    let [a, b, c] = triangle.map(|v| flat.positions[v as usize]);
+    let top = a * 0.6 + b * 0.25 + c * 0.15;
+    let around = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| top + DVec3::new(x, y, -0.2) * 0.5);
+    let corners = [top, around[0], around[1], around[2], around[3], top - DVec3::Z];
+    let sides = [[1, 2], [2, 3], [3, 4], [4, 1]].into_iter().flat_map(|[u, v]| [[0, u, v], [5, v, u]]).collect();
+    let scene = scene(&TriMesh::new(corners.to_vec(), sides), flat);
+    let keeps = offset(&scene);
+    let touched = |higher: f64| -> Vec<u32> {
+        let x: Vec<DVec3> = scene.garment.positions.iter().map(|x| *x + DVec3::Z * (keeps + higher)).collect();
+        let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &jersey(), &scene.held).unwrap();
+        let forces = Forces::new(&cloth, &scene.body, &x);
+        forces.touching.iter().filter(|t| t.of_body).map(|t| t.shares[0].0).collect()
+    };
+    let mut expected = triangle.to_vec();
+    expected.sort_unstable();
+    assert_eq!(touched(0.0), expected);
+    assert_eq!(touched(1e-3), [0; 0]);
 }
 
 #[test]
