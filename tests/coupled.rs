@@ -86,7 +86,7 @@ fn settle(
     let topology = Topology::new(mesh);
     let rest = RestShape::from_edges(mesh).unwrap();
     let cloth = Cloth::new(mesh, &topology, &rest, fabric, held).unwrap();
-    let garment = Garment { mesh, topology: &topology, cloth: &cloth, fabric };
+    let garment = Garment { mesh, topology: &topology, cloth: &cloth };
     solve(&garment, body, &parts(&topology), &mesh.positions, options)
 }
 
@@ -279,7 +279,7 @@ fn what_cannot_be_solved_says_why() {
     let rest = RestShape::from_edges(&mesh).unwrap();
     let fabric = fabric(60.0);
     let cloth = Cloth::new(&mesh, &topology, &rest, &fabric, &[0]).unwrap();
-    let garment = Garment { mesh: &mesh, topology: &topology, cloth: &cloth, fabric: &fabric };
+    let garment = Garment { mesh: &mesh, topology: &topology, cloth: &cloth };
     let options = CoupledOptions::default();
     let short = solve(&garment, &far_away(), &pieces(&mesh, &topology, 1.0), &mesh.positions[1..], &options);
     assert!(matches!(short.unwrap_err(), CoupledError::Count { found: 80, expected: 81, .. }));

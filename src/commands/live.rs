@@ -74,6 +74,7 @@ impl LiveArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
+        self.stages.cloth().only("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;
         let session = Session::new(job.clone(), !self.cold);
@@ -111,7 +112,8 @@ impl LiveArgs {
             None => None,
         };
         let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
-        let files = job.scene.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
+        let files =
+            job.scene.files().into_iter().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         Ok(LiveOptions {
             address: SocketAddr::new(self.bind, self.port),
             host: self.host.clone(),

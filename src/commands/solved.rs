@@ -111,7 +111,7 @@ impl Solved {
             part_of_vertex: &self.drape.parts.part_of_vertex,
             part_force_n: &forces,
             draped: &self.drape.positions,
-            panel: &self.summary.panel(&self.job.settings.fabric),
+            panel: &self.summary.panel(),
             scalars: &scalars,
             overlays: &self.overlays(),
         })?;

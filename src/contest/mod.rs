@@ -164,8 +164,8 @@ pub fn row(
     listener: Listener<'_>,
 ) -> Result<ContestRow, ContestError> {
     let failed = |e: &dyn std::error::Error| ContestError::Failed(e.to_string());
-    let cloth =
-        Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held).map_err(|e| failed(&e))?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)
+        .map_err(|e| failed(&e))?;
     let rounds = options.warm_up + options.rounds;
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); ENTRANTS.len()];
     let mut last: Vec<Option<Result<Outcome, String>>> = ENTRANTS.iter().map(|_| None).collect();
@@ -250,7 +250,9 @@ fn run(
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
     let (model, refine) = match entrant {
-        Entrant::Method(name) => return in_time(name, &Dressing { scene, fabric, cloth }, rule, go_on),
+        Entrant::Method(name) => {
+            return in_time(name, &Dressing { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
+        }
         Entrant::Paper => ("paper", Refine::Steps(0)),
         Entrant::Preview => ("coupled", Refine::Steps(0)),
         Entrant::Converged => ("coupled", Refine::Converged),

@@ -136,6 +136,7 @@ impl CompareArgs {
 
     /// The comparison as a plan: every table on every garment.
     fn plan(&self) -> anyhow::Result<Plan> {
+        self.dials.cloth().only("compare")?;
         let settings = Settings { refine: self.refine, ..self.dials.over(Job::preview().settings)? };
         let table = |name: &String| Ok(TableRule::from(RangeTable::by_name(name)?).named(name));
         let tables: Vec<TableRule> = self.tables.iter().map(table).collect::<anyhow::Result<_>>()?;

@@ -79,6 +79,7 @@ impl ReferenceMethod for Thomaszewski2006 {
         rule: &RestRule,
         onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
+        dressing.of_one_fabric(NAME)?;
         rayon::scope(|_| self.run(dressing, rule, onlooker))
     }
 }

@@ -61,6 +61,7 @@ impl ReferenceMethod for Zhu2016 {
         onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
         // In the pool: hundreds of short parallel loops follow.
+        dressing.of_one_fabric(NAME)?;
         rayon::scope(|_| self.run(dressing, rule, onlooker))
     }
 }
