@@ -267,7 +267,7 @@ fn the_push_out_leaves_held_vertices_and_nothing_inside() {
     let body = cube(DVec3::ZERO, 0.1);
     let inside = vec![DVec3::new(0.09, 0.01, 0.0), DVec3::new(0.02, -0.08, 0.01), DVec3::new(0.2, 0.0, 0.0)];
     let mut x = inside.clone();
-    assert_eq!(push_out(&body, &[false, true, false], 0.001, &mut x), 1);
+    assert_eq!(push_out(&body, &[false, true, false], &[0.001; 3], &mut x), 1);
     assert!((x[0] - DVec3::new(0.101, 0.01, 0.0)).length() < 1e-12);
     assert_eq!(x[1..], inside[1..]);
 }

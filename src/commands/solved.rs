@@ -102,6 +102,9 @@ impl Solved {
         let scene = &self.loaded.scene;
         recorder.body(index, scene.body.mesh())?;
         recorder.garment(index, &scene.garment)?;
+        if scene.layers.len() == 1 && scene.own_fabrics.len() > 1 {
+            recorder.cut_from(index, &scene.fabric_of_vertices())?;
+        }
         let forces: Vec<DVec3> = self.drape.outcomes.iter().map(|o| o.force_n).collect();
         let mut scalars = self.summary.figures.scalars();
         scalars.retain(|(name, _)| name.starts_with("error/"));

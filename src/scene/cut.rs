@@ -27,7 +27,7 @@ pub struct Swatch {
     pub garment: String,
     /// The fabric; none is that of the settings.
     pub fabric: Option<String>,
-    /// Its panels.
+    /// Its panels; none where it is all of the garment.
     pub panels: Vec<String>,
     /// The file that says so; none where the command line does.
     pub by: Option<String>,
@@ -110,20 +110,19 @@ impl SceneSpec {
             let group = mesh.triangle_group.get(t).map(|&group| group as usize);
             numbers.push(cut.number(group.map_or(&unnamed, |group| &of_group[group])));
         }
+        let panels = |fabric: &Option<Fabric>| {
+            let named = mesh.groups.iter().zip(&of_group).filter(|(_, of)| *of == fabric);
+            named.map(|(panel, _)| panel.clone()).collect()
+        };
+        let several = cut.fabrics.len() > 1;
         let swatch = |fabric: &Option<Fabric>| Swatch {
             garment: garment.clone(),
             fabric: fabric.as_ref().map(|fabric| fabric.name.clone()),
-            panels: mesh
-                .groups
-                .iter()
-                .zip(&of_group)
-                .filter(|(_, of)| *of == fabric)
-                .map(|(name, _)| name.clone())
-                .collect(),
+            panels: if several { panels(fabric) } else { Vec::new() },
             by: Some(names.file.clone()),
         };
         cut.swatches = cut.fabrics.iter().map(swatch).collect();
-        rest.cut_from = if cut.fabrics.len() > 1 { numbers } else { Vec::new() };
+        rest.cut_from = if several { numbers } else { Vec::new() };
         Ok(cut)
     }
 }
@@ -155,6 +154,17 @@ impl Scene {
     #[must_use]
     pub fn fabrics(&self, of_settings: &Fabric) -> Vec<Fabric> {
         self.own_fabrics.iter().map(|own| own.as_ref().unwrap_or(of_settings).clone()).collect()
+    }
+
+    /// The number of the fabric of each vertex, of several the last.
+    #[must_use]
+    pub fn fabric_of_vertices(&self) -> Vec<u16> {
+        let mut fabric = vec![0; self.garment.vertex_count()];
+        for (t, triangle) in self.garment.triangles.iter().enumerate() {
+            let of = self.rest.fabric_of(t) as u16;
+            triangle.iter().for_each(|&v| fabric[v as usize] = of.max(fabric[v as usize]));
+        }
+        fabric
     }
 
     /// What they are called, in one line.
