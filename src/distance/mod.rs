@@ -16,6 +16,8 @@
 
 mod worn;
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use parry3d_f64::query::{PointProjection, PointQueryWithLocation};
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
@@ -72,11 +74,11 @@ pub struct SurfacePoint {
     pub triangle: u32,
 }
 
-/// A body ready to be asked for distances.
+/// A body ready to be asked for distances; a clone shares its surface.
 #[derive(Clone)]
 pub struct Body {
-    mesh: TriMesh,
-    shape: ParryMesh,
+    mesh: Arc<TriMesh>,
+    shape: Arc<ParryMesh>,
     worn: Option<worn::Worn>,
 }
 
@@ -112,7 +114,7 @@ impl Body {
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
         let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
             .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: mesh.clone(), shape, worn: None })
+        Ok(Self { mesh: Arc::new(mesh.clone()), shape: Arc::new(shape), worn: None })
     }
 
     /// The surface, m, without what it wears.

@@ -40,7 +40,7 @@ impl Body {
     pub fn wearing(&self, cloth: &TriMesh) -> Result<Self, DistanceError> {
         let on_edge = Topology::new(cloth).boundary_vertices();
         let worn = Worn { cloth: Box::new(Self::new_open(cloth)?), on_edge };
-        Ok(Self { mesh: self.mesh.clone(), shape: self.shape.clone(), worn: Some(worn) })
+        Ok(Self { worn: Some(worn), ..self.clone() })
     }
 }
 

@@ -82,18 +82,6 @@ impl ReferenceMethod for Gross2003 {
         NAME
     }
 
-    fn drape(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        dressing.of_one_fabric(NAME)?;
-        rayon::scope(|_| self.run(dressing, rule, onlooker))
-    }
-}
-
-impl Gross2003 {
     fn run(
         &self,
         dressing: &Dressing<'_>,

@@ -12,7 +12,8 @@
 //!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
-//! back towards how it was placed, if it did not cross there (`clear`), or finds its own way out (`untangle.rs`).
+//! back towards where it is known not to (`clear`: how it was placed, or put over what lies below it), or finds its own way out
+//! (`untangle.rs`).
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -22,7 +23,8 @@
 //! | κ | stiffness: pressure over what is missing to h | N/m³ |
 //! | A | rest area that the gap stands for | m² |
 //!
-//! Between two fabrics thickness and friction are their mean. Limits: a gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
+//! Between two fabrics thickness and friction are their mean, and less offset is kept where the garment was placed nearer to itself. Limits: a
+//! gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
 
 mod gap;
 mod passage;
@@ -221,7 +223,8 @@ impl Proximity {
         self.passage.look(from, to)
     }
 
-    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses, if nothing did there; leaves it where it did.
+    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses; leaves it as it is
+    /// where something crosses there too.
     pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
         if self.passage.known(x).is_empty() || !self.passage.anew(&self.clear).is_empty() {
             return;

@@ -5,8 +5,9 @@
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
 //!
-//! Neighbours are near because they are neighbours: they are left out unless the garment as placed kept them well apart, and so is what
-//! is near across a sliver.
+//! Neighbours are near because they are neighbours. Where the garment as placed kept them well apart they count as any other places do;
+//! else they press only where they come to less than half as near as they were placed, and are left out across a sliver. No gap is kept
+//! wider than it was placed.
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
