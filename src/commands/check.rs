@@ -31,7 +31,7 @@ pub(crate) struct CheckArgs {
     /// its positions alone, with rest shape and held edges of the garment as it was given; exit code 1 where a line fails
     #[arg(long, value_name = "DRAPED.obj", help_heading = "Certificate")]
     certificate: Option<String>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Certificate")]
     cloth: FabricArgs,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]

@@ -77,6 +77,9 @@ impl LiveArgs {
         self.stages.cloth().only("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;
+        if job.scene.names_of_fabrics().is_some() {
+            self.stages.cloth().check_used(&self.input.load(&job.scene)?)?;
+        }
         let session = Session::new(job.clone(), !self.cold);
         let options = self.options(&job)?;
         let server = LiveServer::start(&session, &options)?;

@@ -17,8 +17,8 @@ use super::{Scene, SceneError, SceneSpec};
 use crate::fabric::Fabric;
 use crate::files::{listed, names_a_file, stem};
 use crate::mesh::{RestShape, TriMesh};
-pub use names::CutError;
-use names::{BESIDE, Names, files_named_in, fits};
+use names::{BESIDE, files_named_in, fits};
+pub use names::{CutError, PanelFabrics};
 
 /// A share of a garment that is cut from one fabric.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -90,7 +90,7 @@ impl SceneSpec {
             let swatches = given.iter().map(swatch).collect();
             return Ok(Cut { fabrics: vec![given], swatches });
         };
-        let names = Names::read(&path)?;
+        let names = PanelFabrics::read(&path)?;
         if let (Some(default), Some(given)) = (&names.default, &given) {
             let (default, fabric) = (default.name.clone(), given.name.clone());
             return Err(CutError::Twice { garment, file: names.file, default, fabric });

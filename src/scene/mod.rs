@@ -13,7 +13,7 @@ mod placement;
 mod push_out;
 mod spec;
 
-pub use cut::{CutError, Swatch};
+pub use cut::{CutError, PanelFabrics, Swatch};
 pub use error::SceneError;
 pub use layers::{DistanceTo, Layer};
 pub use load::{Loaded, Tailored};

@@ -67,28 +67,39 @@ struct Written {
 }
 
 /// Such a file, read.
-pub(super) struct Names {
-    pub(super) file: String,
-    pub(super) default: Option<Fabric>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct PanelFabrics {
+    /// What it is called.
+    pub file: String,
+    /// The fabric of every panel that is not named.
+    pub default: Option<Fabric>,
     /// A panel's name, or one with `*` in it, and its line.
-    pub(super) panels: Vec<(String, usize, Fabric)>,
+    pub panels: Vec<(String, usize, Fabric)>,
 }
 
-impl Names {
+impl PanelFabrics {
     pub(super) fn read(path: &Path) -> Result<Self, CutError> {
-        let (text, file) = (read_text(path)?, path.display().to_string());
-        let written: Written = toml::from_str(&text)
+        Self::parse(&read_text(path)?, path)
+    }
+
+    /// Reads it from TOML; `path` is named in errors, and fabrics' files count from its folder.
+    ///
+    /// # Errors
+    /// [`CutError`] names the file, its line, and what was expected.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, CutError> {
+        let file = path.display().to_string();
+        let written: Written = toml::from_str(text)
             .map_err(|e| CutError::Syntax { file: file.clone(), reason: e.to_string().trim_end().to_owned() })?;
         let fabric = |key: &str, name: &Spanned<String>| {
             let place = |source| {
-                let line = line_of(&text, name.span().start);
+                let line = line_of(text, name.span().start);
                 CutError::Fabric { file: file.clone(), line, key: key.to_owned(), source }
             };
             Fabric::by_name(&beside(path, name.get_ref())).map_err(place)
         };
         let default = written.default.as_ref().map(|name| fabric("default", name)).transpose()?;
         let panel = |(panel, name): (&Spanned<String>, &Spanned<String>)| {
-            let (line, panel) = (line_of(&text, panel.span().start), panel.get_ref());
+            let (line, panel) = (line_of(text, panel.span().start), panel.get_ref());
             Ok((panel.clone(), line, fabric(&format!("panels.{panel}"), name)?))
         };
         let panels = written.panels.iter().map(panel).collect::<Result<Vec<_>, CutError>>()?;
@@ -96,7 +107,10 @@ impl Names {
     }
 
     /// The fabric of a panel; none where none is said.
-    pub(super) fn of(&self, panel: &str) -> Result<Option<&Fabric>, CutError> {
+    ///
+    /// # Errors
+    /// [`CutError::Both`] where it fits two lines.
+    pub fn of(&self, panel: &str) -> Result<Option<&Fabric>, CutError> {
         if let Some((.., fabric)) = self.panels.iter().find(|(name, ..)| name == panel) {
             return Ok(Some(fabric));
         }
