@@ -66,7 +66,7 @@ fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
     for touch in contacts.touches() {
         let g = &mut gradient[touch.vertex as usize];
         let tangential = *g - touch.normal * touch.normal.dot(*g);
-        *g -= tangential.clamp_length_max(cloth.friction * touch.force());
+        *g -= tangential.clamp_length_max(cloth.friction[touch.vertex as usize] * touch.force());
     }
 }
 

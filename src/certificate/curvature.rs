@@ -97,7 +97,7 @@ impl<'a> Pencil<'a> {
         let mut contact = Vec::new();
         for t in pushing() {
             let along = outer(t.normal, t.normal);
-            let across = if t.sticks { cloth.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
+            let across = if t.sticks { t.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
             let block = along * t.stiffness + (DMat3::IDENTITY - along) * across;
             let free = t.shares.iter().map(|(v, w)| (layout.unknown[*v as usize], *w)).filter(|(i, _)| *i != HELD);
             let members: Vec<(u32, f64)> = free.collect();

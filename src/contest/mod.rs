@@ -165,8 +165,8 @@ pub fn row(
     listener: Listener<'_>,
 ) -> Result<Contested, ContestError> {
     let failed = |e: &dyn std::error::Error| ContestError::Failed(e.to_string());
-    let cloth =
-        Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held).map_err(|e| failed(&e))?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)
+        .map_err(|e| failed(&e))?;
     let rounds = options.warm_up + options.rounds;
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); ENTRANTS.len()];
     let mut last: Vec<Option<Result<Outcome, String>>> = ENTRANTS.iter().map(|_| None).collect();

@@ -33,7 +33,9 @@ pub(super) fn run(
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
     let (model, refine) = match entrant {
-        Entrant::Method(name) => return in_time(name, &Dressing { scene, fabric, cloth }, rule, go_on),
+        Entrant::Method(name) => {
+            return in_time(name, &Dressing { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
+        }
         Entrant::Paper => ("paper", Refine::Steps(0)),
         Entrant::Preview => ("coupled", Refine::Steps(0)),
         Entrant::Converged => ("coupled", Refine::Converged),

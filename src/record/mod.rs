@@ -138,6 +138,15 @@ impl Recorder {
         self.timed(|open| open.take_garment(index, garment))
     }
 
+    /// Which of several fabrics each vertex of the garment is cut from, so that they are told apart in the drape.
+    pub fn cut_from(&mut self, index: i64, fabric_of_vertex: &[u16]) -> Result<(), RecordError> {
+        self.timed(|open| {
+            RecordError::unless_per_vertex(open.garment.positions.len(), &[("fabrics", fabric_of_vertex.len())])?;
+            open.at(index, 1);
+            open.log_mesh(paths::DRAPE, &meshes::colours(colours::by_fabric(fabric_of_vertex)))
+        })
+    }
+
     /// Sets what the ends of a quantity's colour map stand for (`error` in mm, `force` in N), for a recording whose steps are known
     /// beforehand; without it the first step's values do.
     pub fn scale(&mut self, quantity: &str, range: Range) {

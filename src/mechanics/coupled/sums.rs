@@ -100,7 +100,7 @@ fn triangles<L: Lanes>(
     for &(i, standing_for) in sampled {
         let i = i as usize;
         let t = &cloth.triangles[i];
-        let [huu, huv, hvv] = t.by_gradient(&cloth.stiffness, x, false);
+        let [huu, huv, hvv] = t.by_gradient(cloth.stiffness_of(t), x, false);
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();

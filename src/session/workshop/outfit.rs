@@ -46,8 +46,9 @@ impl Workshop {
             warnings: Vec::new(),
         };
         let rest = all.state.as_ref().map(|state| -> Result<AtRest, EditError> {
-            let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)
-                .map_err(DrapeError::from)?;
+            let cloth =
+                Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)
+                    .map_err(DrapeError::from)?;
             Ok(AtRest {
                 done: true,
                 reaction_n: Arc::new(reactions(&cloth, &all.positions, &state.fit.pressure_kpa)),
