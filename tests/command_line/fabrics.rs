@@ -34,7 +34,7 @@ fn fabrics_that_do_not_go_round_are_refused() {
 fn groups_of_a_mesh_are_cut_from_what_a_file_says() {
     let bench = Bench::new();
     let frame = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z"];
-    let run = |more: &[&str]| [&["run"], &frame[..], more].concat();
+    let run = |more: &[&'static str]| [&["run"], &frame[..], more].concat();
     bench.write("other.toml", "[panels]\nback = \"denim\"\n");
     let given = ["--fabrics", "other.toml", "--no-save"];
     let report = json(&bench.run(&run(&[&given[..], &["--export", "draped.obj", "--format", "json"]].concat())));
