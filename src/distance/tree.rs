@@ -8,9 +8,9 @@
 //! p lies over it, and otherwise the least of those to its three sides. Which triangle is found depends on the point alone:
 //! of equal squares the first triangle's counts, whatever was looked at before.
 //!
-//! A quarter of a drape's time went into closest points by parry3d's own search; this one is some times faster
-//! (`benches/closest.rs`), since it looks at four at a time and begins with a triangle that is near. The point on the triangle, the
-//! sign and the normal are parry's still.
+//! A quarter of a drape's time went into closest points by parry3d's own search; this one takes half as long (`benches/stages.rs` has
+//! both), since it looks at four at a time and begins with a triangle that is near. The point on the triangle and its
+//! pseudo-normals are parry's still.
 //!
 //! Limits: surfaces of up to 2³¹ triangles; points must be finite. A sliver with a corner of less than some millionths counts by its sides
 //! alone, from which no point of it is farther than that share of its length.
