@@ -186,7 +186,7 @@ fn follow(session: &Session, sinks: &SinkArgs) -> anyhow::Result<RecordSummary> 
         let job = Job { accuracy: Against::None, ..(*now.job).clone() };
         let measured =
             job.measure(&finished.ground.loaded.scene, &finished.drape, None, &mut partwise::drape::unobserved)?;
-        let mut solved = Solved::of_session(job, finished, measured)?;
+        let mut solved = Solved::of_session(&job, finished, measured)?;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
             none => none.insert(Recorder::open(solved.record_options(sinks, false, true))?),

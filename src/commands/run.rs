@@ -188,7 +188,7 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        Ok(Solved { job, loaded, drape, measured, snapshots, summary })
+        Ok(Solved { loaded, drape, measured, snapshots, summary })
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {

@@ -111,7 +111,7 @@ impl RunArgs {
         };
         told.recorded = finished.state;
         let Some(measured) = self.measure(session, &now.job, finished)? else { return Ok(()) };
-        let mut solved = Solved::of_session((*now.job).clone(), finished, measured)?;
+        let mut solved = Solved::of_session(&now.job, finished, measured)?;
         solved.summary.since_last = told.last.as_ref().map(|last| since(last, finished));
         told.last = Some(Arc::clone(finished));
         if told.recorder.is_none() {
