@@ -41,7 +41,7 @@ use rerun::{Scalars, TextDocument};
 pub use blueprint::layout::{Layout, Tab};
 pub use colour_map::Range;
 pub use colours::level_colours;
-pub use compare::Chosen;
+pub use compare::{Chosen, Colours};
 pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
@@ -51,7 +51,7 @@ pub(crate) use page::takes_gzip;
 pub use page::{Bundled, bundled};
 pub use panel::Panel;
 pub use pattern::PatternView;
-pub use scatter::{ScatterPoint, When};
+pub use scatter::{Picture, ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
 pub use wrinkles::WrinkleView;
@@ -235,9 +235,14 @@ impl Recorder {
         self.timed(|open| compare::chosen(open, chosen))
     }
 
-    /// All points of cost against error so far; `cost` is the axis' title (`time, ms`).
-    pub fn scatter(&mut self, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
-        self.timed(|open| scatter::scatter(open, when, cost, points))
+    /// All points of a picture so far.
+    pub fn scatter(
+        &mut self,
+        when: When,
+        picture: Picture<'_>,
+        points: &[ScatterPoint<'_>],
+    ) -> Result<(), RecordError> {
+        self.timed(|open| scatter::scatter(open, when, picture, points))
     }
 
     /// Sends what is left, closes the file and gives it its name.

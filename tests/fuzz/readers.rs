@@ -125,7 +125,7 @@ fn fabrics_of_panels() {
                     match fabrics.of(panel) {
                         Err(e) => return refused(&e),
                         Ok(fabric) => {
-                            check(fabric.is_none_or(|f| f.density_kg_per_m2 > 0.0), "a fabric weighs nothing")?
+                            check(fabric.is_none_or(|f| f.density_kg_per_m2 > 0.0), "a fabric weighs nothing")?;
                         }
                     }
                 }
