@@ -33,7 +33,7 @@ use rayon::prelude::*;
 use super::fan::Fan;
 use super::plate::Plate;
 use crate::fabric::Fabric;
-use crate::mechanics::lanes::{Four, Lanes};
+use crate::lanes::{Four, Lanes};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays

@@ -17,7 +17,7 @@
 //! those of the triangles one by one, whose sums have another order.
 
 use super::membrane::{SHORTEST, Stiffness, Triangle};
-use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors};
+use crate::lanes::{Four, Lanes, Pack, Vectors};
 
 /// Rest data of four triangles of one fabric; the last pack of each is filled up with triangles of no area.
 #[derive(Debug, Clone, Copy)]
@@ -142,7 +142,7 @@ mod tests {
 
     use super::*;
     use crate::fabric::Fabric;
-    use crate::mechanics::lanes::{Work, run};
+    use crate::lanes::{Work, run};
 
     struct Packed<'a>(&'a [TrianglePack], &'a [Stiffness], &'a [Four], &'a mut [Four]);
 
