@@ -30,11 +30,15 @@ fn fabrics_that_do_not_go_round_are_refused() {
     bench.refuses(&[&compare[..], &twice].concat(), &["compare", "2 times --fabric"]);
 }
 
+const MESHES: [&str; 8] = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z"];
+
+fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&["run"], &MESHES[..], more].concat()
+}
+
 #[test]
 fn groups_of_a_mesh_are_cut_from_what_a_file_says() {
     let bench = Bench::new();
-    let frame = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z"];
-    let run = |more: &[&'static str]| [&["run"], &frame[..], more].concat();
     bench.write("other.toml", "[panels]\nback = \"denim\"\n");
     let given = ["--fabrics", "other.toml", "--no-save"];
     let report = json(&bench.run(&run(&[&given[..], &["--export", "draped.obj", "--format", "json"]].concat())));
@@ -42,7 +46,7 @@ fn groups_of_a_mesh_are_cut_from_what_a_file_says() {
     assert_eq!(report["cut"][1]["panels"][0], "back");
     let certify = |more: &[&str]| {
         let output =
-            bench.run(&[&["check"], &frame[..], &["--certificate", "draped.obj", "--format", "json"], more].concat());
+            bench.run(&[&["check"], &MESHES[..], &["--certificate", "draped.obj", "--format", "json"], more].concat());
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let findings = report["certificate"]["findings"].as_array().unwrap().clone();
         findings.iter().find(|f| f["name"] == "residual").unwrap()["passes"].as_bool().unwrap()
