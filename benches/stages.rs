@@ -6,12 +6,15 @@
 
 use divan::{Bencher, black_box};
 use glam::DVec3;
+use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags};
 use partwise::drape::{Refine, unobserved};
 use partwise::job::Job;
 use partwise::mechanics::energy::{Cloth, Contacts, Scratch};
 use partwise::mechanics::refine::Solver;
 use partwise::range_table::RangeTable;
 use partwise::scene::Loaded;
+use rayon::prelude::*;
 
 const SIZES: [usize; 3] = [1000, 4000, 16_000];
 
@@ -37,6 +40,18 @@ fn cloth_of(job: &Job, Loaded { scene, .. }: &Loaded) -> Cloth {
 fn closest_points(bencher: Bencher<'_, '_>, vertices: usize) {
     let (_, loaded) = job(vertices, Refine::Steps(0));
     bencher.bench(|| loaded.scene.body.nearest_all(black_box(&loaded.scene.garment.positions)));
+}
+
+/// The same by parry3d's own search, to compare.
+#[divan::bench(args = SIZES)]
+fn closest_points_by_parry(bencher: Bencher<'_, '_>, vertices: usize) {
+    let (_, loaded) = job(vertices, Refine::Steps(0));
+    let body = loaded.scene.body.mesh();
+    let shape = ParryMesh::with_flags(body.positions.clone(), body.triangles.clone(), TriMeshFlags::ORIENTED).unwrap();
+    bencher.bench(|| {
+        let points = black_box(&loaded.scene.garment.positions).par_iter().with_min_len(128);
+        points.map(|x| shape.project_local_point_and_get_location(*x, false).0.point).collect::<Vec<_>>()
+    });
 }
 
 /// Its second half: levels to connected PARTs.

@@ -98,11 +98,11 @@ pub fn assess(
     observer: Observer<'_>,
 ) -> Result<Assessment, AssessError> {
     of_one_garment(scene)?;
-    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)?;
+    let cloth =
+        Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)?;
     let self_contact = settings.self_contact;
     let solver = RefineOptions { self_contact, ..RefineOptions::default() };
-    let mut references =
-        References { scene, fabric: &settings.fabric, cloth: &cloth, solver, options, warnings: Vec::new() };
+    let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
     let own = references.from(&drape.positions, observer)?;
     let canonical = references.from(&scene.garment.positions, observer)?;
     let mut spread = Vec::new();
@@ -148,9 +148,9 @@ pub fn canonical(
     observer: Observer<'_>,
 ) -> Result<(Reference, Vec<String>), AssessError> {
     of_one_garment(scene)?;
-    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
     let solver = RefineOptions::default();
-    let mut references = References { scene, fabric, cloth: &cloth, solver, options, warnings: Vec::new() };
+    let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
     let reference = references.from(&scene.garment.positions, observer)?;
     Ok((reference, references.warnings))
 }
@@ -191,7 +191,6 @@ pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
 
 struct References<'a> {
     scene: &'a Scene,
-    fabric: &'a Fabric,
     cloth: &'a Cloth,
     solver: RefineOptions,
     options: &'a AssessOptions,
@@ -204,7 +203,7 @@ impl References<'_> {
         let key = ReferenceKey::new(&ReferenceInput {
             garment: &self.scene.garment,
             rest: &self.scene.rest,
-            fabric: self.fabric,
+            fabrics: &self.cloth.fabrics,
             body: self.scene.body.mesh(),
             held: &self.scene.held,
             start,

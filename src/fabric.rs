@@ -9,7 +9,11 @@
 //! | B | bending stiffness along weft, on the bias and along warp | N·m |
 //! | μ_f | Coulomb friction against the body | – |
 
+mod mean;
+
 use serde::{Deserialize, Serialize};
+
+pub(crate) use mean::at_vertices;
 
 use crate::files::{Unreadable, names_a_file, read_text};
 

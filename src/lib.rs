@@ -46,6 +46,7 @@ pub mod fabric;
 pub mod figures;
 pub mod files;
 pub mod job;
+mod lanes;
 #[cfg(feature = "viewer")]
 pub mod live;
 pub mod mechanics;

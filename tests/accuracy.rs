@@ -1,5 +1,7 @@
 //! Accuracy and wrinkles against cases worked by hand.
 
+use std::slice::from_ref;
+
 use glam::DVec3;
 use partwise::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
 use partwise::accuracy::representable::representable;
@@ -246,7 +248,7 @@ fn a_reference_is_computed_once_and_a_damaged_one_again() {
     let input = ReferenceInput {
         garment: &mesh,
         rest: &rest,
-        fabric: &cloth,
+        fabrics: from_ref(&cloth),
         body: &body,
         held: &[1, 2],
         start: &mesh.positions,
@@ -254,10 +256,10 @@ fn a_reference_is_computed_once_and_a_damaged_one_again() {
     };
     let key = ReferenceKey::new(&input);
     let stiffer = Fabric { stretch_warp_n_per_m: 101.0, ..cloth.clone() };
-    assert_ne!(key, ReferenceKey::new(&ReferenceInput { fabric: &stiffer, ..input }));
+    assert_ne!(key, ReferenceKey::new(&ReferenceInput { fabrics: from_ref(&stiffer), ..input }));
     assert_ne!(key, ReferenceKey::new(&ReferenceInput { held: &[1], ..input }));
     assert_ne!(key, ReferenceKey::new(&ReferenceInput { options: "tolerance 1e-4", ..input }));
-    assert_eq!(key, ReferenceKey::new(&ReferenceInput { fabric: &cloth.clone(), ..input }));
+    assert_eq!(key, ReferenceKey::new(&ReferenceInput { fabrics: from_ref(&cloth.clone()), ..input }));
 
     let drape = Reference {
         positions: mesh.positions.clone(),
@@ -303,10 +305,11 @@ fn a_cache_that_cannot_be_written_is_a_warning() {
     std::fs::write(&file, "in the way").unwrap();
     let mesh = tube(0.2, 0.5, 12, 3);
     let rest = RestShape::from_edges(&mesh).unwrap();
+    let cloth = fabric();
     let input = ReferenceInput {
         garment: &mesh,
         rest: &rest,
-        fabric: &fabric(),
+        fabrics: from_ref(&cloth),
         body: &mesh,
         held: &[],
         start: &mesh.positions,

@@ -37,6 +37,29 @@ fn coarse(mesh: &TriMesh) -> Coarse {
 }
 
 #[test]
+fn each_triangle_is_cut_from_what_most_of_the_cloth_there_is() {
+    let mesh = tube(0.3, 0.6, 64, 30);
+    let low = |t: &[u32; 3]| t.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() < 3.0 * 0.25;
+    let cut_from: Vec<u16> = mesh.triangles.iter().map(|t| u16::from(low(t))).collect();
+    let rest = RestShape { cut_from, ..RestShape::from_edges(&mesh).unwrap() };
+    let coarse = Coarse::new(&mesh, &rest, mesh.vertex_count() / 4).unwrap();
+    let share = |rest: &RestShape| {
+        let areas = rest.areas();
+        let of_second = (0..areas.len()).filter(|&t| rest.fabric_of(t) == 1).map(|t| areas[t]).sum::<f64>();
+        of_second / areas.iter().sum::<f64>()
+    };
+    let [fine, coarse_share] = [share(&rest), share(&coarse.rest)];
+    assert!((fine - coarse_share).abs() < 0.03, "{fine} of the cloth, {coarse_share} of the coarse one");
+    for (t, triangle) in coarse.mesh.triangles.iter().enumerate() {
+        let z = triangle.map(|v| coarse.mesh.positions[v as usize].z);
+        // Away from the seam there is no doubt.
+        if z.iter().all(|z| *z < 0.2) || z.iter().all(|z| *z > 0.3) {
+            assert_eq!(coarse.rest.fabric_of(t), usize::from(z[0] < 0.25), "triangle {t} at {z:?}");
+        }
+    }
+}
+
+#[test]
 fn it_has_a_quarter_of_the_vertices_the_same_edges_of_cloth_and_no_slivers() {
     let mesh = tube(0.2, 0.6, 60, 33);
     let coarse = coarse(&mesh);

@@ -86,7 +86,7 @@ fn settle(
     let topology = Topology::new(mesh);
     let rest = RestShape::from_edges(mesh).unwrap();
     let cloth = Cloth::new(mesh, &topology, &rest, fabric, held).unwrap();
-    let garment = Garment { mesh, topology: &topology, cloth: &cloth, fabric };
+    let garment = Garment { mesh, topology: &topology, cloth: &cloth };
     solve(&garment, body, &parts(&topology), &mesh.positions, options)
 }
 
@@ -267,7 +267,7 @@ fn the_push_out_leaves_held_vertices_and_nothing_inside() {
     let body = cube(DVec3::ZERO, 0.1);
     let inside = vec![DVec3::new(0.09, 0.01, 0.0), DVec3::new(0.02, -0.08, 0.01), DVec3::new(0.2, 0.0, 0.0)];
     let mut x = inside.clone();
-    assert_eq!(push_out(&body, &[false, true, false], 0.001, &mut x), 1);
+    assert_eq!(push_out(&body, &[false, true, false], &[0.001; 3], &mut x), 1);
     assert!((x[0] - DVec3::new(0.101, 0.01, 0.0)).length() < 1e-12);
     assert_eq!(x[1..], inside[1..]);
 }
@@ -279,7 +279,7 @@ fn what_cannot_be_solved_says_why() {
     let rest = RestShape::from_edges(&mesh).unwrap();
     let fabric = fabric(60.0);
     let cloth = Cloth::new(&mesh, &topology, &rest, &fabric, &[0]).unwrap();
-    let garment = Garment { mesh: &mesh, topology: &topology, cloth: &cloth, fabric: &fabric };
+    let garment = Garment { mesh: &mesh, topology: &topology, cloth: &cloth };
     let options = CoupledOptions::default();
     let short = solve(&garment, &far_away(), &pieces(&mesh, &topology, 1.0), &mesh.positions[1..], &options);
     assert!(matches!(short.unwrap_err(), CoupledError::Count { found: 80, expected: 81, .. }));

@@ -11,8 +11,8 @@ mod scene;
 use std::path::{Path, PathBuf};
 
 use partwise::record::{
-    Chosen, Layout, Overlay, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
-    When, WrinkleView, paths, web,
+    Chosen, Colours, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
+    StepView, Tab, When, WrinkleView, paths, web,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -144,13 +144,18 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
             let (draped, part_of_vertex) = (&scene.draped, &solved.part_of_vertex);
             if i < 4 {
                 let levels = &solved.panel.levels;
-                let chosen =
-                    Chosen { index: 0, slot: i, caption: &caption, draped, part_of_vertex, levels, overlay: None };
+                let chosen = Chosen {
+                    index: 0,
+                    slot: i,
+                    caption: &caption,
+                    draped,
+                    colours: Colours::Parts { part_of_vertex, levels },
+                };
                 recorder.compare(&chosen).unwrap();
             }
-            points.push(ScatterPoint { label: name, cost: ms, error_mm: rms, group: 0, named: true });
+            points.push(ScatterPoint { label: name, x: ms, y: rms, group: 0, named: true });
         }
-        recorder.scatter(When::Table(0), "time, ms", &points).unwrap();
+        recorder.scatter(When::Table(0), Picture::of_error("time, ms"), &points).unwrap();
         recorder.finish().unwrap()
     };
     let one = record("sweep-one.rrd", 1);

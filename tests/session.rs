@@ -84,6 +84,20 @@ fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
 }
 
 #[test]
+fn a_fabric_that_nothing_is_cut_from_is_refused_and_another_garment_has_none_of_its_own() {
+    let own = SceneSpec { fabrics: vec!["denim".to_owned()], ..job().scene };
+    let session = Session::new(Job { scene: own, ..job() }, true);
+    let mut workshop = Workshop::new(MeshCache::in_user_cache());
+    work(&session, &mut workshop);
+    let said = session.submit(&edit(r#"{"fabric": "ponte"}"#), None).unwrap_err().to_string();
+    assert!(said.contains("fabric") && said.contains("all have their own"), "{said}");
+    session.submit(&edit(r#"{"garment": "pullover-1@600", "fabric": "ponte"}"#), None).unwrap();
+    let done = work(&session, &mut workshop);
+    let scene = &done.finished.as_ref().unwrap().ground.loaded.scene;
+    assert_eq!(scene.fabric_names(&done.job.settings.fabric), "ponte");
+}
+
+#[test]
 fn a_measurement_makes_another_form_and_fits_the_garment_to_it() {
     let (session, mut workshop) = settled(true);
     session.submit(&edit(r#"{"measurements": {"waist": 76}}"#), None).unwrap();

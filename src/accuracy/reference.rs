@@ -30,8 +30,8 @@ pub struct ReferenceInput<'a> {
     pub garment: &'a TriMesh,
     /// Its rest shape.
     pub rest: &'a RestShape,
-    /// Its fabric.
-    pub fabric: &'a Fabric,
+    /// Its fabrics.
+    pub fabrics: &'a [Fabric],
     /// The body.
     pub body: &'a TriMesh,
     /// Vertices that do not move.
@@ -54,9 +54,14 @@ impl ReferenceKey {
         let mesh = |mesh: &TriMesh| (points(&mesh.positions), mesh.triangles.clone());
         let rest: Vec<[[f64; 2]; 3]> = input.rest.corners.iter().map(|t| t.map(|corner| corner.to_array())).collect();
         // What a fabric is called changes nothing.
-        let fabric = Fabric { name: String::new(), source: String::new(), ..input.fabric.clone() };
-        let cloth = (mesh(input.garment), rest, fabric, input.held);
+        let nameless = |fabric: &Fabric| Fabric { name: String::new(), source: String::new(), ..fabric.clone() };
+        let fabrics: Vec<Fabric> = input.fabrics.iter().map(nameless).collect();
         let solve = (mesh(input.body), points(input.start), input.options);
+        if let [fabric] = &fabrics[..] {
+            let cloth = (mesh(input.garment), rest, fabric, input.held);
+            return Self(sealed::hash(KIND, &(env!("CARGO_PKG_VERSION"), cloth, solve)));
+        }
+        let cloth = (mesh(input.garment), rest, (&input.rest.cut_from, fabrics), input.held);
         Self(sealed::hash(KIND, &(env!("CARGO_PKG_VERSION"), cloth, solve)))
     }
 

@@ -68,7 +68,7 @@ fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
         // Flatter in a crease than a distance, where the body pushes less.
         let (normal, slope) = (touch.normal.normalize_or_zero(), touch.normal.length().min(1.0));
         let tangential = *g - normal * normal.dot(*g);
-        *g -= tangential.clamp_length_max(cloth.friction * touch.force() * slope);
+        *g -= tangential.clamp_length_max(cloth.friction[touch.vertex as usize] * touch.force() * slope);
     }
 }
 

@@ -55,7 +55,7 @@ impl Curvature {
         let mut held = Vec::new();
         for t in pushing() {
             let along = outer(t.normal, t.normal);
-            let across = if t.sticks { cloth.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
+            let across = if t.sticks { t.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
             let block = along * t.stiffness + (DMat3::IDENTITY - along) * across;
             let members = free(&layout, t.shares.iter().copied());
             layout.add(&members, block, &mut blocks);

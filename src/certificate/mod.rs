@@ -128,7 +128,7 @@ pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificat
     if let Some(vertex) = x.iter().position(|p| !p.is_finite()) {
         return Err(CertifyError::NotFinite { vertex });
     }
-    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held)?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
     let forces = Forces::new(&cloth, &scene.body, x);
     let curvature = Curvature::new(&cloth, &forces, x)?;
     let mut findings = of_forces(&forces, &cloth).to_vec();

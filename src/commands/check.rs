@@ -4,7 +4,6 @@
 use clap::Args;
 use comfy_table::{Table, presets};
 use partwise::certificate::{Certificate, CertifyError, certify};
-use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
 use partwise::{Scene, SceneSpec};
@@ -12,6 +11,7 @@ use serde::Serialize;
 
 use super::certified;
 use super::console;
+use super::fabrics::FabricArgs;
 use super::failure::UserError;
 use super::inputs::InputArgs;
 use super::run::Format;
@@ -31,9 +31,8 @@ pub(crate) struct CheckArgs {
     /// its positions alone, with rest shape and held edges of the garment as it was given; exit code 1 where a line fails
     #[arg(long, value_name = "DRAPED.obj", help_heading = "Certificate")]
     certificate: Option<String>,
-    /// Fabric it was draped in: a name or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC, help_heading = "Certificate")]
-    fabric: String,
+    #[command(flatten, next_help_heading = "Certificate")]
+    cloth: FabricArgs,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
@@ -96,10 +95,11 @@ fn connected_parts(scene: &Scene) -> Vec<(String, String)> {
 impl CheckArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         // As they came: what push-out would mend is a finding here.
-        let mut spec = SceneSpec { push_out: false, ..self.input.spec()? };
+        let mut spec = SceneSpec { push_out: false, ..self.cloth.give(self.input.spec()?)? };
         spec.body = self.body_file.clone().unwrap_or(spec.body);
         spec.garment = self.garment_file.clone().unwrap_or(spec.garment);
         let loaded = self.input.load(&spec)?;
+        self.cloth.check_used(&loaded)?;
         let scene = &loaded.scene;
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
@@ -140,10 +140,12 @@ impl CheckArgs {
             rest: "own".to_owned(),
             hold: None,
             over: Vec::new(),
+            fabrics: Vec::new(),
+            fabrics_file: None,
             ..spec.clone()
         };
         let positions = self.input.load(&spec)?.scene.garment.positions;
-        certify(scene, &Fabric::by_name(&self.fabric)?, &positions).map_err(|error| match error {
+        certify(scene, &self.cloth.first()?, &positions).map_err(|error| match error {
             CertifyError::Count { .. } | CertifyError::NotFinite { .. } => UserError::new(format!("{draped}: {error}")),
             other => other.into(),
         })

@@ -27,6 +27,10 @@ pub(crate) struct InputArgs {
     /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
     #[arg(long, value_name = "FILE.json", conflicts_with = "garment")]
     pattern: Option<String>,
+    /// TOML file that names the fabrics of a garment's panels, or groups: `default = "interlock"`, and under `[panels]` lines such as
+    /// `left_cuff = "denim"` or `"sleeve*" = "rib.toml"` (a file beside it) [default: NAME.fabrics.toml beside NAME.json or NAME.obj]
+    #[arg(long, value_name = "FILE.toml")]
+    fabrics: Option<String>,
     /// Length of the edges that a pattern is meshed with
     #[arg(long, value_name = "CM", default_value_t = SceneSpec::default().edge_cm)]
     edge_length: f64,
@@ -73,6 +77,8 @@ impl InputArgs {
             body: self.body.clone(),
             garment: self.pattern.as_ref().or(self.garment.first()).cloned().unwrap_or_default(),
             over: self.garment.iter().skip(1).cloned().collect(),
+            fabrics: Vec::new(),
+            fabrics_file: self.fabrics.clone(),
             distance_to: self.distance_to,
             edge_cm: self.edge_length,
             body_group: self.body_group.clone(),

@@ -74,8 +74,12 @@ impl LiveArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::listen();
+        self.stages.cloth().only("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;
+        if job.scene.names_of_fabrics().is_some() {
+            self.stages.cloth().check_used(&self.input.load(&job.scene)?)?;
+        }
         let session = Session::new(job.clone(), !self.cold);
         let options = self.options(&job)?;
         let server = LiveServer::start(&session, &options)?;
@@ -111,7 +115,8 @@ impl LiveArgs {
             None => None,
         };
         let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
-        let files = job.scene.files().into_iter().chain(self.stages.files()).map(Path::to_path_buf).collect();
+        let files =
+            job.scene.files().into_iter().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         Ok(LiveOptions {
             address: SocketAddr::new(self.bind, self.port),
             host: self.host.clone(),
@@ -181,7 +186,7 @@ fn follow(session: &Session, sinks: &SinkArgs) -> anyhow::Result<RecordSummary> 
         let job = Job { accuracy: Against::None, ..(*now.job).clone() };
         let measured =
             job.measure(&finished.ground.loaded.scene, &finished.drape, None, &mut partwise::drape::unobserved)?;
-        let mut solved = Solved::of_session(job, finished, measured)?;
+        let mut solved = Solved::of_session(&job, finished, measured)?;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,
             none => none.insert(Recorder::open(solved.record_options(sinks, false, true))?),

@@ -8,6 +8,7 @@ mod check;
 mod compare;
 mod console;
 mod cusick;
+mod fabrics;
 mod failure;
 mod inputs;
 mod interrupt;

@@ -129,12 +129,19 @@ impl RunArgs {
     fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
         let accuracy = if self.accuracy { Against::Own } else { Against::None };
-        Ok(Job { scene: self.input.spec()?, settings, seed: 0, accuracy, spread_starts: self.spread })
+        Ok(Job {
+            scene: self.stages.cloth().give(self.input.spec()?)?,
+            settings,
+            seed: 0,
+            accuracy,
+            spread_starts: self.spread,
+        })
     }
 
     /// Runs every stage of a job.
     fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
         let loaded = self.input.load(&job.scene)?;
+        self.stages.cloth().check_used(&loaded)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
         let mut snapshots = Vec::new();
@@ -181,7 +188,7 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        Ok(Solved { job, loaded, drape, measured, snapshots, summary })
+        Ok(Solved { loaded, drape, measured, snapshots, summary })
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {

@@ -18,7 +18,6 @@ use super::summary::Summary;
 
 /// A garment through every stage.
 pub(super) struct Solved {
-    pub(super) job: Job,
     pub(super) loaded: Loaded,
     pub(super) drape: Drape,
     pub(super) measured: Measured,
@@ -36,11 +35,11 @@ pub(super) struct Snapshot {
 
 impl Solved {
     /// A state of a session, and what was measured of it.
-    pub(super) fn of_session(job: Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
+    pub(super) fn of_session(job: &Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
         let (loaded, drape) = (finished.ground.loaded.clone(), finished.drape.clone());
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.ground.load_ms));
-        Ok(Self { job, loaded, drape, measured, snapshots: Vec::new(), summary })
+        Ok(Self { loaded, drape, measured, snapshots: Vec::new(), summary })
     }
 
     /// How to record it; `live` where more steps follow, whose meshes may be others.
@@ -102,6 +101,9 @@ impl Solved {
         let scene = &self.loaded.scene;
         recorder.body(index, scene.body.mesh())?;
         recorder.garment(index, &scene.garment)?;
+        if scene.layers.len() == 1 && scene.own_fabrics.len() > 1 {
+            recorder.cut_from(index, &scene.fabric_of_vertices())?;
+        }
         let forces: Vec<DVec3> = self.drape.outcomes.iter().map(|o| o.force_n).collect();
         let mut scalars = self.summary.figures.scalars();
         scalars.retain(|(name, _)| name.starts_with("error/"));
@@ -111,7 +113,7 @@ impl Solved {
             part_of_vertex: &self.drape.parts.part_of_vertex,
             part_force_n: &forces,
             draped: &self.drape.positions,
-            panel: &self.summary.panel(&self.job.settings.fabric),
+            panel: &self.summary.panel(),
             scalars: &scalars,
             overlays: &self.overlays(),
         })?;

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use clap::Args;
 use partwise::drape::{Model, Refine, Settings};
-use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::files::names_a_file;
 use partwise::mechanics::coupled::Motion;
 use partwise::range_table::{GapRule, RangeTable, TABLE_3};
 use partwise::word::word;
 
+use super::fabrics::FabricArgs;
 use super::failure::UserError;
 use super::readings::{self, Reading};
 
@@ -34,9 +34,8 @@ pub(crate) struct DialArgs {
     motion: Motion,
     #[arg(long = "reading", value_name = "KEY=VALUE", value_parser = readings::parse, help = readings::HELP)]
     readings: Vec<Reading>,
-    /// Fabric: a built-in name or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
-    fabric: String,
+    #[command(flatten)]
+    cloth: FabricArgs,
     /// Let cloth go through cloth: for comparing, and for garments that are known not to touch themselves
     #[arg(long)]
     no_self_contact: bool,
@@ -60,6 +59,11 @@ pub(crate) struct StageArgs {
 }
 
 impl DialArgs {
+    /// The fabrics.
+    pub(crate) fn cloth(&self) -> &FabricArgs {
+        &self.cloth
+    }
+
     /// The dials over those of `start`.
     pub(crate) fn over(&self, start: Settings) -> anyhow::Result<Settings> {
         let extents: Vec<f64> = self.max_extent.iter().copied().filter(|cm| *cm != 0.0).collect();
@@ -73,7 +77,7 @@ impl DialArgs {
             Model::Paper(_) => Model::Paper(readings::options(&self.readings)?),
             coupled => coupled.clone().with_extents_cm(&extents).with_motion(self.motion),
         };
-        let (fabric, self_contact) = (Fabric::by_name(&self.fabric)?, !self.no_self_contact);
+        let (fabric, self_contact) = (self.cloth.first()?, !self.no_self_contact);
         Ok(Settings { min_part: self.min_part, model, fabric, self_contact, ..start })
     }
 }
@@ -96,14 +100,18 @@ impl StageArgs {
         all.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect()
     }
 
-    /// The fabric alone.
-    pub(crate) fn fabric(&self) -> anyhow::Result<Fabric> {
-        Ok(Fabric::by_name(&self.dials.fabric)?)
+    /// The fabrics alone.
+    pub(crate) fn cloth(&self) -> &FabricArgs {
+        &self.dials.cloth
     }
 
     /// The files behind the arguments, for `--watch`.
     pub(crate) fn files(&self) -> Vec<&Path> {
-        [&self.table, &self.dials.fabric].into_iter().filter(|v| names_a_file(v)).map(Path::new).collect()
+        std::iter::once(&self.table)
+            .chain(&self.dials.cloth.fabric)
+            .filter(|v| names_a_file(v))
+            .map(Path::new)
+            .collect()
     }
 
     /// Reads tables and fabrics.

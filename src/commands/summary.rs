@@ -11,9 +11,10 @@ use partwise::certificate::Certificate;
 use partwise::drape::Drape;
 use partwise::fabric::Fabric;
 use partwise::figures::{Figures, GirthEase, LevelCount};
+use partwise::files::listed;
 use partwise::job::Measured;
 use partwise::record::Panel;
-use partwise::scene::Loaded;
+use partwise::scene::{Loaded, Swatch};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -27,6 +28,12 @@ pub(crate) struct Summary {
     model: &'static str,
     motion: &'static str,
     fabric: String,
+    /// Which garment or panel is cut from which, where that was said.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cut: Vec<Cut>,
+    /// Constants of all of them, for people.
+    #[serde(skip)]
+    fabrics: Vec<Fabric>,
     table: String,
     #[serde(flatten)]
     pub(crate) figures: Figures,
@@ -54,6 +61,27 @@ pub(crate) struct Summary {
     pub(crate) outputs: Vec<String>,
 }
 
+/// A share of a garment that is cut from one fabric.
+#[derive(Debug, Clone, Serialize)]
+struct Cut {
+    garment: String,
+    fabric: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    panels: Vec<String>,
+}
+
+impl Cut {
+    fn of(swatch: &Swatch, of_settings: &Fabric) -> Self {
+        let fabric = swatch.fabric.as_ref().unwrap_or(&of_settings.name);
+        Self { garment: swatch.garment.clone(), fabric: fabric.clone(), panels: swatch.panels.clone() }
+    }
+
+    fn fact(&self) -> (String, String) {
+        let panels = if self.panels.is_empty() { String::new() } else { format!(": {}", listed(&self.panels)) };
+        (format!("cut from {}", self.fabric), format!("{}{panels}", self.garment))
+    }
+}
+
 /// Milliseconds, for people.
 fn ms(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
@@ -78,7 +106,9 @@ impl Summary {
             garment: loaded.garment_name.clone(),
             model: settings.model.name(),
             motion: settings.model.motion().name(),
-            fabric: settings.fabric.name.clone(),
+            fabric: loaded.scene.fabric_names(&settings.fabric),
+            cut: loaded.swatches.iter().map(|swatch| Cut::of(swatch, &settings.fabric)).collect(),
+            fabrics: loaded.scene.fabrics(&settings.fabric),
             table: drape.table.name.clone(),
             figures: measured.figures.clone(),
             parts_per_level: levels.iter().map(|l| l.parts).collect(),
@@ -164,7 +194,7 @@ impl Summary {
     }
 
     /// For the recording's text panel.
-    pub(crate) fn panel(&self, fabric: &Fabric) -> Panel {
+    pub(crate) fn panel(&self) -> Panel {
         let of_model = [("model", self.model.to_owned()), ("motion", self.motion.to_owned())];
         let ease: Vec<String> = self.covered().map(|(e, _, cm)| format!("{} {cm:+.1} cm", e.at)).collect();
         let ease = (!ease.is_empty()).then(|| ("ease", ease.join(", ")));
@@ -175,7 +205,7 @@ impl Summary {
             table: self.table.clone(),
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
-            fabric: fabric_facts(fabric),
+            fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(Cut::fact)).collect(),
             timings_ms: ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
                 .iter()
                 .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))

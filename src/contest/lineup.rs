@@ -29,6 +29,22 @@ impl Entrant {
     }
 }
 
+impl Entrant {
+    /// Its name for people: the paper's number of the reference, first author and year.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Method(zhu2016::NAME) => "[19] Zhu 2016",
+            Self::Method(gross2003::NAME) => "[20] Groß 2003",
+            Self::Method(thomaszewski2006::NAME) => "[21] Thomaszewski 2006",
+            Self::Method(name) => name,
+            Self::Paper => "The paper's equations",
+            Self::Preview => "Our two stages",
+            Self::Converged => "Our converged drape",
+        }
+    }
+}
+
 /// In the order of the columns.
 pub const ENTRANTS: [Entrant; 6] = [
     Entrant::Method(zhu2016::NAME),

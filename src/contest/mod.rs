@@ -22,26 +22,26 @@
 
 mod journal;
 mod lineup;
+mod run;
 mod shape;
 mod table;
 
 use std::ops::ControlFlow;
-use std::time::Duration;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::accuracy::{self, state::State};
 use crate::assess::perturbed;
-use crate::drape::{Model, Refine, Settings, StageTimes, drape};
 use crate::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{RefineOptions, Stop, refine};
-use crate::methods::{self, Dressing, Ended, RestRule};
+use crate::methods::RestRule;
 use crate::quantile::interpolated;
 use crate::scene::Scene;
 pub use journal::{Conditions, Journal, JournalError};
 pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
+use run::{Outcome, run};
 pub use shape::Silhouette;
 use shape::Tape;
 pub use table::{Cells, csv_lines, exponents, tables};
@@ -127,14 +127,15 @@ pub struct ContestRow {
     pub entries: Vec<Entry>,
 }
 
-/// A drape with what is told of it.
-struct Outcome {
-    positions: Vec<DVec3>,
-    time: Duration,
-    ended: String,
-    steps: usize,
-    simulated_s: Option<f64>,
-    counts: Vec<(String, u64)>,
+/// A row with the drapes it is about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contested {
+    /// The figures.
+    pub row: ContestRow,
+    /// Vertices of each entrant's last drape, m; `None` for who cannot run.
+    pub draped: Vec<Option<Vec<DVec3>>>,
+    /// The canonical drape, m.
+    pub canonical: Vec<DVec3>,
 }
 
 /// Why there is no row.
@@ -162,10 +163,10 @@ pub fn row(
     fabric: &Fabric,
     options: &ContestOptions,
     listener: Listener<'_>,
-) -> Result<ContestRow, ContestError> {
+) -> Result<Contested, ContestError> {
     let failed = |e: &dyn std::error::Error| ContestError::Failed(e.to_string());
-    let cloth =
-        Cloth::new(&scene.garment, &scene.topology, &scene.rest, fabric, &scene.held).map_err(|e| failed(&e))?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)
+        .map_err(|e| failed(&e))?;
     let rounds = options.warm_up + options.rounds;
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); ENTRANTS.len()];
     let mut last: Vec<Option<Result<Outcome, String>>> = ENTRANTS.iter().map(|_| None).collect();
@@ -204,7 +205,7 @@ pub fn row(
     let spread_mm = (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
     let base = ENTRANTS.iter().position(|e| *e == Entrant::Converged).map(|i| times[i].clone()).unwrap_or_default();
     let tape = Tape::new(scene, &canonical);
-    let mut entries = Vec::new();
+    let (mut entries, mut draped) = (Vec::new(), Vec::new());
     for ((entrant, times_ms), outcome) in ENTRANTS.into_iter().zip(times).zip(last) {
         let mut entry = Entry { entrant: entrant.name().to_owned(), ..Entry::default() };
         match outcome {
@@ -213,20 +214,24 @@ pub fn row(
                 entry.own_rms_mm = accuracy::rms_mm(&outcome.positions, &own);
                 entry.silhouette = tape.measure(scene, &outcome.positions);
                 entry.canonical_rms_mm = accuracy::rms_mm(&outcome.positions, &canonical);
-                measure(&mut entry, outcome, times_ms, &base, &cloth, scene);
+                measure(&mut entry, &outcome, times_ms, &base, &cloth, scene);
+                draped.push(Some(outcome.positions));
             }
-            Some(Err(error)) => entry.error = Some(error),
-            None => entry.error = Some("no round was run".to_owned()),
+            failed => {
+                entry.error = Some(failed.and_then(Result::err).unwrap_or_else(|| "no round was run".to_owned()));
+                draped.push(None);
+            }
         }
         entries.push(entry);
     }
     let vertices = scene.garment.vertex_count();
-    let canonical = tape.measure(scene, &canonical);
-    Ok(ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, canonical, entries })
+    let measured = tape.measure(scene, &canonical);
+    let row = ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, canonical: measured, entries };
+    Ok(Contested { row, draped, canonical })
 }
 
 /// Fills in what needs no reference.
-fn measure(entry: &mut Entry, outcome: Outcome, times_ms: Vec<f64>, base: &[f64], cloth: &Cloth, scene: &Scene) {
+fn measure(entry: &mut Entry, outcome: &Outcome, times_ms: Vec<f64>, base: &[f64], cloth: &Cloth, scene: &Scene) {
     let State { residual_over_weight, strain_p95, strain_max, penetrating_vertices, penetration_mm, .. } =
         State::of(cloth, &scene.body, &outcome.positions);
     let quartiles = |list: &[f64]| (interpolated(list, 0.5), interpolated(list, 0.75) - interpolated(list, 0.25));
@@ -236,67 +241,6 @@ fn measure(entry: &mut Entry, outcome: Outcome, times_ms: Vec<f64>, base: &[f64]
     entry.times_ms = times_ms;
     (entry.residual_over_weight, entry.strain_p95, entry.strain_max) = (residual_over_weight, strain_p95, strain_max);
     (entry.penetrating_vertices, entry.penetration_mm) = (penetrating_vertices, penetration_mm);
-    (entry.ended, entry.steps) = (outcome.ended, outcome.steps);
-    (entry.simulated_s, entry.counts) = (outcome.simulated_s, outcome.counts);
-}
-
-/// Drapes once.
-fn run(
-    entrant: Entrant,
-    scene: &Scene,
-    fabric: &Fabric,
-    cloth: &Cloth,
-    rule: &RestRule,
-    go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
-) -> Result<Outcome, String> {
-    let (model, refine) = match entrant {
-        Entrant::Method(name) => return in_time(name, &Dressing { scene, fabric, cloth }, rule, go_on),
-        Entrant::Paper => ("paper", Refine::Steps(0)),
-        Entrant::Preview => ("coupled", Refine::Steps(0)),
-        Entrant::Converged => ("coupled", Refine::Converged),
-    };
-    let model = Model::by_name(model).unwrap_or_default();
-    let settings = Settings { model, refine, fabric: fabric.clone(), ..Settings::default() };
-    let made = drape(scene, &settings, &mut |_| go_on()).map_err(|e| e.to_string())?;
-    let StageTimes { distance, segment, mechanics, refine, .. } = made.times;
-    let state = made.state.as_ref();
-    let ended = match (entrant, state.map(|s| s.stop)) {
-        (_, Some(Stop::Interrupted)) => "interrupted",
-        (Entrant::Converged, Some(Stop::Converged)) => "converged",
-        (Entrant::Converged, Some(Stop::Stalled)) => "stalled",
-        (Entrant::Converged, _) => "steps-done",
-        _ => "two-stages",
-    };
-    Ok(Outcome {
-        positions: made.positions,
-        time: distance + segment + mechanics + refine,
-        ended: ended.to_owned(),
-        steps: state.map_or(0, |s| s.steps),
-        simulated_s: None,
-        counts: vec![("PARTs".to_owned(), made.parts.len() as u64)],
-    })
-}
-
-/// Drapes once by a reference method.
-fn in_time(
-    name: &str,
-    dressing: &Dressing<'_>,
-    rule: &RestRule,
-    go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
-) -> Result<Outcome, String> {
-    let method = methods::by_name(name, false, None).ok_or_else(|| format!("there is no method {name}"))?;
-    let made = method.drape(dressing, rule, &mut |_| go_on()).map_err(|e| e.to_string())?;
-    let ended = match made.ended {
-        Ended::AtRest => "at-rest",
-        Ended::TimeOver => "time-over",
-        Ended::Interrupted => "interrupted",
-    };
-    Ok(Outcome {
-        positions: made.positions,
-        time: made.total,
-        ended: ended.to_owned(),
-        steps: made.steps,
-        simulated_s: Some(made.simulated_s),
-        counts: made.counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
-    })
+    (entry.ended, entry.steps) = (outcome.ended.clone(), outcome.steps);
+    (entry.simulated_s, entry.counts) = (outcome.simulated_s, outcome.counts.clone());
 }

@@ -1,6 +1,6 @@
 //! Exact signed distance and closest points on the body.
 //!
-//! For a point x the closest surface point c(x) comes from parry3d's bounding volume hierarchy in double precision. The
+//! For a point x the closest surface point c(x) is that of its nearest triangle (`tree.rs`), by parry3d in double precision. The
 //! signed distance is q(x) = ± |x − c(x)|, negative inside, its sign taken from the angle-weighted pseudo-normal at
 //! c(x) (Bærentzen, Aanæs: "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005);
 //! its gradient ∇q = (x − c)/q is the paper's body normal e_q, whose direction cosines are cos α_q, cos β_q, cos γ_q
@@ -14,13 +14,18 @@
 //! Limits: the sign is exact for closed, consistently wound surfaces without self-intersections; where a body intersects
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
+mod tree;
 mod worn;
+
+use std::sync::Arc;
 
 use glam::DVec3;
 use parry3d_f64::math::Pose;
-use parry3d_f64::query::{PointProjection, PointQueryWithLocation, distance};
+use parry3d_f64::query::{PointQueryWithLocation, distance};
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
+
+use tree::{Nearest, Tree};
 
 use crate::mesh::winding::signed_volumes;
 use crate::mesh::{Topology, TriMesh};
@@ -29,15 +34,15 @@ use crate::mesh::{Topology, TriMesh};
 /// used: 1e-9 m is a million times the spacing of doubles at body size, and a millionth of a cloth's thickness.
 const ON_SURFACE: f64 = 1e-9;
 
-/// Points that are asked for one after the other: in one task, and each with the one before as a hint.
+/// Points that are asked for one after the other: in one task, each search beginning where the one before ended.
 const CHUNK: usize = 128;
 
 /// A volume under this share of the area to the power of one and a half (a sphere's is a tenth) is rounding: a sheet of two square metres is
 /// then thinner than a micrometre, and neither side of it is inside.
 const FLAT: f64 = 1e-6;
 
-/// Above 1 by more than a distance is rounded.
-const ROUNDED: f64 = 1.0 + 1e-12;
+/// A distance to the triangle found that is off by more than this (m) from what made it the nearest was not told rightly.
+const TOLD: f64 = 1e-9;
 
 /// What can be wrong with a body.
 #[derive(Debug, thiserror::Error)]
@@ -73,11 +78,12 @@ pub struct SurfacePoint {
     pub triangle: u32,
 }
 
-/// A body ready to be asked for distances.
+/// A body ready to be asked for distances; a clone shares its surface.
 #[derive(Clone)]
 pub struct Body {
-    mesh: TriMesh,
-    shape: ParryMesh,
+    mesh: Arc<TriMesh>,
+    shape: Arc<ParryMesh>,
+    tree: Arc<Tree>,
     worn: Option<worn::Worn>,
 }
 
@@ -111,9 +117,10 @@ impl Body {
             return Err(DistanceError::Empty);
         }
         // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
-        let shape = ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED)
-            .map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: mesh.clone(), shape, worn: None })
+        let shape = || ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED);
+        let (shape, tree) = rayon::join(shape, || Tree::new(mesh));
+        let shape = shape.map_err(|e| DistanceError::Refused(e.to_string()))?;
+        Ok(Self { mesh: Arc::new(mesh.clone()), shape: Arc::new(shape), tree: Arc::new(tree), worn: None })
     }
 
     /// The surface, m, without what it wears.
@@ -125,52 +132,50 @@ impl Body {
     /// The nearest surface point to a finite `x`.
     #[must_use]
     pub fn nearest(&self, x: DVec3) -> SurfacePoint {
-        let bare = self.found(x, self.shape.project_local_point_and_get_location(x, false));
-        self.worn.as_ref().map_or(bare, |worn| worn.outermost(x, bare))
-    }
-
-    /// The same where it is known to be no farther than `most` (m), which spares most of the search.
-    fn nearest_within(&self, x: DVec3, most: f64) -> SurfacePoint {
-        let found = self.shape.project_local_point_and_get_location_with_max_dist(x, false, most);
-        found.map_or_else(|| self.nearest(x), |found| self.found(x, found))
+        self.outermost(x, self.bare(x, self.tree.nearest(&[x])[0]).0)
     }
 
     /// How far a triangle is from the surface, without what that wears, m: zero where they cross.
     pub(crate) fn distance_to(&self, [a, b, c]: [DVec3; 3]) -> f64 {
         let (here, triangle) = (Pose::IDENTITY, Triangle::new(a, b, c));
-        distance(&here, &self.shape, &here, &triangle).unwrap_or(f64::INFINITY)
-    }
-
-    fn found(
-        &self,
-        x: DVec3,
-        (projection, (triangle, location)): (PointProjection, (u32, TrianglePointLocation)),
-    ) -> SurfacePoint {
-        let offset = x - projection.point;
-        let distance = offset.length();
-        let sign = if projection.is_inside { -1.0 } else { 1.0 };
-        let normal =
-            if distance > ON_SURFACE { offset / (sign * distance) } else { self.pseudo_normal(triangle, location) };
-        SurfacePoint { point: projection.point, signed_distance: sign * distance, normal, triangle }
+        distance(&here, &*self.shape, &here, &triangle).unwrap_or(f64::INFINITY)
     }
 
     /// [`nearest`](Self::nearest) of every point, in parallel; the order, and every bit, is that of the input.
     #[must_use]
     pub fn nearest_all(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
-        points.par_chunks(CHUNK).flat_map_iter(|chunk| self.one_after_the_other(chunk)).collect()
+        let chunk = |chunk: &[DVec3]| {
+            let found = self.tree.nearest(chunk);
+            chunk.iter().zip(found).map(|(x, near)| self.outermost(*x, self.bare(*x, near).0)).collect::<Vec<_>>()
+        };
+        points.par_chunks(CHUNK).flat_map_iter(chunk).collect()
     }
 
-    /// Points that follow each other mostly lie near each other: no point is farther from the body than the one before it is, and its
-    /// distance from that.
-    fn one_after_the_other(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
-        let mut all: Vec<SurfacePoint> = Vec::with_capacity(points.len());
-        for (i, &x) in points.iter().enumerate() {
-            // Behind what it wears the distance leaps.
-            let before = all.last().filter(|_| self.worn.is_none());
-            let most = before.map(|before| before.signed_distance.abs() + x.distance(points[i - 1]));
-            all.push(most.map_or_else(|| self.nearest(x), |most| self.nearest_within(x, most * ROUNDED + ON_SURFACE)));
+    /// The nearest point of the surface itself, and where on its triangle that is.
+    fn bare(&self, x: DVec3, near: Nearest) -> (SurfacePoint, TrianglePointLocation) {
+        let triangle = self.shape.triangle(near.triangle);
+        let (projection, location) = triangle.project_local_point_and_get_location(x, false);
+        let distance = x.distance(projection.point);
+        if (distance - near.square.sqrt()).abs() > TOLD * distance.max(1.0) {
+            // A sliver whose distance was rounding.
+            let (projection, (triangle, location)) = self.shape.project_local_point_and_get_location(x, false);
+            return (self.found(x, projection.point, (triangle, location)), location);
         }
-        all
+        (self.found(x, projection.point, (near.triangle, location)), location)
+    }
+
+    fn found(&self, x: DVec3, point: DVec3, (triangle, location): (u32, TrianglePointLocation)) -> SurfacePoint {
+        let offset = x - point;
+        let distance = offset.length();
+        let outward = self.pseudo_normal(triangle, location);
+        let sign = if offset.dot(outward) <= 0.0 { -1.0 } else { 1.0 };
+        let normal = if distance > ON_SURFACE { offset / (sign * distance) } else { outward };
+        SurfacePoint { point, signed_distance: sign * distance, normal, triangle }
+    }
+
+    /// What of the body and what it wears is outermost at x.
+    fn outermost(&self, x: DVec3, bare: SurfacePoint) -> SurfacePoint {
+        self.worn.as_ref().map_or(bare, |worn| worn.outermost(x, bare))
     }
 
     fn pseudo_normal(&self, triangle: u32, location: TrianglePointLocation) -> DVec3 {

@@ -16,7 +16,6 @@
 //! Limits: the cloth's sides are told by its normals; where it lies in a pleat the way out is that of the nearest sheet.
 
 use glam::DVec3;
-use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::TrianglePointLocation;
 
 use super::{Body, DistanceError, SurfacePoint};
@@ -40,16 +39,15 @@ impl Body {
     pub fn wearing(&self, cloth: &TriMesh) -> Result<Self, DistanceError> {
         let on_edge = Topology::new(cloth).boundary_vertices();
         let worn = Worn { cloth: Box::new(Self::new_open(cloth)?), on_edge };
-        Ok(Self { mesh: self.mesh.clone(), shape: self.shape.clone(), worn: Some(worn) })
+        Ok(Self { worn: Some(worn), ..self.clone() })
     }
 }
 
 impl Worn {
     /// The nearest point of the outermost surface, where `bare` is that of the body.
     pub(super) fn outermost(&self, x: DVec3, bare: SurfacePoint) -> SurfacePoint {
-        let found = self.cloth.shape.project_local_point_and_get_location(x, false);
-        let beyond = self.is_edge(found.1);
-        let cloth = self.cloth.found(x, found);
+        let (cloth, location) = self.cloth.bare(x, self.cloth.tree.nearest(&[x])[0]);
+        let beyond = self.is_edge(cloth.triangle, location);
         let distance = cloth.signed_distance.abs();
         if !beyond && cloth.signed_distance < 0.0 && distance < FELT {
             return cloth;
@@ -61,9 +59,9 @@ impl Worn {
     }
 
     /// Whether it is on an edge of the cloth, past which there is no behind.
-    fn is_edge(&self, (triangle, location): (u32, TrianglePointLocation)) -> bool {
+    fn is_edge(&self, triangle: u32, location: TrianglePointLocation) -> bool {
         let Some(weights) = location.barycentric_coordinates() else { return false };
-        let corners = self.cloth.mesh.triangles[triangle as usize % self.cloth.mesh.triangles.len()];
+        let corners = self.cloth.mesh.triangles[triangle as usize];
         let mut met = corners.iter().zip(weights).filter(|(_, weight)| *weight > 0.0).map(|(v, _)| *v as usize);
         weights.contains(&0.0) && met.all(|v| self.on_edge[v])
     }

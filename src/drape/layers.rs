@@ -65,7 +65,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         let refining = Instant::now();
         // Nothing crosses with all below the last as they lie, and that one as it was put over them.
         let Scene { garment, topology, rest, held, .. } = scene;
-        let cloth = Cloth::new(garment, topology, rest, &settings.fabric, held)?.clear_at(before);
+        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
         let start = scene.lifted_off(worn.positions.clone());
         let refined = refine_from(scene, settings, &cloth, None, start, &mut |step| {

@@ -71,7 +71,7 @@ pub(crate) fn let_go(
     if !asked || held.stop != Stop::Converged {
         return Ok(Released { cloth: None, refined: held, let_go: None });
     }
-    let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &[])?;
+    let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &[])?;
     let mut contacts = free.contacts(&scene.body, &held.positions);
     contacts.stiffen(held.contact_stiffness / contacts.stiffness());
     contacts.update(&held.positions);

@@ -34,14 +34,15 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// The cloth of `scene`, and as many coarser ones as there are.
+    /// The cloth of `scene`, `fabric` being that of what names none, and as many coarser ones as there are.
     pub(crate) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
         let Scene { garment, topology, rest, held, .. } = scene;
+        let fabrics = &scene.fabrics(fabric);
         let (cloth, coarser) = rayon::join(
-            || Cloth::new(garment, topology, rest, fabric, held),
+            || Cloth::new(garment, topology, rest, fabrics, held),
             || {
                 let mut coarser: Vec<Level> = Vec::new();
-                while let Some(next) = Level::below(scene, coarser.last(), fabric) {
+                while let Some(next) = Level::below(scene, coarser.last(), fabrics) {
                     coarser.push(next);
                 }
                 coarser
@@ -69,7 +70,7 @@ impl Levels {
 }
 
 impl Level {
-    fn below(scene: &Scene, above: Option<&Self>, fabric: &Fabric) -> Option<Self> {
+    fn below(scene: &Scene, above: Option<&Self>, fabrics: &[Fabric]) -> Option<Self> {
         let (mesh, rest) = above.map_or((&scene.garment, &scene.rest), |a| (&a.coarse.mesh, &a.coarse.rest));
         let count = mesh.vertex_count() / RATIO;
         if count < LEAST_VERTICES {
@@ -78,7 +79,7 @@ impl Level {
         let coarse = Coarse::new(mesh, rest, count)?;
         let held = above.map_or_else(|| scene.is_held(), |above| above.cloth.held.clone());
         let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
-        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabric, &held).ok()?;
+        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabrics, &held).ok()?;
         Some(Self { coarse, cloth })
     }
 
@@ -94,7 +95,7 @@ impl Level {
     }
 
     /// What is draped at this level.
-    pub(crate) fn garment<'a>(&'a self, fabric: &'a Fabric) -> Garment<'a> {
-        Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth, fabric }
+    pub(crate) fn garment(&self) -> Garment<'_> {
+        Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth }
     }
 }

@@ -7,9 +7,8 @@ use glam::DVec3;
 use super::levels::{Level, Levels};
 use super::{DrapeError, Model, PartOutcome, Refine, Settings};
 use crate::distance::SurfacePoint;
-use crate::fabric::Fabric;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Given};
-use crate::mechanics::paper::{self, PartForces};
+use crate::mechanics::paper::{self, Cut, PartForces};
 use crate::parts::{Parts, segment};
 use crate::range_table::RangeTable;
 use crate::scene::Scene;
@@ -48,10 +47,11 @@ pub(crate) fn stage_two(
         Model::Coupled(options) => {
             let made = if levels.is_none() { Some(Levels::new(scene, fabric)?) } else { None };
             let Some(levels) = levels.or(made.as_ref()) else { return Err(CoupledError::NoParts.into()) };
-            couple(scene, fabric, levels, surface, parts, options, asked)
+            couple(scene, levels, surface, parts, options, asked)
         }
         Model::Paper(options) => {
-            let result = paper::solve(mesh, topology, body, surface, &parts, fabric, options)?;
+            let cut = Cut { rest: &scene.rest, fabrics: &scene.fabrics(fabric) };
+            let result = paper::solve_cut(mesh, topology, body, surface, &parts, &cut, options)?;
             let outcome =
                 |p: &PartForces| PartOutcome { force_n: p.resultant, displacement: p.displacement, contact: p.contact };
             Ok(StageTwo {
@@ -67,7 +67,6 @@ pub(crate) fn stage_two(
 /// Stage two by the coupled model: the PARTs of the table, or those cut to one extent after the other.
 fn couple(
     scene: &Scene,
-    fabric: &Fabric,
     levels: &Levels,
     surface: &[SurfacePoint],
     parts: Parts,
@@ -81,7 +80,7 @@ fn couple(
     let uncut = [f64::INFINITY];
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
-        let result = through_levels(scene, fabric, levels, surface, (&stage.parts, &stage.positions), options, asked)?;
+        let result = through_levels(scene, levels, surface, (&stage.parts, &stage.positions), options, asked)?;
         stage.outcomes = result.parts.iter().map(told).collect();
         stage.positions = result.positions;
         stage.warnings.extend(result.warnings);
@@ -118,14 +117,13 @@ const LEAST_SHARE: f64 = 0.01;
 /// The coupled model on the coarsest cloth whose vertices still tell these PARTs apart, then on the finer ones.
 fn through_levels(
     scene: &Scene,
-    fabric: &Fabric,
     levels: &Levels,
     surface: &[SurfacePoint],
     (parts, start): (&Parts, &[DVec3]),
     options: &CoupledOptions,
     asked: Asked<'_>,
 ) -> Result<CoupledResult, CoupledError> {
-    let folding = Folding::of(&scene.garment, parts, fabric);
+    let folding = Folding::of(&scene.garment, parts, &levels.cloth);
     let enough = |level: &&Level| {
         level.mesh().vertex_count() >= ENOUGH * parts.len()
             && (folding.share < FOLDING || EDGES_A_FOLD * level.edge_m() <= folding.width_m)
@@ -136,13 +134,13 @@ fn through_levels(
     for number in (1..=coarsest).rev() {
         let level = &levels.coarser[number - 1];
         let parts = levels.parts(number, parts);
-        let (garment, start) = (level.garment(fabric), levels.restrict(number, &x));
+        let (garment, start) = (level.garment(), levels.restrict(number, &x));
         let distance_m = &levels.restrict(number, &distance);
         let given = Given { distance_m, least_share: LEAST_SHARE };
         let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, given, options, &mut |_| asked())?;
         x = levels.prolong(number, &x, solved.positions);
     }
-    let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth, fabric };
+    let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
     let given = Given { distance_m: &distance, least_share: 0.0 };
     if coarsest == 0 {
         return coupled::solve_given(&garment, &scene.body, parts, &x, given, options, &mut |_| asked());
@@ -180,7 +178,7 @@ pub(crate) fn approach(
         return start.to_vec();
     }
     let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
-    let garment = Garment { mesh, topology, cloth: &levels.cloth, fabric: &settings.fabric };
+    let garment = Garment { mesh, topology, cloth: &levels.cloth };
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let given = Given { distance_m: &distance, least_share: 0.0 };
     let solved = coupled::solve_given(&garment, body, &finer, start, given, &options, &mut |_| asked());

@@ -6,7 +6,6 @@ pub mod cusick;
 pub mod energy;
 pub mod fit;
 pub mod folds;
-pub(crate) mod lanes;
 pub(crate) mod newton;
 pub mod paper;
 pub(crate) mod principal;

@@ -21,6 +21,7 @@
 
 use glam::DVec3;
 
+use super::energy::contact::Touch;
 use super::energy::{Cloth, Contacts, Friction};
 use crate::distance::Body;
 
@@ -51,6 +52,8 @@ pub struct Touching {
     pub reaction: DVec3,
     /// Its normal part, N.
     pub normal_n: f64,
+    /// μ_f there.
+    pub friction: f64,
     /// Whether friction has something left.
     pub sticks: bool,
     /// Whether it is the body that gives it.
@@ -123,7 +126,6 @@ impl Forces {
 /// Gives all places what leaves least of `rest` (N): each in turn what lies nearest in its cone, as long as that changes anything. One turn
 /// is enough where no two share a vertex.
 fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
-    let friction = cloth.friction;
     for touching in &*touching {
         let free = touching.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
         free.for_each(|(v, w)| rest[*v as usize] -= touching.reaction * *w);
@@ -137,7 +139,7 @@ fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
                 continue;
             }
             let left: DVec3 = free().map(|(v, w)| rest[*v as usize] * *w).sum();
-            let given = within_cone(touching.reaction + left / squares, touching.normal, friction);
+            let given = within_cone(touching.reaction + left / squares, touching.normal, touching.friction);
             let more = given - touching.reaction;
             for (v, w) in free() {
                 rest[*v as usize] -= more * *w;
@@ -152,7 +154,7 @@ fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
     for touching in touching {
         touching.normal_n = touching.reaction.dot(touching.normal);
         let across = touching.reaction - touching.normal * touching.normal_n;
-        touching.sticks = across.length() < SLIPPING * friction * touching.normal_n;
+        touching.sticks = across.length() < SLIPPING * touching.friction * touching.normal_n;
     }
 }
 
@@ -169,20 +171,28 @@ pub(crate) fn grant_beside(cloth: &Cloth, body: &Body, contacts: &Contacts<'_>, 
 /// Where the cloth touches the body at `x`, and then where it touches itself.
 fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let stiffness = cloth.contact_stiffness();
-    let mut contacts =
-        Contacts::new(body, &cloth.areas, &cloth.held, cloth.offset + COVERED, stiffness, Friction::none());
+    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + COVERED).collect();
+    let mut contacts = Contacts::new(body, [&cloth.areas, &offsets], &cloth.held, stiffness, Friction::none());
     contacts.update(x);
     let spans = spanned(cloth, body, x, &contacts);
     let of_body = contacts.touches().iter().filter(|t| t.depth > COVERED - TOUCHING || spans[t.vertex as usize]);
-    let mut all: Vec<Touching> =
-        of_body.map(|t| Touching::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, true)).collect();
+    let at_body = |t: &Touch| Touching {
+        of_body: true,
+        ..Touching::at(
+            vec![(t.vertex, 1.0)],
+            t.normal.normalize_or_zero(),
+            t.stiffness,
+            cloth.friction[t.vertex as usize],
+        )
+    };
+    let mut all: Vec<Touching> = of_body.map(at_body).collect();
     let mut itself = cloth.proximity();
     itself.refresh(x);
     let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
     // What the solver's law pushes with is near to what is needed.
     all.extend(gaps.map(|gap| Touching {
         reaction: gap.normal() * (gap.stiffness() * gap.depth(x).max(0.0)),
-        ..Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), false)
+        ..Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), gap.mean(&cloth.friction))
     }));
     all
 }
@@ -201,9 +211,10 @@ fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3], near: &Contacts<'_>) -> Vec<
         cloth.triangles.iter().map(|t| t.vertices).filter(|t| t.iter().any(|&v| close[v as usize])).collect();
     let points: Vec<DVec3> = triangles.iter().flat_map(|t| inner(*t)).collect();
     for (t, near) in triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
+        let keeps = t.iter().map(|&v| cloth.offsets[v as usize]).fold(0.0, f64::max);
         // What the body wears is asked at these points alone.
-        let touches = near.iter().any(|p| p.signed_distance < cloth.offset)
-            || body.distance_to(t.map(|v| x[v as usize])) < cloth.offset + TOUCHING;
+        let touches = near.iter().any(|p| p.signed_distance < keeps)
+            || body.distance_to(t.map(|v| x[v as usize])) < keeps + TOUCHING;
         if touches {
             t.iter().for_each(|&v| spans[v as usize] = true);
         }
@@ -212,8 +223,17 @@ fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3], near: &Contacts<'_>) -> Vec<
 }
 
 impl Touching {
-    fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, of_body: bool) -> Self {
-        Self { shares, normal, stiffness, reaction: DVec3::ZERO, normal_n: 0.0, sticks: false, of_body }
+    fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, friction: f64) -> Self {
+        Self {
+            shares,
+            normal,
+            stiffness,
+            reaction: DVec3::ZERO,
+            normal_n: 0.0,
+            friction,
+            sticks: false,
+            of_body: false,
+        }
     }
 }
 

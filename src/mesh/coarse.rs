@@ -3,7 +3,7 @@
 //! Vertices of the coarse garment are vertices of the fine one (`decimate.rs`). Its triangles get the rest shape that the fine ones about them
 //! have: with J_t the map from triangle t as placed to its rest shape, their squares JᵀJ, turned into the coarse triangle's plane, are
 //! averaged by area, and so are the directions of their warp; the root of the mean, turned so that the warp runs along y, takes the coarse triangle to its
-//! own rest shape. A chord is shorter than the cloth above it, in both shapes alike.
+//! own rest shape, and the fabric that most of them are cut from is its own. A chord is shorter than the cloth above it, in both shapes alike.
 //!
 //! What the coarse garment does, the fine one follows:
 //!
@@ -22,6 +22,8 @@
 //!
 //! Source: own. Limits: none for a mesh that is no manifold, nor for one whose triangles are far from their rest shape (seams that are
 //! still open): there a mean says nothing.
+
+use std::collections::BTreeMap;
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use parry3d_f64::query::PointQueryWithLocation;
@@ -79,10 +81,10 @@ impl Coarse {
         let anchors: Vec<_> = (mesh.positions.par_iter().zip(&onto).with_min_len(256))
             .map(|(x, &owner)| anchor(&coarse, about.get(owner as usize)?, *x))
             .collect();
-        let corners = rest_corners(mesh, &maps, &coarse, &vertices, &anchors)?;
+        let rest = rest_shape(mesh, rest, &maps, &coarse, &vertices, &anchors)?;
         let anchors =
             anchors.into_iter().map(|a| a.map_or(([0; 3], [0.0; 3]), |a| (coarse.triangles[a.0], a.1))).collect();
-        Some(Self { mesh: coarse, topology, rest: RestShape { corners }, vertices, anchors })
+        Some(Self { mesh: coarse, topology, rest, vertices, anchors })
     }
 
     /// What the coarse vertices have of a list over the fine ones.
@@ -186,14 +188,15 @@ fn anchor(coarse: &TriMesh, about: &[u32], x: DVec3) -> Option<(usize, [f64; 3])
     best.map(|(_, t, coordinates)| (t, coordinates))
 }
 
-/// Rest corners of the coarse triangles.
-fn rest_corners(
+/// Rest corners of the coarse triangles, and their fabrics.
+fn rest_shape(
     mesh: &TriMesh,
+    rest: &RestShape,
     maps: &[Map],
     coarse: &TriMesh,
     vertices: &[u32],
     anchors: &[Option<(usize, [f64; 3])>],
-) -> Option<Vec<[DVec2; 3]>> {
+) -> Option<RestShape> {
     let triangles_of = incidence(mesh);
     let mut over: Vec<Vec<u32>> = (coarse.triangles.iter())
         .map(|t| t.iter().flat_map(|&v| &triangles_of[vertices[v as usize] as usize]).copied().collect())
@@ -203,7 +206,7 @@ fn rest_corners(
             over[*t].extend(triangles);
         }
     }
-    (0..coarse.triangles.len())
+    let corners = (0..coarse.triangles.len())
         .map(|t| {
             let [a, b, c] = coarse.corners(t);
             let normal = (b - a).cross(c - a).try_normalize()?;
@@ -227,7 +230,16 @@ fn rest_corners(
             let turn = DMat2::from_cols(DVec2::new(along.y, along.x), DVec2::new(-along.x, along.y));
             Some([a, b, c].map(|p| turn * stretch * DVec2::new((p - a).dot(x), (p - a).dot(y))))
         })
-        .collect()
+        .collect::<Option<_>>()?;
+    let most = |over: &Vec<u32>| {
+        let mut areas: BTreeMap<u16, f64> = BTreeMap::new();
+        for &f in over {
+            *areas.entry(rest.cut_from[f as usize]).or_default() += maps[f as usize].area;
+        }
+        areas.into_iter().fold((0, 0.0), |most, of| if of.1 > most.1 { of } else { most }).0
+    };
+    let cut_from = if rest.cut_from.is_empty() { Vec::new() } else { over.iter().map(most).collect() };
+    Some(RestShape { corners, cut_from })
 }
 
 /// The root of a positive symmetric matrix, by Cayley and Hamilton.

@@ -67,9 +67,23 @@ pub enum RestError {
 pub struct RestShape {
     /// Corners of each triangle, in the order of the mesh's triangles and of their corners, m.
     pub corners: Vec<[DVec2; 3]>,
+    /// Which of the garment's fabrics each triangle is cut from, by number; empty where all are cut from the first.
+    pub cut_from: Vec<u16>,
 }
 
 impl RestShape {
+    /// Triangles of these corners (m), all cut from one fabric.
+    #[must_use]
+    pub fn new(corners: Vec<[DVec2; 3]>) -> Self {
+        Self { corners, cut_from: Vec::new() }
+    }
+
+    /// The number of the fabric that a triangle is cut from.
+    #[must_use]
+    pub fn fabric_of(&self, triangle: usize) -> usize {
+        self.cut_from.get(triangle).map_or(0, |&fabric| fabric.into())
+    }
+
     /// The mesh as it stands, at rest: own edges, warp along gravity.
     pub fn from_edges(mesh: &TriMesh) -> Result<Self, RestError> {
         Self::edges_of(mesh).checked()
@@ -77,7 +91,7 @@ impl RestShape {
 
     /// [`from_edges`](Self::from_edges), triangles without area and all.
     pub(crate) fn edges_of(mesh: &TriMesh) -> Self {
-        Self { corners: (0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect() }
+        Self::new((0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect())
     }
 
     /// A second mesh of the same vertices and triangles, at rest; warp along gravity in that mesh.
@@ -126,7 +140,7 @@ impl RestShape {
             let mirrored = (b - a).perp_dot(c - a) < 0.0;
             [a, b, c].map(|p| if mirrored { DVec2::new(-p.x, p.y) } else { p })
         });
-        let rest = Self { corners: corners.collect() };
+        let rest = Self::new(corners.collect());
         let ratio = rest.areas().iter().sum::<f64>() / mesh.triangle_areas().iter().sum::<f64>();
         if !METRIC_AREA_RATIO.contains(&ratio) {
             return Err(RestError::NotMetric { metres_per_unit, ratio });

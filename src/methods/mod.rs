@@ -46,6 +46,19 @@ pub struct Dressing<'a> {
     pub cloth: &'a Cloth,
 }
 
+impl Dressing<'_> {
+    /// The methods have one stiffness, density and friction for all of a garment.
+    fn of_one_fabric(&self, method: &'static str) -> Result<(), MethodError> {
+        match self.cloth.fabrics.len() {
+            0 | 1 => Ok(()),
+            n => {
+                let reason = format!("found {n} fabrics in the garment, expected one: the method as published has one");
+                Err(MethodError::Unfit { method, reason })
+            }
+        }
+    }
+}
+
 /// The garment on its way, as the observer sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<'a> {
@@ -134,6 +147,17 @@ pub trait ReferenceMethod: Sync {
     /// Its name: author and year.
     fn name(&self) -> &'static str;
 
+    /// What [`drape`](Self::drape) does, on whatever thread it is called.
+    ///
+    /// # Errors
+    /// [`MethodError`] says in one line why there is no drape.
+    fn run(
+        &self,
+        dressing: &Dressing<'_>,
+        rule: &RestRule,
+        onlooker: Spectator<'_>,
+    ) -> Result<MethodDrape, MethodError>;
+
     /// Drapes until the garment rests by `rule`; `onlooker` is told of every step and may end it.
     ///
     /// # Errors
@@ -143,7 +167,11 @@ pub trait ReferenceMethod: Sync {
         dressing: &Dressing<'_>,
         rule: &RestRule,
         onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError>;
+    ) -> Result<MethodDrape, MethodError> {
+        dressing.of_one_fabric(self.name())?;
+        // In the pool: hundreds of short parallel loops follow.
+        rayon::scope(|_| self.run(dressing, rule, onlooker))
+    }
 }
 
 /// Names of the methods, in the order of the paper's references.

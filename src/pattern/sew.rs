@@ -151,7 +151,7 @@ fn join(pattern: &SewingPattern, outlines: &[Outline], meshed: Vec<Meshed>) -> S
         vertices.sort_unstable();
         vertices.dedup();
     }
-    SewnGarment { mesh, rest: RestShape { corners }, flat, panels, seams, labelled, notes }
+    SewnGarment { mesh, rest: RestShape::new(corners), flat, panels, seams, labelled, notes }
 }
 
 /// Whether the outside of each panel is the back of its plane.

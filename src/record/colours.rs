@@ -44,6 +44,11 @@ pub(super) fn by_part(garment: &TriMesh) -> Vec<Rgb> {
     part.into_iter().map(of).collect()
 }
 
+/// A colour for each vertex of the displaced garment by its fabric.
+pub(super) fn by_fabric(fabric_of_vertex: &[u16]) -> Vec<Rgb> {
+    fabric_of_vertex.iter().map(|&fabric| of_layer(fabric.into())).collect()
+}
+
 /// The colour of garment number `k` of an outfit, inner to outer.
 pub(super) fn of_layer(k: usize) -> Rgb {
     k.checked_sub(1).map_or(DRAPED, |next| OVER[next % OVER.len()])

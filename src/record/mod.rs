@@ -41,7 +41,7 @@ use rerun::{Scalars, TextDocument};
 pub use blueprint::layout::{Layout, Tab};
 pub use colour_map::Range;
 pub use colours::level_colours;
-pub use compare::Chosen;
+pub use compare::{Chosen, Colours};
 pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
@@ -51,7 +51,7 @@ pub(crate) use page::takes_gzip;
 pub use page::{Bundled, bundled};
 pub use panel::Panel;
 pub use pattern::PatternView;
-pub use scatter::{ScatterPoint, When};
+pub use scatter::{Picture, ScatterPoint, When};
 pub use sinks::Sink;
 pub use step::{Overlay, StepView};
 pub use wrinkles::WrinkleView;
@@ -136,6 +136,15 @@ impl Recorder {
     /// The garment as loaded; with the first one the layout is sent.
     pub fn garment(&mut self, index: i64, garment: &TriMesh) -> Result<(), RecordError> {
         self.timed(|open| open.take_garment(index, garment))
+    }
+
+    /// Which of several fabrics each vertex of the garment is cut from, so that they are told apart in the drape.
+    pub fn cut_from(&mut self, index: i64, fabric_of_vertex: &[u16]) -> Result<(), RecordError> {
+        self.timed(|open| {
+            RecordError::unless_per_vertex(open.garment.positions.len(), &[("fabrics", fabric_of_vertex.len())])?;
+            open.at(index, 1);
+            open.log_mesh(paths::DRAPE, &meshes::colours(colours::by_fabric(fabric_of_vertex)))
+        })
     }
 
     /// Sets what the ends of a quantity's colour map stand for (`error` in mm, `force` in N), for a recording whose steps are known
@@ -226,9 +235,14 @@ impl Recorder {
         self.timed(|open| compare::chosen(open, chosen))
     }
 
-    /// All points of cost against error so far; `cost` is the axis' title (`time, ms`).
-    pub fn scatter(&mut self, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
-        self.timed(|open| scatter::scatter(open, when, cost, points))
+    /// All points of a picture so far.
+    pub fn scatter(
+        &mut self,
+        when: When,
+        picture: Picture<'_>,
+        points: &[ScatterPoint<'_>],
+    ) -> Result<(), RecordError> {
+        self.timed(|open| scatter::scatter(open, when, picture, points))
     }
 
     /// Sends what is left, closes the file and gives it its name.

@@ -90,6 +90,11 @@ impl Open {
         &self.options.layout
     }
 
+    /// Where the views look from, at the garment alone.
+    pub(super) fn eye(&self) -> &Eye {
+        &self.eye
+    }
+
     /// What the ends of a quantity's colour map stand for: as they were at its first step, or set before it, so that colours compare
     /// from step to step.
     pub(super) fn scale(&self, quantity: &str, first: impl FnOnce() -> Range) -> Range {
@@ -174,7 +179,7 @@ impl Open {
         }
         self.at(index, 1);
         self.log_mesh(paths::GARMENT, &meshes::plain(garment, colours::CLOTH))?;
-        if self.layout().method.is_none() {
+        if self.layout().method.is_none() && !self.layout().contest {
             self.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
             self.log_mesh(paths::PARTS, &self.cells.shape())?;
             self.log_mesh(paths::FORCE, &self.cells.shape())?;

@@ -33,6 +33,7 @@
 //! | `/legend/stages/table` | Points2D | the table's name | `table` |
 //! | `/legend/<tab>/<name>/bar`, `.../ticks` | LineStrips2D, Points2D | colour bars of a tab, in one drawing | `table` |
 //! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
+//! | `/growth/points` and so on | the same | vertices against time, a point per way to drape and garment | `table` |
 
 #![allow(missing_docs, reason = "the table above says what lies at each path")]
 
@@ -63,6 +64,7 @@ pub const RESIDUAL: &str = "/solver/residual";
 pub const RESIDUAL_LOG10: &str = "/solver/residual_log10";
 pub const COMPARE: &str = "/compare";
 pub const SCATTER: &str = "/scatter";
+pub const GROWTH: &str = "/growth";
 pub const STAGES_LEGEND: &str = "/legend/stages";
 pub const FIT_LEGEND: &str = "/legend/fit";
 pub const WRINKLES_LEGEND: &str = "/legend/wrinkles";

@@ -1,4 +1,4 @@
-//! Cost against error, drawn in the plane: a dot for each table, both axes logarithmic.
+//! One number over another, drawn in the plane: cost against error, a dot for each table; both axes logarithmic.
 //!
 //! The viewer has no plot of one number over another, so that axes, numbers and names are lines and points of a 2D view.
 
@@ -12,15 +12,40 @@ use super::meshes;
 use super::open::Open;
 use super::paths;
 
-/// One table, or any other setting, in the picture of speed against error.
+/// A picture: where it lies and what its axes are called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Picture<'a> {
+    /// Its path: [`paths::SCATTER`] or [`paths::GROWTH`].
+    pub path: &'a str,
+    /// Title of the horizontal axis, with its unit (`time, ms`).
+    pub x: &'a str,
+    /// Title of the vertical axis.
+    pub y: &'a str,
+}
+
+impl<'a> Picture<'a> {
+    /// What something costs against its error.
+    #[must_use]
+    pub fn of_error(cost: &'a str) -> Self {
+        Self { path: paths::SCATTER, x: cost, y: "error, mm" }
+    }
+
+    /// How times grow.
+    #[must_use]
+    pub fn of_growth() -> Self {
+        Self { path: paths::GROWTH, x: "vertices", y: "time, ms" }
+    }
+}
+
+/// One table, or any other setting, in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScatterPoint<'a> {
     /// Its name.
     pub label: &'a str,
-    /// What it costs: time in ms, or whatever else the axis is called.
-    pub cost: f64,
-    /// Error, mm.
-    pub error_mm: f64,
+    /// Where it lies along the horizontal axis: what it costs.
+    pub x: f64,
+    /// Along the vertical one: its error.
+    pub y: f64,
     /// Points of one group share a colour; the front, say, against the rest.
     pub group: usize,
     /// Whether its name is written beside it, where there is room.
@@ -88,25 +113,29 @@ fn round(value: f64, up: bool) -> f64 {
 }
 
 /// Points that are not positive and finite cannot be placed and are left out.
-pub(super) fn scatter(open: &Open, when: When, cost: &str, points: &[ScatterPoint<'_>]) -> Result<(), RecordError> {
+pub(super) fn scatter(
+    open: &Open,
+    when: When,
+    picture: Picture<'_>,
+    points: &[ScatterPoint<'_>],
+) -> Result<(), RecordError> {
+    let path = picture.path;
     match when {
         When::Table(index) => open.at(index, 6),
         When::Iteration(iteration) => open.at_iteration(iteration),
     }
-    let placed: Vec<&ScatterPoint<'_>> = points
-        .iter()
-        .filter(|p| p.cost.is_finite() && p.error_mm.is_finite() && p.cost > 0.0 && p.error_mm > 0.0)
-        .collect();
-    let costs = Axis::around(placed.iter().map(|p| p.cost), PICTURE[0]);
-    let errors = Axis::around(placed.iter().map(|p| p.error_mm), PICTURE[1]);
-    axes(open, &costs, &errors, cost)?;
-    let place = |p: &ScatterPoint<'_>| [costs.place(p.cost), errors.place(p.error_mm)];
+    let placed: Vec<&ScatterPoint<'_>> =
+        points.iter().filter(|p| p.x.is_finite() && p.y.is_finite() && p.x > 0.0 && p.y > 0.0).collect();
+    let along = Axis::around(placed.iter().map(|p| p.x), PICTURE[0]);
+    let up = Axis::around(placed.iter().map(|p| p.y), PICTURE[1]);
+    axes(open, [&along, &up], picture)?;
+    let place = |p: &ScatterPoint<'_>| [along.place(p.x), up.place(p.y)];
     let palette = colours::palette();
     let dots = Points2D::new(placed.iter().map(|p| plane(place(p))))
         .with_colors(meshes::rerun_colours(placed.iter().map(|p| palette[p.group % palette.len()])))
         .with_radii([DOT as f32])
         .with_draw_order(30.0);
-    open.log(&format!("{}/points", paths::SCATTER), &dots)?;
+    open.log(&format!("{path}/points"), &dots)?;
     let frame = Rect { low: [0.0, 0.0], high: PICTURE };
     let mut labels = Labels::new(frame, placed.iter().map(|p| place(p)), DOT);
     let named = placed.iter().filter(|p| p.named && !p.label.is_empty());
@@ -119,31 +148,31 @@ pub(super) fn scatter(open: &Open, when: When, cost: &str, points: &[ScatterPoin
         }
     }
     let leaders = LineStrips2D::new(leaders).with_colors([Color::from_rgb(150, 156, 165)]).with_radii([0.25]);
-    open.log(&format!("{}/leaders", paths::SCATTER), &leaders)?;
-    open.log(&format!("{}/names", paths::SCATTER), &texts(anchors, names))
+    open.log(&format!("{path}/leaders"), &leaders)?;
+    open.log(&format!("{path}/names"), &texts(anchors, names))
 }
 
 /// The grid, the numbers at it, and what they count.
-fn axes(open: &Open, costs: &Axis, errors: &Axis, cost: &str) -> Result<(), RecordError> {
+fn axes(open: &Open, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<(), RecordError> {
     let [width, height] = PICTURE;
     let mut lines = Vec::new();
     let mut shades = Vec::new();
     let mut places = vec![plane([0.5 * width, -13.0]), plane([0.0, height + 16.0])];
-    let mut labels = vec![cost.to_owned(), "error, mm".to_owned()];
+    let mut labels = vec![picture.x.to_owned(), picture.y.to_owned()];
     let mut line = |from: [f64; 2], to: [f64; 2], major: bool| {
         lines.push(vec![plane(from), plane(to)]);
         shades.push(if major { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
     };
-    for (multiple, value) in costs.ticks() {
-        let x = costs.place(value);
+    for (multiple, value) in along.ticks() {
+        let x = along.place(value);
         line([x, 0.0], [x, height], multiple == 1);
         if matches!(multiple, 1 | 2 | 5) {
             places.push(plane([x, -1.0]));
             labels.push(number(value));
         }
     }
-    for (multiple, value) in errors.ticks() {
-        let y = errors.place(value);
+    for (multiple, value) in up.ticks() {
+        let y = up.place(value);
         line([0.0, y], [width, y], multiple == 1);
         if matches!(multiple, 1 | 2 | 5) {
             places.push(plane([-16.0, y + 6.0]));
@@ -151,8 +180,8 @@ fn axes(open: &Open, costs: &Axis, errors: &Axis, cost: &str) -> Result<(), Reco
         }
     }
     let axes = LineStrips2D::new(lines).with_colors(shades).with_radii([0.25]);
-    open.log(&format!("{}/axes", paths::SCATTER), &axes)?;
-    open.log(&format!("{}/ticks", paths::SCATTER), &texts(places, labels))
+    open.log(&format!("{}/axes", picture.path), &axes)?;
+    open.log(&format!("{}/ticks", picture.path), &texts(places, labels))
 }
 
 /// The viewer's plane has y downwards.

@@ -1,5 +1,6 @@
 //! Why there is no scene. The user can mend all of these.
 
+use super::CutError;
 use crate::distance::DistanceError;
 use crate::files::{Unreadable, listed};
 use crate::mesh::MeshError;
@@ -52,6 +53,9 @@ pub enum SceneError {
          the same unit, up axis and place (--unit, --up)?"
     )]
     NotNear { nearest: f64, limit: f64 },
+    /// What it is cut from.
+    #[error(transparent)]
+    Cut(Box<CutError>),
     /// Nothing to hold.
     #[error(
         "--hold {what}: found no edge there, only cloth that goes on; expected an open edge to hold, as a waistband has"

@@ -106,7 +106,8 @@ impl Scene {
         }
         let first = layer.vertices.start as u32;
         let held = self.held.iter().filter(|&&v| layer.vertices.contains(&(v as usize))).map(|v| v - first).collect();
-        let rest = RestShape { corners: self.rest.corners[layer.triangles.clone()].to_vec() };
+        let cut_from = self.rest.cut_from.get(layer.triangles.clone()).unwrap_or_default().to_vec();
+        let rest = RestShape { corners: self.rest.corners[layer.triangles.clone()].to_vec(), cut_from };
         let whole = Layer { vertices: 0..layer.vertices.len(), triangles: 0..layer.triangles.len(), ..layer };
         Ok(Self {
             body: self.below(k, x)?,
@@ -117,6 +118,7 @@ impl Scene {
             let_go: false,
             layers: vec![whole],
             distance_to: self.distance_to,
+            own_fabrics: self.own_fabrics.clone(),
         })
     }
 

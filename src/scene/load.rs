@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::cut::{Cut, Swatch};
 use super::layers::join;
 use super::spec::REST_AUTO;
 use super::{Layer, PushOutReport, Scene, SceneError, SceneSpec, facing_body};
@@ -38,6 +39,8 @@ pub struct Loaded {
     pub flat_pattern: Option<FlatPattern>,
     /// Heights at which the built-in form has its bust, waist and hip girths, m.
     pub girths_at_m: Option<[f64; 3]>,
+    /// What it is cut from, where that was said.
+    pub swatches: Vec<Swatch>,
     imported: Option<Imported>,
 }
 
@@ -55,6 +58,7 @@ struct Unplaced {
     mesh: TriMesh,
     rest: RestShape,
     held: Vec<u32>,
+    cut: Cut,
     tailored: Option<Tailored>,
     imported: Option<Imported>,
     pattern: Option<FlatPattern>,
@@ -68,6 +72,8 @@ impl Unplaced {
 
     /// Adds another garment, worn over it; what came of files and patterns is then that of several, and is left behind.
     fn put_on(&mut self, outer: Self) {
+        let triangles = [&self.mesh, &outer.mesh].map(|mesh| mesh.triangles.len());
+        self.cut.join(outer.cut, &outer.rest, &mut self.rest, triangles);
         let before = join(&mut self.mesh, &mut self.rest, outer.mesh, outer.rest);
         self.held.extend(outer.held.iter().map(|v| v + before));
         (self.tailored, self.imported, self.pattern) = (None, None, None);
@@ -103,6 +109,7 @@ impl SceneSpec {
         let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
         (scene.layers, scene.distance_to) = (layers, self.distance_to);
+        scene.own_fabrics = unplaced.cut.fabrics;
         scene.held = match &self.hold {
             None => {
                 scene.let_go = unplaced.tailored.is_some();
@@ -120,6 +127,7 @@ impl SceneSpec {
             pushed_out,
             tailored: unplaced.tailored,
             flat_pattern: unplaced.pattern,
+            swatches: unplaced.cut.swatches,
             girths_at_m: form.map(|m| [m.bust_height, m.waist_height, m.hip_height]),
             imported: unplaced.imported,
         })
@@ -132,11 +140,13 @@ impl SceneSpec {
         of_body: Option<&Imported>,
         made: Option<Result<Unplaced, SceneError>>,
     ) -> Result<Unplaced, SceneError> {
-        match made {
+        let mut unplaced = match made {
             Some(made) => made,
             None if self.is_a_pattern() => self.tailor(body),
             None => self.load_garment(body, of_body),
-        }
+        }?;
+        unplaced.cut = self.cut(&unplaced.mesh, &mut unplaced.rest)?;
+        Ok(unplaced)
     }
 
     fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
@@ -168,6 +178,7 @@ impl SceneSpec {
                 mesh: made.mesh,
                 rest: made.rest,
                 held: made.held,
+                cut: Cut::default(),
                 tailored: None,
                 imported: None,
                 pattern: None,
@@ -191,6 +202,7 @@ impl SceneSpec {
             mesh: imported.mesh.clone(),
             rest,
             held: Vec::new(),
+            cut: Cut::default(),
             tailored: None,
             imported: Some(imported),
             pattern,
@@ -203,7 +215,8 @@ impl SceneSpec {
         let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
-        Ok(Unplaced { mesh, rest, held, tailored: Some(Tailored { pattern, put_on }), imported: None, pattern: None })
+        let (cut, tailored) = (Cut::default(), Some(Tailored { pattern, put_on }));
+        Ok(Unplaced { mesh, rest, held, cut, tailored, imported: None, pattern: None })
     }
 
     /// The rest shape of a garment, which loses the triangles that have no area in it.
@@ -258,6 +271,7 @@ impl Loaded {
             let of_both = pattern.notes.iter().cloned().chain(put_on.notes());
             notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
         }
+        notes.extend(self.swatches.iter().map(|swatch| format!("cut: {swatch}")));
         if self.pushed_out.is_clean() && self.pushed_out.found_inside > 0 {
             notes.push(self.pushed_out.to_string());
         }

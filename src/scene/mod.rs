@@ -4,6 +4,7 @@
 //! the garment is turned to face away from the body, its rest shape is taken before anything moves, it must be near the
 //! body, and what starts inside is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
+mod cut;
 mod error;
 mod hold;
 mod layers;
@@ -12,6 +13,7 @@ mod placement;
 mod push_out;
 mod spec;
 
+pub use cut::{CutError, PanelFabrics, Swatch};
 pub use error::SceneError;
 pub use layers::{DistanceTo, Layer};
 pub use load::{Loaded, Tailored};
@@ -22,6 +24,7 @@ pub use spec::{DRESS_FORM, SceneSpec};
 use glam::DVec3;
 
 use crate::distance::{Body, SurfacePoint};
+use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use placement::check_near;
 
@@ -47,6 +50,8 @@ pub struct Scene {
     pub layers: Vec<Layer>,
     /// What its distances count to.
     pub distance_to: DistanceTo,
+    /// The fabrics that its rest shape numbers; `None` is that of the settings, which is all there is unless something else was asked.
+    pub own_fabrics: Vec<Option<Fabric>>,
 }
 
 impl Scene {
@@ -69,7 +74,8 @@ impl Scene {
         let layer = Layer { name, vertices: 0..garment.vertex_count(), triangles: 0..garment.triangles.len() };
         let (layers, distance_to) = (vec![layer], DistanceTo::Body);
         let topology = Topology::new(&garment);
-        Self { body, topology, garment, rest, held: Vec::new(), let_go: false, layers, distance_to }
+        let own_fabrics = vec![None];
+        Self { body, topology, garment, rest, held: Vec::new(), let_go: false, layers, distance_to, own_fabrics }
     }
 
     /// Puts them together, nothing held; what starts inside the body is pushed out if asked.

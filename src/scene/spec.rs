@@ -1,6 +1,6 @@
 //! Body and garment by name or file, and what is asked of them: plain data that flags, sweep files and scripts fill.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,12 @@ pub struct SceneSpec {
     pub garment: String,
     /// Garments worn over it, inner to outer, each named as it is.
     pub over: Vec<String>,
+    /// Fabrics of the garments, inner to outer, each a built-in name or a file; empty where all are of that of the settings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fabrics: Vec<String>,
+    /// TOML file that names the fabrics of the garment's panels; where it is not given, `GARMENT.fabrics.toml` beside the garment's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fabrics_file: Option<String>,
     /// What distances count to where garments are worn over each other.
     pub distance_to: DistanceTo,
     /// One group or object of the body's file alone.
@@ -62,6 +68,8 @@ impl Default for SceneSpec {
             body: DRESS_FORM.to_owned(),
             garment: "low-cut-dress".to_owned(),
             over: Vec::new(),
+            fabrics: Vec::new(),
+            fabrics_file: None,
             distance_to: DistanceTo::default(),
             body_group: None,
             garment_group: None,
@@ -87,10 +95,10 @@ impl SceneSpec {
 
     /// The files it names.
     #[must_use]
-    pub fn files(&self) -> Vec<&Path> {
+    pub fn files(&self) -> Vec<PathBuf> {
         let named =
             [&self.body, &self.garment, &self.rest].into_iter().chain(&self.over).filter(|name| names_a_file(name));
-        named.map(Path::new).collect()
+        named.map(PathBuf::from).chain(self.files_of_fabrics()).collect()
     }
 
     /// What the garment is called where one name will do, a recording's for one.
@@ -113,8 +121,13 @@ impl SceneSpec {
 
     /// Each garment by itself, inner to outer.
     pub(super) fn layers(&self) -> impl Iterator<Item = Self> + '_ {
-        let one = |garment: &String| Self { garment: garment.clone(), over: Vec::new(), ..self.clone() };
-        std::iter::once(&self.garment).chain(&self.over).map(one)
+        let one = |(k, garment): (usize, &String)| Self {
+            garment: garment.clone(),
+            over: Vec::new(),
+            fabrics: self.fabrics.get(k).into_iter().cloned().collect(),
+            ..self.clone()
+        };
+        std::iter::once(&self.garment).chain(&self.over).enumerate().map(one)
     }
 
     /// Finds names that mean nothing before any time is spent.
@@ -122,6 +135,7 @@ impl SceneSpec {
         if self.body != DRESS_FORM && !names_a_file(&self.body) {
             return Err(SceneError::UnknownBody { found: self.body.clone() });
         }
+        self.check_fabrics()?;
         for layer in self.layers().filter(|layer| !names_a_file(&layer.garment)) {
             layer.described()?;
         }

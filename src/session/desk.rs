@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::EditError;
 use super::history::History;
 use super::results::{AtRest, Ground, Refusal, Sectioned, Snapshot, TrailPoint};
+use super::{Edit, EditError};
 use crate::drape::{Refine, stage_one};
 use crate::job::Job;
 use crate::parts::{Parts, UNASSIGNED};
@@ -210,6 +210,16 @@ impl Desk {
             after_ms: ms_since(since),
             min_part: settings.min_part,
         })
+    }
+
+    /// Refuses a fabric that nothing is cut from.
+    pub(super) fn check_fabric(&self, edit: &Edit, job: &Job) -> Result<(), EditError> {
+        let Some(ground) = self.view.ground.as_ref().filter(|ground| ground.spec == job.scene) else { return Ok(()) };
+        if edit.fabric.is_none() || ground.loaded.scene.takes_the_settings_fabric() {
+            return Ok(());
+        }
+        let found = "one for a garment whose panels all have their own";
+        Err(EditError::value("fabric", found, "a change of the file that names their fabrics"))
     }
 
     /// Where the cloth rests does not depend on the table: an edit that touches neither garment nor fabric leaves the drape.

@@ -199,6 +199,8 @@ impl Edit {
         if let Some(garment) = &self.garment {
             scene.garment.clone_from(garment);
             scene.over.clear();
+            scene.fabrics.clear();
+            scene.fabrics_file = None;
         }
         if self.body.is_some() || self.garment.is_some() {
             scene.check_names()?;

@@ -81,6 +81,7 @@ impl Session {
     pub fn submit(&self, edit: &Edit, gesture: Option<u64>) -> Result<u64, EditError> {
         self.change(|desk| {
             let job = edit.applied(desk.job())?;
+            desk.check_fabric(edit, &job)?;
             desk.take(job, gesture)
         })
     }

@@ -247,7 +247,7 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..nv).flat_map(|j| (0..nu).flat_map(move |i| cell(i, j))).collect();
         let mesh = TriMesh::new(places.iter().map(|p| around(*p)).collect(), triangles);
         let corners = mesh.triangles.iter().map(|t| t.map(|v| DVec2::new(places[v as usize].0, places[v as usize].1)));
-        let rest = RestShape { corners: corners.collect() };
+        let rest = RestShape::new(corners.collect());
         let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
         seen.swap(30, 31);
         let flat = laid_flat(&mesh, &rest, &seen);

@@ -48,7 +48,7 @@ impl MeshCache {
     /// [`dress_form`], from the cache where it is there.
     pub fn dress_form(&self, spec: &BodySpec) -> Result<TriMesh, ShapeError> {
         let make = || {
-            let (mesh, rest) = (dress_form(spec)?, RestShape { corners: Vec::new() });
+            let (mesh, rest) = (dress_form(spec)?, RestShape::new(Vec::new()));
             Ok(PlacedGarment { name: String::new(), mesh, rest, held: Vec::new() })
         };
         Ok(self.get_or_make(&("form", spec, body::DEFAULT_TRIANGLES), make)?.mesh)
@@ -105,7 +105,7 @@ fn unpack((positions, triangles, groups, triangle_group, corners, held): Stored)
     let positions = positions.into_iter().map(DVec3::from_array).collect();
     let corners = corners.into_iter().map(|t| t.map(DVec2::from_array)).collect();
     let mesh = TriMesh { positions, triangles, groups, triangle_group };
-    PlacedGarment { name: String::new(), mesh, rest: RestShape { corners }, held }
+    PlacedGarment { name: String::new(), mesh, rest: RestShape::new(corners), held }
 }
 
 #[cfg(test)]

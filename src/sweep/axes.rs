@@ -188,7 +188,8 @@ fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
             match key.as_str() {
                 "accuracy" => point.job.accuracy = text.parse()?,
                 "body" | "garment" => return Err("bodies and garments have axes of their own".to_owned()),
-                "rest" if names_a_file(&text) => return Err("options name no file".to_owned()),
+                "rest" | "fabrics" if names_a_file(&text) => return Err("options name no file".to_owned()),
+                "fabrics_file" => return Err("options name no file; put one beside the garment's".to_owned()),
                 _ => drop(scene.insert(key.clone(), v.clone())),
             }
             point.options.insert(key.clone(), text);

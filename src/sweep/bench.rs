@@ -1,6 +1,7 @@
 //! Runs points: the scene of each made once for all that share it, passes timed, figures taken, whatever goes wrong a row.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -162,6 +163,7 @@ impl<'a> Bench<'a> {
         passes: (usize, usize),
         keep: impl FnOnce(&Loaded, &Drape, &Measured) -> Result<(), PointError>,
     ) -> Option<Row> {
+        let cut_from = Cell::new(None);
         let measure = |(loaded, drape): (Arc<Loaded>, Drape)| {
             let measured =
                 point.job.measure(&loaded.scene, &drape, self.cache.as_ref(), &mut |_: &Step<'_>| self.listen());
@@ -170,9 +172,13 @@ impl<'a> Bench<'a> {
                 other => PointError::failed(&other),
             })?;
             keep(&loaded, &drape, &measured)?;
+            cut_from.set(Some(loaded.scene.fabric_names(&point.job.settings.fabric)));
             Ok(measured.figures)
         };
-        row_of(point, passes, || self.pass(point), measure)
+        let row = row_of(point, passes, || self.pass(point), measure)?;
+        // Of what has fabrics of its own, these.
+        let fabric = cut_from.take().unwrap_or(row.fabric);
+        Some(Row { fabric, ..row })
     }
 
     fn pass(&self, point: &Point) -> Result<Pass<(Arc<Loaded>, Drape)>, PointError> {

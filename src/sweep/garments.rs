@@ -23,7 +23,7 @@ pub(super) fn garments(axis: Axis<'_>, inputs: &mut Inputs) -> Result<Vec<Edit>,
                     let known = label.parse().and_then(|request: GarmentRequest| GarmentSpec::by_name(&request.name));
                     known.map_err(PlanError::input(&source.place(v), "garment"))?;
                 }
-                inputs.input(&label, &source.place(v))
+                inputs.garment(&label, &source.place(v))
             };
             values.iter().map(garment).collect::<Result<Vec<_>, _>>()?
         }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::PlanError;
 use crate::files::names_a_file;
+use crate::scene::SceneSpec;
 
 /// A body or garment, built in by name or a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +59,17 @@ impl Inputs {
             }
         };
         Ok(Input { label: label.to_owned(), name: path.display().to_string(), key: format!("blake3 {digest}") })
+    }
+
+    /// A garment as written; what says which panel is cut from what determines a result, too.
+    pub(super) fn garment(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
+        let mut input = self.input(label, place)?;
+        for file in SceneSpec::new("", &input.name).files_of_fabrics() {
+            // One that cannot be read is the scene's to refuse.
+            let bytes = fs::read(&file).unwrap_or_default();
+            input.key += &format!(" {}", &blake3::hash(&bytes).to_hex()[..32]);
+        }
+        Ok(input)
     }
 
     /// A text file as written.

@@ -78,7 +78,7 @@ impl Plan {
         let mut point = |job: Job| {
             let mut point = Point::of(job);
             point.set_body(&inputs.input(&point.body, name)?);
-            point.set_garment(&inputs.input(&point.garment, name)?);
+            point.set_garment(&inputs.garment(&point.garment, name)?);
             Ok(point.named())
         };
         let (points, notes) = distinct(jobs.into_iter().map(&mut point).collect::<Result<_, PlanError>>()?);

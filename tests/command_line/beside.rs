@@ -20,6 +20,16 @@ fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     assert!(entries.iter().all(|e| e["error"].is_null() && e["median_ms"].as_f64().unwrap() > 0.0));
     // The very times of the first run: nothing was draped again.
     assert_eq!(json(&contest("1")), first);
+    // A recording of a row that is draped, and none of one that is found.
+    let recorded = |rows_file: &str| {
+        let of = ["bench", "table-4", "--rows", "pullover-1@600", "--rounds", "1", "--starts", "0", "--rows-file"];
+        bench.run(&[&of[..], &[rows_file, "--recordings", "seen", "--csv", "rows.csv"]].concat())
+    };
+    let found = String::from_utf8_lossy(&recorded(&rows).stderr).into_owned();
+    assert!(found.contains("1 rows were found in") && !found.contains("recording: "), "{found}");
+    let made = recorded("others.json");
+    assert!(String::from_utf8_lossy(&made.stderr).contains("recording: "));
+    assert!(fs::metadata(bench.path("seen/pullover-1-600.rrd")).unwrap().len() > 50_000);
     let other = contest("2");
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));

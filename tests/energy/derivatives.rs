@@ -12,7 +12,7 @@ use crate::patch::{cloth, deformed, fabric, jitters, of, sheet};
 const H: f64 = 1e-6;
 
 /// Checks `gradient` against differences of `energy` along three directions over all vertices.
-fn check_gradient(x: &[DVec3], energy: impl Fn(&[DVec3]) -> f64, gradient: &[DVec3], what: &str) {
+pub(crate) fn check_gradient(x: &[DVec3], energy: impl Fn(&[DVec3]) -> f64, gradient: &[DVec3], what: &str) {
     for k in 0..3 {
         let d: Vec<DVec3> = (0..x.len()).map(|i| jitters(1000 * (k + 1) + i)).collect();
         let at = |s: f64| energy(&x.iter().zip(&d).map(|(p, d)| *p + *d * (s * H)).collect::<Vec<_>>());
@@ -69,7 +69,7 @@ fn gravity_gradient() {
 }
 
 /// A block whose upper half of y < 0.8 mm the sheet grazes.
-fn block() -> Body {
+pub(crate) fn block() -> Body {
     let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
@@ -78,7 +78,7 @@ fn block() -> Body {
 }
 
 /// The sheet with part of it within the offset of the block's face y = 0.
-fn grazing(mesh: &TriMesh) -> Vec<DVec3> {
+pub(crate) fn grazing(mesh: &TriMesh) -> Vec<DVec3> {
     deformed(mesh).iter().map(|p| DVec3::new(p.x, 0.3 * p.y + 6e-4, p.z)).collect()
 }
 
@@ -113,7 +113,7 @@ fn friction_gradient() {
 }
 
 /// Checks the positive ∇²E d against differences of ∇E, over the free vertices.
-fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
+pub(crate) fn check_hessian(cloth: &Cloth, x: &[DVec3], contacts: &Contacts, tolerance: f64) {
     let mut blocks = Vec::new();
     cloth.hessian(x, contacts, &mut blocks);
     check_blocks(cloth, x, contacts, &blocks, tolerance);

@@ -5,3 +5,4 @@
 mod derivatives;
 mod invariance;
 mod patch;
+mod two_fabrics;

@@ -15,6 +15,7 @@ use partwise::parts::{Parts, segment};
 use partwise::range_table::RangeTable;
 
 mod balance;
+mod fabrics;
 mod readings;
 mod strip;
 

@@ -8,6 +8,7 @@ use partwise::fabric::{self, Fabric};
 use partwise::pattern::SewingPattern;
 use partwise::range_table::RangeTable;
 use partwise::said::said;
+use partwise::scene::PanelFabrics;
 use partwise::shapes::{BUILT_IN, BodySpec, GarmentSpec};
 use partwise::sweep::Plan;
 use partwise::{Job, SceneSpec};
@@ -53,6 +54,7 @@ pub(crate) const TELLING: &[&str] = &[
     "out of range",
     "cannot be read",
     "are missing",
+    "line of its own",
     "recursion limit",
 ];
 
@@ -105,6 +107,30 @@ fn fabrics() {
             check(numbers.iter().chain(&f.bending_nm).all(|x| x.is_finite() && *x > 0.0), "a constant is not above 0")?;
             check(f.poisson.is_finite() && f.friction.is_finite() && f.friction >= 0.0, "a ratio is no number")?;
             Ok(Said::Taken)
+        }
+    });
+}
+
+#[test]
+fn fabrics_of_panels() {
+    let seeds = [
+        "default = \"interlock\"\n[panels]\nleft_cuff = \"denim\"\n\"*sleeve*\" = \"silk\"\n",
+        "[panels]\n\"**a*\" = \"wool\"\nfront = \"nowhere.toml\"\n",
+    ];
+    fuzz("panel-fabrics", 1.0, seeds.map(str::to_owned).to_vec(), |text| {
+        match PanelFabrics::parse(text, Path::new("input.fabrics.toml")) {
+            Err(e) => refused(&e),
+            Ok(fabrics) => {
+                for panel in ["front", "left_cuff", "right_sleeve_f", "é*"] {
+                    match fabrics.of(panel) {
+                        Err(e) => return refused(&e),
+                        Ok(fabric) => {
+                            check(fabric.is_none_or(|f| f.density_kg_per_m2 > 0.0), "a fabric weighs nothing")?;
+                        }
+                    }
+                }
+                Ok(Said::Taken)
+            }
         }
     });
 }

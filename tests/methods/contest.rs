@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use partwise::SceneSpec;
-use partwise::contest::{ContestError, ContestOptions, ENTRANTS, row};
+use partwise::contest::{ContestError, ContestOptions, Contested, ENTRANTS, row};
 use partwise::fabric::Fabric;
 
 const SMALL: ContestOptions = ContestOptions {
@@ -21,7 +21,13 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
         told.push((round, what.to_owned()));
         ControlFlow::Continue(())
     });
-    let made = made.unwrap();
+    let Contested { row: made, draped, canonical } = made.unwrap();
+    let vertices = scene.garment.vertex_count();
+    assert!(canonical.len() == vertices && draped.len() == ENTRANTS.len());
+    for (entry, x) in made.entries.iter().zip(&draped) {
+        let apart = partwise::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
+        assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.entrant);
+    }
     assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
     let names: Vec<&str> = made.entries.iter().map(|e| e.entrant.as_str()).collect();
@@ -52,7 +58,8 @@ fn who_cannot_run_says_why_and_the_others_go_on() {
     scene.body = partwise::distance::Body::new_open(&open).unwrap();
     let options = ContestOptions { rounds: 1, starts: 0, ..SMALL };
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &options, &mut |_, _, _| ControlFlow::Continue(()));
-    let made = made.unwrap();
+    let Contested { row: made, draped, .. } = made.unwrap();
+    assert_eq!(draped.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, true, true, true, true]);
     let error = made.entries[0].error.as_deref().unwrap();
     assert!(error.contains("zhu2016 cannot run here") && error.contains("not closed"), "{error}");
     let error = made.entries[1].error.as_deref().unwrap();

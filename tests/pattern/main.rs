@@ -5,6 +5,7 @@
 mod bad;
 mod closed_forms;
 mod curves;
+mod cut;
 mod seams;
 mod worn;
 

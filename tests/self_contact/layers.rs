@@ -3,6 +3,7 @@
 use partwise::Scene;
 use partwise::certificate::certify;
 use partwise::drape::{Drape, Refine, Settings, drape, unobserved};
+use partwise::fabric::Fabric;
 use partwise::mesh::self_intersection::crossing_pairs;
 use partwise::scene::{DistanceTo, SceneSpec};
 
@@ -46,6 +47,42 @@ fn a_pullover_over_a_skirt_rests_without_a_crossing_whatever_the_threads() {
         outside += usize::from(radius(v) > radius(beside) - 0.01);
     }
     assert!(all > 50 && outside * 20 > all * 19, "{outside} of {all}");
+}
+
+#[test]
+fn each_garment_has_its_own_fabric_and_all_of_them_rest() {
+    let fabrics = ["denim", "interlock"].map(str::to_owned).to_vec();
+    let over = vec!["pullover-1@900".to_owned()];
+    let spec = SceneSpec { garment: "flared-skirt@700".into(), over, fabrics, ..SceneSpec::default() };
+    let loaded = spec.load().unwrap();
+    let scene = &loaded.scene;
+    // That of the settings is nobody's.
+    let settings = Settings { fabric: Fabric::by_name("silk").unwrap(), ..Settings::default() };
+    assert_eq!(scene.fabric_names(&settings.fabric), "denim + interlock");
+    let [skirt, pullover] = &scene.layers[..] else { panic!("{:?}", scene.layers) };
+    assert!(skirt.triangles.clone().all(|t| scene.rest.fabric_of(t) == 0));
+    assert!(pullover.triangles.clone().all(|t| scene.rest.fabric_of(t) == 1));
+    let draped = drape(scene, &settings, &mut unobserved).unwrap();
+    let certificate = certify(scene, &settings.fabric, &draped.positions).unwrap();
+    for line in ["residual", "forces add up", "friction", "inside the body", "cloth through cloth"] {
+        let finding = certificate.finding(line).unwrap();
+        assert!(finding.passes, "{finding:?}");
+    }
+    // Denim's is not the drape of a skirt in interlock, nor one in which it counts as interlock at rest.
+    let soft = Scene { own_fabrics: vec![Some(Fabric::by_name("interlock").unwrap()); 2], ..scene.clone() };
+    assert!(!certify(&soft, &settings.fabric, &draped.positions).unwrap().finding("residual").unwrap().passes);
+    // The same garments in one fabric, said twice or once, are the same to the last bit.
+    let of = |fabrics: Vec<String>, dial: &str| {
+        let scene = SceneSpec { fabrics, ..spec.clone() }.load().unwrap().scene;
+        let refine = Refine::Steps(2);
+        drape(
+            &scene,
+            &Settings { fabric: Fabric::by_name(dial).unwrap(), refine, ..Settings::default() },
+            &mut unobserved,
+        )
+    };
+    let twice = of(vec!["denim".into(), "denim".into()], "silk").unwrap();
+    assert!(twice.positions == of(Vec::new(), "denim").unwrap().positions);
 }
 
 #[test]

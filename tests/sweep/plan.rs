@@ -219,6 +219,8 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         (format!("{point}options = {{ unit = \"furlong\" }}"), "s.toml:3: options: found", "furlong"),
         (format!("{point}options = {{ accuracy = \"high\" }}"), "s.toml:3: options: found", "canonical"),
         (format!("{point}options = {{ rest = \"a.obj\" }}"), "s.toml:3: options: found", "name no file"),
+        (format!("{point}options = {{ fabrics = [\"a.toml\"] }}"), "s.toml:3: options: found", "name no file"),
+        (format!("{point}options = {{ fabrics_file = \"a\" }}"), "s.toml:3: options: found", "beside the garment"),
         (format!("{point}body = {{ chest = 92 }}"), "s.toml:3: body: the spec", "chest"),
         (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
         (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),

@@ -87,7 +87,7 @@ impl RunArgs {
     pub(super) fn run_by_method(&self) -> anyhow::Result<()> {
         self.refuse_beside_a_method()?;
         let began = Instant::now();
-        let (spec, fabric) = (self.input.spec()?, self.stages.fabric()?);
+        let (spec, fabric) = (self.stages.cloth().give(self.input.spec()?)?, self.stages.cloth().first()?);
         if !spec.over.is_empty() {
             return Err(UserError::new(format!(
                 "--method {}: found {} garments over each other, expected one: it keeps no cloth off cloth",
@@ -97,13 +97,15 @@ impl RunArgs {
         }
         self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
         let loaded = self.input.load(&spec)?;
+        self.stages.cloth().check_used(&loaded)?;
         let load = began.elapsed();
         let sewn = loaded.tailored.as_ref().map(|tailored| &tailored.put_on.garment);
         let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty(), sewn);
         let method = method.with_context(|| format!("there is no method {}", self.method))?;
         let scene = loaded.scene.clone();
-        let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held)?;
-        let dressing = Dressing { scene: &scene, fabric: &fabric, cloth: &cloth };
+        let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&fabric), &scene.held)?;
+        let fabric = &cloth.fabrics[0];
+        let dressing = Dressing { scene: &scene, fabric, cloth: &cloth };
         let bar = console::progress(None, self.method);
         let (mut kept, mut meshes): (Vec<Kept>, f64) = (Vec::new(), 0.0);
         interrupt::keep();
@@ -120,7 +122,7 @@ impl RunArgs {
         let drape = drape.map_err(|e| UserError::new(e.to_string()))?;
         let measured = Instant::now();
         let (figures, fit) = MethodFigures::of(&dressing, &drape);
-        let certificate = self.certify.then(|| certify(&scene, &fabric, &drape.positions)).transpose()?;
+        let certificate = self.certify.then(|| certify(&scene, fabric, &drape.positions)).transpose()?;
         let mut timings = vec![("load", load)];
         timings.extend(drape.times.iter().copied());
         timings.extend([("method", drape.total), ("measure", measured.elapsed())]);
@@ -128,7 +130,7 @@ impl RunArgs {
         if scene.let_go && !scene.held.is_empty() {
             warnings.push(format!("{} does not let go: what is held stays held", self.method));
         }
-        let made = Made { drape: &drape, figures: &figures, fit: &fit, fabric: &fabric, kept: &kept };
+        let made = Made { drape: &drape, figures: &figures, fit: &fit, fabric, kept: &kept };
         let (recorder, spent) = self.record_method(&loaded, &made, &timings, &warnings)?;
         timings.push(("record", spent));
         let mut outputs = Vec::new();

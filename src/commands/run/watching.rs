@@ -38,7 +38,7 @@ impl RunArgs {
     pub(super) fn keep_watching(&self) -> anyhow::Result<()> {
         let job = self.job()?;
         let of_meshes: Vec<PathBuf> =
-            job.scene.files().into_iter().chain(self.input.measurements()).map(Path::to_path_buf).collect();
+            job.scene.files().into_iter().chain(self.input.measurements().map(Path::to_path_buf)).collect();
         let files: Vec<PathBuf> =
             of_meshes.iter().cloned().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         if files.is_empty() {
@@ -50,7 +50,7 @@ impl RunArgs {
         let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
         let mut watch = FileWatch::new(files);
         // What cannot be from the start is an error, as without --watch.
-        self.input.load(&job.scene)?;
+        self.stages.cloth().check_used(&self.input.load(&job.scene)?)?;
         let session = Session::new(job, true);
         let mut workshop = Workshop::new(self.input.meshes());
         let working = session.clone();
@@ -111,7 +111,7 @@ impl RunArgs {
         };
         told.recorded = finished.state;
         let Some(measured) = self.measure(session, &now.job, finished)? else { return Ok(()) };
-        let mut solved = Solved::of_session((*now.job).clone(), finished, measured)?;
+        let mut solved = Solved::of_session(&now.job, finished, measured)?;
         solved.summary.since_last = told.last.as_ref().map(|last| since(last, finished));
         told.last = Some(Arc::clone(finished));
         if told.recorder.is_none() {

@@ -9,8 +9,8 @@ use std::path::Path;
 use partwise::figures::Figures;
 use partwise::quantile::nearest_rank;
 use partwise::record::{
-    Chosen, Layout, Overlay, Panel, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, Tab,
-    When,
+    Chosen, Colours, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
+    Sink, StepView, Tab, When,
 };
 use partwise::sweep::{Row, Status, Timing};
 
@@ -113,7 +113,7 @@ pub(crate) fn record(
     }
     if judged {
         let cost = if chosen.len() > 1 { "time, ms (green: side by side)" } else { "time, ms" };
-        recorder.scatter(When::Table(0), cost, &scatter(rows, &label, &chosen))?;
+        recorder.scatter(When::Table(0), Picture::of_error(cost), &scatter(rows, &label, &chosen))?;
     }
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {
@@ -123,9 +123,7 @@ pub(crate) fn record(
                 slot,
                 caption: &caption(rows[i]),
                 draped: &point.positions,
-                part_of_vertex: &point.part_of_vertex,
-                levels: &point.levels,
-                overlay: None,
+                colours: Colours::Parts { part_of_vertex: &point.part_of_vertex, levels: &point.levels },
             })?;
         }
     }
@@ -145,8 +143,8 @@ fn scatter<'a>(rows: &[&Row], labels: &'a [String], chosen: &[usize]) -> Vec<Sca
     let point = |(i, row): (usize, &&Row)| {
         Some(ScatterPoint {
             label: &labels[i],
-            cost: total_ms(row)?,
-            error_mm: error_mm(row)?,
+            x: total_ms(row)?,
+            y: error_mm(row)?,
             group: usize::from(chosen.contains(&i)),
             named: rows.len() <= ALL_NAMED || chosen.contains(&i),
         })

@@ -14,6 +14,7 @@ use partwise::range_table::RangeTable;
 use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
 
+use crate::commands::fabrics::FabricArgs;
 use crate::commands::work::refining;
 use crate::commands::{console, interrupt};
 
@@ -70,13 +71,14 @@ impl Garment {
     pub(crate) fn load(
         name: &str,
         body: &str,
-        fabric: &Fabric,
+        cloth: &FabricArgs,
         motion: Motion,
         options: &AssessOptions,
     ) -> anyhow::Result<Option<Self>> {
-        let loaded = SceneSpec::new(body, name).load()?;
+        let (loaded, fabric) = (SceneSpec::new(body, name).load()?, cloth.first()?);
+        cloth.check_used(&loaded)?;
         let found = refining(&format!("{name}: reference drape"), |observer| {
-            canonical(&loaded.scene, fabric, options, &mut |step| {
+            canonical(&loaded.scene, &fabric, options, &mut |step| {
                 let _ = observer(step);
                 if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
@@ -99,7 +101,7 @@ impl Garment {
             scene,
             reference: reference.positions,
             displacement,
-            fabric: fabric.clone(),
+            fabric,
             options: options.clone(),
             motion,
             table_3: Holds { parts: 0, rms_mm: 0.0 },

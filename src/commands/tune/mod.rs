@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use partwise::assess::AssessOptions;
-use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::files::stem;
 use partwise::mechanics::coupled::Motion;
 use partwise::range_table::RangeTable;
@@ -25,6 +24,7 @@ use self::check::{Taken, check};
 use self::find::{Found, SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
 use self::garment::Garment;
 use self::report::Verdict;
+use super::fabrics::FabricArgs;
 use super::failure::UserError;
 use super::sinks::SinkArgs;
 use super::sweep::report::{Format, line};
@@ -68,9 +68,8 @@ pub(crate) struct TuneArgs {
     /// Body: `form`, or an OBJ file with garments placed around it
     #[arg(long, value_name = "form|FILE.obj", default_value = DRESS_FORM)]
     body: String,
-    /// Fabric of the reference drape: a built-in name or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
-    fabric: String,
+    #[command(flatten)]
+    cloth: FabricArgs,
     /// Most PARTs a table may make, over all garments tuned together, each its share of Table 3's [default: as many as Table 3
     /// makes of each]
     #[arg(long, value_name = "N", help_heading = "Search")]
@@ -125,7 +124,7 @@ impl TuneArgs {
         use_threads(self.threads)?;
         interrupt::listen();
         let ladder = self.ladder()?;
-        let fabric = Fabric::by_name(&self.fabric)?;
+        self.cloth.only("tune")?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
         let names: Vec<String> = if self.garment.is_empty() {
             BUILT_IN.iter().map(|n| (*n).to_owned()).filter(|n| !self.hold_out.contains(n)).collect()
@@ -133,7 +132,7 @@ impl TuneArgs {
             self.garment.clone()
         };
         let load = |names: &[String]| -> anyhow::Result<Option<Vec<Garment>>> {
-            names.iter().map(|name| Garment::load(name, &self.body, &fabric, self.motion, &options)).collect()
+            names.iter().map(|name| Garment::load(name, &self.body, &self.cloth, self.motion, &options)).collect()
         };
         let (Some(garments), Some(held_out)) = (load(&names)?, load(&self.hold_out)?) else { return Ok(()) };
         let sets: Vec<Vec<&Garment>> =

@@ -8,7 +8,8 @@ use partwise::figures::LevelCount;
 use partwise::parts::Parts;
 use partwise::range_table::RangeTable;
 use partwise::record::{
-    Chosen, Layout, Overlay, Panel, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView, When,
+    Chosen, Colours, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
+    StepView, When,
 };
 use partwise::table_search::Front;
 
@@ -114,9 +115,10 @@ fn slot(
         slot,
         caption: &format!("{} PARTs · holds to {:.1} mm · model {model_mm:.1} mm", holds.parts, holds.rms_mm),
         draped: &held(garment, &parts)?,
-        part_of_vertex: &parts.part_of_vertex,
-        levels: &LevelCount::all(shown.table, &parts),
-        overlay: None,
+        colours: Colours::Parts {
+            part_of_vertex: &parts.part_of_vertex,
+            levels: &LevelCount::all(shown.table, &parts),
+        },
     })?;
     Ok(())
 }
@@ -124,13 +126,13 @@ fn slot(
 /// The front so far beside Table 3, all garments of the search together.
 fn scatter(recorder: &mut Recorder, index: i64, all: &[&Garment], front: &Front) -> anyhow::Result<()> {
     let (parts, error_mm) = super::report::table_3(all);
-    let mut points = vec![ScatterPoint { label: "Table 3", cost: parts as f64, error_mm, group: 1, named: true }];
+    let mut points = vec![ScatterPoint { label: "Table 3", x: parts as f64, y: error_mm, group: 1, named: true }];
     points.extend(front.points.iter().map(|p| ScatterPoint {
         label: "",
-        cost: p.parts as f64,
-        error_mm: 1e3 * p.rms_m,
+        x: p.parts as f64,
+        y: 1e3 * p.rms_m,
         group: 0,
         named: false,
     }));
-    Ok(recorder.scatter(When::Table(index), "PARTs", &points)?)
+    Ok(recorder.scatter(When::Table(index), Picture::of_error("PARTs"), &points)?)
 }

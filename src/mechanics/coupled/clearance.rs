@@ -13,13 +13,14 @@ const ROUNDS: usize = 4;
 /// Nearer than this share of the offset a vertex is moved: rounding may leave it a hair short, and an eighth of the way is near enough.
 pub(super) const NEAR: f64 = 0.875;
 
-/// Moves every vertex that is not held to at least `offset_m` from the body; returns how many moved.
-pub fn push_out(body: &Body, held: &[bool], offset_m: f64, positions: &mut [DVec3]) -> usize {
+/// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
+pub fn push_out(body: &Body, held: &[bool], offsets_m: &[f64], positions: &mut [DVec3]) -> usize {
     let moved: Vec<bool> = positions
         .par_iter_mut()
         .with_min_len(128)
         .zip(held)
-        .map(|(x, &held)| {
+        .zip(offsets_m)
+        .map(|((x, &held), &offset_m)| {
             let mut moved = false;
             for _ in 0..if held { 0 } else { ROUNDS } {
                 let near = body.nearest(*x);

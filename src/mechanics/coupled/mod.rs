@@ -43,7 +43,6 @@ use super::energy::{Cloth, Contacts, gravity};
 use super::newton::{Descent, Pace};
 use super::refine::Record;
 use crate::distance::Body;
-use crate::fabric::Fabric;
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
 use hessian::Reduced;
@@ -70,8 +69,6 @@ pub struct Garment<'a> {
     pub topology: &'a Topology,
     /// Its cloth at full resolution.
     pub cloth: &'a Cloth,
-    /// What it is made of.
-    pub fabric: &'a Fabric,
 }
 
 /// Told of the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
@@ -128,7 +125,7 @@ pub(crate) fn solve_given(
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<CoupledResult, CoupledError> {
-    let Garment { mesh, topology, cloth, fabric } = *garment;
+    let Garment { mesh, topology, cloth } = *garment;
     check("the list of start positions", start.len(), mesh.vertex_count())?;
     check("the list of vertex PARTs", parts.part_of_vertex.len(), mesh.vertex_count())?;
     if parts.is_empty() {
@@ -137,7 +134,7 @@ pub(crate) fn solve_given(
     let began = Instant::now();
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
     let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion))?;
-    let loose = cloth.clone().with_slack(&slack::shares(mesh, parts, fabric));
+    let loose = cloth.clone().with_slack(&slack::shares(mesh, parts, cloth));
     let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
     let soft = loose.softened(height, options.soft_strain).unwrap_or(loose);
     let setup = began.elapsed();
@@ -149,9 +146,10 @@ pub(crate) fn solve_given(
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
     let mut positions = descent.x;
-    let leave = |(v, &held): (usize, &bool)| held || descent.contacts.is_clear(v, positions[v], NEAR * cloth.offset);
+    let leave =
+        |(v, &held): (usize, &bool)| held || descent.contacts.is_clear(v, positions[v], NEAR * cloth.offsets[v]);
     let leave: Vec<bool> = cloth.held.iter().enumerate().map(leave).collect();
-    let pushed_out = push_out(body, &leave, cloth.offset, &mut positions);
+    let pushed_out = push_out(body, &leave, &cloth.offsets, &mut positions);
     for (part, out) in parts.parts.iter().zip(&mut results) {
         let moved = part.vertices.iter().map(|&v| positions[v as usize] - start[v as usize]).sum::<DVec3>();
         out.displacement = moved / part.vertices.len() as f64;

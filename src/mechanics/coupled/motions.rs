@@ -20,8 +20,8 @@ use glam::{DMat3, DVec3};
 
 use super::options::Motion;
 use super::weights::Weights;
+use crate::lanes::{Four, Lanes, Pack};
 use crate::mechanics::energy::pattern::Pattern;
-use crate::mechanics::lanes::{Four, Lanes, Pack};
 use crate::mechanics::newton::{SolveError, Solver};
 use crate::mechanics::principal::principal;
 use crate::parts::Parts;

@@ -21,7 +21,7 @@
 //! | ℓ | width of a PART: twice its farthest vertex's distance from its middle | m |
 //! | λ, L, T | width of a fold, its length, the tension along it | m, m, N/m |
 //!
-//! Limits: one λ for the whole garment; a PART both long and narrow is as wide as it is long, so a narrow ring counts as wide.
+//! Several fabrics have a λ each, under the garment's mean weight. Limits: λ does not depend on the place; a PART both long and narrow is as wide as it is long, so a narrow ring counts as wide.
 
 use std::f64::consts::PI;
 
@@ -29,9 +29,10 @@ use glam::DVec3;
 
 use crate::GRAVITY;
 use crate::fabric::Fabric;
-use crate::mechanics::energy::membrane::SLACK;
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::energy::membrane::{SLACK, Triangle};
 use crate::mesh::TriMesh;
-use crate::parts::{Parts, UNASSIGNED};
+use crate::parts::{Part, Parts, UNASSIGNED};
 
 #[cfg(doc)]
 use crate::mechanics::energy::membrane;
@@ -43,45 +44,63 @@ const NARROW: f64 = 2.0;
 /// What folds there are to make, by how wide the PARTs are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Folding {
-    /// λ, the width of a fold, m.
+    /// λ, the width of a fold, m; of several fabrics the narrowest.
     pub width_m: f64,
     /// Share of the vertices in PARTs so narrow that they fold with their neighbours.
     pub share: f64,
 }
 
 impl Folding {
-    /// Of these PARTs of a garment in this fabric.
+    /// Of these PARTs of a garment.
     #[must_use]
-    pub fn of(mesh: &TriMesh, parts: &Parts, fabric: &Fabric) -> Self {
-        let width_m = fold_width(mesh, fabric);
-        let folding = parts.parts.iter().filter(|part| width(mesh, &part.vertices) <= NARROW * width_m);
-        let vertices: usize = folding.map(|part| part.vertices.len()).sum();
+    pub fn of(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Self {
+        let folds = fold_widths(mesh, cloth);
+        let mut fold_of_vertex = vec![folds[0]; mesh.vertex_count()];
+        for t in cloth.triangles.iter().rev() {
+            t.vertices.iter().for_each(|&v| fold_of_vertex[v as usize] = folds[t.fabric as usize]);
+        }
+        let folding = |part: &Part| {
+            let width = width(mesh, &part.vertices);
+            part.vertices.iter().filter(|&&v| width <= NARROW * fold_of_vertex[v as usize]).count()
+        };
+        let vertices: usize = parts.parts.iter().map(folding).sum();
+        let width_m = folds.into_iter().fold(f64::INFINITY, f64::min);
         Self { width_m, share: vertices as f64 / mesh.vertex_count().max(1) as f64 }
     }
 }
 
-/// Share r of each triangle: that of the widest PART it touches.
-pub(super) fn shares(mesh: &TriMesh, parts: &Parts, fabric: &Fabric) -> Vec<f64> {
-    let stiffness = fabric.stretch_weft_n_per_m.min(fabric.stretch_warp_n_per_m);
-    let bending = fabric.bending_nm.into_iter().fold(0.0, f64::max);
-    let narrow = NARROW * fold_width(mesh, fabric);
-    let of_part: Vec<f64> = parts.map(|_, part| {
-        let width = width(mesh, &part.vertices);
-        if width <= narrow { SLACK } else { (PI * PI * bending / (stiffness * width * width)).min(SLACK) }
-    });
-    let of_triangle = |triangle: &[u32; 3]| {
-        let parts = triangle.iter().map(|&v| parts.part_of_vertex[v as usize]).filter(|&p| p != UNASSIGNED);
-        parts.map(|p| of_part[p as usize]).fold(SLACK, f64::min)
+/// Share r of each triangle: that of the widest PART it touches, in its own fabric.
+pub(super) fn shares(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Vec<f64> {
+    let widths: Vec<f64> = parts.map(|_, part| width(mesh, &part.vertices));
+    let share = |(fabric, fold): (&Fabric, f64)| -> Vec<f64> {
+        let stiffness = fabric.stretch_weft_n_per_m.min(fabric.stretch_warp_n_per_m);
+        let bending = fabric.bending_nm.into_iter().fold(0.0, f64::max);
+        let of_part = |&width: &f64| {
+            if width <= NARROW * fold { SLACK } else { (PI * PI * bending / (stiffness * width * width)).min(SLACK) }
+        };
+        widths.iter().map(of_part).collect()
     };
-    mesh.triangles.iter().map(of_triangle).collect()
+    let of_part: Vec<Vec<f64>> = cloth.fabrics.iter().zip(fold_widths(mesh, cloth)).map(share).collect();
+    let of_triangle = |t: &Triangle| {
+        let parts = t.vertices.iter().map(|&v| parts.part_of_vertex[v as usize]).filter(|&p| p != UNASSIGNED);
+        parts.map(|p| of_part[t.fabric as usize][p as usize]).fold(SLACK, f64::min)
+    };
+    cloth.triangles.iter().map(of_triangle).collect()
 }
 
-/// λ, m.
-fn fold_width(mesh: &TriMesh, fabric: &Fabric) -> f64 {
-    let bending = fabric.bending_nm.into_iter().sum::<f64>() / 3.0;
+/// λ of each fabric, m: its own bending under what the garment weighs on average.
+fn fold_widths(mesh: &TriMesh, cloth: &Cloth) -> Vec<f64> {
     let length = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
-    let tension = 0.5 * fabric.density_kg_per_m2 * GRAVITY * length;
-    if tension > 0.0 { 2.0 * PI.sqrt() * (bending / tension).powf(0.25) * length.sqrt() } else { 0.0 }
+    // As the first one's and what the others have more of, so that of one fabric it is that one's to the last bit.
+    let of_first = cloth.fabrics[0].density_kg_per_m2;
+    let denser = |t: &Triangle| t.area * (cloth.fabrics[t.fabric as usize].density_kg_per_m2 - of_first);
+    let more = cloth.triangles.iter().map(denser).sum::<f64>() / cloth.triangles.iter().map(|t| t.area).sum::<f64>();
+    let tension = 0.5 * (of_first + more) * GRAVITY * length;
+    let fold = |fabric: &Fabric| {
+        let bending = fabric.bending_nm.into_iter().sum::<f64>() / 3.0;
+        if tension > 0.0 { 2.0 * PI.sqrt() * (bending / tension).powf(0.25) * length.sqrt() } else { 0.0 }
+    };
+    cloth.fabrics.iter().map(fold).collect()
 }
 
 /// ℓ, m.

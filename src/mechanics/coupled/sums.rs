@@ -7,13 +7,13 @@
 //! - a vertex: m ε f_a g_b on the diagonal, and K f_a g_b with K the Hessian of its contact and friction.
 //!
 //! The four f_a are one register. What comes on the diagonal alone is kept by itself, a ninth of the work. Same bits on every machine
-//! ([`lanes`](crate::mechanics::lanes)).
+//! ([`lanes`](crate::lanes)).
 
 use glam::{DMat3, DVec3};
 
 use super::elements::Elements;
 use super::motions::Functions;
-use crate::mechanics::lanes::{Four, Lanes, Pack, Work, run};
+use crate::lanes::{Four, Lanes, Pack, Work, run};
 use crate::mechanics::newton::State;
 
 /// What is summed.
@@ -100,7 +100,7 @@ fn triangles<L: Lanes>(
     for &(i, standing_for) in sampled {
         let i = i as usize;
         let t = &cloth.triangles[i];
-        let [huu, huv, hvv] = t.by_gradient(&cloth.stiffness, x, false);
+        let [huu, huv, hvv] = t.by_gradient(cloth.stiffness_of(t), x, false);
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();

@@ -14,6 +14,9 @@
 //! ½ 2B/(A₀ + A₁) |Σ c_i x_i|² with the cotangent weights c_i of the same paper and the factor that a mesh of equilateral
 //! triangles needs.
 //!
+//! Where fabrics meet, a ring or hinge has their mean by area: exact along the seam; across it, where the softer side would take more of
+//! the bend, an upper bound, as a seam with its allowances is stiffer than the cloth beside it.
+//!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | A_i | rest area, each triangle's shared among its inner vertices | m² |
@@ -30,14 +33,14 @@ use rayon::prelude::*;
 use super::fan::Fan;
 use super::plate::Plate;
 use crate::fabric::Fabric;
-use crate::mechanics::lanes::{Four, Lanes};
+use crate::lanes::{Four, Lanes};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
 /// zero; a good ring changes by less than this.
 const RIDGE: f64 = 1e-6;
 
-/// A floor for H as a share of B_u + B_v, so that a saddle always costs something.
+/// A floor for H as a share of B_u + B_v: a saddle always costs something.
 const LEAST_TWIST: f64 = 0.1;
 
 /// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum.
@@ -61,13 +64,11 @@ struct Element {
 impl Bending {
     /// Rings and hinges of a mesh in its rest shape.
     #[must_use]
-    pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabric: &Fabric) -> Self {
-        let [weft, bias, warp] = fabric.bending_nm;
-        let twist = (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp));
-        let stiffness = DVec3::new(weft, twist, warp);
+    pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabrics: &[Fabric]) -> Self {
+        let stiffness: Vec<DVec3> = fabrics.iter().map(stiffness).collect();
         let fans = Fan::all(mesh, rest);
         let mut bending = Self::default();
-        let mut share = vec![0.0; mesh.vertex_count()];
+        let mut share = vec![vec![0.0; mesh.vertex_count()]; fabrics.len()];
         let mut bare = vec![false; mesh.triangles.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             let corners = voronoi(rest.corners[t]);
@@ -76,6 +77,7 @@ impl Bending {
             bare[t] = sum == 0.0;
             let [a, b, c] = rest.corners[t];
             let area = 0.5 * (b - a).perp_dot(c - a).abs();
+            let share = &mut share[rest.fabric_of(t)];
             for (&v, part) in inner() {
                 share[v as usize] += area * part / sum;
             }
@@ -84,19 +86,19 @@ impl Bending {
         let weights: Vec<Option<Vec<DVec3>>> = fans.par_iter().with_min_len(64).map(weights_of).collect();
         for (v, (fan, weights)) in fans.iter().zip(weights).enumerate() {
             if let (Some(fan), Some(weights)) = (fan, weights) {
-                bending.push_ring(v as u32, fan, weights, stiffness * share[v]);
+                let whole = stiffness.iter().zip(&share).map(|(stiffness, share)| *stiffness * share[v]).sum();
+                bending.push_ring(v as u32, fan, weights, whole);
             }
         }
-        let mean = 0.25 * (weft + 2.0 * bias + warp);
+        let mean: Vec<f64> =
+            fabrics.iter().map(|f| f.bending_nm).map(|[u, bias, v]| 0.25 * (u + 2.0 * bias + v)).collect();
         let inner = topology.edges.iter().zip(&topology.edge_triangles).zip(&topology.edge_valence);
         for ((&edge, &[s, t]), &valence) in inner {
             if valence > 1 && (bare[s as usize] || bare[t as usize]) {
-                bending.push_hinge(mesh, rest, edge, [s, t], mean);
+                bending.push_hinge(mesh, rest, edge, [s, t], &mean);
             }
         }
-        let elements: Vec<_> = bending.elements().collect();
-        let plate = Plate::new(mesh.vertex_count(), &elements);
-        bending.plate = plate;
+        bending.plate = Plate::new(mesh.vertex_count(), &bending.elements().collect::<Vec<_>>());
         bending
     }
 
@@ -109,10 +111,11 @@ impl Bending {
         self.elements.push(Element { start, end: self.vertices.len() as u32, stiffness });
     }
 
-    fn push_hinge(&mut self, mesh: &TriMesh, rest: &RestShape, [a, b]: [u32; 2], wings: [u32; 2], b_mean: f64) {
+    fn push_hinge(&mut self, mesh: &TriMesh, rest: &RestShape, [a, b]: [u32; 2], wings: [u32; 2], mean: &[f64]) {
         let mut weights = [0.0; 4];
         let mut vertices = [a, b, a, b];
-        let mut area = 0.0;
+        let (mut area, mut more) = (0.0, 0.0);
+        let of_first = mean[rest.fabric_of(wings[0] as usize)];
         for (k, t) in wings.map(|t| t as usize).into_iter().enumerate() {
             let at = |v: u32| mesh.triangles[t].iter().position(|&c| c == v);
             let (Some(i), Some(j)) = (at(a), at(b)) else { return };
@@ -124,8 +127,11 @@ impl Bending {
             weights[1] += at_a;
             weights[2 + k] = -at_a - at_b;
             vertices[2 + k] = mesh.triangles[t][tip];
-            area += 0.5 * (q - p).perp_dot(r - p).abs();
+            let own = 0.5 * (q - p).perp_dot(r - p).abs();
+            area += own;
+            more += own * (mean[rest.fabric_of(t)] - of_first);
         }
+        let b_mean = of_first + more / area;
         let start = self.vertices.len() as u32;
         self.vertices.extend(vertices);
         self.weights.extend(weights.map(|w| DVec3::X * w));
@@ -203,6 +209,12 @@ impl Bending {
     }
 }
 
+/// (B_u, H, B_v), N·m.
+fn stiffness(fabric: &Fabric) -> DVec3 {
+    let [weft, bias, warp] = fabric.bending_nm;
+    DVec3::new(weft, (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp)), warp)
+}
+
 /// Each corner's part of a triangle: its Voronoi cell, or halves and quarters where that leaves the triangle (Meyer,
 /// Desbrun, Schröder, Barr: "Discrete differential-geometry operators for triangulated 2-manifolds", 2003). A third each would
 /// weigh vertices by their valence, and a strip would bend more where the light ones lie.
@@ -222,7 +234,7 @@ fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
     parts.map(|p| p / parts.iter().sum::<f64>())
 }
 
-/// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre takes minus their sum.
+/// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre's is minus their sum.
 fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
     let scale = spokes.iter().map(|p| p.length()).sum::<f64>() / spokes.len() as f64;
     // f(p) − f(0) = g·p + ½ f_uu p_u² + f_uv p_u p_v + ½ f_vv p_v², near spokes counting more.
@@ -255,8 +267,7 @@ fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
     Some(rows.iter().map(fit).collect())
 }
 
-/// The lower factor L of a symmetric matrix L Lᵀ; `None` where it is not positive. Five by five is too small for a library's setting up,
-/// and there is one for every vertex.
+/// The lower factor L of a symmetric matrix L Lᵀ; `None` where it is not positive. Too small, and one a vertex, for a library's.
 fn cholesky(mut m: [[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
     for j in 0..5 {
         for i in j..5 {

@@ -11,6 +11,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
+use super::EnergyError;
 use super::bending::Bending;
 use super::contact::Contacts;
 use super::friction::Friction;
@@ -21,7 +22,7 @@ use super::pattern::Pattern;
 use super::proximity::{Proximity, Skin};
 use crate::GRAVITY;
 use crate::distance::Body;
-use crate::fabric::Fabric;
+use crate::fabric::{Fabric, at_vertices};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with
@@ -34,40 +35,7 @@ const TIGHTEST_RADIUS: f64 = 0.03;
 /// No mesh is so coarse that its cloth floats farther than this from the body, m: the gap cloth simulators commonly keep.
 const LARGEST_SAG: f64 = 3e-3;
 
-/// What can be wrong with a garment's data.
-#[derive(Debug, thiserror::Error)]
-pub enum EnergyError {
-    /// As many rest triangles as triangles are needed.
-    #[error("the rest shape has {rest} triangles and the garment {mesh}: give the rest shape of this very mesh")]
-    RestCount {
-        /// Triangles of the rest shape.
-        rest: usize,
-        /// Triangles of the mesh.
-        mesh: usize,
-    },
-    /// A triangle without rest area has no strain.
-    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
-    Degenerate {
-        /// Its index, from 0.
-        triangle: usize,
-    },
-    /// A held vertex that is not there.
-    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
-    Held {
-        /// Index asked for, from 0.
-        vertex: u32,
-        /// Vertices there are.
-        count: usize,
-    },
-    /// No vertex left to move.
-    #[error("no vertex is free: all {count} are held")]
-    NothingFree {
-        /// Vertices there are.
-        count: usize,
-    },
-}
-
-/// The unchanging part of the energy of one garment in one fabric.
+/// The unchanging part of the energy of one garment in its fabrics.
 #[derive(Debug, Clone)]
 pub struct Cloth {
     /// Mass of each vertex, kg.
@@ -78,17 +46,22 @@ pub struct Cloth {
     pub held: Vec<bool>,
     /// Weight of the whole garment, N.
     pub weight: f64,
-    /// Distance the cloth keeps from the body, m.
+    /// Distance each vertex keeps from the body, m.
+    pub offsets: Vec<f64>,
+    /// Most of them, m.
     pub offset: f64,
-    /// Thickness of the cloth, m.
-    pub thickness: f64,
-    /// Coulomb friction, against the body and against itself.
-    pub friction: f64,
+    /// Thickness of the cloth at each vertex, m.
+    pub thickness: Arc<Vec<f64>>,
+    /// Coulomb friction at each vertex, against the body and against itself.
+    pub friction: Arc<Vec<f64>>,
+    /// What it is cut from, as the triangles number them.
+    pub fabrics: Arc<Vec<Fabric>>,
     /// The triangles' rest data.
     pub triangles: Vec<Triangle>,
     /// The rings that bend.
     pub bending: Arc<Bending>,
-    pub(crate) stiffness: Stiffness,
+    /// Of each fabric.
+    pub(super) stiffness: Vec<Stiffness>,
     /// The triangles by fours.
     pub(super) packs: Vec<TrianglePack>,
     placed: Arc<Vec<DVec3>>,
@@ -99,7 +72,8 @@ pub struct Cloth {
 }
 
 impl Cloth {
-    /// Precomputes everything that does not depend on positions. `held` vertices do not move.
+    /// Precomputes everything that does not depend on positions. `fabric` is one, or all that the rest shape numbers; `held`
+    /// vertices do not move.
     ///
     /// # Errors
     /// [`EnergyError`] names the triangle or vertex that is wrong.
@@ -107,12 +81,17 @@ impl Cloth {
         mesh: &TriMesh,
         topology: &Topology,
         rest: &RestShape,
-        fabric: &Fabric,
+        fabric: &(impl AsRef<[Fabric]> + ?Sized),
         held: &[u32],
     ) -> Result<Self, EnergyError> {
         let n = mesh.vertex_count();
+        let fabrics = fabric.as_ref();
         if rest.corners.len() != mesh.triangles.len() {
             return Err(EnergyError::RestCount { rest: rest.corners.len(), mesh: mesh.triangles.len() });
+        }
+        let cut_from = 1 + rest.cut_from.iter().copied().max().map_or(0, usize::from);
+        if cut_from > fabrics.len() {
+            return Err(EnergyError::Fabrics { cut_from, given: fabrics.len() });
         }
         let mut is_held = vec![false; n];
         for &vertex in held {
@@ -123,20 +102,31 @@ impl Cloth {
             .iter()
             .zip(&rest.corners)
             .enumerate()
-            .map(|(triangle, (&v, &c))| Triangle::new(v, c).ok_or(EnergyError::Degenerate { triangle }))
+            .map(|(triangle, (&v, &c))| {
+                let made = Triangle::new(v, c).ok_or(EnergyError::Degenerate { triangle })?;
+                Ok(Triangle { fabric: rest.fabric_of(triangle) as u16, ..made })
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let mut areas = vec![0.0; n];
+        let mut by_fabric = vec![vec![0.0; n]; fabrics.len()];
         for (t, area) in triangles.iter().zip(rest.areas()) {
             for &v in &t.vertices {
                 areas[v as usize] += area.abs() / 3.0;
+                by_fabric[t.fabric as usize][v as usize] += area.abs() / 3.0;
             }
         }
         // A vertex of no triangle has no mass and nothing to balance: it keeps still.
         for (h, &area) in is_held.iter_mut().zip(&areas) {
             *h |= area == 0.0;
         }
-        let masses: Vec<f64> = areas.iter().map(|a| a * fabric.density_kg_per_m2).collect();
-        let bending = Bending::new(mesh, topology, rest, fabric);
+        let mut masses = vec![0.0; n];
+        for (areas, fabric) in by_fabric.iter().zip(fabrics) {
+            masses.iter_mut().zip(areas).for_each(|(mass, area)| *mass += area * fabric.density_kg_per_m2);
+        }
+        let bending = Bending::new(mesh, topology, rest, fabrics);
+        let thickness = at_vertices(mesh, rest, fabrics, |fabric| fabric.thickness_m);
+        let sag = sag(mesh);
+        let offsets: Vec<f64> = thickness.iter().map(|thickness| thickness + sag).collect();
         if !is_held.contains(&false) {
             return Err(EnergyError::NothingFree { count: n });
         }
@@ -147,16 +137,18 @@ impl Cloth {
             masses,
             areas,
             held: is_held,
-            offset: fabric.thickness_m + sag(mesh),
-            friction: fabric.friction,
+            offset: offsets.iter().copied().fold(0.0, f64::max),
+            offsets,
+            thickness: Arc::new(thickness),
+            friction: Arc::new(at_vertices(mesh, rest, fabrics, |fabric| fabric.friction)),
+            fabrics: Arc::new(fabrics.to_vec()),
             triangles,
             bending: Arc::new(bending),
-            stiffness: Stiffness::new(fabric),
+            stiffness: fabrics.iter().map(Stiffness::new).collect(),
             clear: Arc::clone(&placed),
             placed,
             layout: Arc::new(OnceLock::new()),
             skin: Arc::new(OnceLock::new()),
-            thickness: fabric.thickness_m,
         })
     }
 
@@ -185,7 +177,11 @@ impl Cloth {
     #[must_use]
     pub fn softened(&self, height_m: f64, strain: f64) -> Option<Self> {
         let most = self.weight / self.areas.iter().sum::<f64>() * height_m / strain;
-        let stiffness = if most > 0.0 && most.is_finite() { self.stiffness.capped(most)? } else { return None };
+        let softer: Vec<_> = self.stiffness.iter().map(|stiffness| stiffness.capped(most)).collect();
+        if !(most > 0.0 && most.is_finite() && softer.iter().any(Option::is_some)) {
+            return None;
+        }
+        let stiffness = softer.iter().zip(&self.stiffness).map(|(softer, own)| softer.unwrap_or(*own)).collect();
         Some(Self { stiffness, ..self.clone() })
     }
 
@@ -211,10 +207,15 @@ impl Cloth {
         self.masses.len()
     }
 
-    /// Contact stiffness κ to begin with, N/m³.
+    /// Contact stiffness κ to begin with, N/m³; of several fabrics for the thinnest.
     #[must_use]
     pub fn contact_stiffness(&self) -> f64 {
-        HALF_THICKNESS_PRESSURE / (0.5 * self.offset)
+        HALF_THICKNESS_PRESSURE / (0.5 * self.offsets.iter().copied().fold(f64::INFINITY, f64::min))
+    }
+
+    /// The membrane stiffness of a triangle.
+    pub(crate) fn stiffness_of(&self, triangle: &Triangle) -> &Stiffness {
+        &self.stiffness[triangle.fabric as usize]
     }
 
     /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
@@ -233,7 +234,8 @@ impl Cloth {
     #[must_use]
     pub fn proximity(&self) -> Proximity {
         let skin = self.skin.get_or_init(|| Arc::new(Skin::new(&self.triangles, self.vertex_count())));
-        Proximity::new(Arc::clone(skin), [&self.placed, &self.clear].map(Arc::clone), self.thickness, self.friction)
+        let of_vertices = [&self.thickness, &self.friction].map(Arc::clone);
+        Proximity::new(Arc::clone(skin), [&self.placed, &self.clear].map(Arc::clone), of_vertices)
     }
 
     /// The layout of a Hessian with blocks for these pairs of vertices as well, ordered as the cloth lies at `x`.
@@ -242,8 +244,8 @@ impl Cloth {
     }
 
     pub(super) fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
-        let friction = Friction::new(self.friction);
-        Contacts::new(body, &self.areas, &self.held, self.offset, self.contact_stiffness(), friction)
+        let friction = Friction::new(Arc::clone(&self.friction));
+        Contacts::new(body, [&self.areas, &self.offsets], &self.held, self.contact_stiffness(), friction)
     }
 
     pub(super) fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {

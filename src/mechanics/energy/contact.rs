@@ -101,14 +101,20 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at distance `offset` (m) with
+    /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at their `offsets` (m) with
     /// `stiffness` κ (N/m³). Ask [`update`](Self::update) before use.
     #[must_use]
-    pub fn new(body: &'b Body, areas: &[f64], held: &[bool], offset: f64, stiffness: f64, friction: Friction) -> Self {
+    pub fn new(
+        body: &'b Body,
+        [areas, offsets]: [&[f64]; 2],
+        held: &[bool],
+        stiffness: f64,
+        friction: Friction,
+    ) -> Self {
         let n = areas.len();
         Self {
             met: Met::Rounded(Field::new(body, n)),
-            offsets: vec![offset; n],
+            offsets: offsets.to_vec(),
             areas: areas.to_vec(),
             held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],

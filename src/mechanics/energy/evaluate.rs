@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::packs::{self, TrianglePack};
 use super::{Cloth, Contacts};
 use crate::GRAVITY;
-use crate::mechanics::lanes::{Four, Lanes, Work, run};
+use crate::lanes::{Four, Lanes, Work, run};
 
 /// Memory of an evaluation, kept from one to the next.
 #[derive(Debug, Clone, Default)]

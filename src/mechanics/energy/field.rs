@@ -22,7 +22,6 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
-use rayon::prelude::*;
 
 use crate::distance::Body;
 
@@ -67,8 +66,8 @@ impl<'b> Field<'b> {
         missing.sort_unstable_by_key(IVec3::to_array);
         missing.dedup();
         let body = self.body;
-        let found: Vec<f64> =
-            missing.par_iter().with_min_len(128).map(|i| body.nearest(i.as_dvec3() * SIDE).signed_distance).collect();
+        let points: Vec<DVec3> = missing.iter().map(|i| i.as_dvec3() * SIDE).collect();
+        let found = body.nearest_all(&points).into_iter().map(|near| near.signed_distance);
         self.values.extend(missing.into_iter().zip(found));
         for v in moved {
             let cell = cell_of(x[v as usize]);

@@ -19,6 +19,8 @@
 //!
 //! Limits: statics has no history of its own; the anchors are where the solver's path first touched the body.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
 use super::contact::Touch;
@@ -52,7 +54,8 @@ impl Hold {
 /// Every hold of a cloth on the body.
 #[derive(Debug, Clone, Default)]
 pub struct Friction {
-    coefficient: f64,
+    /// Of each vertex.
+    coefficients: Arc<Vec<f64>>,
     holds: Vec<Hold>,
 }
 
@@ -63,16 +66,16 @@ impl Friction {
         Self::default()
     }
 
-    /// With Coulomb's coefficient.
+    /// With each vertex's coefficient of Coulomb.
     #[must_use]
-    pub fn new(coefficient: f64) -> Self {
-        Self { coefficient, holds: Vec::new() }
+    pub fn new(coefficients: Arc<Vec<f64>>) -> Self {
+        Self { coefficients, holds: Vec::new() }
     }
 
     /// Takes normal forces and normals from `touches` at `x`; keeps the anchors of those that held, drags those that
     /// slipped, lets go of those that left.
     pub fn refresh(&mut self, touches: &[Touch], x: &[DVec3]) {
-        if self.coefficient <= 0.0 {
+        if self.coefficients.iter().all(|coefficient| *coefficient <= 0.0) {
             return;
         }
         let mut old = self.holds.iter().peekable();
@@ -85,8 +88,12 @@ impl Friction {
             // steeper than any.
             let slope = t.normal.length();
             let normal = t.normal / if slope > 0.0 { slope } else { 1.0 };
-            let mut hold =
-                Hold { vertex: t.vertex, anchor, normal, limit: self.coefficient * t.force() * slope.min(1.0) };
+            let mut hold = Hold {
+                vertex: t.vertex,
+                anchor,
+                normal,
+                limit: self.coefficients[t.vertex as usize] * t.force() * slope.min(1.0),
+            };
             let slip = hold.slip(x);
             // The anchor stays in the tangent plane through the vertex; only the slip within ε is elastic.
             hold.anchor = position - slip.clamp_length_max(ELASTIC_SLIP);
@@ -153,7 +160,7 @@ mod tests {
     fn a_gradient_steeper_than_a_distance_leaves_the_hessian_positive_and_the_slip_along_the_surface() {
         let normal = DVec3::new(12.0, -30.0, 20.0);
         let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
-        let mut friction = Friction::new(0.3);
+        let mut friction = Friction::new(Arc::new(vec![0.3]));
         friction.refresh(&[touch], &[DVec3::ZERO]);
         let x = [DVec3::new(3e-4, 1e-4, -2e-4)];
         let (_, block) = friction.hessian(&x).next().unwrap();

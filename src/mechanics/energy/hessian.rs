@@ -17,7 +17,7 @@ impl Cloth {
 
     /// The same in the blocks of another layout.
     pub(crate) fn hessian_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(layout, |t| t.hessian(&self.stiffness, x), x, contacts, blocks);
+        self.assemble(layout, |t| t.hessian(self.stiffness_of(t), x), x, contacts, blocks);
     }
 
     /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
@@ -34,7 +34,7 @@ impl Cloth {
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
     ) {
-        self.assemble(layout, |t| t.hessian_bearing(&self.stiffness, x), x, contacts, blocks);
+        self.assemble(layout, |t| t.hessian_bearing(self.stiffness_of(t), x), x, contacts, blocks);
     }
 
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
@@ -47,7 +47,7 @@ impl Cloth {
                 .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))),
         );
         for t in &self.triangles {
-            for (&v, block) in t.vertices.iter().zip(t.own_blocks(&self.stiffness, x)) {
+            for (&v, block) in t.vertices.iter().zip(t.own_blocks(self.stiffness_of(t), x)) {
                 blocks[v as usize] += block;
             }
         }

@@ -57,6 +57,8 @@ pub struct Triangle {
     pub slack: f64,
     /// Whether it is a sliver, and counts as higher than it is.
     pub sliver: bool,
+    /// Number of the fabric it is cut from.
+    pub fabric: u16,
 }
 
 /// Membrane stiffness, N/m.
@@ -164,6 +166,7 @@ impl Triangle {
             gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
             slack: if sliver { 0.0 } else { SLACK },
             sliver,
+            fabric: 0,
         })
     }
 

@@ -17,9 +17,9 @@
 //! those of the triangles one by one, whose sums have another order.
 
 use super::membrane::{SHORTEST, Stiffness, Triangle};
-use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors};
+use crate::lanes::{Four, Lanes, Pack, Vectors};
 
-/// Rest data of four triangles; the last pack of a garment is filled up with triangles of no area.
+/// Rest data of four triangles of one fabric; the last pack of each is filled up with triangles of no area.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TrianglePack {
     /// Gradients of the second and third corners' shape functions, 1/m: the three sum to zero.
@@ -28,12 +28,18 @@ pub(super) struct TrianglePack {
     area: Four,
     slack: Four,
     vertices: [[u32; 3]; 4],
+    fabric: u16,
 }
 
 impl TrianglePack {
-    /// Of all triangles, in their order.
+    /// Of all triangles, fabric by fabric, each in their order.
     pub(super) fn all(triangles: &[Triangle]) -> Vec<Self> {
-        triangles.chunks(4).map(Self::new).collect()
+        if triangles.iter().all(|t| t.fabric == triangles[0].fabric) {
+            return triangles.chunks(4).map(Self::new).collect();
+        }
+        let mut sorted = triangles.to_vec();
+        sorted.sort_by_key(|t| t.fabric);
+        sorted.chunk_by(|a, b| a.fabric == b.fabric).flat_map(|same| same.chunks(4).map(Self::new)).collect()
     }
 
     fn new(four: &[Triangle]) -> Self {
@@ -43,6 +49,7 @@ impl TrianglePack {
             area: Four::ZERO,
             slack: Four::ZERO,
             vertices: [[0; 3]; 4],
+            fabric: four[0].fabric,
         };
         for (i, t) in four.iter().enumerate() {
             let [_, p, q] = t.gradients;
@@ -55,15 +62,27 @@ impl TrianglePack {
     }
 }
 
-/// Adds the gradient of the triangles to `gradient`, N; returns their energy, J.
+/// Adds the gradient of the triangles to `gradient`, N, by the stiffness of the fabric of each; returns their energy, J.
 #[inline(always)]
 pub(super) fn add_gradient<L: Lanes>(
     l: L,
     packs: &[TrianglePack],
-    c: &Stiffness,
+    stiffness: &[Stiffness],
     x: &[Four],
     gradient: &mut [Four],
 ) -> f64 {
+    let mut energy = 0.0;
+    let mut left = packs;
+    while let Some(first) = left.first() {
+        let (same, others) = left.split_at(left.partition_point(|pack| pack.fabric == first.fabric));
+        energy += of_one_fabric(l, same, &stiffness[first.fabric as usize], x, gradient);
+        left = others;
+    }
+    energy
+}
+
+#[inline(always)]
+fn of_one_fabric<L: Lanes>(l: L, packs: &[TrianglePack], c: &Stiffness, x: &[Four], gradient: &mut [Four]) -> f64 {
     // Of one length, so that one check of an index does for both.
     let gradient = &mut gradient[..x.len()];
     let (zero, one, half) = (Pack::splat(l, 0.0), Pack::splat(l, 1.0), Pack::splat(l, 0.5));
@@ -123,9 +142,9 @@ mod tests {
 
     use super::*;
     use crate::fabric::Fabric;
-    use crate::mechanics::lanes::{Work, run};
+    use crate::lanes::{Work, run};
 
-    struct Packed<'a>(&'a [TrianglePack], &'a Stiffness, &'a [Four], &'a mut [Four]);
+    struct Packed<'a>(&'a [TrianglePack], &'a [Stiffness], &'a [Four], &'a mut [Four]);
 
     impl Work for Packed<'_> {
         type Output = f64;
@@ -141,28 +160,31 @@ mod tests {
         (i as f64 * 12.9898).sin()
     }
 
-    /// Taut, slack along weft, along warp and along both, and a side of no length; seven triangles, so that one lane is empty.
+    /// Taut, slack along weft, along warp and along both, and a side of no length; seven triangles, so that one lane is empty; of one
+    /// fabric, and of two in turn.
     #[test]
     fn packs_and_what_is_left_over_agree_with_the_triangles() {
-        let stiffness = Stiffness::new(&Fabric::by_name("cotton").unwrap());
+        let stiffness = ["cotton", "jersey"].map(|name| Stiffness::new(&Fabric::by_name(name).unwrap()));
         let rest = |i: usize| {
             let jitter = |k: usize| DVec2::new(noise(7 * i + k), noise(11 * i + k + 3)) * 2e-3;
             [jitter(0), DVec2::new(0.01, 0.0) + jitter(1), DVec2::new(0.002, 0.011) + jitter(2)]
         };
         let scales = [[1.05, 1.1], [0.8, 1.2], [1.3, 0.7], [0.6, 0.5], [1.2, 0.999], [0.0, 1.1], [1.0, 1.0]];
-        for count in 1..=scales.len() {
+        for (count, fabrics) in (1..=scales.len()).flat_map(|count| [(count, 1), (count, 2)]) {
             let mut x: Vec<DVec3> = Vec::new();
             let mut triangles = Vec::new();
             for (i, scale) in scales.iter().enumerate().take(count) {
                 let first = x.len() as u32;
                 let mut t = Triangle::new([first, first + 1, first + 2], rest(i)).unwrap();
                 t.slack = 0.1 + 0.02 * i as f64;
+                t.fabric = (i % fabrics) as u16;
                 triangles.push(t);
                 let turned = |p: DVec2| DVec3::new(0.8 * p.x, p.y, -0.6 * p.x) + DVec3::new(0.3, 0.1, 1.2);
                 x.extend(rest(i).map(|p| turned(p * DVec2::from(*scale))));
             }
             let mut expected = vec![DVec3::ZERO; x.len()];
-            let energy: f64 = triangles.iter().map(|t| t.add_gradient(&stiffness, &x, &mut expected)).sum();
+            let energy: f64 =
+                triangles.iter().map(|t| t.add_gradient(&stiffness[t.fabric as usize], &x, &mut expected)).sum();
             let padded: Vec<Four> = x.iter().map(|p| Four([p.x, p.y, p.z, 0.0])).collect();
             let mut gradient = vec![Four::ZERO; x.len()];
             let packed = run(Packed(&TrianglePack::all(&triangles), &stiffness, &padded, &mut gradient));

@@ -17,7 +17,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::mechanics::lanes::{Four, Lanes, Pack};
+use crate::lanes::{Four, Lanes, Pack};
 
 /// The pairs j < i with Q_ij, by i, two at a time.
 #[derive(Debug, Clone, Default)]

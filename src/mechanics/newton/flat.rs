@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors};
+use crate::lanes::{Four, Lanes, Pack, Vectors};
 
 /// Fours of a group: sixteen vertices, four registers a vector of four vertices.
 const GROUP: usize = 12;

@@ -3,7 +3,7 @@
 //! Sums go in four registers that do not wait for each other, in an order that depends on the length alone.
 
 use super::flat::{Blocks, Flat};
-use crate::mechanics::lanes::{Four, Lanes, Pack, Vectors, Work, run};
+use crate::lanes::{Four, Lanes, Pack, Vectors, Work, run};
 
 /// A pair of L-BFGS: s and y, and 1 / sᵀy, 1/J.
 #[derive(Debug, Default)]

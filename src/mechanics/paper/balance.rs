@@ -11,6 +11,8 @@ pub(super) struct Sums {
     pub(super) area: f64,
     /// Σ ΔV, m³.
     pub(super) volume: f64,
+    /// Mass beyond that of this volume of the first vertex's fabric, kg.
+    pub(super) more: f64,
     /// Σ (cos α_q, cos β_q, cos γ_q) ΔV, m³.
     pub(super) body: DVec3,
     /// Σ (cos α_p, cos β_p, cos γ_p) q ΔV, m⁴.

@@ -55,10 +55,10 @@ pub(super) struct HangingStrip<'a> {
     pub(super) areas: &'a [f64],
     /// The nearest body point of each vertex.
     pub(super) surface: &'a [SurfacePoint],
-    /// k, N/m.
-    pub(super) stiffness: f64,
-    /// t, m.
-    pub(super) thickness_m: f64,
+    /// k at each vertex, N/m.
+    pub(super) stiffness: &'a [f64],
+    /// t at each vertex, m.
+    pub(super) thickness_m: &'a [f64],
     /// The reading of cos(•_p).
     pub(super) cosine: Cosine,
     /// As [`PaperOptions::degenerate_below`](super::PaperOptions::degenerate_below).
@@ -73,7 +73,7 @@ impl HangingStrip<'_> {
         for v in vertices.iter().map(|&v| v as usize) {
             let a = self.areas[v];
             let s = top_z - self.garment.positions[v].z;
-            let q = clearance(self.surface[v].signed_distance, self.thickness_m, Clearance::PlusThickness);
+            let q = clearance(self.surface[v].signed_distance, self.thickness_m[v], Clearance::PlusThickness);
             compliance += a * (height_m * s - 0.5 * s * s);
             weighted += a * q * share(self.normals[v], positive).z;
             plain += a * q;
@@ -84,6 +84,11 @@ impl HangingStrip<'_> {
             return 0.0;
         }
         let w = if weighted > self.degenerate_below * plain { weighted } else { plain };
-        self.stiffness * area * area / (self.thickness_m * w * compliance)
+        let mean = |of: &[f64]| {
+            let first = of[vertices[0] as usize];
+            let more = |&v: &u32| self.areas[v as usize] * (of[v as usize] - first);
+            first + vertices.iter().map(more).sum::<f64>() / area
+        };
+        mean(self.stiffness) * area * area / (mean(self.thickness_m) * w * compliance)
     }
 }

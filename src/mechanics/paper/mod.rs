@@ -37,7 +37,7 @@ mod solve;
 mod volume;
 
 pub use options::{BodyForce, Clearance, Contactless, Cosine, LineForce, PaperOptions, Untouched, Volume};
-pub use solve::solve;
+pub use solve::{Cut, solve, solve_cut};
 
 use glam::DVec3;
 

@@ -15,20 +15,20 @@ pub(super) struct Projected {
     pub(super) left_inside: usize,
 }
 
-/// Moves every position inside the body to its nearest surface point plus `thickness_m` along the outward normal.
-pub(super) fn put_outside(body: &Body, positions: &mut [DVec3], thickness_m: f64) -> Projected {
-    let put = |x: &mut DVec3| {
+/// Moves every position inside the body to its nearest surface point plus its thickness (m) along the outward normal.
+pub(super) fn put_outside(body: &Body, positions: &mut [DVec3], thickness_m: &[f64]) -> Projected {
+    let put = |(x, thickness_m): (&mut DVec3, &f64)| {
         let mut near = body.nearest(*x);
         let moved = near.signed_distance < 0.0;
         for _ in 0..ROUNDS {
             if near.signed_distance >= 0.0 {
                 break;
             }
-            *x = near.point + thickness_m * near.normal;
+            *x = near.point + *thickness_m * near.normal;
             near = body.nearest(*x);
         }
         (moved, near.signed_distance < 0.0)
     };
-    let found: Vec<(bool, bool)> = positions.par_iter_mut().with_min_len(256).map(put).collect();
+    let found: Vec<(bool, bool)> = positions.par_iter_mut().with_min_len(256).zip(thickness_m).map(put).collect();
     Projected { moved: found.iter().filter(|f| f.0).count(), left_inside: found.iter().filter(|f| f.1).count() }
 }

@@ -11,8 +11,8 @@ use super::{
 };
 use crate::GRAVITY;
 use crate::distance::{Body, SurfacePoint};
-use crate::fabric::Fabric;
-use crate::mesh::{Topology, TriMesh};
+use crate::fabric::{Fabric, at_vertices};
+use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::{Part, Parts};
 
 /// Displaces every PART by equations (2) to (9). `surface` is the nearest body point of each garment vertex; vertices in no PART
@@ -29,11 +29,45 @@ pub fn solve(
     fabric: &Fabric,
     options: &PaperOptions,
 ) -> Result<PaperResult, PaperError> {
-    check(garment, surface, parts, fabric, options)?;
-    let thickness = fabric.thickness_m;
+    let rest = RestShape::new(Vec::new());
+    let fabrics = std::slice::from_ref(fabric);
+    solve_cut(garment, topology, body, surface, parts, &Cut { rest: &rest, fabrics }, options)
+}
+
+/// What a garment is cut from.
+#[derive(Debug, Clone, Copy)]
+pub struct Cut<'a> {
+    /// Its rest shape, which says which triangle is of which fabric.
+    pub rest: &'a RestShape,
+    /// The fabrics.
+    pub fabrics: &'a [Fabric],
+}
+
+/// [`solve`] for a garment of several fabrics: each vertex has the mean of those about it, and p_f of a PART is that of a strip with the
+/// PART's mean stiffness and density throughout.
+///
+/// # Errors
+/// As there.
+pub fn solve_cut(
+    garment: &TriMesh,
+    topology: &Topology,
+    body: &Body,
+    surface: &[SurfacePoint],
+    parts: &Parts,
+    cut: &Cut<'_>,
+    options: &PaperOptions,
+) -> Result<PaperResult, PaperError> {
+    check(garment, surface, parts, cut.fabrics, options)?;
+    let of = |constant: fn(&Fabric) -> f64| at_vertices(garment, cut.rest, cut.fabrics, constant);
+    let (thickness, stiffness) = (of(|f| f.thickness_m), of(|f| f.stretch_warp_n_per_m));
+    let density = of(|f| f.density_kg_per_m2);
     let areas = garment.vertex_areas();
     let normals = garment.vertex_normals();
-    let volume = volumes(garment, topology, &areas, thickness, options.volume);
+    let volume = volumes(garment, topology, &areas, &thickness, options.volume);
+    let per_volume: Vec<f64> = density.iter().zip(&thickness).map(|(density, thickness)| density / thickness).collect();
+    // Masses as those of the first vertex's fabric and what the others have more: of one fabric nothing.
+    let mass_density = per_volume.first().copied().unwrap_or_default();
+    let more = |v: usize| (per_volume[v] - mass_density) * volume[v];
     let mut warnings = Vec::new();
     let nearest_m = surface.iter().map(|s| s.signed_distance).fold(f64::INFINITY, f64::min);
     let mut contact_m = options.contact_distance_m;
@@ -44,9 +78,10 @@ pub fn solve(
     let sum_part = |_: usize, part: &Part| {
         let mut sums = Sums::default();
         for v in part.vertices.iter().map(|&v| v as usize) {
-            let q = clearance(surface[v].signed_distance, thickness, options.clearance);
+            let q = clearance(surface[v].signed_distance, thickness[v], options.clearance);
             sums.area += areas[v];
             sums.volume += volume[v];
+            sums.more += more(v);
             sums.body += surface[v].normal * volume[v];
             sums.garment += share(normals[v], options.cosine) * (q * volume[v]);
             sums.largest += q.abs() * volume[v];
@@ -56,8 +91,8 @@ pub fn solve(
     };
     let sums = parts.map(sum_part);
 
-    let mass_density = fabric.density_kg_per_m2 / thickness;
-    let weight_n = GRAVITY * mass_density * volume.iter().sum::<f64>();
+    let all_more = (0..volume.len()).map(more).sum::<f64>();
+    let weight_n = GRAVITY * mass_density * volume.iter().sum::<f64>() + GRAVITY * all_more;
     let contact_parts = sums.iter().filter(|s| s.contact).count();
     let body_force = match options.body_force {
         BodyForce::Given(value) => value,
@@ -78,8 +113,8 @@ pub fn solve(
         normals: &normals,
         areas: &areas,
         surface,
-        stiffness: fabric.stretch_warp_n_per_m,
-        thickness_m: thickness,
+        stiffness: &stiffness,
+        thickness_m: &thickness,
         cosine: options.cosine,
         degenerate_below: options.degenerate_below,
     };
@@ -87,7 +122,7 @@ pub fn solve(
 
     let forces = parts.map(|k, part| {
         let s = &sums[k];
-        let gravity = DVec3::new(0.0, 0.0, GRAVITY * mass_density * s.volume);
+        let gravity = DVec3::new(0.0, 0.0, GRAVITY * mass_density * s.volume + GRAVITY * s.more);
         let anti_force = if s.contact { body_force * s.body } else { DVec3::ZERO };
         let line_force = match options.line_force {
             LineForce::Given(value) => value,
@@ -112,7 +147,7 @@ pub fn solve(
     let displacement = |p: u32| forces.get(p as usize).map_or(DVec3::ZERO, |f| f.displacement);
     let moved = garment.positions.iter().zip(&parts.part_of_vertex).map(|(&x, &p)| x + displacement(p));
     let mut positions: Vec<DVec3> = moved.collect();
-    let projected = put_outside(body, &mut positions, thickness);
+    let projected = put_outside(body, &mut positions, &thickness);
 
     let degenerate_parts = forces.iter().filter(|f| f.degenerate.contains(&true)).count();
     if degenerate_parts > 0 {
@@ -149,7 +184,7 @@ fn check(
     garment: &TriMesh,
     surface: &[SurfacePoint],
     parts: &Parts,
-    fabric: &Fabric,
+    fabrics: &[Fabric],
     options: &PaperOptions,
 ) -> Result<(), PaperError> {
     let expected = garment.vertex_count();
@@ -158,13 +193,17 @@ fn check(
             return Err(PaperError::Length { what, found, expected });
         }
     }
-    for (what, found) in [
-        ("thickness in m", fabric.thickness_m),
-        ("areal density in kg/m²", fabric.density_kg_per_m2),
-        ("warp stiffness in N/m", fabric.stretch_warp_n_per_m),
+    let of_fabrics = fabrics.iter().flat_map(|fabric| {
+        [
+            ("thickness in m", fabric.thickness_m),
+            ("areal density in kg/m²", fabric.density_kg_per_m2),
+            ("warp stiffness in N/m", fabric.stretch_warp_n_per_m),
+        ]
+    });
+    for (what, found) in of_fabrics.chain([
         ("contact distance in m", options.contact_distance_m),
         ("smallest share of stiffness", options.degenerate_below),
-    ] {
+    ]) {
         if !(found.is_finite() && found > 0.0) {
             return Err(PaperError::Constant { what, found });
         }

@@ -10,11 +10,11 @@ pub(super) fn volumes(
     garment: &TriMesh,
     topology: &Topology,
     areas: &[f64],
-    thickness_m: f64,
+    thickness_m: &[f64],
     reading: Volume,
 ) -> Vec<f64> {
     match reading {
-        Volume::AreaTimesThickness => areas.iter().map(|a| a * thickness_m).collect(),
+        Volume::AreaTimesThickness => areas.iter().zip(thickness_m).map(|(a, t)| a * t).collect(),
         Volume::Cuboid => (0..garment.vertex_count() as u32).map(|v| cuboid(garment, topology, v)).collect(),
     }
 }

@@ -173,7 +173,7 @@ fn opened(dressing: &Dressing<'_>, name: String, of_garment: &[u32]) -> Result<P
     let local = |v: u32| vertices.binary_search(&v).unwrap_or_default() as u32;
     let triangles: Vec<[u32; 3]> = of_garment.iter().map(|&t| scene.garment.triangles[t as usize].map(local)).collect();
     let mesh = TriMesh::new(vertices.iter().map(|&v| scene.garment.positions[v as usize]).collect(), triangles.clone());
-    let rest = RestShape { corners: of_garment.iter().map(|&t| scene.rest.corners[t as usize]).collect() };
+    let rest = RestShape::new(of_garment.iter().map(|&t| scene.rest.corners[t as usize]).collect());
     // Seen from where its normals point to on the whole, which sets a front or a half sleeve out without a fold.
     let outward = (0..triangles.len()).map(|t| mesh.double_area_vector(t)).sum::<DVec3>().normalize_or(DVec3::Y);
     let up = if outward.z.abs() > 0.9 { DVec3::X } else { DVec3::Z };

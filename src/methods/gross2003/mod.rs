@@ -82,17 +82,6 @@ impl ReferenceMethod for Gross2003 {
         NAME
     }
 
-    fn drape(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        rayon::scope(|_| self.run(dressing, rule, onlooker))
-    }
-}
-
-impl Gross2003 {
     fn run(
         &self,
         dressing: &Dressing<'_>,
@@ -260,7 +249,7 @@ impl Apart {
         let length = |[a, b]: [u32; 2]| mesh.positions[a as usize].distance(mesh.positions[b as usize]);
         let pairs = copies.iter().flat_map(|copies| copies.windows(2).map(|w| [w[0], w[1]]));
         let seams = pairs.map(|pair| (pair, length(pair))).collect();
-        Self { mesh, rest: RestShape { corners }, of, seams }
+        Self { mesh, rest: RestShape::new(corners), of, seams }
     }
 
     /// The widest seam, m.

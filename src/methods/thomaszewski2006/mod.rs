@@ -73,17 +73,6 @@ impl ReferenceMethod for Thomaszewski2006 {
         NAME
     }
 
-    fn drape(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        rayon::scope(|_| self.run(dressing, rule, onlooker))
-    }
-}
-
-impl Thomaszewski2006 {
     fn run(
         &self,
         dressing: &Dressing<'_>,

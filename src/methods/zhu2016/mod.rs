@@ -54,18 +54,6 @@ impl ReferenceMethod for Zhu2016 {
         NAME
     }
 
-    fn drape(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        // In the pool: hundreds of short parallel loops follow.
-        rayon::scope(|_| self.run(dressing, rule, onlooker))
-    }
-}
-
-impl Zhu2016 {
     fn run(
         &self,
         dressing: &Dressing<'_>,

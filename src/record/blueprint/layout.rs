@@ -6,9 +6,10 @@ use super::super::legend::visible;
 use super::super::outfit::{self, Worn};
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
-use super::closer;
+use super::rows::{grid, in_rows};
 use super::view::View;
 use super::{Node, TimePanel};
+use super::{closer, contest};
 
 /// Width over height of a tab in a window of 16:10, below the bars of the viewer.
 pub(crate) const ASPECT: f64 = 1.8;
@@ -18,8 +19,6 @@ const STAGE_HEIGHT: f64 = 0.75;
 const REPORT_OVER_STAGE: f32 = 1.25;
 /// Share of a tab's height that a row of colour bars takes: its title bar, the strip and the numbers.
 pub(super) const BARS_HEIGHT: f32 = 0.115;
-/// Height of a view's title bar over that of a tab, in a window of 1280 × 800.
-const TITLE_HEIGHT: f64 = 0.036;
 
 /// What a recording will hold beyond the stages of one drape; each piece gets its views only if it is there.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -48,6 +47,8 @@ pub struct Layout {
     pub scatter: bool,
     /// A reference method, with the names of what it shows besides the garment: its tab stands for the stages.
     pub method: Option<Vec<String>>,
+    /// What is side by side are ways to drape: they stand for the stages, and times are plotted over errors and over vertices.
+    pub contest: bool,
     /// The recording is watched while it grows: the cursor follows the newest step.
     pub follow: bool,
     /// The tab shown when the recording opens.
@@ -85,6 +86,9 @@ impl Layout {
 
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
+        if self.contest {
+            return Node::Tabs(0, vec![self.side_by_side(eye), contest::numbers()]);
+        }
         let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
         let mut tabs = vec![(Tab::Stages, first)];
         if !self.compare.is_empty() {
@@ -120,7 +124,7 @@ impl Layout {
     pub(crate) fn eye(&self, tab: Tab, eye: &Eye) -> Eye {
         eye.through(match tab {
             Tab::Stages | Tab::Numbers => self.stage_grid(eye).1,
-            Tab::SideBySide => over_bars(ASPECT / self.compare.len() as f64),
+            Tab::SideBySide => self.compare_grid(eye).1,
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
             Tab::Pattern => over_bars(pattern::ASPECT),
             Tab::Outfit => 0.5 * ASPECT,
@@ -134,19 +138,10 @@ impl Layout {
         3 + usize::from(!self.held) + usize::from(self.error)
     }
 
-    /// In how many rows the stages stand, and width over height of a view: as the garment is largest, a gown in one row, a pullover
-    /// in two.
+    /// In how many rows the stages stand, and width over height of a view: a gown in one row, a pullover in two.
     fn stage_grid(&self, eye: &Eye) -> (usize, f64) {
         let count = self.stage_count() as f64;
-        let width = ASPECT * count / (count + f64::from(REPORT_OVER_STAGE));
-        let view = |rows: usize| {
-            let rows = rows as f64;
-            [width / (count / rows).ceil(), STAGE_HEIGHT / rows - TITLE_HEIGHT]
-        };
-        let scale = |[w, h]: [f64; 2]| (w / eye.half_width.max(1e-9)).min(h / eye.half_height.max(1e-9));
-        let rows = if scale(view(2)) > scale(view(1)) { 2 } else { 1 };
-        let [w, h] = view(rows);
-        (rows, w / h)
+        grid(eye, self.stage_count(), [ASPECT * count / (count + f64::from(REPORT_OVER_STAGE)), STAGE_HEIGHT])
     }
 
     fn stages(&self, eye: &Eye) -> Node {
@@ -162,13 +157,7 @@ impl Layout {
             views.push(seen("Error", paths::ERROR));
         }
         let wide = views.len() as f32;
-        let views = match rows {
-            1 => Node::Row("Stages", views),
-            _ => {
-                let lower = views.split_off(views.len().div_ceil(2));
-                Node::Column("Stages", vec![(1.0, Node::Row("Stages", views)), (1.0, Node::Row("Stages", lower))])
-            }
-        };
+        let views = in_rows("Stages", views, rows);
         let mut below: Vec<(f32, Node)> = vec![
             (1.3, View::bars("Vertices over distance, cm; colours are levels", &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
@@ -209,15 +198,6 @@ impl Layout {
         let Some(count) = self.table_count.map(i64::from) else { return view.into() };
         let room = if legend { 2 * count / 3 } else { 0 };
         view.between(-1 - room, count).into()
-    }
-
-    fn side_by_side(&self, eye: &Eye) -> Node {
-        let eye = &self.eye(Tab::SideBySide, eye);
-        let views = self.compare.iter().enumerate().map(|(slot, title)| {
-            let path = format!("{}/{slot}", paths::COMPARE);
-            (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
-        });
-        over("Side by side", views.collect(), "What they cost", paths::COMPARE_CAPTIONS, self.compare.len())
     }
 
     /// A row for each garment, its PARTs, forces and drape, beside all of them.

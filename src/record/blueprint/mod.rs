@@ -5,9 +5,11 @@
 //! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
 mod closer;
+mod contest;
 pub(crate) mod layout;
 mod method;
 mod panels;
+mod rows;
 pub(crate) mod view;
 
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};

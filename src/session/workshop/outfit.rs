@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::rest::reactions;
+use super::rest::{Way, reactions};
 use super::{Target, Workshop, ask};
 use crate::drape::{Drape, DrapeError, drape};
 use crate::mechanics::energy::Cloth;
@@ -22,24 +22,9 @@ impl Workshop {
     ) -> Result<(), EditError> {
         let began = Instant::now();
         let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
-        let at = |positions: &[glam::DVec3], residual: f64, steps: usize| AtRest {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
-            done: false,
-            kept: false,
-            warm: false,
-            positions: Arc::new(positions.to_vec()),
-            residual_over_weight: residual,
-            steps,
-            ms: ms_since(began),
-            after_ms: ms_since(target.accepted),
-            reaction_n: Arc::default(),
-            told: None,
-            let_go: None,
-            of: (settings.fabric.clone(), settings.refine),
-        };
+        let way = Way { target, sectioned, warm: false, began };
         let all = drape(scene, settings, &mut |step| {
-            let step = Arc::new(at(step.positions, step.residual_over_weight, step.iteration));
+            let step = Arc::new(way.at(step.positions, step.residual_over_weight, step.iteration));
             session.publish(target.state, |desk| desk.view.rest = Some(step));
             ask(session, target.state)
         })?;
@@ -61,13 +46,14 @@ impl Workshop {
             warnings: Vec::new(),
         };
         let rest = all.state.as_ref().map(|state| -> Result<AtRest, EditError> {
-            let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &settings.fabric, &scene.held)
-                .map_err(DrapeError::from)?;
+            let cloth =
+                Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)
+                    .map_err(DrapeError::from)?;
             Ok(AtRest {
                 done: true,
                 reaction_n: Arc::new(reactions(&cloth, &all.positions, &state.fit.pressure_kpa)),
                 told: Some(Arc::new(state.clone())),
-                ..at(&all.positions, state.residual_over_weight, state.steps)
+                ..way.at(&all.positions, state.residual_over_weight, state.steps)
             })
         });
         let rest = rest.transpose()?.map(Arc::new);

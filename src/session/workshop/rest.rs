@@ -19,6 +19,38 @@ use crate::session::desk::ms_since;
 use crate::session::results::{AtRest, Finished, Sectioned};
 use crate::session::{EditError, Session};
 
+/// A drape on its way to rest.
+pub(super) struct Way<'a> {
+    pub(super) target: &'a Target,
+    pub(super) sectioned: &'a Sectioned,
+    pub(super) warm: bool,
+    pub(super) began: Instant,
+}
+
+impl Way<'_> {
+    /// How far it has come: nothing yet of what is told of a drape at rest.
+    pub(super) fn at(&self, positions: &[DVec3], residual_over_weight: f64, steps: usize) -> AtRest {
+        let Self { target, sectioned, warm, began } = *self;
+        let settings = &target.job.settings;
+        AtRest {
+            state: target.state,
+            ground: Arc::clone(&sectioned.ground),
+            done: false,
+            kept: false,
+            warm,
+            positions: Arc::new(positions.to_vec()),
+            residual_over_weight,
+            steps,
+            ms: ms_since(began),
+            after_ms: ms_since(target.accepted),
+            reaction_n: Arc::default(),
+            told: None,
+            let_go: None,
+            of: (settings.fabric.clone(), settings.refine),
+        }
+    }
+}
+
 impl Workshop {
     /// Steps at full resolution from `start`, shown step by step.
     pub(super) fn settle(
@@ -32,25 +64,10 @@ impl Workshop {
     ) -> Result<(), EditError> {
         let began = Instant::now();
         let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
-        let at = |positions: &[DVec3], residual: f64, steps: usize| AtRest {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
-            done: false,
-            kept: false,
-            warm,
-            positions: Arc::new(positions.to_vec()),
-            residual_over_weight: residual,
-            steps,
-            ms: ms_since(began),
-            after_ms: ms_since(target.accepted),
-            reaction_n: Arc::default(),
-            told: None,
-            let_go: None,
-            of: (settings.fabric.clone(), settings.refine),
-        };
+        let way = Way { target, sectioned, warm, began };
         let mut show = |step: &Step<'_>| {
             if step.iteration > 0 {
-                let step = Arc::new(at(step.positions, step.residual_over_weight, step.iteration));
+                let step = Arc::new(way.at(step.positions, step.residual_over_weight, step.iteration));
                 session.publish(target.state, |desk| desk.view.rest = Some(step));
             }
             ask(session, target.state)
@@ -72,7 +89,7 @@ impl Workshop {
             let_go,
             ms: took.as_secs_f64() * 1e3,
             told: Some(Arc::new(state.clone())),
-            ..at(&positions, state.residual_over_weight, state.steps)
+            ..way.at(&positions, state.residual_over_weight, state.steps)
         });
         self.done.rested = Some(took);
         session.publish(target.state, |desk| {

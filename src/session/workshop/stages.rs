@@ -78,16 +78,9 @@ impl Workshop {
             after_ms: ms_since(target.accepted),
             warnings: Vec::new(),
         };
-        let garment = Garment {
-            mesh: &scene.garment,
-            topology: &scene.topology,
-            cloth: &levels.cloth,
-            fabric: &target.job.settings.fabric,
-        };
+        let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
         let mut reached = start.to_vec();
-        if let Some(glance) = glance(scene, levels, &parts, start, &target.job.settings.fabric, options, &mut |_| {
-            ask(session, target.state)
-        }) {
+        if let Some(glance) = glance(scene, levels, &parts, start, options, &mut |_| ask(session, target.state)) {
             reached = glance;
             let shown = Arc::new(preview(&reached));
             session.publish(target.state, |desk| desk.view.preview = Some(shown));
@@ -170,14 +163,12 @@ fn glance(
     levels: &Levels,
     parts: &Parts,
     start: &[DVec3],
-    fabric: &Fabric,
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Option<Vec<DVec3>> {
     let level = levels.coarser.first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
     let two = CoupledOptions { max_steps: GLANCE_STEPS, ..options.clone() };
     let coarse = levels.restrict(1, start);
-    let solved =
-        coupled::solve_before(&level.garment(fabric), &scene.body, &levels.parts(1, parts), &coarse, &two, onlooker);
+    let solved = coupled::solve_before(&level.garment(), &scene.body, &levels.parts(1, parts), &coarse, &two, onlooker);
     solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
 }

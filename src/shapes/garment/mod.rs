@@ -125,7 +125,7 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
     );
     let waistband = openings.iter().position(|o| matches!(o, Opening::Waistband(_))).map(|i| i as u8 + 1);
     let held = (0..tags.len() as u32).filter(|&v| Some(tags[v as usize]) == waistband).collect();
-    Ok(PlacedGarment { name: spec.name.clone(), mesh, rest: RestShape { corners }, held })
+    Ok(PlacedGarment { name: spec.name.clone(), mesh, rest: RestShape::new(corners), held })
 }
 
 /// Where a skirt's fullness begins, m: at the waist, or at a dress's hip.

@@ -67,6 +67,13 @@ impl Gap {
         self.key.vertices.into_iter().zip(self.weights).filter(|(v, _)| *v != NONE)
     }
 
+    /// The mean of what its vertices have, each place counting half.
+    pub(crate) fn mean(&self, of: &[f64]) -> f64 {
+        // Where all have the same it is that one to the last bit.
+        let first = of[self.key.vertices[0] as usize];
+        first + 0.5 * self.members().map(|(v, w)| w.abs() * (of[v as usize] - first)).sum::<f64>()
+    }
+
     /// What is missing to the goal at `x`, m: positive where they press.
     pub(crate) fn depth(&self, x: &[DVec3]) -> f64 {
         self.goal - self.normal.dot(self.across(x))

@@ -12,7 +12,8 @@
 //!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
-//! back towards how it was placed, if it did not cross there (`clear`), or finds its own way out (`untangle.rs`).
+//! back towards where it is known not to (`clear`: how it was placed, or put over what lies below it), or finds its own way out
+//! (`untangle.rs`).
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -22,7 +23,8 @@
 //! | κ | stiffness: pressure over what is missing to h | N/m³ |
 //! | A | rest area that the gap stands for | m² |
 //!
-//! Limits: one offset for the whole garment; a gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
+//! Between two fabrics thickness and friction are their mean, and less offset is kept where the garment was placed nearer to itself. Limits: a
+//! gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
 
 mod gap;
 mod passage;
@@ -73,16 +75,39 @@ const LEAST_SHARE: f64 = 0.02;
 /// Refreshes without fewer crossings after which what crosses is left as it is.
 const PATIENCE: usize = 40;
 
+/// How far apart a cloth is kept, by its thickness at each vertex.
+#[derive(Debug, Clone)]
+struct Apart {
+    thickness: Arc<Vec<f64>>,
+    /// Least and most offset on this mesh, m.
+    bounds: [f64; 2],
+}
+
+impl Apart {
+    /// h, m, of two places whose thicknesses (m) have this mean.
+    fn offset(&self, thickness: f64) -> f64 {
+        thickness.clamp(self.bounds[0], self.bounds[1])
+    }
+
+    /// κ, N/m³, where the offset is this one, m.
+    fn stiffness(offset: f64) -> f64 {
+        HALF_OFFSET_PRESSURE / (0.5 * offset)
+    }
+
+    /// Most of all offsets, m.
+    fn most(&self) -> f64 {
+        self.offset(self.thickness.iter().copied().fold(0.0, f64::max))
+    }
+}
+
 /// The gaps of a cloth with itself.
 #[derive(Debug, Clone)]
 pub struct Proximity {
     skin: Arc<Skin>,
     placed: Arc<Vec<DVec3>>,
     clear: Arc<Vec<DVec3>>,
-    offset: f64,
-    thickness: f64,
-    stiffness: f64,
-    friction: f64,
+    apart: Apart,
+    friction: Arc<Vec<f64>>,
     gaps: Vec<Gap>,
     passage: Passage,
     /// Fewest crossings so far, and how many refreshes ago they were fewer than before.
@@ -91,35 +116,33 @@ pub struct Proximity {
 }
 
 impl Proximity {
-    /// None looked for yet: how the cloth was placed, and where it goes back to where a start crosses; `thickness` in m.
-    pub(super) fn new(skin: Arc<Skin>, [placed, clear]: [Arc<Vec<DVec3>>; 2], thickness: f64, friction: f64) -> Self {
+    /// None looked for yet: how the cloth was placed, and where it goes back to where a start crosses; thickness (m) and friction of each
+    /// vertex.
+    pub(super) fn new(
+        skin: Arc<Skin>,
+        [placed, clear]: [Arc<Vec<DVec3>>; 2],
+        [thickness, friction]: [Arc<Vec<f64>>; 2],
+    ) -> Self {
         let least = (LEAST_OF_EDGE * skin.edge_m).min(LEAST_OF_ANY);
-        let offset = thickness.clamp(least, (MOST_OF_EDGE * skin.edge_m).max(least));
+        let apart = Apart { thickness, bounds: [least, (MOST_OF_EDGE * skin.edge_m).max(least)] };
         let passage = Passage::new(Arc::clone(&skin));
-        Self {
-            skin,
-            placed,
-            clear,
-            offset,
-            thickness,
-            stiffness: HALF_OFFSET_PRESSURE / (0.5 * offset),
-            friction,
-            gaps: Vec::new(),
-            passage,
-            fewest: usize::MAX,
-            since: 0,
-        }
+        Self { skin, placed, clear, apart, friction, gaps: Vec::new(), passage, fewest: usize::MAX, since: 0 }
     }
 
     /// Looks for gaps at `x` (m); those that were there before go on.
     pub fn refresh(&mut self, x: &[DVec3]) {
-        let Self { skin, placed, offset, thickness, stiffness, friction, passage, .. } = self;
-        let mut gaps = search::gaps(skin, x, placed, [REACH * *offset, *offset, *thickness], *stiffness);
+        let Self { skin, placed, apart, friction, passage, .. } = self;
+        let most = apart.most();
+        let mut gaps = search::gaps(skin, x, placed, apart, REACH * most);
         let crossing = passage.known(x);
         self.since = if crossing.len() < self.fewest { 0 } else { self.since + 1 };
         self.fewest = self.fewest.min(crossing.len());
         if !crossing.is_empty() {
-            let back = if self.since < PATIENCE { untangle::gaps(skin, x, crossing, *stiffness) } else { Vec::new() };
+            let back = if self.since < PATIENCE {
+                untangle::gaps(skin, x, crossing, Apart::stiffness(most))
+            } else {
+                Vec::new()
+            };
             // About a crossing nobody knows which side is the right one.
             gaps.retain(|gap| !gap.members().any(|(v, _)| passage.is_tangled(v)));
             gaps.extend(back);
@@ -137,7 +160,7 @@ impl Proximity {
                 gap.continues(before, x);
             }
             let depth = gap.depth(x);
-            gap.limit = *friction * gap.stiffness * depth.max(0.0);
+            gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
             if depth > (1.0 - NARROW) * gap.goal {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
@@ -200,7 +223,8 @@ impl Proximity {
         self.passage.look(from, to)
     }
 
-    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses, if nothing did there; leaves it where it did.
+    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses; leaves it as it is
+    /// where something crosses there too.
     pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
         if self.passage.known(x).is_empty() || !self.passage.anew(&self.clear).is_empty() {
             return;

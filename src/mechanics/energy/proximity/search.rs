@@ -5,8 +5,9 @@
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
 //!
-//! Neighbours are near because they are neighbours: they are left out unless the garment as placed kept them well apart, and so is what
-//! is near across a sliver.
+//! Neighbours are near because they are neighbours. Where the garment as placed kept them well apart they count as any other places do;
+//! else they press only where they come to less than half as near as they were placed, and are left out across a sliver. No gap is kept
+//! wider than it was placed.
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
@@ -16,6 +17,7 @@ use parry3d_f64::query::details::closest_points_segment_segment_with_locations_n
 use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
+use super::Apart;
 use super::gap::{Gap, Key, Kind, NONE};
 use super::skin::Skin;
 
@@ -35,16 +37,10 @@ const LEAST_GOAL: f64 = 1e-5;
 const OF_EDGES: f64 = 0.25;
 
 /// All gaps under `reach` (m) at `x`, sorted by key; `placed` is where nothing was folded yet. Same bits on any number of threads.
-pub(super) fn gaps(
-    skin: &Skin,
-    x: &[DVec3],
-    placed: &[DVec3],
-    [reach, offset, thickness]: [f64; 3],
-    stiffness: f64,
-) -> Vec<Gap> {
+pub(super) fn gaps(skin: &Skin, x: &[DVec3], placed: &[DVec3], apart: &Apart, reach: f64) -> Vec<Gap> {
     let boxes: Vec<Aabb> = skin.triangles.iter().map(|t| bounds(t, x)).collect();
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let look = Look { skin, x, placed, reach, offset, thickness, stiffness };
+    let look = Look { skin, x, placed, reach, apart };
     let mut found: Vec<Found> = (0..skin.triangles.len())
         .into_par_iter()
         .with_min_len(64)
@@ -75,9 +71,7 @@ struct Look<'a> {
     x: &'a [DVec3],
     placed: &'a [DVec3],
     reach: f64,
-    offset: f64,
-    thickness: f64,
-    stiffness: f64,
+    apart: &'a Apart,
 }
 
 impl Look<'_> {
@@ -151,10 +145,14 @@ impl Look<'_> {
     }
 
     fn gap(&self, key: Key, weights: [f64; 5], area: f64) -> Option<Gap> {
-        let mut gap = Gap::new(key, weights, self.offset, self.stiffness * area);
+        let mut gap = Gap::new(key, weights, 0.0, 0.0);
+        let thickness = gap.mean(&self.apart.thickness);
+        let offset = self.apart.offset(thickness);
+        (gap.goal, gap.stiffness) = (offset, Apart::stiffness(offset) * area);
+        gap.first = gap.stiffness;
         // What was placed nearer than that is not pushed farther apart than it was.
         let placed = gap.across(self.placed).length();
-        gap.goal = gap.goal.min(placed.max(self.thickness));
+        gap.goal = gap.goal.min(placed.max(thickness));
         if placed < KEPT_APART * self.reach && self.belongs(&gap) {
             gap.goal = gap.goal.min(OF_NEIGHBOURS * placed);
         }

@@ -1,6 +1,8 @@
 //! The table search: against every table there is on a small garment, and against stage one itself on a larger one.
 #![allow(clippy::unwrap_used)] // in what the tests share, too
 
+mod every_table;
+
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -9,9 +11,8 @@ use partwise::accuracy::representable::unblended_rms_m;
 use partwise::mechanics::coupled::Motion;
 use partwise::mesh::{RestShape, Topology, TriMesh};
 use partwise::parts::{Grain, Parts, segment};
-use partwise::range_table::{Extent, RangeTable};
+use partwise::range_table::RangeTable;
 use partwise::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
-use proptest::prelude::*;
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
 fn sheet(w: usize, h: usize) -> TriMesh {
@@ -77,73 +78,6 @@ fn coarse(candidates: usize, options: SearchOptions) -> SearchOptions {
 
 fn is_a_front(front: &Front) {
     assert!(front.points.windows(2).all(|w| w[0].parts < w[1].parts && w[0].rms_m > w[1].rms_m));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
-    #[test]
-    fn the_front_is_that_of_all_tables(
-        distances in prop::collection::vec(0u32..5, 20),
-        moves in prop::collection::vec(-1.0f64..1.0, 60),
-        extents in prop::collection::vec((3.0f64..10.0, 0usize..3), 0..2),
-        affine in any::<bool>(),
-    ) {
-        let motion = if affine { Motion::Affine } else { Motion::Translation };
-        let mesh = sheet(5, 4);
-        let topology = Topology::new(&mesh);
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let grain = Grain::new(&mesh, &topology, &rest);
-        let distances: Vec<f64> = distances.iter().map(|&d| 0.01 * f64::from(d)).collect();
-        let displacement: Vec<DVec3> = moves.chunks(3).map(DVec3::from_slice).collect();
-        let sample =
-            Sample { mesh: &mesh, topology: &topology, grain: &grain, distances_m: &distances, displacement: &displacement, weight: 2.5, max_parts: 14 };
-        let (widths, shapes): (Vec<f64>, Vec<usize>) = extents.into_iter().unzip();
-        let shapes: Vec<f64> = shapes.into_iter().flat_map(|s| [1.0, [0.5, 2.0, 4.0][s]]).collect();
-        let options = SearchOptions {
-            include: Vec::new(),
-            motion,
-            rounds: 1,
-            shapes: shapes.clone(),
-            ..SearchOptions::with_extents(&widths)
-        };
-        let found = search(&[sample], &options, &unheard);
-
-        // Up to four bounds between five values, and each level uncut or cut to one of two shapes: 16 to 768 tables.
-        let mut best = [f64::INFINITY; 15];
-        let cuts = widths.iter().flat_map(|&w| shapes.iter().map(move |s| Extent { width_cm: w, height_cm: s * w }));
-        let choices: Vec<Extent> = cuts.chain([Extent::UNCUT]).collect();
-        for mask in 0u32..16 {
-            let inner: Vec<f64> = (0..4).filter(|b| mask >> b & 1 == 1).map(|b| 0.5 + f64::from(b)).collect();
-            let table = RangeTable::from_inner_bounds("all", &inner).unwrap();
-            for mut code in 0..choices.len().pow(inner.len() as u32 + 1) {
-                let mut extents = Vec::new();
-                for _ in 0..=inner.len() {
-                    extents.push(Some(choices[code % choices.len()]));
-                    code /= choices.len();
-                }
-                let table = table.clone().with_extents(&extents).unwrap();
-                let parts = segment(&topology, &distances, &table).cut_to_table(&mesh, &topology, &rest, &table);
-                if parts.len() <= 14 {
-                    let rms = unblended_rms_m(&parts, &mesh.positions, &displacement, motion);
-                    best[parts.len()] = rms.min(best[parts.len()]);
-                }
-            }
-        }
-        if best.iter().all(|rms| rms.is_infinite()) {
-            let refused = matches!(found, Err(SearchError::TooFewParts { ref max_parts }) if max_parts[..] == [14]);
-            prop_assert!(refused);
-            return Ok(());
-        }
-        let found = found.unwrap();
-        is_a_front(found.front());
-        let mut least = f64::INFINITY;
-        for (parts, rms) in best.into_iter().enumerate() {
-            least = rms.min(least);
-            let point = found.front().best_within(parts);
-            // An affine map may leave nothing, and of nothing the root is of rounding.
-            prop_assert!(point.map_or(least.is_infinite(), |p| (p.rms_m - least).abs() < 1e-7));
-        }
-    }
 }
 
 #[test]

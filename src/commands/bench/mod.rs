@@ -1,5 +1,7 @@
 //! `partwise bench table-4`: the paper's comparison as an experiment that anybody can repeat.
 
+mod recorded;
+
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -11,10 +13,10 @@ use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::shapes::{GarmentRequest, MeshCache};
 use serde_json::json;
 
-use super::failure::UserError;
-use super::sweep::report::Format;
-use super::work::{use_threads, write_csv};
-use super::{console, interrupt};
+use crate::commands::failure::UserError;
+use crate::commands::sweep::report::Format;
+use crate::commands::work::{use_threads, write_csv};
+use crate::commands::{console, interrupt};
 
 const LONG_ABOUT: &str = "\
 Drapes the paper's garments in every way there is: its reference methods [19], [20] and [21], its own equations (`paper`), the coupled \
@@ -32,6 +34,7 @@ Examples:
   partwise bench table-4 --quick                               two small garments, one round: does it run?
   partwise bench table-4 --growth flared-skirt                 1,000 to 64,000 vertices: how costs grow, with fitted exponents
   partwise bench table-4 --rows pullover-1@4710 --rounds 1     one row, once
+  partwise bench table-4 --recordings table-4                  a recording a row: the drapes side by side
   partwise bench table-4 --csv table-4.csv --format json       for scripts
 
 Rows are kept in --rows-file as they are done; the same command goes on from there after Ctrl-C.";
@@ -71,6 +74,9 @@ pub(crate) struct TableFourArgs {
     /// Where rows are kept, and found again
     #[arg(long, value_name = "FILE.json", default_value = "table-4.json")]
     rows_file: PathBuf,
+    /// Record each row as it is done into this folder: its drapes side by side, and plots of time
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
     /// Write a line for every entrant of every row to this file as well
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
@@ -102,8 +108,13 @@ impl TableFourArgs {
         } else {
             Journal::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
         };
+        if let Some(folder) = &self.recordings {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
+        }
         interrupt::listen();
         let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
+        let kept = asked.len() - left.len();
         let runs = options.warm_up + options.rounds;
         let bar = console::progress(Some((left.len() * runs * ENTRANTS.len()) as u64), "table 4");
         for (done, (name, vertices)) in left.iter().enumerate() {
@@ -121,7 +132,13 @@ impl TableFourArgs {
             let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
             let loaded = spec.load_with(&MeshCache::in_user_cache())?;
             match contest::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
-                Ok(row) => journal.rows.push(row),
+                Ok(contested) => {
+                    journal.rows.push(contested.row.clone());
+                    if let Some(folder) = &self.recordings {
+                        let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
+                        bar.suspend(|| console::note(&format!("recording: {}", path.display())));
+                    }
+                }
                 Err(ContestError::Interrupted) => break,
                 Err(error) => return Err(error.into()),
             }
@@ -130,7 +147,7 @@ impl TableFourArgs {
             }
         }
         bar.finish_and_clear();
-        self.report(&journal, &asked)
+        self.report(&journal, &asked, kept)
     }
 
     fn options(&self) -> ContestOptions {
@@ -182,13 +199,19 @@ impl TableFourArgs {
         })
     }
 
-    fn report(&self, journal: &Journal, asked: &[(String, usize)]) -> anyhow::Result<()> {
+    fn report(&self, journal: &Journal, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {
         let find =
             |(name, n): &(String, usize)| journal.rows.iter().find(|row| row.garment == *name && row.asked == *n);
         let rows: Vec<ContestRow> = asked.iter().filter_map(find).cloned().collect();
         let csv = contest::csv_lines(&rows)?;
         if let Some(path) = &self.csv {
             write_csv(path, &csv)?;
+        }
+        if self.recordings.is_some() && kept > 0 {
+            console::note(&format!(
+                "{kept} rows were found in {} and not draped again: they have no recording",
+                self.rows_file.display()
+            ));
         }
         let missing = asked.len() - rows.len();
         match self.format {

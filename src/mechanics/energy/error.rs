@@ -1,0 +1,42 @@
+//! Why a garment has no energy. The user can mend all of these.
+
+/// What can be wrong with a garment's data.
+#[derive(Debug, thiserror::Error)]
+pub enum EnergyError {
+    /// As many rest triangles as triangles are needed.
+    #[error("the rest shape has {rest} triangles and the garment {mesh}: give the rest shape of this very mesh")]
+    RestCount {
+        /// Triangles of the rest shape.
+        rest: usize,
+        /// Triangles of the mesh.
+        mesh: usize,
+    },
+    /// A triangle without rest area has no strain.
+    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
+    Degenerate {
+        /// Its index, from 0.
+        triangle: usize,
+    },
+    /// Triangles cut from a fabric that is not given.
+    #[error("the garment is cut from {cut_from} fabrics and {given} given: give each, in the order of their numbers")]
+    Fabrics {
+        /// Fabrics that the rest shape names.
+        cut_from: usize,
+        /// Fabrics there are.
+        given: usize,
+    },
+    /// A held vertex that is not there.
+    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
+    Held {
+        /// Index asked for, from 0.
+        vertex: u32,
+        /// Vertices there are.
+        count: usize,
+    },
+    /// No vertex left to move.
+    #[error("no vertex is free: all {count} are held")]
+    NothingFree {
+        /// Vertices there are.
+        count: usize,
+    },
+}

@@ -1,0 +1,173 @@
+//! What a drape says of itself where its numbers alone would reassure: what slid, what fell, where skin shows, what slivers do.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod meshes;
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use glam::DVec3;
+use partwise::Job;
+use partwise::drape::{Scene, drape, unobserved};
+use partwise::figures::Figures;
+use partwise::mesh::TriMesh;
+use partwise::mesh::export::write_mesh;
+use partwise::mesh::self_intersection::crossing_pairs;
+use partwise::sweep::{Bench, Plan, Status};
+
+/// Rings of `around` points from the top down, closed by a point at each end where `ends` are given.
+fn turned(profile: &[(f64, f64)], around: u32, ends: Option<[f64; 2]>) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for &(radius, z) in profile {
+        mesh.positions.extend((0..around).map(|i| {
+            let (y, x) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
+            DVec3::new(radius * x, radius * y, z)
+        }));
+    }
+    let rings = profile.len() as u32;
+    for (j, i) in (0..rings - 1).flat_map(|j| (0..around).map(move |i| (j, i))) {
+        let [a, b] = [j * around + i, j * around + (i + 1) % around];
+        mesh.triangles.extend([[a, a + around, b], [b, a + around, b + around]]);
+    }
+    if let Some([top, bottom]) = ends {
+        let tip = mesh.positions.len() as u32;
+        mesh.positions.extend([DVec3::Z * top, DVec3::Z * bottom]);
+        let last = (rings - 1) * around;
+        for (i, next) in (0..around).map(|i| (i, (i + 1) % around)) {
+            mesh.triangles.extend([[tip, i, next], [tip + 1, last + next, last + i]]);
+        }
+    }
+    mesh
+}
+
+/// A cone, 10 cm wide at the top and 40 cm at the foot (radii).
+fn cone() -> TriMesh {
+    let profile: Vec<(f64, f64)> = (0..=10).map(|k| (0.1 + 0.03 * f64::from(k), 1.0 - 0.1 * f64::from(k))).collect();
+    turned(&profile, 32, Some([1.02, -0.02]))
+}
+
+fn sphere() -> TriMesh {
+    let ring = |k: i32| {
+        let (s, c) = (std::f64::consts::PI * f64::from(k) / 24.0).sin_cos();
+        (0.3 * s, 1.0 + 0.3 * c)
+    };
+    turned(&(1..24).map(ring).collect::<Vec<_>>(), 48, Some([1.3, 0.7]))
+}
+
+fn draped(scene: &Scene) -> (Figures, Vec<String>, Vec<DVec3>) {
+    let job = Job::default();
+    let result = drape(scene, &job.settings, &mut unobserved).unwrap();
+    let measured = job.measure(scene, &result, None, &mut unobserved).unwrap();
+    (measured.figures, measured.warnings, result.positions)
+}
+
+#[test]
+fn a_garment_that_slides_down_is_told_with_what_to_hold() {
+    let mut tube = turned(&[(0.3, 0.95), (0.3, 0.9), (0.3, 0.85), (0.3, 0.8), (0.3, 0.75), (0.3, 0.7)], 40, None);
+    tube.groups = vec!["waist".to_owned()];
+    tube.triangle_group = vec![0; tube.triangles.len()];
+    let mut scene = Scene::of_meshes(&cone(), tube).unwrap();
+    let (figures, warnings, x) = draped(&scene);
+    let sank = (0..40).map(|v| scene.garment.positions[v].z - x[v].z).sum::<f64>() / 40.0;
+    assert!(sank > 0.2 && (figures.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
+    let said = warnings.join("\n");
+    assert!(said.contains("slid down") && said.contains("--hold top") && said.contains("waist"), "{said}");
+    // Held, it stays, and nothing is said.
+    scene.held = scene.edge("top").unwrap();
+    let (figures, warnings, _) = draped(&scene);
+    assert_eq!(figures.top_sank_mm, 0.0);
+    assert!(!warnings.join("\n").contains("slid"), "{warnings:?}");
+}
+
+#[test]
+fn skin_between_vertices_that_are_outside_is_told() {
+    // Triangles of 15 cm on a sphere of 30 cm: their middles sag a centimetre under their corners.
+    let cape = |around, rings: u32| {
+        let ring = |k: u32| {
+            let u = f64::from(k) / f64::from(rings - 1);
+            (0.05 + 0.4 * u, 1.33 - 0.25 * u)
+        };
+        turned(&(0..rings).map(ring).collect::<Vec<_>>(), around, None)
+    };
+    let scene = Scene::of_meshes(&sphere(), cape(12, 5)).unwrap();
+    let (figures, warnings, x) = draped(&scene);
+    let pairs = crossing_pairs(&scene.garment.with_positions(x), scene.body.mesh()).len();
+    assert!(pairs > 0 && figures.body_crossing_pairs == pairs && figures.penetrating_vertices == 0, "{pairs}");
+    let said = warnings.join("\n");
+    assert!(said.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{said}");
+    assert!(said.contains("no vertex is inside"), "{said}");
+    let (figures, warnings, _) = draped(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap());
+    assert_eq!(figures.body_crossing_pairs, 0);
+    assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
+fn a_garment_that_falls_off_is_a_failed_row_and_the_sweep_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    write_mesh(&folder.path().join("body.obj"), &sphere()).unwrap();
+    write_mesh(&folder.path().join("tube.obj"), &turned(&[(0.4, 1.2), (0.4, 1.1), (0.4, 1.0)], 30, None)).unwrap();
+    let text = format!(
+        "name = \"falls\"\n[base]\nbody = '{}'\ngarment = '{}'\noptions = {{ unit = \"m\", up = \"z\" }}\nrefine = \"converged\"\n[grid]\ntables = [\"table-3\", {{ quantile = 3 }}]\n",
+        place("body.obj"),
+        place("tube.obj")
+    );
+    let plan = Plan::parse(&text, "falls.toml", folder.path(), &Job::preview()).unwrap();
+    assert_eq!(plan.points.len(), 2);
+    let stop = AtomicBool::new(false);
+    let bench = Bench::new(None, &stop);
+    for point in &plan.points {
+        // No row would be the user's interruption, and the end of the sweep.
+        let row = bench.row(point, (0, 1), |_, _, _| Ok(())).unwrap();
+        assert_eq!(row.status, Status::Error);
+        assert!(row.error.contains("fallen off the body") && row.error.contains("hold"), "{}", row.error);
+    }
+}
+
+#[test]
+fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
+    // Two tubes about a cone, far too wide to stay where they are.
+    let tube = |top: f64| turned(&[(0.35, top), (0.35, top - 0.05), (0.35, top - 0.1)], 24, None);
+    let mut both = tube(0.9);
+    let lower = tube(0.6);
+    let first = both.positions.len() as u32;
+    both.positions.extend(&lower.positions);
+    both.triangles.extend(lower.triangles.iter().map(|t| t.map(|v| v + first)));
+    both.groups = ["upper", "inside", "lower"].map(str::to_owned).to_vec();
+    both.triangle_group = (0..both.triangles.len()).map(|t| if t < 96 { 0 } else { 2 }).collect();
+    let mut scene = Scene::of_meshes(&cone(), both).unwrap();
+    let ring = |from: u32| (from..from + 24).collect::<Vec<u32>>();
+    assert_eq!(scene.edge("top").unwrap(), ring(0));
+    assert_eq!(scene.edge("top:2").unwrap(), ring(first));
+    assert_eq!(scene.edges("top:2, top:1").unwrap(), [ring(0), ring(first)].concat());
+    assert_eq!(scene.edge("upper").unwrap(), [ring(0), ring(48)].concat());
+    for (what, expected) in
+        [("top:3", "`top:1` to `top:2`"), ("top:x", "2 connected parts"), ("inside", "no edge"), ("hem", "upper")]
+    {
+        let said = scene.edges(what).unwrap_err().to_string();
+        assert!(said.contains("--hold") && said.contains(expected), "{said}");
+    }
+    scene.held = scene.edges("top:1,top:2").unwrap();
+    let (figures, _, x) = draped(&scene);
+    assert!(figures.residual_over_weight.unwrap() < 1e-3 && figures.top_sank_mm == 0.0);
+    assert!(scene.held.iter().all(|&v| x[v as usize] == scene.garment.positions[v as usize]));
+}
+
+#[test]
+fn what_is_stretched_beyond_what_fabrics_bear_and_what_presses_is_told() {
+    let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
+    let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
+    let mut scene = Scene::of_meshes(&sphere(), cape).unwrap();
+    // A preview that rests on the body presses on it.
+    let job = Job::preview();
+    let preview = drape(&scene, &job.settings, &mut unobserved).unwrap();
+    let figures = job.measure(&scene, &preview, None, &mut unobserved).unwrap().figures;
+    assert!(figures.contact_parts > 0 && figures.pressure_max_kpa.unwrap() > 0.0, "{:?}", figures.pressure_max_kpa);
+    // Cut for somebody of less than half the size, and held at both ends.
+    scene.rest.corners.iter_mut().flatten().for_each(|p| *p *= 0.4);
+    scene.held = (0..40).chain(360..400).collect();
+    let (figures, warnings, _) = draped(&scene);
+    assert!(figures.strain_max.unwrap() > 0.5, "{:?}", figures.strain_max);
+    assert!(warnings.iter().any(|w| w.contains("more than fabrics bear")), "{warnings:?}");
+}
