@@ -148,7 +148,7 @@ mod tests {
     fn in_a_crease_it_holds_along_the_surface_as_much_as_the_body_pushes() {
         let normal = DVec3::new(0.3, 0.0, 0.4);
         let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
-        let mut friction = Friction::new(0.3);
+        let mut friction = Friction::new(Arc::new(vec![0.3]));
         friction.refresh(&[touch], &[DVec3::ZERO]);
         let mut gradient = [DVec3::ZERO];
         friction.add_gradient(&[DVec3::new(4e-3, 0.0, -3e-3)], &mut gradient);

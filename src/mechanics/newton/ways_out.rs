@@ -97,8 +97,7 @@ impl Descent<'_, '_> {
             trial.extend(x.iter().zip(way).map(|(x, z)| *x + *z * t));
             contacts.update(trial);
             let there = cloth.evaluate(trial, contacts, trial_gradient, scratch);
-            // Also where it is no number.
-            if !(there < best.0) {
+            if there.is_nan() || there >= best.0 {
                 break;
             }
             best = (there, t);

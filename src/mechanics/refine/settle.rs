@@ -31,11 +31,11 @@ const LESS: f64 = 0.9;
 const LEAST_STRIDE: f64 = 0.125;
 
 /// Times the length of a step that one may go which goes on like the one before, near rest: see `newton::onward`. With 2 the five garments
-/// at ten sizes, knit and woven, take 354 steps together, with 1 363.
+/// at ten sizes, knit and woven, took 354 steps together, with 1 363.
 const FARTHEST: f64 = 2.0;
 
-/// Looks at a rest whether it lasts, at most: see `newton::ways_out`. Without them the same twenty take 327 steps, and four of them are
-/// saddles or still move; with four, one still does.
+/// Looks at a rest whether it lasts, at most: see `newton::ways_out`. Without them the same twenty took 327 steps, and four of them were
+/// saddles or still moved; with four, one still did.
 const LOOKS: usize = 8;
 
 /// Iterations of a relaxation at the start and after a step.
