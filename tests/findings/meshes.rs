@@ -189,3 +189,26 @@ fn a_stray_triangle_in_an_open_body_does_not_end_the_drape() {
     });
     assert!(found.unwrap().positions.iter().all(|p| p.is_finite()));
 }
+
+#[test]
+fn seams_that_long_triangles_bridge_are_told_when_the_garment_falls_through() {
+    // Two panels on either side of a ball, each 60 cm wide, and nothing but long triangles between them over it.
+    let (columns, rows, side) = (31_u32, 16_u32, 0.02);
+    let mut mesh = TriMesh::default();
+    for x in [-0.4, 0.4] {
+        let at = |v: u32| DVec3::new(x, side * f64::from(v % columns) - 0.3, 1.36 - side * f64::from(v / columns));
+        mesh.positions.extend((0..columns * rows).map(at));
+    }
+    let far = columns * rows;
+    let quad = |a: u32, right: u32, below: u32| [[a, a + below, a + right], [a + right, a + below, a + right + below]];
+    let cells = (0..rows - 1).flat_map(|j| (0..columns - 1).map(move |i| j * columns + i));
+    for a in cells {
+        mesh.triangles.extend(quad(a, 1, columns));
+        mesh.triangles.extend(quad(far + a, 1, columns).map(|[a, b, c]| [a, c, b]));
+    }
+    mesh.triangles.extend((0..columns - 1).flat_map(|i| quad(i, 1, far)).map(|[a, b, c]| [a, c, b]));
+    let (figures, warnings, _) = draped(&Scene::of_meshes(&sphere(), mesh).unwrap());
+    assert!(figures.top_sank_mm > 100.0, "{} mm", figures.top_sank_mm);
+    let bridges = format!("{} of its triangles are up to 80 cm long", 2 * (columns - 1));
+    assert!(warnings.iter().any(|w| w.contains(&bridges) && w.contains("--pattern")), "{warnings:?}");
+}

@@ -24,6 +24,7 @@ mod flat;
 mod forest;
 mod groves;
 mod onward;
+mod record;
 pub(crate) mod relax;
 mod solver;
 mod substitute;
@@ -37,6 +38,7 @@ use glam::{DMat3, DVec3};
 use super::energy::proximity::Looked;
 use super::energy::{Cloth, Contacts, Scratch};
 use onward::Onward;
+pub use record::Record;
 use relax::Relaxation;
 pub use solver::{SolveError, Solver};
 pub(crate) use ways_out::Rest;
@@ -94,25 +96,6 @@ pub(crate) struct Advance {
     pub(crate) largest_move_m: f64,
     /// Whether all moved back by and large, against the step before.
     pub(crate) back: bool,
-}
-
-/// One line of the history.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Record {
-    /// Steps done.
-    pub iteration: usize,
-    /// Energy, J.
-    pub energy: f64,
-    /// ‖∇E‖₂ over the weight.
-    pub residual_over_weight: f64,
-    /// Step length t of the line search.
-    pub step_length: f64,
-    /// Largest move of a vertex, m.
-    pub largest_move_m: f64,
-    /// Damping ε, 1/s².
-    pub damping: f64,
-    /// Whether the energy is that of the softened cloth.
-    pub softened: bool,
 }
 
 /// A cloth on its way down.
@@ -178,19 +161,6 @@ impl<'c, 'b> Descent<'c, 'b> {
     pub(crate) fn state(&self) -> State<'_> {
         let Self { cloth, x, contacts, gradient, damping, .. } = self;
         State { cloth, x, contacts, gradient, damping: *damping }
-    }
-
-    /// A line of the history, after `advance`.
-    pub(crate) fn record(&self, iteration: usize, advance: Option<Advance>, softened: bool) -> Record {
-        Record {
-            iteration,
-            energy: self.energy,
-            residual_over_weight: self.residual,
-            step_length: advance.map_or(0.0, |a| a.step_length),
-            largest_move_m: advance.map_or(0.0, |a| a.largest_move_m),
-            damping: self.damping,
-            softened,
-        }
     }
 
     /// Takes energy and residual anew, after positions, contacts or the cloth have changed.
