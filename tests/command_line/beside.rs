@@ -33,6 +33,8 @@ fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     let other = contest("2");
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));
+    // Where nothing is recorded yet: a refusal leaves nothing.
+    let bench = Bench::new();
     bench.refuses(&["bench", "table-4", "--rows", "pullover-1"], &["pullover-1@VERTICES"]);
     bench.refuses(&["bench", "table-4", "--growth", "pullover-1@600"], &["--growth pullover-1@600", "--rows"]);
 }
