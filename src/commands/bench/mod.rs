@@ -30,7 +30,7 @@ Beside each method's error stand hem height and girths. What a method cannot run
 
 const EXAMPLES: &str = "\
 Examples:
-  partwise bench table-4                                       the ten rows; half an hour on two cores
+  partwise bench table-4                                       the ten rows; some ten minutes on two cores
   partwise bench table-4 --quick                               two small garments, one round: does it run?
   partwise bench table-4 --growth flared-skirt                 1,000 to 64,000 vertices: how costs grow, with fitted exponents
   partwise bench table-4 --rows pullover-1@4710 --rounds 1     one row, once
