@@ -15,18 +15,13 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::mechanics::curvature::{Curved, NEGATIVE, Until, dot, free};
+use crate::mechanics::curvature::{Curved, DAMPING, NEGATIVE, STEPS, Until};
 use crate::mechanics::energy::friction::ELASTIC_SLIP;
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};
+use crate::mechanics::newton::dot;
 use crate::mechanics::reactions::Forces;
 use crate::mechanics::refine::{SolveError, Solver};
-
-/// Steps of Lanczos' method.
-const STEPS: usize = 40;
-
-/// Damping in B, 1/s²: under a thousandth of what a hanging cloth swings with (g over a metre).
-const DAMPING: f64 = 1e-2;
 
 /// The curvature about a drape.
 #[derive(Debug, Clone)]
@@ -57,7 +52,7 @@ impl Curvature {
             let along = outer(t.normal, t.normal);
             let across = if t.sticks { t.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
             let block = along * t.stiffness + (DMat3::IDENTITY - along) * across;
-            let members = free(&layout, t.shares.iter().copied());
+            let members = layout.free(t.shares.iter().copied());
             layout.add(&members, block, &mut blocks);
             held.push((members, block));
         }

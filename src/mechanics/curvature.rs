@@ -16,11 +16,16 @@
 //! contacts are kept as they are, so a way out that lifts cloth off the body is not seen; λ is that of so many steps, an upper bound.
 
 use faer::{Mat, Side};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
-use super::energy::pattern::HELD;
-use super::energy::{Cloth, Contacts, HessianLayout, Scratch};
-use super::newton::SolveError;
+use super::energy::{Cloth, Contacts, Held, HessianLayout, Scratch};
+use super::newton::{SolveError, dot};
+
+/// Steps of Lanczos' method for whoever asks whether a rest lasts.
+pub(crate) const STEPS: usize = 40;
+
+/// Damping ε in their B, 1/s²: under a thousandth of what a hanging cloth swings with (g over a metre).
+pub(crate) const DAMPING: f64 = 1e-2;
 
 /// Longest move of a vertex in a difference of the gradient, m: the cloth's own non-linearity is of the order of its edges, a centimetre.
 const DIFFERENCE: f64 = 1e-6;
@@ -40,9 +45,6 @@ pub(crate) struct Until {
     /// A λ under this, and settled, is enough.
     pub(crate) clear: f64,
 }
-
-/// What contact adds to H: unknowns with their shares, and the matrix between them.
-pub(crate) type Held = (Vec<(u32, f64)>, DMat3);
 
 /// H, over the free vertices in elimination order.
 pub(crate) struct Curved<'a> {
@@ -167,19 +169,10 @@ impl Curved<'_> {
     }
 }
 
-/// Unknowns and shares of what is not held.
-pub(crate) fn free(layout: &HessianLayout, members: impl Iterator<Item = (u32, f64)>) -> Vec<(u32, f64)> {
-    members.map(|(v, w)| (layout.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect()
-}
-
 /// The lowest λ after so many steps.
 fn lowest_of(matrix: &Mat<f64>, steps: usize) -> f64 {
     let small = matrix.submatrix(0, 0, steps, steps).to_owned();
     small.self_adjoint_eigenvalues(Side::Lower).map_or(0.0, |values| values[0])
-}
-
-pub(crate) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
 /// a ← a + t b.

@@ -134,6 +134,10 @@ impl TableFourArgs {
             match contest::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
                 Ok(contested) => {
                     journal.rows.push(contested.row.clone());
+                    // Kept before it is recorded: a disk that is full then costs a picture and no row.
+                    if !self.quick {
+                        self.keep(&journal)?;
+                    }
                     if let Some(folder) = &self.recordings {
                         let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
                         bar.suspend(|| console::note(&format!("recording: {}", path.display())));
@@ -141,9 +145,6 @@ impl TableFourArgs {
                 }
                 Err(ContestError::Interrupted) => break,
                 Err(error) => return Err(error.into()),
-            }
-            if !self.quick {
-                self.keep(&journal)?;
             }
         }
         bar.finish_and_clear();

@@ -21,7 +21,8 @@
 //! | ℓ | width of a PART: twice its farthest vertex's distance from its middle | m |
 //! | λ, L, T | width of a fold, its length, the tension along it | m, m, N/m |
 //!
-//! Several fabrics have a λ each, under the garment's mean weight. Limits: λ does not depend on the place; a PART both long and narrow is as wide as it is long, so a narrow ring counts as wide.
+//! Several fabrics have a λ each, under the garment's mean weight. Limits: λ does not depend on the place; a PART both long and narrow
+//! is as wide as it is long, so a narrow ring counts as wide.
 
 use std::f64::consts::PI;
 

@@ -7,7 +7,9 @@ use glam::{DMat3, DVec3};
 use super::membrane::Triangle;
 use super::pattern::HELD;
 use super::{Cloth, Contacts, HessianLayout};
-use crate::mechanics::curvature::{Held, free};
+
+/// What contact adds to the Hessian: unknowns with their shares, and the matrix between them, N/m.
+pub(crate) type Held = (Vec<(u32, f64)>, DMat3);
 
 impl Cloth {
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
@@ -86,8 +88,7 @@ impl Cloth {
             }
         }
         for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
-            let members: Vec<(u32, f64)> =
-                gap.members().map(|(v, w)| (layout.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect();
+            let members = layout.free(gap.members());
             layout.add(&members, block, blocks);
         }
     }
@@ -95,9 +96,9 @@ impl Cloth {
     /// What body, friction and gaps add to ∇²E at `x`, N/m: unknowns of a layout with their shares, and the matrix between them.
     pub(crate) fn held_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts) -> Vec<Held> {
         let on_body = contacts.hessian().chain(contacts.friction.hessian(x));
-        let by_body = on_body.map(|(v, block)| (free(layout, std::iter::once((v, 1.0))), block));
+        let by_body = on_body.map(|(v, block)| (layout.free(std::iter::once((v, 1.0))), block));
         let gaps = contacts.proximity.iter().flat_map(|p| p.hessian(x));
-        by_body.chain(gaps.map(|(gap, block)| (free(layout, gap.members()), block))).collect()
+        by_body.chain(gaps.map(|(gap, block)| (layout.free(gap.members()), block))).collect()
     }
 
     /// H d for a Hessian in [`hessian`](Self::hessian)'s blocks, both over the unknowns in elimination order.

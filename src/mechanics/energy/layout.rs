@@ -67,6 +67,11 @@ impl HessianLayout {
         Self { order, unknown, pattern, triangle_slots, bending_blocks }
     }
 
+    /// Unknowns and shares of those vertices that are not held.
+    pub(crate) fn free(&self, members: impl Iterator<Item = (u32, f64)>) -> Vec<(u32, f64)> {
+        members.map(|(v, w)| (self.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect()
+    }
+
     /// Adds a symmetric `block` (N/m) between unknowns with these shares; what has no block of its own is left out.
     pub(crate) fn add(&self, members: &[(u32, f64)], block: DMat3, blocks: &mut [DMat3]) {
         for (k, &(i, w)) in members.iter().enumerate() {

@@ -40,5 +40,6 @@ pub(crate) use cover::Covered;
 pub use error::EnergyError;
 pub use evaluate::Scratch;
 pub use friction::Friction;
+pub(crate) use hessian::Held;
 pub use layout::HessianLayout;
 pub use proximity::Proximity;

@@ -276,7 +276,12 @@ impl<'c, 'b> Descent<'c, 'b> {
     }
 }
 
-/// ‖g‖₂, N.
-fn norm(gradient: &[DVec3]) -> f64 {
-    gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt()
+/// ‖a‖₂.
+fn norm(a: &[DVec3]) -> f64 {
+    a.iter().map(|a| a.length_squared()).sum::<f64>().sqrt()
+}
+
+/// a · b.
+pub(crate) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }

@@ -15,7 +15,7 @@
 
 use glam::DVec3;
 
-use super::norm;
+use super::{dot, norm};
 
 /// A step goes on like the one before where its cosine with it is over this.
 const ALIKE: f64 = 0.8;
@@ -65,10 +65,6 @@ impl Onward {
     pub(super) fn forget(&mut self) {
         self.step.clear();
     }
-}
-
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
 #[cfg(test)]

@@ -11,14 +11,8 @@
 use glam::DVec3;
 
 use super::{Descent, SolveError, State, Whole};
-use crate::mechanics::curvature::{Curved, Until};
+use crate::mechanics::curvature::{Curved, DAMPING, STEPS, Until};
 use crate::mechanics::energy::proximity::Looked;
-
-/// Steps of Lanczos' method.
-const STEPS: usize = 40;
-
-/// Damping of a look, 1/s²: under a thousandth of what a hanging cloth swings with (g over a metre).
-const DAMPING: f64 = 1e-2;
 
 /// λ under which a way leads out: over a hundred times what single precision makes of none.
 const LEADS_OUT: f64 = -1e-3;

@@ -23,8 +23,8 @@ const CLOSE: f64 = 1e-2;
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
-/// Near rest, so many steps back, each against the one before, without a residual less than a share of the least so far, go to and fro: normals of gaps, anchors of friction stay
-/// as they are during a step and follow it, and what two states ask of each other may never agree. Half the way between them, and half
+/// Near rest, so many steps back, each against the one before, without a residual less than a share of the least so far, go to and fro:
+/// normals of gaps and anchors of friction stay as they are during a step and follow it, and what two states ask of each other may never agree. Half the way between them, and half
 /// again, it does (Krasnoselskii's iteration, 1955).
 const TO_AND_FRO: usize = 3;
 const LESS: f64 = 0.9;
