@@ -14,15 +14,15 @@
 //! Limits: the sign is exact for closed, consistently wound surfaces without self-intersections; where a body intersects
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
+mod ends;
 mod tree;
 mod worn;
 
 use std::sync::Arc;
 
 use glam::DVec3;
-use parry3d_f64::math::Pose;
-use parry3d_f64::query::{PointQueryWithLocation, distance};
-use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, Triangle, TrianglePointLocation};
+use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
 use rayon::prelude::*;
 
 use tree::{Nearest, Tree};
@@ -133,12 +133,6 @@ impl Body {
     #[must_use]
     pub fn nearest(&self, x: DVec3) -> SurfacePoint {
         self.outermost(x, self.bare(x, self.tree.nearest(&[x])[0]).0)
-    }
-
-    /// How far a triangle is from the surface, without what that wears, m: zero where they cross.
-    pub(crate) fn distance_to(&self, [a, b, c]: [DVec3; 3]) -> f64 {
-        let (here, triangle) = (Pose::IDENTITY, Triangle::new(a, b, c));
-        distance(&here, &*self.shape, &here, &triangle).unwrap_or(f64::INFINITY)
     }
 
     /// [`nearest`](Self::nearest) of every point, in parallel; the order, and every bit, is that of the input.

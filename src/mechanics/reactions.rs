@@ -22,15 +22,19 @@
 use glam::DVec3;
 
 use super::energy::contact::Touch;
-use super::energy::{Cloth, Contacts, Friction};
+use super::energy::{Cloth, Contacts, Friction, touching_between};
 use crate::distance::Body;
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
 /// tenth of a millimetre.
 const TOUCHING: f64 = 2e-4;
 
-/// Vertices are kept this much farther from the body at most where it would poke through between them, m (`energy::cover`).
-const COVERED: f64 = 4e-3;
+/// Triangles with a corner this much farther from the body than it keeps are asked whether they touch it in between, m.
+const BETWEEN: f64 = 4e-3;
+
+/// A place between vertices counts as touching where it is nearer than it would keep by itself and this, m: it is kept farther off where the
+/// body is rougher than that (`energy::cover`).
+const BETWEEN_TOUCHING: f64 = 5e-4;
 
 /// Turns in which reactions are given, at most, and the change of all of them, over the weight, that ends it.
 const TURNS: usize = 3000;
@@ -42,7 +46,8 @@ const SLIPPING: f64 = 0.999;
 /// A place of the cloth that touches the body or another place of it, and what it is given there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Touching {
-    /// The vertices that the reaction goes to, with their shares: one on the body, up to four of a gap of the cloth with itself.
+    /// The vertices that the reaction goes to, with their shares: one on the body, up to three of a place between, up to four of a gap of the
+    /// cloth with itself.
     pub shares: Vec<(u32, f64)>,
     /// Unit normal that the reaction pushes along.
     pub normal: DVec3,
@@ -77,7 +82,7 @@ pub struct Forces {
     pub beyond: f64,
     /// Touching vertices with more of it than a hundredth of what they are given.
     pub beyond_count: usize,
-    /// Where it touches: the body's vertices ascending, then the cloth's gaps with itself.
+    /// Where it touches: vertices on the body ascending, places between them, then the cloth's gaps with itself.
     pub touching: Vec<Touching>,
 }
 
@@ -164,18 +169,18 @@ pub(crate) fn grant_beside(cloth: &Cloth, body: &Body, contacts: &Contacts<'_>, 
     let mut pushed = vec![false; x.len()];
     contacts.touches().iter().for_each(|t| pushed[t.vertex as usize] = true);
     let mut beside = touching(cloth, body, x);
-    beside.retain(|t| !t.of_body || t.shares.iter().all(|(v, _)| !pushed[*v as usize]));
+    beside.retain(|t| !t.of_body || t.shares.len() > 1 || !pushed[t.shares[0].0 as usize]);
     grant(&mut beside, rest, cloth);
 }
 
 /// Where the cloth touches the body at `x`, and then where it touches itself.
 fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let stiffness = cloth.contact_stiffness();
-    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + COVERED).collect();
+    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + BETWEEN).collect();
     let mut contacts = Contacts::new(body, [&cloth.areas, &offsets], &cloth.held, stiffness, Friction::none());
     contacts.update(x);
-    let spans = spanned(cloth, body, x, &contacts);
-    let of_body = contacts.touches().iter().filter(|t| t.depth > COVERED - TOUCHING || spans[t.vertex as usize]);
+    let mut close = vec![false; x.len()];
+    contacts.touches().iter().for_each(|t| close[t.vertex as usize] = true);
     let at_body = |t: &Touch| Touching {
         of_body: true,
         ..Touching::at(
@@ -185,7 +190,14 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
             cloth.friction[t.vertex as usize],
         )
     };
-    let mut all: Vec<Touching> = of_body.map(at_body).collect();
+    let at_vertices = contacts.touches().iter().filter(|t| t.depth > BETWEEN - TOUCHING);
+    let mut all: Vec<Touching> = at_vertices.map(at_body).collect();
+    for (corners, shares, normal) in touching_between(cloth, body, x, &close, BETWEEN_TOUCHING) {
+        let mean = |of: &[f64]| corners.iter().zip(shares).map(|(&v, w)| of[v as usize] * w).sum::<f64>();
+        let (stiffness, friction) = (stiffness * mean(&cloth.areas), mean(&cloth.friction));
+        let shares = corners.into_iter().zip(shares).filter(|(_, w)| *w > 0.0).collect();
+        all.push(Touching { of_body: true, ..Touching::at(shares, normal, stiffness, friction) });
+    }
     let mut itself = cloth.proximity();
     itself.refresh(x);
     let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
@@ -195,31 +207,6 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
         ..Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), gap.mean(&cloth.friction))
     }));
     all
-}
-
-/// Whether a triangle of each vertex touches the body between its corners: these may then be kept farther off than by themselves, so that
-/// it does not poke through. Asked of triangles that are `near` it with a corner.
-fn spanned(cloth: &Cloth, body: &Body, x: &[DVec3], near: &Contacts<'_>) -> Vec<bool> {
-    let mut close = vec![false; x.len()];
-    near.touches().iter().for_each(|t| close[t.vertex as usize] = true);
-    let mut spans = vec![false; x.len()];
-    let inner = |v: [u32; 3]| {
-        let [a, b, c] = v.map(|v| x[v as usize]);
-        [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
-    };
-    let triangles: Vec<[u32; 3]> =
-        cloth.triangles.iter().map(|t| t.vertices).filter(|t| t.iter().any(|&v| close[v as usize])).collect();
-    let points: Vec<DVec3> = triangles.iter().flat_map(|t| inner(*t)).collect();
-    for (t, near) in triangles.iter().zip(body.nearest_all(&points).chunks_exact(4)) {
-        let keeps = t.iter().map(|&v| cloth.offsets[v as usize]).fold(0.0, f64::max);
-        // What the body wears is asked at these points alone.
-        let touches = near.iter().any(|p| p.signed_distance < keeps)
-            || body.distance_to(t.map(|v| x[v as usize])) < keeps + TOUCHING;
-        if touches {
-            t.iter().for_each(|&v| spans[v as usize] = true);
-        }
-    }
-    spans
 }
 
 impl Touching {

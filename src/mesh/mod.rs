@@ -18,6 +18,7 @@ pub mod glb;
 pub(crate) mod half_edge;
 pub mod health;
 pub mod import;
+pub(crate) mod lattice;
 mod polygon;
 pub mod report;
 pub mod rest;

@@ -106,7 +106,7 @@ impl SceneSpec {
             unplaced.put_on(outer);
             layers.push(unplaced.layer(spec.layer_name(), before));
         }
-        let (mut scene, pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
+        let (mut scene, mut pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
             .map_err(SceneError::about(&self.garment))?;
         (scene.layers, scene.distance_to) = (layers, self.distance_to);
         scene.own_fabrics = unplaced.cut.fabrics;
@@ -117,6 +117,10 @@ impl SceneSpec {
             }
             Some(what) => scene.edges(what).map_err(SceneError::about(&self.garment))?,
         };
+        // What is made for the form needs not be asked.
+        if self.push_out && self.layers().any(|spec| spec.is_a_mesh() || spec.is_a_pattern()) {
+            pushed_out.off_ends_m = scene.take_off_ends();
+        }
         let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
         let reports = of_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
         Ok(Loaded {
@@ -272,7 +276,7 @@ impl Loaded {
             notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
         }
         notes.extend(self.swatches.iter().map(|swatch| format!("cut: {swatch}")));
-        if self.pushed_out.is_clean() && self.pushed_out.found_inside > 0 {
+        if self.pushed_out.is_clean() && (self.pushed_out.found_inside > 0 || self.pushed_out.off_ends_m > 0.0) {
             notes.push(self.pushed_out.to_string());
         }
         notes

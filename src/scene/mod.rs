@@ -86,6 +86,14 @@ impl Scene {
         Ok((Self::new(body, garment, rest), report))
     }
 
+    /// Takes the garment off over the ends of the body that stick through it; the longest way that a vertex went, m.
+    fn take_off_ends(&mut self) -> f64 {
+        let Some(taken) = self.body.taken_off_ends(&self.garment, &self.is_held()) else { return 0.0 };
+        let farthest = self.garment.positions.iter().zip(&taken).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        self.garment.positions = taken;
+        farthest
+    }
+
     /// Whether each garment vertex is held.
     #[must_use]
     pub fn is_held(&self) -> Vec<bool> {

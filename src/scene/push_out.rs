@@ -54,6 +54,8 @@ pub struct PushOutReport {
     pub left_inside: usize,
     /// Triangles turned by more than a right angle.
     pub turned_over: usize,
+    /// The longest way that a vertex went to be off an end of the body (toes, a thumb) that stuck through the garment, m; zero where none did.
+    pub off_ends_m: f64,
 }
 
 impl PushOutReport {
@@ -66,6 +68,13 @@ impl PushOutReport {
 
 impl fmt::Display for PushOutReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.off_ends_m > 0.0 {
+            write!(
+                f,
+                "the body stuck through the garment (a foot, a hand?); taken off over its end, by up to {:.0} mm; ",
+                1e3 * self.off_ends_m
+            )?;
+        }
         if self.found_inside == 0 {
             return f.write_str("no vertex of the garment starts inside the body");
         }

@@ -15,11 +15,12 @@
 //! A distance costs as much as ten triangles' energies, so each vertex remembers its last one: q has slope at most one,
 //! hence q(x) ≥ q(x') − |x − x'|, and a vertex whose bound stays above h is not asked again.
 //!
-//! Limits: vertices are tested, not edges or triangles; where the body pokes through a triangle all the same, the distance that its
-//! corners keep is raised (`cover.rs`).
+//! Limits: vertices are tested, not edges or triangles; where the body pokes through a triangle all the same, places within it are
+//! kept off as well (`cover.rs`).
 
 use glam::{DMat3, DVec3};
 
+use super::cover::Cover;
 use super::field::{Field, SIDE};
 use super::friction::Friction;
 use super::membrane::outer;
@@ -79,6 +80,8 @@ pub struct Contacts<'b> {
     pub friction: Friction,
     /// Where the cloth meets itself; not asked where there is none.
     pub proximity: Option<Proximity>,
+    /// Places between the vertices that keep off the body.
+    pub(super) cover: Cover,
 }
 
 impl<'b> Contacts<'b> {
@@ -98,6 +101,7 @@ impl<'b> Contacts<'b> {
             touches: Vec::new(),
             friction: Friction::none(),
             proximity: None,
+            cover: Cover::default(),
         }
     }
 
@@ -125,6 +129,7 @@ impl<'b> Contacts<'b> {
             touches: Vec::new(),
             friction,
             proximity: None,
+            cover: Cover::default(),
         }
     }
 
@@ -242,11 +247,13 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// Refreshes what stays as it is between two steps, at the positions `x` last updated: friction, and where the cloth meets itself.
+    /// Refreshes what stays as it is between two steps, at the positions `x` last updated: friction, where the cloth meets itself, and
+    /// what is kept off between its vertices.
     pub fn refresh(&mut self, x: &[DVec3]) {
         self.friction.refresh(&self.touches, x);
+        let to_body = self.cover.gaps(self.body(), x);
         if let Some(proximity) = &mut self.proximity {
-            proximity.refresh(x);
+            proximity.refresh_with(x, to_body);
         }
     }
 

@@ -170,6 +170,12 @@ impl Triangle {
         })
     }
 
+    /// Length of its longest side at rest, m.
+    #[must_use]
+    pub fn longest_side_m(&self) -> f64 {
+        2.0 * self.area * self.gradients.iter().map(|b| b.length()).fold(0.0, f64::max)
+    }
+
     /// F_u and F_v.
     #[must_use]
     pub fn deformation(&self, x: &[DVec3]) -> [DVec3; 2] {

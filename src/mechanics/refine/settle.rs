@@ -110,8 +110,6 @@ fn settle(
     if limit > 0 {
         descent.untangle(UNTANGLING, RELAXING);
     }
-    let triangles: Vec<[u32; 3]> = cloth.triangles.iter().map(|t| t.vertices).collect();
-    let mut covered = Covered::default();
     let mut tangent = Whole::default();
     // Whether the energy is new to these positions: at the start, and when the cloth gets its true stiffness.
     let mut fresh = true;
@@ -124,19 +122,24 @@ fn settle(
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
+            let covered = |descent: &mut Descent<'_, '_>| descent.contacts.cover(cloth, &mut descent.x);
             if descent.contacts.penetration(&descent.x).0 > 0 {
                 descent.contacts.stiffen(4.0);
-            } else if !options.self_contact || descent.contacts.cover(&triangles, &descent.x, &mut covered) == 0 {
-                if !options.lasting || looks == LOOKS || iteration >= limit {
-                    break Stop::Converged;
+            } else {
+                match if options.self_contact { covered(&mut descent) } else { Covered::Done } {
+                    Covered::Places => {}
+                    Covered::Moved => descent.damping = options.damping,
+                    Covered::Done if !options.lasting || looks == LOOKS || iteration >= limit => break Stop::Converged,
+                    Covered::Done => {
+                        looks += 1;
+                        match descent.look(&mut tangent, looks > 1, RELAXING)? {
+                            Rest::Lasts => break Stop::Converged,
+                            Rest::Moves => {}
+                            Rest::Left => (least, back) = (f64::INFINITY, 0),
+                        }
+                        descent.damping = LEAST_DAMPING;
+                    }
                 }
-                looks += 1;
-                match descent.look(&mut tangent, looks > 1, RELAXING)? {
-                    Rest::Lasts => break Stop::Converged,
-                    Rest::Moves => {}
-                    Rest::Left => (least, back) = (f64::INFINITY, 0),
-                }
-                descent.damping = LEAST_DAMPING;
             }
             descent.contacts.update(&descent.x);
             descent.contacts.refresh(&descent.x);

@@ -15,6 +15,8 @@ pub(super) struct Key {
     /// The vertex and the corners of its feature, the ends of both edges, or those of an edge and the corners of a triangle; [`NONE`]
     /// where there are fewer.
     pub(super) vertices: [u32; 5],
+    /// Which of the places that are kept off the body it is; [`NONE`] for a gap of the cloth with itself.
+    pub(super) place: u32,
 }
 
 /// What faces what.
@@ -26,6 +28,8 @@ pub(super) enum Kind {
     Edges,
     /// An edge and the triangle that it crosses.
     Crossing,
+    /// A place within a triangle, and the body.
+    Body,
 }
 
 /// A gap as it was when it was last looked for: places and plane stay until the next time.
@@ -34,6 +38,8 @@ pub struct Gap {
     pub(super) key: Key,
     /// w of each vertex: they add up to zero.
     pub(super) weights: [f64; 5],
+    /// The place on the body that it is taken from, m; zero of a gap of the cloth with itself.
+    pub(super) body: DVec3,
     /// n, from the second place to the first.
     pub(super) normal: DVec3,
     /// h: how far apart along n the two places are kept, m.
@@ -53,13 +59,13 @@ pub struct Gap {
 impl Gap {
     /// A gap without a past, no plane in it yet.
     pub(super) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
-        let (normal, from, slip) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        Self { key, weights, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
+        let [body, normal, from, slip] = [DVec3::ZERO; 4];
+        Self { key, weights, body, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
     }
 
-    /// Σ w x, m: from the second place to the first.
+    /// Σ w x, less the place on the body, m: from the second place to the first.
     pub(super) fn across(&self, x: &[DVec3]) -> DVec3 {
-        self.members().map(|(v, w)| x[v as usize] * w).sum()
+        self.members().map(|(v, w)| x[v as usize] * w).sum::<DVec3>() - self.body
     }
 
     /// Its vertices and their weights.
@@ -67,11 +73,12 @@ impl Gap {
         self.key.vertices.into_iter().zip(self.weights).filter(|(v, _)| *v != NONE)
     }
 
-    /// The mean of what its vertices have, each place counting half.
+    /// The mean of what its vertices have, each place of the cloth counting alike.
     pub(crate) fn mean(&self, of: &[f64]) -> f64 {
         // Where all have the same it is that one to the last bit.
         let first = of[self.key.vertices[0] as usize];
-        first + 0.5 * self.members().map(|(v, w)| w.abs() * (of[v as usize] - first)).sum::<f64>()
+        let each = if self.key.kind == Kind::Body { 1.0 } else { 0.5 };
+        first + each * self.members().map(|(v, w)| w.abs() * (of[v as usize] - first)).sum::<f64>()
     }
 
     /// What is missing to the goal at `x`, m: positive where they press.

@@ -28,6 +28,7 @@
 
 mod gap;
 mod passage;
+mod place;
 mod search;
 mod skin;
 mod untangle;
@@ -37,6 +38,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 pub use gap::Gap;
+pub(super) use place::Place;
 pub(crate) use passage::Looked;
 use passage::Passage;
 pub(crate) use skin::Skin;
@@ -131,6 +133,11 @@ impl Proximity {
 
     /// Looks for gaps at `x` (m); those that were there before go on.
     pub fn refresh(&mut self, x: &[DVec3]) {
+        self.refresh_with(x, Vec::new());
+    }
+
+    /// The same with these gaps to the body beside those of the cloth with itself.
+    pub(super) fn refresh_with(&mut self, x: &[DVec3], to_body: Vec<Gap>) {
         let Self { skin, placed, apart, friction, passage, .. } = self;
         let most = apart.most();
         let mut gaps = search::gaps(skin, x, placed, apart, REACH * most);
@@ -146,8 +153,9 @@ impl Proximity {
             // About a crossing nobody knows which side is the right one.
             gaps.retain(|gap| !gap.members().any(|(v, _)| passage.is_tangled(v)));
             gaps.extend(back);
-            gaps.sort_unstable_by_key(|gap| gap.key);
         }
+        gaps.extend(to_body);
+        gaps.sort_unstable_by_key(|gap| gap.key);
         let mut before = self.gaps.iter().peekable();
         for gap in &mut gaps {
             while before.next_if(|b| b.key < gap.key).is_some() {}
@@ -162,7 +170,7 @@ impl Proximity {
             let depth = gap.depth(x);
             gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
-            if depth > (1.0 - NARROW) * gap.goal {
+            if depth > (1.0 - NARROW) * gap.goal && gap.first > 0.0 {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
             }
             gap.slip =
@@ -208,9 +216,9 @@ impl Proximity {
         self.gaps.iter().filter(|gap| gap.depth(x) > 0.0).count()
     }
 
-    /// All gaps, what crosses left out.
+    /// All gaps of the cloth with itself, what crosses left out.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = &Gap> {
-        self.gaps.iter().filter(|gap| gap.key.kind != gap::Kind::Crossing)
+        self.gaps.iter().filter(|gap| matches!(gap.key.kind, gap::Kind::Vertex | gap::Kind::Edges))
     }
 
     /// What the gaps that press at `x` push with, N, normal to each.
@@ -243,6 +251,16 @@ impl Proximity {
             x.clone_from(&self.clear);
         }
         self.passage.begin(Vec::new());
+    }
+
+    /// Puts the cloth from `x` to another place (m), if it crosses itself no more there; whether it did.
+    pub(super) fn put(&mut self, x: &[DVec3], there: &[DVec3]) -> bool {
+        let crossing = self.passage.anew(there);
+        let put = crossing.len() <= self.passage.known(x).len();
+        if put {
+            self.passage.begin(crossing);
+        }
+        put
     }
 
     /// Pairs of triangles that cross at `x`, where the last step ended.

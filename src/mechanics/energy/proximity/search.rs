@@ -96,7 +96,7 @@ impl Look<'_> {
                 *v = if *share == 0.0 { NONE } else { *v };
             }
             to.sort_unstable_by_key(|(v, _)| *v);
-            let key = Key { kind: Kind::Vertex, vertices: [v, to[0].0, to[1].0, to[2].0, NONE] };
+            let key = Key { kind: Kind::Vertex, vertices: [v, to[0].0, to[1].0, to[2].0, NONE], place: NONE };
             let weights = [1.0, to[0].1, to[1].1, to[2].1, 0.0];
             let area = self.skin.vertex_areas[v as usize];
             if let Some(gap) = self.gap(key, weights, area) {
@@ -137,7 +137,7 @@ impl Look<'_> {
         if across.length_squared() > self.reach * self.reach {
             return;
         }
-        let key = Key { kind: Kind::Edges, vertices: [a, b, c, d, NONE] };
+        let key = Key { kind: Kind::Edges, vertices: [a, b, c, d, NONE], place: NONE };
         let area = OF_EDGES * self.skin.edge_areas[e as usize].min(self.skin.edge_areas[f as usize]);
         if let Some(gap) = self.gap(key, [p_share, q_share, -r_share, -s_share, 0.0], area) {
             found.push(Found { gap, faces: 1 });

@@ -72,7 +72,7 @@ fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f
     }
     let length = g.length();
     let stride = STRIDE * skin.edge_m * length / (length * length + HALF_AT).sqrt();
-    let key = Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]] };
+    let key = Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]], place: NONE };
     let weights = [1.0 - share, share, -shares[0], -shares[1], -shares[2]];
     let mut gap = Gap::new(key, weights, 0.0, stiffness * skin.edge_areas[edge]);
     gap.normal = g / length;
