@@ -29,9 +29,6 @@ use crate::distance::Body;
 /// tenth of a millimetre.
 const TOUCHING: f64 = 2e-4;
 
-/// Triangles with a corner this much farther from the body than it keeps are asked whether they touch it in between, m.
-const BETWEEN: f64 = 4e-3;
-
 /// A place between vertices counts as touching where it is nearer than it would keep by itself and this, m: it is kept farther off where the
 /// body is rougher than that (`energy::cover`).
 const BETWEEN_TOUCHING: f64 = 5e-4;
@@ -176,11 +173,9 @@ pub(crate) fn grant_beside(cloth: &Cloth, body: &Body, contacts: &Contacts<'_>, 
 /// Where the cloth touches the body at `x`, and then where it touches itself.
 fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let stiffness = cloth.contact_stiffness();
-    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + BETWEEN).collect();
+    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + TOUCHING).collect();
     let mut contacts = Contacts::new(body, [&cloth.areas, &offsets], &cloth.held, stiffness, Friction::none());
     contacts.update(x);
-    let mut close = vec![false; x.len()];
-    contacts.touches().iter().for_each(|t| close[t.vertex as usize] = true);
     let at_body = |t: &Touch| Touching {
         of_body: true,
         ..Touching::at(
@@ -190,9 +185,8 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
             cloth.friction[t.vertex as usize],
         )
     };
-    let at_vertices = contacts.touches().iter().filter(|t| t.depth > BETWEEN - TOUCHING);
-    let mut all: Vec<Touching> = at_vertices.map(at_body).collect();
-    for (corners, shares, normal) in touching_between(cloth, body, x, &close, BETWEEN_TOUCHING) {
+    let mut all: Vec<Touching> = contacts.touches().iter().map(at_body).collect();
+    for (corners, shares, normal) in touching_between(cloth, body, x, BETWEEN_TOUCHING) {
         let mean = |of: &[f64]| corners.iter().zip(shares).map(|(&v, w)| of[v as usize] * w).sum::<f64>();
         let (stiffness, friction) = (stiffness * mean(&cloth.areas), mean(&cloth.friction));
         let shares = corners.into_iter().zip(shares).filter(|(_, w)| *w > 0.0).collect();

@@ -4,6 +4,8 @@
 
 mod knot;
 mod layers;
+mod skin;
+mod starts;
 
 use std::f64::consts::TAU;
 

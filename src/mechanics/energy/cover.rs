@@ -63,7 +63,7 @@ pub(crate) enum Covered {
 }
 
 impl Contacts<'_> {
-    /// Covers the skin that is through the cloth at `x` (m). Takes effect with the next [`update`](Self::update) and
+    /// Covers the skin that is through the cloth at `x` (m), where it rests. Takes effect with the next [`update`](Self::update) and
     /// [`refresh`](Self::refresh).
     pub(crate) fn cover(&mut self, cloth: &Cloth, x: &mut Vec<DVec3>) -> Covered {
         let Some(body) = self.body() else { return Covered::Done };
@@ -85,6 +85,15 @@ impl Contacts<'_> {
         *x = garment.positions;
         let changed = self.cover.around(cloth, body, x, &pairs);
         if changed > 0 { Covered::Places } else { Covered::Done }
+    }
+
+    /// The same near rest, where places had to be kept off before: adds what is through the cloth by now. How many places are new.
+    pub(crate) fn cover_more(&mut self, cloth: &Cloth, x: &[DVec3]) -> usize {
+        let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else { return 0 };
+        let garment = TriMesh::new(x.to_vec(), cloth.triangles.iter().map(|t| t.vertices).collect());
+        let mut crossing: Vec<u32> = crossing_pairs(&garment, body.mesh()).into_iter().map(|[t, _]| t).collect();
+        crossing.dedup();
+        crossing.into_iter().map(|t| self.cover.add(cloth, &cloth.triangles[t as usize], body, x, true)).sum()
     }
 }
 
@@ -126,7 +135,7 @@ impl Cover {
     fn add(&mut self, cloth: &Cloth, triangle: &Triangle, body: &Body, x: &[DVec3], crosses: bool) -> usize {
         let (corners, longest) = (triangle.vertices, triangle.longest_side_m());
         let offset = offset(cloth, triangle);
-        let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area;
+        let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
         let all: Vec<Place> = lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
         let mut deepest: Vec<(f64, usize)> = body.nearest_all(&at).iter().map(|near| near.signed_distance).zip(0..).collect();
@@ -170,19 +179,120 @@ fn offset(cloth: &Cloth, triangle: &Triangle) -> f64 {
 }
 
 /// Places between the vertices of a cloth at `x` (m) that touch the body, within `margin` (m) of what they would keep: the corners with their
-/// shares, and the body's normal. Asked of the triangles that have a corner which is `near`.
+/// shares, and the body's normal. As the distance to the body has slope at most one, those of the vertices tell which need not be asked.
 pub(in crate::mechanics) fn touching_between(
     cloth: &Cloth,
     body: &Body,
     x: &[DVec3],
-    near: &[bool],
     margin: f64,
 ) -> Vec<([u32; 3], [f64; 3], DVec3)> {
-    let close = cloth.triangles.iter().filter(|t| t.vertices.iter().any(|&v| near[v as usize]));
-    let of_each = |t| lattice(Triangle::longest_side_m(t)).map(move |shares| (t, shares));
-    let all: Vec<(&Triangle, [f64; 3])> = close.flat_map(of_each).collect();
-    let at: Vec<DVec3> = all.iter().map(|(t, shares)| place(t.vertices.map(|v| x[v as usize]), *shares)).collect();
-    let found = body.nearest_all(&at);
-    let touches = all.into_iter().zip(found).filter(|((t, _), near)| near.signed_distance < offset(cloth, t) + margin);
-    touches.map(|((t, shares), near)| (t.vertices, shares, near.normal)).collect()
+    let far: Vec<f64> = body.nearest_all(x).iter().map(|near| near.signed_distance).collect();
+    let mut asked: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
+    for t in &cloth.triangles {
+        let keeps = offset(cloth, t) + margin;
+        let corners = t.vertices.map(|v| x[v as usize]);
+        let clear = |at: DVec3| t.vertices.iter().zip(corners).any(|(&v, corner)| far[v as usize] - corner.distance(at) > keeps);
+        let all = lattice(t.longest_side_m()).map(|shares| (t, shares, place(corners, shares)));
+        asked.extend(all.filter(|(_, _, at)| !clear(*at)));
+    }
+    let found = body.nearest_all(&asked.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
+    let touches = asked.into_iter().zip(found).filter(|((t, ..), near)| near.signed_distance < offset(cloth, t) + margin);
+    touches.map(|((t, shares, _), near)| (t.vertices, shares, near.normal)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fabric::Fabric;
+    use crate::mesh::{RestShape, Topology};
+
+    /// A box of this half width and depth under z = 0.
+    fn post(half: f64) -> Body {
+        let corner = |i: usize| {
+            let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
+            DVec3::new(side(0) + 0.021, side(1) + 0.013, if i >> 2 & 1 == 1 { 0.0 } else { -0.3 })
+        };
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
+    }
+
+    /// Two triangles of 6 cm with the post 3 mm through the one.
+    fn pierced() -> (Cloth, Vec<DVec3>) {
+        let at = |x: f64, y: f64| DVec3::new(x, y, -3e-3);
+        let x = vec![at(0.0, 0.0), at(0.06, 0.0), at(0.0, 0.06), at(0.06, 0.06)];
+        let mesh = TriMesh::new(x.clone(), vec![[0, 1, 2], [2, 1, 3]]);
+        let fabric = Fabric::by_name("jersey").unwrap();
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        (Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[3]).unwrap(), x)
+    }
+
+    /// Contacts that cover the post, by now slid along it, and where the cloth is.
+    fn covered<'b>(cloth: &Cloth, body: &'b Body, mut x: Vec<DVec3>) -> (Contacts<'b>, Vec<DVec3>) {
+        let mut contacts = cloth.contacts(body, &x);
+        contacts.proximity = Some(cloth.proximity());
+        assert!(contacts.touches().is_empty(), "no corner touches");
+        assert_eq!(contacts.cover(cloth, &mut x), Covered::Places);
+        contacts.refresh(&x);
+        // One more refresh, for friction to have a pressure.
+        contacts.refresh(&x);
+        let slid = x.iter().enumerate().map(|(i, p)| *p + DVec3::new(2e-4, 1e-4 * i as f64, 5e-5)).collect();
+        (contacts, slid)
+    }
+
+    fn force(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<DVec3> {
+        let (mut with, mut without) = (Vec::new(), Vec::new());
+        cloth.gradient(x, contacts, &mut with);
+        cloth.gradient(x, &Contacts::none(), &mut without);
+        with.iter().zip(&without).map(|(a, b)| *a - *b).collect()
+    }
+
+    #[test]
+    fn gradient_and_blocks_of_what_is_kept_off_are_those_of_its_energy() {
+        let (body, (cloth, x)) = (post(0.004), pierced());
+        let (contacts, x) = covered(&cloth, &body, x);
+        let pressing = contacts.proximity.as_ref().unwrap().pressing(&x);
+        assert!(pressing > 2, "{pressing}");
+        let energy = |x: &[DVec3]| cloth.energy(x, &contacts) - cloth.energy(x, &Contacts::none());
+        let told = force(&cloth, &contacts, &x);
+        assert_eq!(told[3], DVec3::ZERO, "it is held");
+        let largest = told.iter().map(|f| f.length()).fold(0.0, f64::max);
+        let (mut blocks, mut without) = (Vec::new(), Vec::new());
+        cloth.hessian(&x, &contacts, &mut blocks);
+        cloth.hessian(&x, &Contacts::none(), &mut without);
+        blocks.iter_mut().zip(without).for_each(|(a, b)| *a -= b);
+        let step = 1e-8;
+        for (i, &v) in cloth.order().iter().enumerate() {
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let moved = |s: f64| {
+                    let mut x = x.clone();
+                    x[v as usize] += axis * s;
+                    x
+                };
+                let slope = (energy(&moved(step)) - energy(&moved(-step))) / (2.0 * step);
+                assert!((slope - told[v as usize].dot(axis)).abs() < 1e-5 * largest, "vertex {v}: {slope}");
+                let (ahead, behind) = (force(&cloth, &contacts, &moved(step)), force(&cloth, &contacts, &moved(-step)));
+                let mut d = vec![DVec3::ZERO; cloth.order().len()];
+                d[i] = axis;
+                let mut change = Vec::new();
+                cloth.multiply(&blocks, &d, &mut change);
+                let scale = change.iter().map(|f| f.length()).fold(1.0, f64::max);
+                for (&w, change) in cloth.order().iter().zip(&change) {
+                    let measured = (ahead[w as usize] - behind[w as usize]) / (2.0 * step);
+                    assert!(measured.distance(*change) < 1e-4 * scale, "{v} {w}: {measured} and {change}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_covered_is_let_go() {
+        let (body, (cloth, mut x)) = (post(0.004), pierced());
+        let (mut contacts, _) = covered(&cloth, &body, x.clone());
+        // Nothing moves, so nothing comes of it.
+        let rounds = (0..200).take_while(|_| contacts.cover(&cloth, &mut x) != Covered::Done).count();
+        assert!((IDLE - 1..200).contains(&rounds), "{rounds}");
+        contacts.refresh(&x);
+        assert_eq!(contacts.proximity.as_ref().unwrap().pressing(&x), 0);
+    }
 }

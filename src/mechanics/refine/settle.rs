@@ -20,6 +20,10 @@ const FAR_FROM_REST: f64 = 0.5;
 /// Residual over weight under which damping falls faster: only the softest ways to move are left, and those it holds back most.
 const CLOSE: f64 = 1e-2;
 
+/// Residual over weight under which one looks again for skin through the cloth, once there was some: before it has come to rest with what
+/// was found so far.
+const COVERING: f64 = 3e-2;
+
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
@@ -147,6 +151,10 @@ fn settle(
         }
         if iteration >= limit {
             break Stop::StepsDone;
+        }
+        if !soft && descent.residual < COVERING && descent.contacts.cover_more(cloth, &descent.x) > 0 {
+            descent.contacts.refresh(&descent.x);
+            descent.evaluate();
         }
         if std::mem::take(&mut fresh) {
             let analysed = tangent.solver.take();
