@@ -13,10 +13,12 @@ pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
 use warnings::top_sank_mm;
+pub use warnings::TightestOpening;
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
 use crate::drape::Drape;
+use crate::mechanics::fit::TORN_PERCENT;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::quantile::nearest_rank;
 use crate::scene::Scene;
@@ -66,6 +68,9 @@ pub struct Figures {
     pub strain_p95: Option<f64>,
     /// Its largest value.
     pub strain_max: Option<f64>,
+    /// The opening that is stretched most, of a garment whose cloth is stretched too far.
+    #[serde(skip)]
+    pub tightest_opening: Option<TightestOpening>,
     /// Largest contact pressure, kPa.
     pub pressure_max_kpa: Option<f64>,
     /// RMS vertex error against the result's own continuation, mm.
@@ -123,6 +128,9 @@ impl Figures {
             refine_steps: state.map(|s| s.steps),
             strain_p95: state.map(|s| 1e-2 * s.fit.strain_p95_percent),
             strain_max: state.map(|s| 1e-2 * s.fit.strain_max_percent),
+            tightest_opening: state
+                .filter(|s| s.fit.strain_max_percent > TORN_PERCENT)
+                .and_then(|_| TightestOpening::of(scene, &drape.positions)),
             pressure_max_kpa: state.map(|s| s.fit.pressure_max_kpa),
             ..Self::default()
         }

@@ -1,5 +1,7 @@
 //! What a user should act upon although the numbers alone would reassure, and with what.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::Figures;
@@ -10,6 +12,9 @@ use crate::scene::Scene;
 
 /// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
 const SANK_MM: f64 = 100.0;
+
+/// An opening that is longer by more than this is told where the cloth is stretched too far.
+const STRETCHED: f64 = 1.1;
 
 /// Triangles this many times as long as half of them are, and longer than this (m), bridge something: no remesher leaves such.
 const BRIDGE: f64 = 5.0;
@@ -42,19 +47,61 @@ impl Figures {
         }
         if self.body_crossing_pairs > 0 {
             found.push(format!(
-                "skin shows through the cloth: {} pairs of triangles of garment and body cross{}; contact is felt at vertices, so \
-                 a finer garment mesh mends it",
+                "skin shows through the cloth: {} pairs of triangles of garment and body cross{}; a preview, a few steps and \
+                 --no-self-contact leave that, and at rest a place that is too tight: a finer garment mesh, or more cloth, mends it",
                 self.body_crossing_pairs,
                 if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
             ));
         }
         if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
             found.push(format!(
-                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught",
-                1e2 * strain
+                "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught{}",
+                1e2 * strain,
+                self.tightest_opening.map(TightestOpening::said).unwrap_or_default()
             ));
         }
         found
+    }
+}
+
+/// An opening of a garment that is stretched to be where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TightestOpening {
+    /// Its length as cut, m.
+    pub cut_m: f64,
+    /// Its length as worn, m.
+    pub worn_m: f64,
+    /// Where it is above the lowest point of the body, m.
+    pub height_m: f64,
+}
+
+impl TightestOpening {
+    /// The opening that is stretched most at `positions` (m); `None` where none is by over a tenth.
+    pub(super) fn of(scene: &Scene, positions: &[DVec3]) -> Option<Self> {
+        let mut cut = HashMap::new();
+        for (corners, rest) in scene.garment.triangles.iter().zip(&scene.rest.corners) {
+            for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                cut.insert([corners[i].min(corners[j]), corners[i].max(corners[j])], rest[i].distance(rest[j]));
+            }
+        }
+        let (low, _) = scene.body.mesh().bounds()?;
+        let around = |opening: Vec<u32>| {
+            let sides = || opening.iter().zip(opening.iter().cycle().skip(1));
+            let at = |v: &u32| positions[*v as usize];
+            Self {
+                cut_m: sides().filter_map(|(a, b)| cut.get(&[*a.min(b), *a.max(b)])).sum(),
+                worn_m: sides().map(|(a, b)| at(a).distance(at(b))).sum(),
+                height_m: opening.iter().map(|v| at(v).z).sum::<f64>() / opening.len() as f64 - low.z,
+            }
+        };
+        let all = scene.topology.boundary_loops().into_iter().map(around);
+        let stretched = all.filter(|o| o.worn_m > STRETCHED * o.cut_m && o.cut_m > 0.0);
+        stretched.max_by(|a, b| (a.worn_m / a.cut_m).total_cmp(&(b.worn_m / b.cut_m)))
+    }
+
+    fn said(self) -> String {
+        let [cut, worn, height] = [self.cut_m, self.worn_m, self.height_m].map(|m| 1e2 * m);
+        format!("; its opening at a height of {height:.0} cm, {cut:.1} cm as cut, is stretched to {worn:.1} cm")
     }
 }
 

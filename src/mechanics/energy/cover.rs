@@ -87,6 +87,11 @@ impl Contacts<'_> {
         if changed > 0 { Covered::Places } else { Covered::Done }
     }
 
+    /// Lets all places go, for good, where the cloth does not come to rest with them.
+    pub(crate) fn uncover(&mut self) {
+        self.cover = Cover { given_up: true, ..Cover::default() };
+    }
+
     /// The same near rest, where places had to be kept off before: adds what is through the cloth by now. How many places are new.
     pub(crate) fn cover_more(&mut self, cloth: &Cloth, x: &[DVec3]) -> usize {
         let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else { return 0 };
@@ -102,7 +107,7 @@ impl Cover {
     pub(super) fn gaps(&self, body: Option<&Body>, x: &[DVec3]) -> Vec<Gap> {
         let Some(body) = body else { return Vec::new() };
         let kept = (0..).zip(&self.places).filter(|(_, place)| place.stiffness > 0.0);
-        kept.map(|(number, place)| place.gap(number, body, x)).collect()
+        kept.filter_map(|(number, place)| place.gap(number, body, x)).collect()
     }
 
     /// Keeps places about these `pairs` of triangles that cross off the body; returns how many are new, farther off or let go.
@@ -138,7 +143,9 @@ impl Cover {
         let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
         let all: Vec<Place> = lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
-        let mut deepest: Vec<(f64, usize)> = body.nearest_all(&at).iter().map(|near| near.signed_distance).zip(0..).collect();
+        let found = body.nearest_all(&at);
+        let out = found.iter().zip(0..).filter(|(near, i)| all[*i].leads_out(near, x));
+        let mut deepest: Vec<(f64, usize)> = out.map(|(near, i)| (near.signed_distance, i)).collect();
         deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
         let of_triangle: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added: Vec<DVec3> = Vec::new();
@@ -210,17 +217,17 @@ mod tests {
     fn post(half: f64) -> Body {
         let corner = |i: usize| {
             let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
-            DVec3::new(side(0) + 0.021, side(1) + 0.013, if i >> 2 & 1 == 1 { 0.0 } else { -0.3 })
+            DVec3::new(side(0) + 0.014, side(1) + 0.01, if i >> 2 & 1 == 1 { 0.0 } else { -0.3 })
         };
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
     }
 
-    /// Two triangles of 6 cm with the post 3 mm through the one.
+    /// Two triangles of 3 cm with the post 1.5 mm through both.
     fn pierced() -> (Cloth, Vec<DVec3>) {
-        let at = |x: f64, y: f64| DVec3::new(x, y, -3e-3);
-        let x = vec![at(0.0, 0.0), at(0.06, 0.0), at(0.0, 0.06), at(0.06, 0.06)];
+        let at = |x: f64, y: f64| DVec3::new(x, y, -1.5e-3);
+        let x = vec![at(0.0, 0.0), at(0.03, 0.0), at(0.0, 0.03), at(0.03, 0.03)];
         let mesh = TriMesh::new(x.clone(), vec![[0, 1, 2], [2, 1, 3]]);
         let fabric = Fabric::by_name("jersey").unwrap();
         let rest = RestShape::from_edges(&mesh).unwrap();
@@ -249,10 +256,10 @@ mod tests {
 
     #[test]
     fn gradient_and_blocks_of_what_is_kept_off_are_those_of_its_energy() {
-        let (body, (cloth, x)) = (post(0.004), pierced());
+        let (body, (cloth, x)) = (post(0.005), pierced());
         let (contacts, x) = covered(&cloth, &body, x);
         let pressing = contacts.proximity.as_ref().unwrap().pressing(&x);
-        assert!(pressing > 2, "{pressing}");
+        assert!(pressing > 1, "{pressing}");
         let energy = |x: &[DVec3]| cloth.energy(x, &contacts) - cloth.energy(x, &Contacts::none());
         let told = force(&cloth, &contacts, &x);
         assert_eq!(told[3], DVec3::ZERO, "it is held");
@@ -287,7 +294,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_covered_is_let_go() {
-        let (body, (cloth, mut x)) = (post(0.004), pierced());
+        let (body, (cloth, mut x)) = (post(0.005), pierced());
         let (mut contacts, _) = covered(&cloth, &body, x.clone());
         // Nothing moves, so nothing comes of it.
         let rounds = (0..200).take_while(|_| contacts.cover(&cloth, &mut x) != Covered::Done).count();

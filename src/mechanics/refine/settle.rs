@@ -24,6 +24,9 @@ const CLOSE: f64 = 1e-2;
 /// was found so far.
 const COVERING: f64 = 3e-2;
 
+/// Steps in which the cloth must come to rest with what covers the skin; else it is let go. The longest took 24, in a pair of trousers.
+const PATIENCE: usize = 80;
+
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
 
@@ -39,8 +42,8 @@ const LEAST_STRIDE: f64 = 0.125;
 const FARTHEST: f64 = 2.0;
 
 /// Looks at a rest whether it lasts, at most: see `newton::ways_out`. Without them the same twenty took 327 steps, and four of them were
-/// saddles or still moved; with four, one still did.
-const LOOKS: usize = 8;
+/// saddles or still moved; with four, and of other paths with eight, one still did.
+const LOOKS: usize = 16;
 
 /// Iterations of a relaxation at the start and after a step.
 const RELAXING: usize = 20;
@@ -120,6 +123,8 @@ fn settle(
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let mut looks = 0;
+    // The step before which covering asked for something, while it has not come to rest with that.
+    let mut covering: Option<usize> = None;
     let (mut least, mut back) = (f64::INFINITY, 0);
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
@@ -130,7 +135,9 @@ fn settle(
             if descent.contacts.penetration(&descent.x).0 > 0 {
                 descent.contacts.stiffen(4.0);
             } else {
-                match if options.self_contact { covered(&mut descent) } else { Covered::Done } {
+                let covered = if options.self_contact { covered(&mut descent) } else { Covered::Done };
+                covering = (covered != Covered::Done).then_some(iteration);
+                match covered {
                     Covered::Places => {}
                     Covered::Moved => descent.damping = options.damping,
                     Covered::Done if !options.lasting || looks == LOOKS || iteration >= limit => break Stop::Converged,
@@ -151,6 +158,12 @@ fn settle(
         }
         if iteration >= limit {
             break Stop::StepsDone;
+        }
+        if covering.is_some_and(|since| iteration > since + PATIENCE) {
+            covering = None;
+            descent.contacts.uncover();
+            descent.contacts.refresh(&descent.x);
+            descent.evaluate();
         }
         if !soft && descent.residual < COVERING && descent.contacts.cover_more(cloth, &descent.x) > 0 {
             descent.contacts.refresh(&descent.x);

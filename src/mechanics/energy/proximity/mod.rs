@@ -170,7 +170,7 @@ impl Proximity {
             let depth = gap.depth(x);
             gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
-            if depth > (1.0 - NARROW) * gap.goal && gap.first > 0.0 {
+            if depth > (1.0 - NARROW) * gap.goal {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
             }
             gap.slip =

@@ -1,16 +1,19 @@
 //! Places within a triangle that keep off the body, as gaps to it.
 //!
-//! A place is Σ w x over the corners. Seen from there the body is a plane: through its nearest point, across its normal there. A place that
-//! is deep in the body is asked to go no farther at a time than [`STRIDE`].
+//! A place is Σ w x over the corners. Seen from there the body is a plane: through its nearest point, across its normal there. Where a place
+//! is in the body and the nearest way out leads back through the cloth or along it, nothing is asked: that pulls a limb farther through.
 
 use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind, NONE};
-use crate::distance::Body;
+use crate::distance::{Body, SurfacePoint};
 use crate::mesh::lattice;
 
-/// A place is asked to go no farther than this between two looks, m.
-const STRIDE: f64 = 0.01;
+/// A way out of the body leads out of the cloth where its cosine with the cloth's normal is over this.
+const OUTWARD: f64 = 0.3;
+
+/// What is deeper than this is not asked out, m: contact may be felt too late by as much as a triangle sags, not by more.
+const DEEPEST: f64 = 0.015;
 
 /// A place within a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,18 +34,23 @@ impl Place {
         lattice::place(self.corners.map(|v| x[v as usize]), self.shares)
     }
 
-    /// The gap to the body, by this number.
-    pub(in crate::mechanics::energy) fn gap(&self, number: u32, body: &Body, x: &[DVec3]) -> Gap {
+    /// The gap to the body, by this number; `None` where there is no way out of it, for cloth that is wound outward.
+    pub(in crate::mechanics::energy) fn gap(&self, number: u32, body: &Body, x: &[DVec3]) -> Option<Gap> {
         let ([a, b, c], [s, t, u]) = (self.corners, self.shares);
+        let near = body.nearest(self.at(x));
+        if !self.leads_out(&near, x) {
+            return None;
+        }
         let key = Key { kind: Kind::Body, vertices: [a, b, c, NONE, NONE], place: number };
         let mut gap = Gap::new(key, [s, t, u, 0.0, 0.0], self.offset, self.stiffness);
-        let near = body.nearest(self.at(x));
         (gap.body, gap.normal) = (near.point, near.normal);
-        if gap.goal - near.signed_distance > STRIDE {
-            gap.goal = near.signed_distance + STRIDE;
-            // It is on its way, not pressed.
-            gap.first = 0.0;
-        }
-        gap
+        Some(gap)
+    }
+
+    /// Whether the way to the point of the body that is `near` leads out of the cloth as well.
+    pub(in crate::mechanics::energy) fn leads_out(&self, near: &SurfacePoint, x: &[DVec3]) -> bool {
+        let [a, b, c] = self.corners.map(|v| x[v as usize]);
+        let out = (b - a).cross(c - a).normalize_or_zero();
+        near.signed_distance >= 0.0 || near.signed_distance > -DEEPEST && near.normal.dot(out) > OUTWARD
     }
 }
