@@ -211,7 +211,9 @@ mod tests {
         assert!(self_intersecting_pairs(&taken).is_empty());
         assert!(taken.positions.iter().any(|x| x.x > 0.14) && taken.positions.iter().all(|x| x.x < 0.16));
         // The upper end is where it was.
-        assert!(leg.positions.iter().zip(&taken.positions).filter(|(x, _)| x.z > 0.35).all(|(a, b)| a.distance(*b) < 1e-3));
+        assert!(
+            leg.positions.iter().zip(&taken.positions).filter(|(x, _)| x.z > 0.35).all(|(a, b)| a.distance(*b) < 1e-3)
+        );
         // What reaches too far is none, and where nothing reaches through nothing moves.
         assert!(toes(0.4).taken_off_ends(&leg, &held).is_none());
         assert!(toes(0.07).taken_off_ends(&leg, &held).is_none());

@@ -12,8 +12,8 @@ pub use by_method::MethodFigures;
 pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
-use warnings::top_sank_mm;
 pub use warnings::TightestOpening;
+use warnings::top_sank_mm;
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;

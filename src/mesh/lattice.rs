@@ -27,7 +27,8 @@ mod tests {
         for (longest, count) in [(0.001, 7), (0.016, 12), (1.0, 88)] {
             let all: Vec<[f64; 3]> = lattice(longest).collect();
             assert_eq!(all.len(), count);
-            let inside = |w: &[f64; 3]| (w.iter().sum::<f64>() - 1.0).abs() < 1e-15 && w.iter().all(|w| (0.0..1.0).contains(w));
+            let inside =
+                |w: &[f64; 3]| (w.iter().sum::<f64>() - 1.0).abs() < 1e-15 && w.iter().all(|w| (0.0..1.0).contains(w));
             assert!(all.iter().all(inside), "{all:?}");
         }
         assert_eq!(place([DVec3::X, DVec3::Y, DVec3::Z], [0.5, 0.25, 0.25]), DVec3::new(0.5, 0.25, 0.25));

@@ -33,7 +33,10 @@ fn from_starts(seeds: std::ops::RangeInclusive<u64>, vertices: usize) -> Ended {
         let draped = drape(&scene, &Settings { fabric, ..Settings::default() }, &mut unobserved).unwrap();
         let residual = draped.state.as_ref().unwrap().residual_over_weight;
         let (crossing, inside) = (draped.self_intersecting_pairs, draped.penetrating_vertices);
-        println!("{} seed {seed}: {began} pairs at the start, {crossing} at the end, {inside} inside, {residual:.1e}", names[seed as usize % 4]);
+        println!(
+            "{} seed {seed}: {began} pairs at the start, {crossing} at the end, {inside} inside, {residual:.1e}",
+            names[seed as usize % 4]
+        );
         ended.began_crossing += usize::from(began > 0);
         ended.end_crossing += usize::from(crossing > 0);
         ended.end_inside += usize::from(inside > 0);

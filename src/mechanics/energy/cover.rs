@@ -94,7 +94,9 @@ impl Contacts<'_> {
 
     /// The same near rest, where places had to be kept off before: adds what is through the cloth by now. How many places are new.
     pub(crate) fn cover_more(&mut self, cloth: &Cloth, x: &[DVec3]) -> usize {
-        let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else { return 0 };
+        let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else {
+            return 0;
+        };
         let garment = TriMesh::new(x.to_vec(), cloth.triangles.iter().map(|t| t.vertices).collect());
         let mut crossing: Vec<u32> = crossing_pairs(&garment, body.mesh()).into_iter().map(|[t, _]| t).collect();
         crossing.dedup();
@@ -198,12 +200,15 @@ pub(in crate::mechanics) fn touching_between(
     for t in &cloth.triangles {
         let keeps = offset(cloth, t) + margin;
         let corners = t.vertices.map(|v| x[v as usize]);
-        let clear = |at: DVec3| t.vertices.iter().zip(corners).any(|(&v, corner)| far[v as usize] - corner.distance(at) > keeps);
+        let clear = |at: DVec3| {
+            t.vertices.iter().zip(corners).any(|(&v, corner)| far[v as usize] - corner.distance(at) > keeps)
+        };
         let all = lattice(t.longest_side_m()).map(|shares| (t, shares, place(corners, shares)));
         asked.extend(all.filter(|(_, _, at)| !clear(*at)));
     }
     let found = body.nearest_all(&asked.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
-    let touches = asked.into_iter().zip(found).filter(|((t, ..), near)| near.signed_distance < offset(cloth, t) + margin);
+    let touches =
+        asked.into_iter().zip(found).filter(|((t, ..), near)| near.signed_distance < offset(cloth, t) + margin);
     touches.map(|((t, shares, _), near)| (t.vertices, shares, near.normal)).collect()
 }
 

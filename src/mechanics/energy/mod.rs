@@ -35,9 +35,9 @@ mod plate;
 pub mod proximity;
 
 pub use cloth::Cloth;
+pub use contact::Contacts;
 pub(crate) use cover::Covered;
 pub(super) use cover::touching_between;
-pub use contact::Contacts;
 pub use error::EnergyError;
 pub use evaluate::Scratch;
 pub use friction::Friction;

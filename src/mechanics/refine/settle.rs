@@ -42,7 +42,7 @@ const LEAST_STRIDE: f64 = 0.125;
 const FARTHEST: f64 = 2.0;
 
 /// Looks at a rest whether it lasts, at most: see `newton::ways_out`. Without them the same twenty took 327 steps, and four of them were
-/// saddles or still moved; with four, and of other paths with eight, one still did.
+/// saddles or still moved; with four one still did, and from other previews with eight.
 const LOOKS: usize = 16;
 
 /// Iterations of a relaxation at the start and after a step.
