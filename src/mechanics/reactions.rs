@@ -22,7 +22,8 @@
 use glam::DVec3;
 
 use super::energy::contact::Touch;
-use super::energy::{Cloth, Contacts, Friction, touching_between};
+use super::energy::proximity::touching_between;
+use super::energy::{Cloth, Contacts, Friction};
 use crate::distance::Body;
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a

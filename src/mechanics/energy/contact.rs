@@ -123,7 +123,8 @@ impl<'b> Contacts<'b> {
             held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],
             answer: vec![f64::NEG_INFINITY; n],
-            leave: leave_of_unasked(held),
+            // Who is held is never asked.
+            leave: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
             near: Vec::new(),
             stiffness,
             touches: Vec::new(),
@@ -160,12 +161,10 @@ impl<'b> Contacts<'b> {
     /// Finds what touches at `x`. Same bits on any number of threads.
     pub fn update(&mut self, x: &[DVec3]) {
         self.touches.clear();
-        if matches!(self.met, Met::Nothing) {
-            return;
-        }
-        if matches!(self.met, Met::Planes(..)) {
-            self.update_planes(x);
-            return;
+        match self.met {
+            Met::Nothing => return,
+            Met::Planes(..) => return self.update_planes(x),
+            Met::Rounded(_) => {}
         }
         self.bound(x);
         self.find_near(x);
@@ -247,8 +246,7 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// Refreshes what stays as it is between two steps, at the positions `x` last updated: friction, where the cloth meets itself, and
-    /// what is kept off between its vertices.
+    /// Refreshes at the positions `x` last updated what stays as it is between two steps: friction, gaps of the cloth, and places kept off.
     pub fn refresh(&mut self, x: &[DVec3]) {
         self.friction.refresh(&self.touches, x);
         let to_body = self.cover.gaps(self.body(), x);
@@ -299,9 +297,4 @@ impl<'b> Contacts<'b> {
     pub fn hessian(&self) -> impl Iterator<Item = (u32, DMat3)> + '_ {
         self.touches.iter().map(|t| (t.vertex, outer(t.normal, t.normal) * t.stiffness))
     }
-}
-
-/// Of vertices not asked yet: those that are held never will be.
-fn leave_of_unasked(held: &[bool]) -> Vec<f64> {
-    held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect()
 }

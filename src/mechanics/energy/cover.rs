@@ -11,15 +11,12 @@
 use glam::DVec3;
 
 use super::membrane::Triangle;
-use super::proximity::{Gap, Place};
+use super::proximity::{Gap, Place, offset};
 use super::{Cloth, Contacts};
 use crate::distance::Body;
 use crate::mesh::TriMesh;
-use crate::mesh::lattice::{lattice, place};
+use crate::mesh::lattice::lattice;
 use crate::mesh::self_intersection::crossing_pairs;
-
-/// The distance that a place keeps is the cloth's thickness, but at least this, m: what the body rises between two places of a lattice.
-const LEAST_OFFSET: f64 = 6e-4;
 
 /// It is raised by so much at a time, and in all, m.
 const RAISE: f64 = 3e-4;
@@ -179,37 +176,6 @@ impl Cover {
         let given_up = self.places.iter_mut().filter(|place| tight.contains(&place.corners));
         given_up.map(|place| place.stiffness = 0.0).count()
     }
-}
-
-/// The distance that a place within a triangle keeps, m.
-fn offset(cloth: &Cloth, triangle: &Triangle) -> f64 {
-    let thickness = triangle.vertices.iter().map(|&v| cloth.thickness[v as usize]).sum::<f64>() / 3.0;
-    thickness.max(LEAST_OFFSET)
-}
-
-/// Places between the vertices of a cloth at `x` (m) that touch the body, within `margin` (m) of what they would keep: the corners with their
-/// shares, and the body's normal. As the distance to the body has slope at most one, those of the vertices tell which need not be asked.
-pub(in crate::mechanics) fn touching_between(
-    cloth: &Cloth,
-    body: &Body,
-    x: &[DVec3],
-    margin: f64,
-) -> Vec<([u32; 3], [f64; 3], DVec3)> {
-    let far: Vec<f64> = body.nearest_all(x).iter().map(|near| near.signed_distance).collect();
-    let mut asked: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
-    for t in &cloth.triangles {
-        let keeps = offset(cloth, t) + margin;
-        let corners = t.vertices.map(|v| x[v as usize]);
-        let clear = |at: DVec3| {
-            t.vertices.iter().zip(corners).any(|(&v, corner)| far[v as usize] - corner.distance(at) > keeps)
-        };
-        let all = lattice(t.longest_side_m()).map(|shares| (t, shares, place(corners, shares)));
-        asked.extend(all.filter(|(_, _, at)| !clear(*at)));
-    }
-    let found = body.nearest_all(&asked.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
-    let touches =
-        asked.into_iter().zip(found).filter(|((t, ..), near)| near.signed_distance < offset(cloth, t) + margin);
-    touches.map(|((t, shares, _), near)| (t.vertices, shares, near.normal)).collect()
 }
 
 #[cfg(test)]

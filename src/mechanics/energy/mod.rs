@@ -37,7 +37,6 @@ pub mod proximity;
 pub use cloth::Cloth;
 pub use contact::Contacts;
 pub(crate) use cover::Covered;
-pub(super) use cover::touching_between;
 pub use error::EnergyError;
 pub use evaluate::Scratch;
 pub use friction::Friction;

@@ -40,7 +40,8 @@ use glam::{DMat3, DVec3};
 pub use gap::Gap;
 pub(crate) use passage::Looked;
 use passage::Passage;
-pub(super) use place::Place;
+pub(in crate::mechanics) use place::touching_between;
+pub(super) use place::{Place, offset};
 pub(crate) use skin::Skin;
 
 /// Pressure that takes up half the offset, Pa: a garment's layers lie on each other by their weight, some 2 Pa each; where more is

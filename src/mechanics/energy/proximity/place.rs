@@ -7,7 +7,12 @@ use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind, NONE};
 use crate::distance::{Body, SurfacePoint};
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::energy::membrane::Triangle;
 use crate::mesh::lattice;
+
+/// The distance that a place keeps is the cloth's thickness, but at least this, m: what the body rises between two places of a lattice.
+const LEAST_OFFSET: f64 = 6e-4;
 
 /// A way out of the body leads out of the cloth where its cosine with the cloth's normal is over this.
 const OUTWARD: f64 = 0.3;
@@ -53,4 +58,35 @@ impl Place {
         let out = (b - a).cross(c - a).normalize_or_zero();
         near.signed_distance >= 0.0 || near.signed_distance > -DEEPEST && near.normal.dot(out) > OUTWARD
     }
+}
+
+/// The distance that a place within a triangle keeps, m.
+pub(in crate::mechanics::energy) fn offset(cloth: &Cloth, triangle: &Triangle) -> f64 {
+    let thickness = triangle.vertices.iter().map(|&v| cloth.thickness[v as usize]).sum::<f64>() / 3.0;
+    thickness.max(LEAST_OFFSET)
+}
+
+/// Places between the vertices of a cloth at `x` (m) that touch the body, within `margin` (m) of what they would keep: the corners with their
+/// shares, and the body's normal. As the distance to the body has slope at most one, those of the vertices tell which need not be asked.
+pub(in crate::mechanics) fn touching_between(
+    cloth: &Cloth,
+    body: &Body,
+    x: &[DVec3],
+    margin: f64,
+) -> Vec<([u32; 3], [f64; 3], DVec3)> {
+    let far: Vec<f64> = body.nearest_all(x).iter().map(|near| near.signed_distance).collect();
+    let mut asked: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
+    for t in &cloth.triangles {
+        let keeps = offset(cloth, t) + margin;
+        let corners = t.vertices.map(|v| x[v as usize]);
+        let clear = |at: DVec3| {
+            t.vertices.iter().zip(corners).any(|(&v, corner)| far[v as usize] - corner.distance(at) > keeps)
+        };
+        let all = lattice::lattice(t.longest_side_m()).map(|shares| (t, shares, lattice::place(corners, shares)));
+        asked.extend(all.filter(|(_, _, at)| !clear(*at)));
+    }
+    let found = body.nearest_all(&asked.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
+    let touches =
+        asked.into_iter().zip(found).filter(|((t, ..), near)| near.signed_distance < offset(cloth, t) + margin);
+    touches.map(|((t, shares, _), near)| (t.vertices, shares, near.normal)).collect()
 }
