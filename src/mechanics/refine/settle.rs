@@ -120,7 +120,7 @@ fn settle(
     let mut looks = 0;
     let (mut least, mut back) = (f64::INFINITY, 0);
     let stop = loop {
-        if observer(&seen(&descent, iteration)).is_break() {
+        if observer(&seen(&descent, iteration, false)).is_break() {
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
@@ -131,6 +131,9 @@ fn settle(
                     break Stop::Converged;
                 }
                 looks += 1;
+                if looks == 1 && observer(&seen(&descent, iteration, true)).is_break() {
+                    break Stop::Interrupted;
+                }
                 match descent.look(&mut tangent, looks > 1, RELAXING)? {
                     Rest::Lasts => break Stop::Converged,
                     Rest::Moves => {}
@@ -204,13 +207,14 @@ fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
     residual > FAR_FROM_REST * GRAVITY * squares.sqrt() / cloth.weight
 }
 
-fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize) -> Step<'a> {
+fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize, at_rest: bool) -> Step<'a> {
     Step {
         iteration,
         energy: descent.energy,
         residual_over_weight: descent.residual,
         contacts: descent.contacts.touches().len(),
         positions: &descent.x,
+        at_rest,
     }
 }
 
