@@ -240,8 +240,12 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
     };
     let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
     let mut residual = f64::NAN;
+    let trace = std::env::var_os("PARTWISE_FAMILIES_TRACE").is_some();
     let found = drape(&scene, &settings, &mut |step| {
         residual = step.residual_over_weight;
+        if trace {
+            eprintln!("{:4} E {:.6} J, residual {residual:.1e}, {} touch", step.iteration, step.energy, step.contacts);
+        }
         if step.iteration > STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     match found {

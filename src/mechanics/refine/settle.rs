@@ -30,6 +30,13 @@ const TO_AND_FRO: usize = 3;
 const LESS: f64 = 0.9;
 const LEAST_STRIDE: f64 = 0.125;
 
+/// Farther from rest so many, and none where the residual is over a share of the weight that no such state leaves.
+const FAR_TO_AND_FRO: usize = 8;
+const FAR: f64 = 0.1;
+
+/// Where that does not end it, gaps come and go by a share, half as much each time, and at least this one: see `energy::proximity`.
+const LEAST_FADE: f64 = 1.0 / 64.0;
+
 /// Times the length of a step that one may go which goes on like the one before, near rest: see `newton::onward`. With 2 the five garments
 /// at ten sizes, knit and woven, took 354 steps together, with 1 363.
 const FARTHEST: f64 = 2.0;
@@ -118,7 +125,7 @@ fn settle(
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let mut looks = 0;
-    let (mut least, mut back) = (f64::INFINITY, 0);
+    let (mut least, mut back, mut fade) = (f64::INFINITY, 0, 1.0_f64);
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
             break Stop::Interrupted;
@@ -171,12 +178,18 @@ fn settle(
             descent.damping = (descent.damping * 2.0).min(MOST_DAMPING);
         }
         back = if advance.back { back + 1 } else { 0 };
-        if descent.residual < LESS * least || descent.residual > CLOSE {
+        if descent.residual < LESS * least || descent.residual > FAR {
             (least, back) = (descent.residual, 0);
             descent.stride = (2.0 * descent.stride).min(1.0);
-        } else if back >= TO_AND_FRO {
-            descent.stride = (0.5 * descent.stride).max(LEAST_STRIDE);
+        } else if back >= if descent.residual < CLOSE { TO_AND_FRO } else { FAR_TO_AND_FRO } {
             back = 0;
+            if descent.stride > LEAST_STRIDE {
+                descent.stride *= 0.5;
+            } else if let Some(itself) = &mut descent.contacts.proximity {
+                fade = (0.5 * fade).max(LEAST_FADE);
+                itself.fade(fade);
+                descent.stride = 1.0;
+            }
         }
         if advance.accepted {
             history.push(descent.record(iteration, Some(advance), soft));
