@@ -6,6 +6,7 @@
 mod browser;
 mod input;
 mod outputs;
+mod told;
 mod waiting;
 
 use std::ffi::OsStr;

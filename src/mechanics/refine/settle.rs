@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::to_and_fro::ToAndFro;
 use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -18,24 +19,10 @@ const MOST_DAMPING: f64 = 1e4;
 const FAR_FROM_REST: f64 = 0.5;
 
 /// Residual over weight under which damping falls faster: only the softest ways to move are left, and those it holds back most.
-const CLOSE: f64 = 1e-2;
+pub(super) const CLOSE: f64 = 1e-2;
 
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
-
-/// Near rest, so many steps back, each against the one before, without a residual less than a share of the least so far, go to and fro:
-/// normals of gaps and anchors of friction stay as they are during a step and follow it, and what two states ask of each other may never agree. Half the way between them, and half
-/// again, it does (Krasnoselskii's iteration, 1955).
-const TO_AND_FRO: usize = 3;
-const LESS: f64 = 0.9;
-const LEAST_STRIDE: f64 = 0.125;
-
-/// Farther from rest so many, and none where the residual is over a share of the weight that no such state leaves.
-const FAR_TO_AND_FRO: usize = 8;
-const FAR: f64 = 0.1;
-
-/// Where that does not end it, gaps come and go by a share, half as much each time, and at least this one: see `energy::proximity`.
-const LEAST_FADE: f64 = 1.0 / 64.0;
 
 /// Times the length of a step that one may go which goes on like the one before, near rest: see `newton::onward`. With 2 the five garments
 /// at ten sizes, knit and woven, took 354 steps together, with 1 363.
@@ -125,7 +112,7 @@ fn settle(
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let mut looks = 0;
-    let (mut least, mut back, mut fade) = (f64::INFINITY, 0, 1.0_f64);
+    let mut swing = ToAndFro::default();
     let stop = loop {
         if observer(&seen(&descent, iteration)).is_break() {
             break Stop::Interrupted;
@@ -141,7 +128,7 @@ fn settle(
                 match descent.look(&mut tangent, looks > 1, RELAXING)? {
                     Rest::Lasts => break Stop::Converged,
                     Rest::Moves => {}
-                    Rest::Left => (least, back) = (f64::INFINITY, 0),
+                    Rest::Left => swing.anew(&mut descent),
                 }
                 descent.damping = LEAST_DAMPING;
             }
@@ -177,20 +164,7 @@ fn settle(
         } else if advance.share < 0.3 {
             descent.damping = (descent.damping * 2.0).min(MOST_DAMPING);
         }
-        back = if advance.back { back + 1 } else { 0 };
-        if descent.residual < LESS * least || descent.residual > FAR {
-            (least, back) = (descent.residual, 0);
-            descent.stride = (2.0 * descent.stride).min(1.0);
-        } else if back >= if descent.residual < CLOSE { TO_AND_FRO } else { FAR_TO_AND_FRO } {
-            back = 0;
-            if descent.stride > LEAST_STRIDE {
-                descent.stride *= 0.5;
-            } else if let Some(itself) = &mut descent.contacts.proximity {
-                fade = (0.5 * fade).max(LEAST_FADE);
-                itself.fade(fade);
-                descent.stride = 1.0;
-            }
-        }
+        swing.after(&mut descent, advance.back);
         if advance.accepted {
             history.push(descent.record(iteration, Some(advance), soft));
         }

@@ -158,8 +158,14 @@ impl Layout {
         }
         let wide = views.len() as f32;
         let views = in_rows("Stages", views, rows);
+        // Four beside each other cut long names.
+        let histogram = if self.several_tables {
+            "Vertices over distance, cm"
+        } else {
+            "Vertices over distance, cm; colours are levels"
+        };
         let mut below: Vec<(f32, Node)> = vec![
-            (1.3, View::bars("Vertices over distance, cm; colours are levels", &[paths::HISTOGRAM]).into()),
+            (1.3, View::bars(histogram, &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
         ];
         if self.several_tables {
@@ -205,12 +211,12 @@ impl Layout {
         let all = self.eye(Tab::Outfit, eye);
         let rows = self.outfit.len() as f64;
         let one = eye.through(ASPECT / 6.0 * rows);
-        let stages = [("PARTs", "parts"), ("force", "force"), ("drape", "drape")];
+        let stages = [("PARTs", "parts"), ("Force", "force"), ("Drape", "drape")];
         let row = |(k, worn): (usize, &Worn)| {
             let branch = outfit::branch(k, worn);
             let view = |(title, leaf): (&str, &str)| {
                 let path = format!("{branch}/{leaf}");
-                (1.0, View::spatial(format!("{}: {title}", worn.name), &[paths::BODY, &path], &one).into())
+                (1.0, View::spatial(format!("{title}, {}", worn.name), &[paths::BODY, &path], &one).into())
             };
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };

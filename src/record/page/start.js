@@ -10,6 +10,7 @@ run({ url: [here.recording], persist: true, theme }, failed).then(show, failed);
 // Asks now and then whether the program is still there. One that was started again has another recording, and may be of another
 // version: then the page is loaded anew.
 const lost = document.getElementById("lost");
+lost.textContent = `The program behind this page has ended. Run it again with --web-port ${location.port}, and it is shown here.`;
 for (let wait = 1000; ; ) {
   await new Promise((done) => setTimeout(done, wait));
   try {
