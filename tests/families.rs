@@ -295,6 +295,14 @@ fn a_sample_comes_to_rest() {
     assert_eq!(ends.keys().collect::<Vec<_>>(), ["rest"], "{ends:?}");
 }
 
+#[test]
+fn layers_where_what_faces_what_jumps_rest_between_both() {
+    // Went to and fro for ever: in two steps, over a hundredth of the weight; in four, under it.
+    let cases = [(7, 60, "doubled", "interlock"), (5, 250, "doubled", "interlock"), (8, 1000, "doubled", "interlock")];
+    let ends = family(cases.into_iter());
+    assert_eq!(ends.keys().collect::<Vec<_>>(), ["rest"], "{ends:?}");
+}
+
 /// A list of words in an environment variable, or all of them.
 fn chosen<'a>(variable: &str, all: &[&'a str]) -> Vec<&'a str> {
     let Ok(text) = std::env::var(variable) else { return all.to_vec() };
