@@ -211,12 +211,12 @@ impl Layout {
         let all = self.eye(Tab::Outfit, eye);
         let rows = self.outfit.len() as f64;
         let one = eye.through(ASPECT / 6.0 * rows);
-        let stages = [("PARTs", "parts"), ("Force", "force"), ("Drape", "drape")];
+        let stages = [("PARTs", "parts"), ("force", "force"), ("drape", "drape")];
         let row = |(k, worn): (usize, &Worn)| {
             let branch = outfit::branch(k, worn);
             let view = |(title, leaf): (&str, &str)| {
                 let path = format!("{branch}/{leaf}");
-                (1.0, View::spatial(format!("{title}, {}", worn.name), &[paths::BODY, &path], &one).into())
+                (1.0, View::spatial(format!("{}: {title}", worn.name), &[paths::BODY, &path], &one).into())
             };
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };
