@@ -3,7 +3,7 @@
 //! Normals of gaps and anchors of friction stay as they are during a step and follow it, and what faces what jumps; what two states ask of
 //! each other may never agree. Half the way between them, and half again, it does where what is asked follows steadily (Krasnoselskii's
 //! iteration, 1955). Where it jumps, nothing is at rest but a mean of both sides, and gaps come and go by a share
-//! ([`fade`](crate::mechanics::energy::Proximity::fade)).
+//! (`energy::proximity`).
 //!
 //! It is told by steps back, each against the one before, or by a few steps that end near where they began, in either case without less
 //! of a residual than there was before.

@@ -11,7 +11,7 @@
 //! the plane by the same law as on the body ([`friction`](super::friction)).
 //!
 //! What faces what changes by jumps: two edges do so between their ends alone, and who comes to face another one begins anew. Cloth that
-//! lies where it jumps has no state that repeats itself, and goes to and fro between two for ever. Asked to [`fade`](Proximity::fade),
+//! lies where it jumps has no state that repeats itself, and goes to and fro between two for ever. Asked to fade,
 //! gaps come and go by a share of their stiffness at a refresh, so that it rests where a mean of both pushes (Filippov's solution of an
 //! equation whose right side jumps).
 //!
