@@ -11,6 +11,7 @@
 //! with its true stiffness. Each of the two energies falls; [`Record::softened`] says which one a step belongs to.
 
 mod settle;
+mod to_and_fro;
 
 use std::ops::ControlFlow;
 

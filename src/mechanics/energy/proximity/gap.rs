@@ -42,6 +42,8 @@ pub struct Gap {
     pub(super) stiffness: f64,
     /// κ A to begin with, N/m.
     pub(super) first: f64,
+    /// Whether it is there no more, and fades.
+    pub(super) going: bool,
     /// From here on friction counts: Σ w x then, m.
     pub(super) from: DVec3,
     /// Elastic slip that it began with there, m.
@@ -54,7 +56,7 @@ impl Gap {
     /// A gap without a past, no plane in it yet.
     pub(super) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
         let (normal, from, slip) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        Self { key, weights, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
+        Self { key, weights, normal, goal, stiffness, first: stiffness, going: false, from, slip, limit: 0.0 }
     }
 
     /// Σ w x, m: from the second place to the first.
@@ -125,9 +127,11 @@ impl Gap {
         Some(block)
     }
 
-    /// Takes over what the same gap had before: its slip, and a stiffness that had to grow.
-    pub(super) fn continues(&mut self, before: &Self, x: &[DVec3]) {
-        self.stiffness = self.stiffness.max(before.stiffness);
+    /// Takes over what the same gap had before: its slip, and a stiffness that had to grow; one that comes or goes nears what it will be by
+    /// this share.
+    pub(super) fn continues(&mut self, before: &Self, x: &[DVec3], share: f64) {
+        let end = if self.going { 0.0 } else { self.stiffness.max(before.stiffness) };
+        self.stiffness = if share < 1.0 { before.stiffness + share * (end - before.stiffness) } else { end };
         // A place that went through has the other side's normal now, and must go back.
         if before.normal.dot(self.normal) < 0.0 {
             self.normal = -self.normal;

@@ -10,6 +10,11 @@
 //! state that repeats itself under a refresh is at rest with the true distances. Friction holds the two places together along
 //! the plane by the same law as on the body ([`friction`](super::friction)).
 //!
+//! What faces what changes by jumps: two edges do so between their ends alone, and who comes to face another one begins anew. Cloth that
+//! lies where it jumps has no state that repeats itself, and goes to and fro between two for ever. Asked to fade,
+//! gaps come and go by a share of their stiffness at a refresh, so that it rests where a mean of both pushes (Filippov's solution of an
+//! equation whose right side jumps).
+//!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
 //! back towards where it is known not to (`clear`: how it was placed, or put over what lies below it), or finds its own way out
@@ -72,6 +77,9 @@ const BACK: f64 = 0.7;
 /// and is as it was placed where this share of the way still crosses.
 const LEAST_SHARE: f64 = 0.02;
 
+/// A gap that has faded to less than this share of its stiffness is gone.
+const FADED: f64 = 1e-3;
+
 /// Refreshes without fewer crossings after which what crosses is left as it is.
 const PATIENCE: usize = 40;
 
@@ -110,6 +118,8 @@ pub struct Proximity {
     friction: Arc<Vec<f64>>,
     gaps: Vec<Gap>,
     passage: Passage,
+    /// Share of its stiffness by which a gap comes or goes at a refresh.
+    fade: f64,
     /// Fewest crossings so far, and how many refreshes ago they were fewer than before.
     fewest: usize,
     since: usize,
@@ -126,7 +136,18 @@ impl Proximity {
         let least = (LEAST_OF_EDGE * skin.edge_m).min(LEAST_OF_ANY);
         let apart = Apart { thickness, bounds: [least, (MOST_OF_EDGE * skin.edge_m).max(least)] };
         let passage = Passage::new(Arc::clone(&skin));
-        Self { skin, placed, clear, apart, friction, gaps: Vec::new(), passage, fewest: usize::MAX, since: 0 }
+        Self {
+            skin,
+            placed,
+            clear,
+            apart,
+            friction,
+            gaps: Vec::new(),
+            passage,
+            fade: 1.0,
+            fewest: usize::MAX,
+            since: 0,
+        }
     }
 
     /// Looks for gaps at `x` (m); those that were there before go on.
@@ -148,6 +169,10 @@ impl Proximity {
             gaps.extend(back);
             gaps.sort_unstable_by_key(|gap| gap.key);
         }
+        if self.fade < 1.0 {
+            stay(&self.gaps, &mut gaps);
+        }
+        let fade = self.fade;
         let mut before = self.gaps.iter().peekable();
         for gap in &mut gaps {
             while before.next_if(|b| b.key < gap.key).is_some() {}
@@ -156,19 +181,25 @@ impl Proximity {
             if gap.key.kind == gap::Kind::Crossing {
                 continue;
             }
-            if let Some(before) = again {
-                gap.continues(before, x);
+            match again {
+                Some(before) => gap.continues(before, x, fade),
+                None => gap.stiffness *= fade,
             }
             let depth = gap.depth(x);
             gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
-            if depth > (1.0 - NARROW) * gap.goal {
+            if depth > (1.0 - NARROW) * gap.goal && fade == 1.0 {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
             }
             gap.slip =
                 if gap.limit > 0.0 { gap.slip.clamp_length_max(super::friction::ELASTIC_SLIP) } else { DVec3::ZERO };
         }
         self.gaps = gaps;
+    }
+
+    /// From now on gaps come and go by this share of their stiffness at a refresh; 1 for at once.
+    pub(crate) fn fade(&mut self, share: f64) {
+        self.fade = share;
     }
 
     /// Adds the gradient (N) at `x`, but where a vertex is `held`; returns the energy, J.
@@ -249,4 +280,19 @@ impl Proximity {
     pub(crate) fn crossings(&mut self, x: &[DVec3]) -> usize {
         self.passage.known(x).len()
     }
+}
+
+/// Adds to the gaps of now those of `before` that are none any more, until they have faded.
+fn stay(before: &[Gap], gaps: &mut Vec<Gap>) {
+    let mut now = gaps.iter().map(|gap| gap.key).peekable();
+    let mut staying = Vec::new();
+    for gap in before {
+        while now.next_if(|key| *key < gap.key).is_some() {}
+        let gone = now.peek() != Some(&gap.key) && gap.key.kind != gap::Kind::Crossing;
+        if gone && gap.stiffness > FADED * gap.first {
+            staying.push(Gap { going: true, ..*gap });
+        }
+    }
+    gaps.extend(staying);
+    gaps.sort_unstable_by_key(|gap| gap.key);
 }
