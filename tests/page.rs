@@ -16,9 +16,9 @@ fn served(folder: &tempfile::TempDir) -> Served {
     serve_file(&path, None, None).unwrap()
 }
 
-/// Host of an address, and whatever query it has.
-fn parts(url: &str) -> (&str, &str) {
-    url.strip_prefix("http://").unwrap().split_once('/').unwrap()
+/// Host of an address, which has nothing else.
+fn host(url: &str) -> &str {
+    url.strip_prefix("http://").unwrap().strip_suffix('/').unwrap()
 }
 
 /// Head and body of the answer to a request.
@@ -47,14 +47,13 @@ fn foreign(text: &str) -> Vec<String> {
 fn the_page_opens_its_recording_without_a_query_and_names_no_foreign_host() {
     let folder = tempfile::tempdir().unwrap();
     let served = served(&folder);
-    let (host, query) = parts(served.url());
+    let host = host(served.url());
     let (head, body) = get(host, "/");
     assert!(head.starts_with("http/1.1 200"), "{head}");
     let page = String::from_utf8(body).unwrap();
-    let data = query.strip_prefix("?url=").unwrap().replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
-    assert!(page.contains(&format!("data-recording=\"{data}\"")), "{page}");
+    assert!(page.contains("data-recording=\"rerun+http://127.0.0.1:"), "{page}");
     let [start, program] = ["/start.js", "/program.js"].map(|path| String::from_utf8(get(host, path).1).unwrap());
-    assert!(start.contains("dataset.recording") && program.contains("hide_welcome_screen: true"));
+    assert!(start.contains("here.recording") && program.contains("hide_welcome_screen: true"));
     for text in [&page, &start, &program] {
         assert_eq!(foreign(text), [""; 0]);
     }
@@ -71,7 +70,7 @@ fn the_page_opens_its_recording_without_a_query_and_names_no_foreign_host() {
 fn the_browser_is_forbidden_every_other_host() {
     let folder = tempfile::tempdir().unwrap();
     let served = served(&folder);
-    let (host, _) = parts(served.url());
+    let host = host(served.url());
     for path in ["/", "/start.js", "/re_viewer.js", "/nowhere"] {
         let (head, _) = get(host, path);
         let policy = head.lines().find_map(|line| line.strip_prefix("content-security-policy: ")).unwrap();
@@ -94,7 +93,7 @@ fn the_browser_is_forbidden_every_other_host() {
 fn requests_of_any_size_and_kind_leave_the_server_standing() {
     let folder = tempfile::tempdir().unwrap();
     let served = served(&folder);
-    let (host, _) = parts(served.url());
+    let host = host(served.url());
     for length in ["99999999999", "18446744073709551615", "-1", "x"] {
         for method in ["GET", "POST"] {
             let request = format!("{method} / HTTP/1.1\nHost: {host}\nContent-Length: {length}\nConnection: close\n\n");
@@ -115,7 +114,7 @@ fn requests_of_any_size_and_kind_leave_the_server_standing() {
 fn the_program_comes_packed_once_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let served = served(&folder);
-    let (host, _) = parts(served.url());
+    let host = host(served.url());
     let (head, plain) = get(host, "/re_viewer_bg.wasm");
     assert!(head.contains("content-type: application/wasm") && !head.contains("content-encoding"), "{head}");
     assert!(plain.starts_with(b"\0asm"));
@@ -136,4 +135,26 @@ fn the_program_comes_packed_once_it_is() {
     let mut unpacked = Vec::new();
     flate2::read::GzDecoder::new(packed.as_slice()).read_to_end(&mut unpacked).unwrap();
     assert!(unpacked == plain);
+}
+
+#[test]
+fn a_page_knows_its_server_from_one_that_comes_after_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = served(&folder);
+    let name = |served: &Served| String::from_utf8(get(host(served.url()), "/run").1).unwrap();
+    let page = |served: &Served| String::from_utf8(get(host(served.url()), "/").1).unwrap();
+    let before = name(&first);
+    assert!(!before.is_empty() && page(&first).contains(&format!("data-run=\"{before}\"")));
+    assert_eq!(name(&first), before);
+    // On the very port that was left.
+    let port: u16 = host(first.url()).split_once(':').unwrap().1.parse().unwrap();
+    drop(first);
+    let second = serve_file(&folder.path().join("x.rrd"), Some(port), None).unwrap();
+    assert!(second.url().ends_with(&format!(":{port}/")), "{}", second.url());
+    assert!(name(&second) != before && page(&second).contains(&format!("data-run=\"{}\"", name(&second))));
+    // Asked for by two it is refused; not asked for, another is taken.
+    let error = serve_file(&folder.path().join("x.rrd"), Some(port), None).err().unwrap().to_string();
+    assert!(error.contains(&port.to_string()) && error.contains("--web-port"), "{error}");
+    let (one, two) = (served(&folder), served(&folder));
+    assert_ne!(one.url(), two.url());
 }

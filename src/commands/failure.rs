@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
+use partwise::assess::AssessError;
 use partwise::drape::DrapeError;
 use partwise::fabric::FabricError;
 use partwise::files::Unreadable;
@@ -55,6 +56,7 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<PaperError>()
         || cause.is::<EditError>()
         || cause.downcast_ref::<LiveError>().is_some_and(|error| !matches!(error, LiveError::Server(_)))
+        || matches!(cause.downcast_ref::<AssessError>(), Some(AssessError::Fallen | AssessError::Layers { .. }))
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
         || cause.downcast_ref::<StoreError>().is_some_and(store)

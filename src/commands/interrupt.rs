@@ -1,9 +1,15 @@
 //! Ctrl-C: the first asks the work in hand to stop and keep what is done, the second ends the program.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// One press that comes twice: `timeout` and its like signal the program and then all of its group.
+const ONE_PRESS: Duration = Duration::from_millis(300);
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static KEEPING: AtomicBool = AtomicBool::new(false);
+static FIRST: OnceLock<Instant> = OnceLock::new();
 
 /// Listens from now on. Where no handler can be set, Ctrl-C just ends the program, as it would have.
 pub(crate) fn listen() {
@@ -14,10 +20,14 @@ pub(crate) fn listen() {
 /// Listens from now on, while there is nothing to keep yet: until [`keep`] is called, Ctrl-C ends the program at once.
 pub(crate) fn listen_at_once() {
     let _ = ctrlc::set_handler(|| {
-        if REQUESTED.swap(true, Ordering::SeqCst) || !KEEPING.load(Ordering::SeqCst) {
+        let since = FIRST.get_or_init(Instant::now).elapsed();
+        let again = REQUESTED.swap(true, Ordering::SeqCst);
+        if !KEEPING.load(Ordering::SeqCst) || (again && since > ONE_PRESS) {
             std::process::exit(130);
         }
-        super::console::note("interrupted: keeping what is done (again to quit at once)");
+        if !again {
+            super::console::note("interrupted: keeping what is done (again to quit at once)");
+        }
     });
 }
 
@@ -39,6 +49,6 @@ pub(crate) fn flag() -> &'static AtomicBool {
 /// Blocks until Ctrl-C.
 pub(crate) fn wait() {
     while !requested() {
-        std::thread::sleep(std::time::Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(100));
     }
 }

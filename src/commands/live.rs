@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use partwise::Job;
 use partwise::job::Against;
-use partwise::live::{LiveOptions, LiveServer, random_token};
+use partwise::live::{LiveError, LiveOptions, LiveServer, random_token};
 use partwise::record::{RecordSummary, Recorder};
 use partwise::session::{Session, Workshop};
 
@@ -21,6 +21,8 @@ use super::{browser, console, interrupt};
 
 /// How long to wait for news before Ctrl-C is looked at.
 const GLANCE: Duration = Duration::from_millis(100);
+/// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again.
+const PORT: u16 = 7279;
 
 pub(crate) const LONG_ABOUT: &str = "\
 Serves a page: the Rerun viewer in the middle, the range table beside it. Drag a bound, change the fabric, a measurement or \
@@ -37,9 +39,9 @@ pub(crate) struct LiveArgs {
     input: InputArgs,
     #[command(flatten)]
     stages: StageArgs,
-    /// Port of the page; 0 takes any free one
-    #[arg(long, value_name = "PORT", default_value_t = 0, help_heading = "Page")]
-    port: u16,
+    /// Port of the page; 0 takes any free one [default: 7279, or any where that is taken]
+    #[arg(long, value_name = "PORT", help_heading = "Page")]
+    port: Option<u16>,
     /// Address to listen on; others than this machine's own need a token, which is made and printed
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]
     bind: IpAddr,
@@ -82,7 +84,7 @@ impl LiveArgs {
         }
         let session = Session::new(job.clone(), !self.cold);
         let options = self.options(&job)?;
-        let server = LiveServer::start(&session, &options)?;
+        let server = self.serve(&session, &options)?;
         self.print(server.address(), &options);
         let worker = {
             let (session, mut workshop) = (session.clone(), Workshop::new(self.input.meshes()));
@@ -107,6 +109,16 @@ impl LiveArgs {
         Ok(())
     }
 
+    fn serve(&self, session: &Session, options: &LiveOptions) -> Result<LiveServer, LiveError> {
+        match LiveServer::start(session, options) {
+            Err(LiveError::Address { .. }) if self.port.is_none() => {
+                let address = SocketAddr::new(self.bind, 0);
+                LiveServer::start(session, &LiveOptions { address, ..options.clone() })
+            }
+            other => other,
+        }
+    }
+
     fn options(&self, job: &Job) -> anyhow::Result<LiveOptions> {
         let far = !self.bind.is_loopback();
         let control = match &self.token {
@@ -118,7 +130,7 @@ impl LiveArgs {
         let files =
             job.scene.files().into_iter().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         Ok(LiveOptions {
-            address: SocketAddr::new(self.bind, self.port),
+            address: SocketAddr::new(self.bind, self.port.unwrap_or(PORT)),
             host: self.host.clone(),
             control,
             onlooker,

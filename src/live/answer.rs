@@ -49,6 +49,8 @@ pub(super) struct Site {
     pub(super) pieces: Arc<Pieces>,
     pub(super) news: watch::Receiver<u64>,
     pub(super) flows: Arc<AtomicUsize>,
+    /// By which a page knows this server again.
+    pub(super) run: String,
 }
 
 /// Answers a request, whatever it is.
@@ -75,7 +77,7 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
     may(right, request.method())?;
     let method = request.method().clone();
     match (&method, of_api) {
-        (&Method::GET, "state") => Ok(json_of(&with_right(report::state(&site.session.snapshot()), right))),
+        (&Method::GET, "state") => Ok(json_of(&for_reader(report::state(&site.session.snapshot()), right, &site.run))),
         (&Method::GET, "choices") => Ok(json_of(&report::choices())),
         (&Method::GET, "events") => flow(site, "text/event-stream", events),
         (&Method::GET, "stream") => match site.pieces.broken() {
@@ -263,8 +265,9 @@ fn label(bytes: &Bytes) -> Result<Option<String>, Refused> {
     }
 }
 
-fn with_right(mut state: Value, right: Right) -> Value {
+fn for_reader(mut state: Value, right: Right, run: &str) -> Value {
     state["may_steer"] = json!(right == Right::Control);
+    state["run"] = json!(run);
     state
 }
 

@@ -61,6 +61,7 @@ impl LiveServer {
             pieces: Arc::clone(&pieces),
             news,
             flows: Arc::new(AtomicUsize::new(0)),
+            run: crate::record::name_of_run(),
         });
         let (stop, stopped) = oneshot::channel();
         let serve = move || {

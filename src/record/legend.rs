@@ -15,7 +15,7 @@ pub(super) const TEXT: Color = Color(rerun::Rgba32(0xFFFF_FFFF));
 /// A column's width and a row's height, in the drawing's units: two to four pixels of the viewer's.
 const CELL: [f64; 2] = [150.0, 19.0];
 /// Where in its cell the strip begins and ends, and how thick it is; the title stands before it, the numbers under it.
-const STRIP: [f64; 2] = [52.0, 142.0];
+const STRIP: [f64; 2] = [56.0, 138.0];
 const THICKNESS: f64 = 4.0;
 /// How far under the strip the boxes of the numbers begin: the viewer's own begin above their point.
 const DROP: f64 = 1.8;

@@ -26,6 +26,9 @@ use crate::whole_file::{WholeFile, folder_of};
 const ANSWER: Duration = Duration::from_secs(3);
 /// Port of a spawned native viewer: Rerun's own default.
 const VIEWER_PORT: u16 = 9876;
+/// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again: PART on
+/// the keys of a telephone.
+const PAGE_PORT: u16 = 7278;
 /// History a server of a recording from disk keeps: it holds the recording whole.
 pub(super) const WHOLE_HISTORY: u64 = 1 << 30;
 
@@ -38,7 +41,7 @@ pub enum Sink {
     Spawn,
     /// A viewer elsewhere, `rerun+http://HOST:PORT/proxy`.
     Connect(String),
-    /// The bundled web viewer on 127.0.0.1; `None` takes any free port.
+    /// The bundled web viewer on 127.0.0.1; `None` takes any free port, for the page 7278 if that is free.
     Serve {
         /// Port of the page.
         web_port: Option<u16>,
@@ -99,10 +102,10 @@ impl OpenSinks {
             Sink::Connect(url) => self.sinks.push(Box::new(connect(url)?)),
             Sink::Serve { web_port, grpc_port, history_bytes } => {
                 // The page first: its port is checked before a server thread runs.
-                let web_port = free_port(*web_port, "--web-port")?;
+                let page = listen_for_pages(*web_port)?;
                 let (sink, grpc_port) = serve(*grpc_port, *history_bytes)?;
                 self.sinks.push(Box::new(sink));
-                self.web = Some(WebViewer::start(web_port, grpc_port)?);
+                self.web = Some(WebViewer::start(page, grpc_port)?);
             }
         }
         Ok(())
@@ -181,13 +184,19 @@ pub(crate) fn serve(port: Option<u16>, history_bytes: u64) -> Result<(GrpcServer
     Ok((sink, port))
 }
 
+/// Listens on 127.0.0.1 for the page's readers: on the port asked for; without one on the page's own if that is free, or on any.
+pub(crate) fn listen_for_pages(port: Option<u16>) -> Result<TcpListener, RecordError> {
+    let own = if port.is_none() { listen(PAGE_PORT, "--web-port").ok() } else { None };
+    own.map_or_else(|| listen(port.unwrap_or(0), "--web-port"), Ok)
+}
+
+fn listen(port: u16, option: &'static str) -> Result<TcpListener, RecordError> {
+    TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|source| RecordError::PortInUse { port, option, source })
+}
+
 /// A free port on 127.0.0.1: the one asked for, or any.
-pub(crate) fn free_port(port: Option<u16>, option: &'static str) -> Result<u16, RecordError> {
-    let asked = port.unwrap_or(0);
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, asked)).map_err(|source| RecordError::PortInUse {
-        port: asked,
-        option,
-        source,
-    })?;
-    listener.local_addr().map(|a| a.port()).map_err(|source| RecordError::PortInUse { port: asked, option, source })
+fn free_port(port: Option<u16>, option: &'static str) -> Result<u16, RecordError> {
+    let port = port.unwrap_or(0);
+    let address = listen(port, option)?.local_addr();
+    address.map(|a| a.port()).map_err(|source| RecordError::PortInUse { port, option, source })
 }

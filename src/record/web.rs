@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::BufReader;
+use std::net::TcpListener;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -11,7 +12,7 @@ use rerun::sink::LogSink as _;
 
 use super::error::RecordError;
 use super::page::Page;
-use super::sinks::{WHOLE_HISTORY, free_port, serve};
+use super::sinks::{WHOLE_HISTORY, listen_for_pages, serve};
 
 /// A page that shows a recording; it is served for as long as this lives.
 pub struct WebViewer {
@@ -20,14 +21,12 @@ pub struct WebViewer {
 }
 
 impl WebViewer {
-    /// Serves the page on `web_port`, pointed at the data on `grpc_port`.
-    pub(crate) fn start(web_port: u16, grpc_port: u16) -> Result<Self, RecordError> {
-        let failed = |reason: String| RecordError::Server { what: "the web viewer", port: web_port, reason };
-        let page = Page::serve(web_port, &format!("rerun+http://127.0.0.1:{grpc_port}/proxy")).map_err(failed)?;
-        // The page knows its recording; the parameter makes an address that can be kept differ from run to run.
-        // %2B and the rest: the address of the data is a parameter of the page's.
-        let data = format!("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc_port}%2Fproxy");
-        Ok(Self { _page: page, url: format!("http://127.0.0.1:{web_port}/?url={data}") })
+    /// Serves the page to whom `listener` hears, pointed at the data on `grpc_port`.
+    pub(crate) fn start(listener: TcpListener, grpc_port: u16) -> Result<Self, RecordError> {
+        let port = listener.local_addr().map_or(0, |address| address.port());
+        let failed = |reason: String| RecordError::Server { what: "the web viewer", port, reason };
+        let page = Page::serve(listener, &format!("rerun+http://127.0.0.1:{grpc_port}/proxy")).map_err(failed)?;
+        Ok(Self { _page: page, url: format!("http://127.0.0.1:{port}/") })
     }
 
     /// The address to open in a browser.
@@ -59,16 +58,16 @@ pub fn check_file(path: &Path) -> Result<(), RecordError> {
     read(path).map(|_| ())
 }
 
-/// Serves any `.rrd` file in the bundled web viewer on 127.0.0.1; `None` takes a free port. The file is read once.
+/// Serves any `.rrd` file in the bundled web viewer on 127.0.0.1, on ports as of [`Sink::Serve`](super::Sink::Serve). The file is read once.
 ///
 /// # Errors
 /// An unreadable file, one that is no recording, a port in use.
 pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) -> Result<Served, RecordError> {
     let messages = read(path)?;
-    let web_port = free_port(web_port, "--web-port")?;
+    let page = listen_for_pages(web_port)?;
     let (data, grpc_port) = serve(grpc_port, WHOLE_HISTORY)?;
     data.send_all(messages);
-    let viewer = WebViewer::start(web_port, grpc_port)?;
+    let viewer = WebViewer::start(page, grpc_port)?;
     Ok(Served { viewer, _data: data })
 }
 

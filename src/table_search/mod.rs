@@ -67,7 +67,7 @@ pub struct Sample<'a> {
     pub displacement: &'a [DVec3],
     /// How much its squared error counts beside the other garments'; only the ratios matter.
     pub weight: f64,
-    /// Most PARTs a table may make of it.
+    /// Most PARTs a table may make of it; as many as it has vertices where more are asked for.
     pub max_parts: usize,
 }
 
@@ -113,6 +113,8 @@ pub fn search(
     progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
 ) -> Result<Search, SearchError> {
     error::check(samples)?;
+    let within = |s: &Sample<'_>| s.max_parts.min(s.distances_m.len());
+    let samples: &[Sample<'_>] = &samples.iter().map(|s| Sample { max_parts: within(s), ..*s }).collect::<Vec<_>>();
     let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
     let mut charges = Charges::even(samples.len());

@@ -11,10 +11,11 @@ use serde_json::Value;
 
 use crate::client::GARMENT;
 
-fn watching(table: &Path) -> (Child, Receiver<Value>) {
+fn watching(table: &Path, more: &[&str]) -> (Child, Receiver<Value>) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_partwise"))
         .args(["--garment", GARMENT, "--watch", "--no-save", "--format", "json", "--table"])
         .arg(table)
+        .args(more)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -38,7 +39,7 @@ fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_i
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("mine.toml");
     save(&table, "[[0, inf]]");
-    let (mut child, results) = watching(&table);
+    let (mut child, results) = watching(&table, &[]);
     // Another file, touched all the time.
     let over = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -76,4 +77,42 @@ fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_i
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     assert!(said.contains("row 2 starts at 1"), "{said}");
+}
+
+/// Resident memory of a process, MB.
+#[cfg(target_os = "linux")]
+fn resident_mb(child: &Child) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() / 1024.0
+}
+
+/// `PARTWISE_WATCH_EDITS=500` for longer.
+#[test]
+#[cfg(target_os = "linux")]
+#[allow(clippy::print_stderr, reason = "a test that tells what it measured")]
+fn memory_does_not_grow_with_edits_beyond_what_is_kept_for_pages() {
+    let edits = std::env::var("PARTWISE_WATCH_EDITS").map_or(60, |text| text.parse::<usize>().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("mine.toml");
+    save(&table, "[[0, inf]]");
+    let (mut child, results) = watching(&table, &["--serve", "--history", "4"]);
+    let mut memory = Vec::new();
+    for i in 0..edits {
+        results.recv_timeout(Duration::from_secs(120)).unwrap();
+        memory.push(resident_mb(&child));
+        let bound = 1.0 + 0.01 * i as f64;
+        save(&table, &format!("[[0, {bound}], [{bound}, inf]]"));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    child.wait().unwrap();
+    let told: Vec<String> = memory.iter().step_by((edits / 12).max(1)).map(|mb| format!("{mb:.0}")).collect();
+    eprintln!("{edits} edits, resident, MB: {}, at the end {:.0}", told.join(" "), memory[edits - 1]);
+    // Without the bound each edit of this garment stays, 0.3 MB at the least; allocators breathe.
+    let (half, end) = (memory[edits / 2], memory[edits - 1]);
+    assert!(
+        end - half < 0.1 * (edits / 2) as f64 + 8.0,
+        "{half:.0} MB after {} edits, {end:.0} after {edits}",
+        edits / 2
+    );
 }

@@ -41,6 +41,20 @@ fn what_the_user_can_mend_ends_with_two() {
     let far = ["--body", "body.obj", "--garment", "far.obj", "--unit", "m", "--up", "z", "--no-save"];
     bench.run(&far).with(2, &["far.obj", "no body near"]);
     bench.write("flat.obj", &GARMENT.replace("v 0 0 1.65", "v 0 -0.2 1.62"));
+    // A sheet beside the body, that nothing holds.
+    let beside: String = (0..21)
+        .flat_map(|j| (0..21).map(move |i| (i, j)))
+        .map(|(i, j)| format!("v {} {} 1.5\n", 0.5 + 0.02 * f64::from(i), 0.02 * f64::from(j)))
+        .chain(
+            (0..20)
+                .flat_map(|j| (0..20).map(move |i| 21 * j + i + 1))
+                .map(|a| format!("f {} {} {} {}\n", a, a + 1, a + 22, a + 21)),
+        )
+        .collect();
+    bench.write("beside.obj", &beside);
+    let tune =
+        ["tune", "--body", "body.obj", "--garment", "beside.obj", "--levels-only", "--max-parts", "3", "--out", "t"];
+    bench.run(&tune).with(2, &["beside.obj", "falls off the body"]);
     let flat = ["--body", "body.obj", "--garment", "flat.obj", "--unit", "m", "--up", "z", "--no-save"];
     bench.run(&flat).with(0, &["1 triangles that have no area at rest, the first of face 1"]);
 }

@@ -3,8 +3,10 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod browser;
 mod input;
 mod outputs;
+mod told;
 mod waiting;
 
 use std::ffi::OsStr;

@@ -241,6 +241,15 @@ fn a_search_that_is_broken_off_keeps_the_rounds_before() {
 }
 
 #[test]
+fn a_limit_beyond_all_vertices_is_their_number() {
+    let garment = Wavy::new(12, 10, 0.2);
+    let found = |most: usize| search(&[garment.sample(1.0, most)], &coarse(20, SearchOptions::default()), &unheard);
+    assert_eq!(found(usize::MAX), found(120));
+    let both = [garment.sample(1.0, usize::MAX), garment.sample(2.0, 1 << 60)];
+    assert!(search(&both, &coarse(20, SearchOptions::default()), &unheard).is_ok());
+}
+
+#[test]
 fn affine_maps_hold_a_turn_that_translations_do_not() {
     let mut garment = Wavy::new(31, 24, 0.4);
     garment.displacement = garment.mesh.positions.iter().map(|x| DVec3::new(-x.y, x.x, 0.0) * 0.3).collect();

@@ -12,6 +12,8 @@ const TABLE: &str = "name = \"mine\"\nunit = \"cm\"\ngap = \"extend-lower\"\nlev
 const SWEEP: &str = "name = \"s\"\nrepeats = 1\n[base]\nbody = \"body.obj\"\ngarment = \"garment.obj\"\noptions = { unit = \"m\", up = \"z\" }\n\
     [grid]\ntables = [\"table-3\", { quantile = [2, 3] }, \"table.toml\"]\nextents_cm = [\"none\", 8]\n";
 
+const CUT: &str = "default = \"cotton\"\n[panels]\nskirt_back = \"denim\"\n\"waist*\" = \"rib-knit\"\n";
+
 /// SplitMix64, for runs that are the same everywhere.
 struct Random(u64);
 
@@ -63,7 +65,7 @@ pub(super) struct Kind {
 
 const SCENE: &str = "--body body.obj --garment garment.obj --unit m --up z";
 
-pub(super) const KINDS: [Kind; 10] = [
+pub(super) const KINDS: [Kind; 13] = [
     Kind {
         name: "run",
         line: "SCENE --table table.toml --fabric fabric.toml --refine 0 --format json --no-save --export out.obj",
@@ -108,6 +110,24 @@ pub(super) const KINDS: [Kind; 10] = [
         line: "check form spec.toml --measurements body.toml --no-cache",
         files: &["spec.toml", "body.toml"],
         share: 2,
+    },
+    Kind {
+        name: "tune",
+        line: "tune --body body.obj --garment garment.obj --levels-only --max-parts 4 --out tuned --format json",
+        files: &["body.obj", "garment.obj"],
+        share: 5,
+    },
+    Kind {
+        name: "pattern",
+        line: "pattern skirt.json --svg flat.svg --edge-length 4 --format json",
+        files: &["skirt.json"],
+        share: 5,
+    },
+    Kind {
+        name: "sewn",
+        line: "--pattern skirt.json --fabrics cut.toml --edge-length 6 --refine 0 --no-save --format json",
+        files: &["skirt.json", "cut.toml"],
+        share: 3,
     },
 ];
 
@@ -156,6 +176,8 @@ impl Seeds {
             ("sweep.toml", SWEEP.into()),
             ("fabric.toml", asset("fabrics/denim.toml")),
             ("spec.toml", asset("garments/flared-skirt.toml")),
+            ("skirt.json", asset("patterns/skirt.json")),
+            ("cut.toml", CUT.into()),
             ("body.toml", toml::to_string(&partwise::shapes::BodySpec::default()).unwrap().into_bytes()),
         ]);
         for (name, bytes) in &files {
@@ -171,7 +193,7 @@ impl Seeds {
             files.insert(name, fs::read(&path).unwrap_or_else(|e| panic!("{name}: {e}")));
         }
         let help = |command: &str| partwise().args([command, "--help"]).output().unwrap().stdout;
-        let mut flags: Vec<String> = ["run", "check", "compare", "sweep", "merge", "cusick"]
+        let mut flags: Vec<String> = ["run", "check", "compare", "sweep", "merge", "cusick", "tune", "pattern"]
             .iter()
             .flat_map(|command| {
                 let text = String::from_utf8(help(command)).unwrap();

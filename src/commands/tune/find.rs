@@ -98,5 +98,6 @@ pub(crate) fn find(
 /// The most PARTs of each garment: its share of a total, as Table 3 spends them.
 pub(crate) fn limits(garments: &[&Garment], max_parts: usize) -> Vec<usize> {
     let total: usize = garments.iter().map(|w| w.table_3.parts).sum();
-    garments.iter().map(|w| w.table_3.parts * max_parts / total.max(1)).collect()
+    let share = |w: &&Garment| w.table_3.parts as u128 * max_parts as u128 / total.max(1) as u128;
+    garments.iter().map(|w| usize::try_from(share(w)).unwrap_or(usize::MAX)).collect()
 }

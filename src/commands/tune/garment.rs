@@ -15,6 +15,7 @@ use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
 
 use crate::commands::fabrics::FabricArgs;
+use crate::commands::failure::UserError;
 use crate::commands::work::refining;
 use crate::commands::{console, interrupt};
 
@@ -86,6 +87,11 @@ impl Garment {
         let (reference, warnings) = match found {
             Ok(found) => found,
             Err(AssessError::Interrupted) => return Ok(None),
+            Err(AssessError::Fallen) => {
+                return Err(UserError::new(format!(
+                    "{name}: it falls off the body, so there is no drape to find tables for; give one that stays on by itself"
+                )));
+            }
             Err(other) => return Err(other.into()),
         };
         for warning in loaded.warnings().iter().chain(&warnings) {
@@ -170,7 +176,8 @@ impl Garment {
         });
         let own_mm = match own {
             Ok(own) => Some(own.accuracy.vertices.rms_mm),
-            Err(AssessError::Interrupted) => None,
+            // One table's preview may slide off where others stay: that is no end to the search.
+            Err(AssessError::Interrupted | AssessError::Fallen) => None,
             Err(other) => return Err(other.into()),
         };
         Ok(Worth {

@@ -25,7 +25,10 @@ export class Session extends EventTarget {
       try {
         const first = await ask("api/state");
         if (!first.ok) throw new Error((await first.json()).error);
-        this.#take(await first.json());
+        const now = await first.json();
+        // A program that was started again counts its states anew, and may be of another version.
+        if (this.state && this.state.run !== now.run) return location.reload();
+        this.#take(now);
         this.dispatchEvent(new Event("connected"));
         wait = 250;
         await this.#events();
@@ -58,7 +61,8 @@ export class Session extends EventTarget {
     const trail = state.trail ?? this.#longer(state.trail_end);
     const histogram = state.histogram ?? this.state?.histogram;
     const may_steer = state.may_steer ?? this.state?.may_steer;
-    this.state = { ...state, trail, histogram, may_steer };
+    const run = state.run ?? this.state?.run;
+    this.state = { ...state, trail, histogram, may_steer, run };
     this.dispatchEvent(new Event("state"));
   }
 

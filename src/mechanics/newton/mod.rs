@@ -53,6 +53,10 @@ const SHORTEST_STEP: f64 = 1e-6;
 /// Lengths of a step that are tried relaxed; what is shorter is cut for another reason.
 const RELAXED_TRIALS: usize = 2;
 
+/// Lengths of a step that are refused for what crosses where they end relaxed; what is shorter is taken as it is. A cloth that begins far
+/// from its rest shape is carried as far by its relaxation however short the step.
+const RELAXED_CROSSINGS: usize = 4;
+
 /// Where a step is taken from.
 pub(crate) struct State<'a> {
     pub(crate) cloth: &'a Cloth,
@@ -226,7 +230,7 @@ impl<'c, 'b> Descent<'c, 'b> {
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (pace.longest_move_m / longest).min(1.0);
         let mut t = (first * onward.reach(direction, *farthest)).min(pace.longest_move_m / longest);
-        let mut relaxed = 0;
+        let (mut relaxed, mut crossed) = (0, 0);
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
@@ -236,11 +240,14 @@ impl<'c, 'b> Descent<'c, 'b> {
             if !falls {
                 relaxed += usize::from(t <= first);
                 falls = relaxed <= RELAXED_TRIALS
+                    && crossed < RELAXED_CROSSINGS
                     && pace.relaxing_trial > 0
                     && relaxation.run(cloth, contacts, trial, pace.relaxing_trial) <= most;
             }
             if falls {
-                relaxation.run(cloth, contacts, trial, pace.relaxing);
+                if crossed < RELAXED_CROSSINGS {
+                    relaxation.run(cloth, contacts, trial, pace.relaxing);
+                }
                 if *stride < 1.0 {
                     trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *stride));
                     contacts.update(trial);
@@ -251,7 +258,7 @@ impl<'c, 'b> Descent<'c, 'b> {
                         contacts.update(trial);
                         break true;
                     }
-                    Some(Looked::Crosses) => {}
+                    Some(Looked::Crosses) => crossed += 1,
                 }
             }
             t = if t > first { first } else { 0.5 * t };

@@ -11,6 +11,7 @@
 //! with its true stiffness. Each of the two energies falls; [`Record::softened`] says which one a step belongs to.
 
 mod settle;
+mod to_and_fro;
 
 use std::ops::ControlFlow;
 
@@ -68,6 +69,8 @@ pub struct Step<'a> {
     pub contacts: usize,
     /// Positions, m.
     pub positions: &'a [DVec3],
+    /// Whether it rests as far as its forces tell; told once, before it is looked at whether that lasts.
+    pub at_rest: bool,
 }
 
 /// Why a run ended.

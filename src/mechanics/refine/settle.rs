@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::to_and_fro::ToAndFro;
 use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::distance::Body;
@@ -18,7 +19,7 @@ const MOST_DAMPING: f64 = 1e4;
 const FAR_FROM_REST: f64 = 0.5;
 
 /// Residual over weight under which damping falls faster: only the softest ways to move are left, and those it holds back most.
-const CLOSE: f64 = 1e-2;
+pub(super) const CLOSE: f64 = 1e-2;
 
 /// Residual over weight under which one looks again for skin through the cloth, once there was some: before it has come to rest with what
 /// was found so far.
@@ -29,13 +30,6 @@ const PATIENCE: usize = 80;
 
 /// Residual over weight at which the softened cloth has done its part.
 const SOFT_TOLERANCE: f64 = 1e-2;
-
-/// Near rest, so many steps back, each against the one before, without a residual less than a share of the least so far, go to and fro:
-/// normals of gaps and anchors of friction stay as they are during a step and follow it, and what two states ask of each other may never agree. Half the way between them, and half
-/// again, it does (Krasnoselskii's iteration, 1955).
-const TO_AND_FRO: usize = 3;
-const LESS: f64 = 0.9;
-const LEAST_STRIDE: f64 = 0.125;
 
 /// Times the length of a step that one may go which goes on like the one before, near rest: see `newton::onward`. With 2 the five garments
 /// at ten sizes, knit and woven, took 354 steps together, with 1 363.
@@ -125,9 +119,9 @@ fn settle(
     let mut looks = 0;
     // The step before which covering asked for something, while it has not come to rest with that.
     let mut covering: Option<usize> = None;
-    let (mut least, mut back) = (f64::INFINITY, 0);
+    let mut swing = ToAndFro::default();
     let stop = loop {
-        if observer(&seen(&descent, iteration)).is_break() {
+        if observer(&seen(&descent, iteration, false)).is_break() {
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
@@ -138,15 +132,21 @@ fn settle(
                 let covered = if options.self_contact { covered(&mut descent) } else { Covered::Done };
                 covering = (covered != Covered::Done).then_some(iteration);
                 match covered {
-                    Covered::Places => {}
-                    Covered::Moved => descent.damping = options.damping,
+                    Covered::Places => swing.anew(&mut descent),
+                    Covered::Moved => {
+                        swing.anew(&mut descent);
+                        descent.damping = options.damping;
+                    }
                     Covered::Done if !options.lasting || looks == LOOKS || iteration >= limit => break Stop::Converged,
                     Covered::Done => {
                         looks += 1;
+                        if looks == 1 && observer(&seen(&descent, iteration, true)).is_break() {
+                            break Stop::Interrupted;
+                        }
                         match descent.look(&mut tangent, looks > 1, RELAXING)? {
                             Rest::Lasts => break Stop::Converged,
                             Rest::Moves => {}
-                            Rest::Left => (least, back) = (f64::INFINITY, 0),
+                            Rest::Left => swing.anew(&mut descent),
                         }
                         descent.damping = LEAST_DAMPING;
                     }
@@ -194,14 +194,7 @@ fn settle(
         } else if advance.share < 0.3 {
             descent.damping = (descent.damping * 2.0).min(MOST_DAMPING);
         }
-        back = if advance.back { back + 1 } else { 0 };
-        if descent.residual < LESS * least || descent.residual > CLOSE {
-            (least, back) = (descent.residual, 0);
-            descent.stride = (2.0 * descent.stride).min(1.0);
-        } else if back >= TO_AND_FRO {
-            descent.stride = (0.5 * descent.stride).max(LEAST_STRIDE);
-            back = 0;
-        }
+        swing.after(&mut descent, advance.back);
         if advance.accepted {
             history.push(descent.record(iteration, Some(advance), soft));
         }
@@ -228,13 +221,14 @@ fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
     residual > FAR_FROM_REST * GRAVITY * squares.sqrt() / cloth.weight
 }
 
-fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize) -> Step<'a> {
+fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize, at_rest: bool) -> Step<'a> {
     Step {
         iteration,
         energy: descent.energy,
         residual_over_weight: descent.residual,
         contacts: descent.contacts.touches().len(),
         positions: &descent.x,
+        at_rest,
     }
 }
 

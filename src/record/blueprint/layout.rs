@@ -158,8 +158,14 @@ impl Layout {
         }
         let wide = views.len() as f32;
         let views = in_rows("Stages", views, rows);
+        // Four beside each other cut long names.
+        let histogram = if self.several_tables {
+            "Vertices over distance, cm"
+        } else {
+            "Vertices over distance, cm; colours are levels"
+        };
         let mut below: Vec<(f32, Node)> = vec![
-            (1.3, View::bars("Vertices over distance, cm; colours are levels", &[paths::HISTOGRAM]).into()),
+            (1.3, View::bars(histogram, &[paths::HISTOGRAM]).into()),
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
         ];
         if self.several_tables {

@@ -4,8 +4,9 @@
 //! statistics elsewhere. The Content-Security-Policy forbids the browser every other host.
 
 use std::convert::Infallible;
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::Write as _;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net;
 use std::sync::OnceLock;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -43,12 +44,12 @@ pub(super) struct Page {
 }
 
 impl Page {
-    /// Serves the page on `port` of 127.0.0.1; it opens the recording at `recording` (`rerun+http://...`).
-    pub(super) fn serve(port: u16, recording: &str) -> Result<Self, String> {
+    /// Serves the page to whom `listener` hears; it opens the recording at `recording` (`rerun+http://...`).
+    pub(super) fn serve(listener: net::TcpListener, recording: &str) -> Result<Self, String> {
         let files = Files::new(recording)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| e.to_string())?;
-        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
-        let listener = runtime.block_on(TcpListener::bind(address)).map_err(|e| e.to_string())?;
+        listener.set_nonblocking(true).map_err(|e| e.to_string())?;
+        let listener = runtime.block_on(async { TcpListener::from_std(listener) }).map_err(|e| e.to_string())?;
         let (stop, stopped) = oneshot::channel();
         let serve = move || {
             runtime.block_on(async {
@@ -94,12 +95,20 @@ async fn accept(listener: TcpListener, files: Files) {
 #[derive(Clone)]
 struct Files {
     index: Bytes,
+    run: String,
     viewer: &'static WebViewerData,
+}
+
+/// A name that no other server has, by which a page knows its own again: what the standard library keys its hashers with is random.
+pub(crate) fn name_of_run() -> String {
+    format!("{:016x}", RandomState::new().build_hasher().finish())
 }
 
 impl Files {
     fn new(recording: &str) -> Result<Self, String> {
-        Ok(Self { index: INDEX.replace("{recording}", recording).into(), viewer: viewer()? })
+        let run = name_of_run();
+        let index = INDEX.replace("{recording}", recording).replace("{run}", &run).into();
+        Ok(Self { index, run, viewer: viewer()? })
     }
 
     fn answer<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
@@ -109,6 +118,7 @@ impl Files {
         let viewer = self.viewer;
         let (kind, bytes) = match request.uri().path() {
             "/" | "/index.html" => ("text/html; charset=utf-8", self.index.clone()),
+            "/run" => ("text/plain", Bytes::from(self.run.clone())),
             "/start.js" => ("text/javascript", Bytes::from_static(START.as_bytes())),
             "/program.js" => ("text/javascript", Bytes::from_static(PROGRAM.as_bytes())),
             "/re_viewer.js" => ("text/javascript", Bytes::from_static(viewer.viewer_js())),

@@ -3,13 +3,24 @@
 import { fail, run, show } from "./program.js";
 
 const failed = (error) => fail(error?.message ?? String(error), "Reload the page to try again.");
-const query = new URLSearchParams(location.search);
-const asked = query.getAll("url");
-run(
-  {
-    url: asked.length > 0 ? asked : [document.documentElement.dataset.recording],
-    persist: true,
-    theme: query.get("theme"),
-  },
-  failed,
-).then(show, failed);
+const here = document.documentElement.dataset;
+const theme = new URLSearchParams(location.search).get("theme");
+run({ url: [here.recording], persist: true, theme }, failed).then(show, failed);
+
+// Asks now and then whether the program is still there. One that was started again has another recording, and may be of another
+// version: then the page is loaded anew.
+const lost = document.getElementById("lost");
+lost.textContent = `The program behind this page has ended. Run it again with --web-port ${location.port}, and it is shown here.`;
+for (let wait = 1000; ; ) {
+  await new Promise((done) => setTimeout(done, wait));
+  try {
+    const answer = await fetch("run", { cache: "no-store", signal: AbortSignal.timeout(5000) });
+    if (!answer.ok) throw new Error("something else answers");
+    if ((await answer.text()) !== here.run) location.reload();
+    lost.hidden = true;
+    wait = 1000;
+  } catch {
+    lost.hidden = false;
+    wait = Math.min(1.5 * wait, 5000);
+  }
+}

@@ -8,6 +8,9 @@ use crate::mechanics::energy::membrane::outer;
 /// No vertex: fills up a place that needs fewer.
 pub(super) const NONE: u32 = u32::MAX;
 
+/// A gap that has faded to less than this share of its stiffness is gone.
+const FADED: f64 = 1e-3;
+
 /// What makes a gap the same one at another time: whose it is and between which features.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
@@ -48,6 +51,8 @@ pub struct Gap {
     pub(super) stiffness: f64,
     /// κ A to begin with, N/m.
     pub(super) first: f64,
+    /// Whether it is there no more, and fades.
+    pub(super) going: bool,
     /// From here on friction counts: Σ w x then, m.
     pub(super) from: DVec3,
     /// Elastic slip that it began with there, m.
@@ -60,7 +65,7 @@ impl Gap {
     /// A gap without a past, no plane in it yet.
     pub(super) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
         let [body, normal, from, slip] = [DVec3::ZERO; 4];
-        Self { key, weights, body, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
+        Self { key, weights, body, normal, goal, stiffness, first: stiffness, going: false, from, slip, limit: 0.0 }
     }
 
     /// Σ w x, less the place on the body, m: from the second place to the first.
@@ -132,9 +137,11 @@ impl Gap {
         Some(block)
     }
 
-    /// Takes over what the same gap had before: its slip, and a stiffness that had to grow.
-    pub(super) fn continues(&mut self, before: &Self, x: &[DVec3]) {
-        self.stiffness = self.stiffness.max(before.stiffness);
+    /// Takes over what the same gap had before: its slip, and a stiffness that had to grow; one that comes or goes nears what it will be by
+    /// this share.
+    pub(super) fn continues(&mut self, before: &Self, x: &[DVec3], share: f64) {
+        let end = if self.going { 0.0 } else { self.stiffness.max(before.stiffness) };
+        self.stiffness = if share < 1.0 { before.stiffness + share * (end - before.stiffness) } else { end };
         // A place that went through has the other side's normal now, and must go back.
         if before.normal.dot(self.normal) < 0.0 {
             self.normal = -self.normal;
@@ -142,4 +149,19 @@ impl Gap {
         let u = before.slipped(before.across(x));
         self.slip = u - self.normal * self.normal.dot(u);
     }
+}
+
+/// Adds to the gaps of now those of `before` that are none any more, until they have faded.
+pub(super) fn stay(before: &[Gap], gaps: &mut Vec<Gap>) {
+    let mut now = gaps.iter().map(|gap| gap.key).peekable();
+    let mut staying = Vec::new();
+    for gap in before {
+        while now.next_if(|key| *key < gap.key).is_some() {}
+        let gone = now.peek() != Some(&gap.key) && gap.key.kind != Kind::Crossing;
+        if gone && gap.stiffness > FADED * gap.first {
+            staying.push(Gap { going: true, ..*gap });
+        }
+    }
+    gaps.extend(staying);
+    gaps.sort_unstable_by_key(|gap| gap.key);
 }

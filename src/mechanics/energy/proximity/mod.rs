@@ -10,6 +10,11 @@
 //! state that repeats itself under a refresh is at rest with the true distances. Friction holds the two places together along
 //! the plane by the same law as on the body ([`friction`](super::friction)).
 //!
+//! What faces what changes by jumps: two edges do so between their ends alone, and who comes to face another one begins anew. Cloth that
+//! lies where it jumps has no state that repeats itself, and goes to and fro between two for ever. Asked to fade,
+//! gaps come and go by a share of their stiffness at a refresh, so that it rests where a mean of both pushes (Filippov's solution of an
+//! equation whose right side jumps).
+//!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
 //! back towards where it is known not to (`clear`: how it was placed, or put over what lies below it), or finds its own way out
@@ -113,6 +118,8 @@ pub struct Proximity {
     friction: Arc<Vec<f64>>,
     gaps: Vec<Gap>,
     passage: Passage,
+    /// Share of its stiffness by which a gap comes or goes at a refresh.
+    fade: f64,
     /// Fewest crossings so far, and how many refreshes ago they were fewer than before.
     fewest: usize,
     since: usize,
@@ -129,7 +136,18 @@ impl Proximity {
         let least = (LEAST_OF_EDGE * skin.edge_m).min(LEAST_OF_ANY);
         let apart = Apart { thickness, bounds: [least, (MOST_OF_EDGE * skin.edge_m).max(least)] };
         let passage = Passage::new(Arc::clone(&skin));
-        Self { skin, placed, clear, apart, friction, gaps: Vec::new(), passage, fewest: usize::MAX, since: 0 }
+        Self {
+            skin,
+            placed,
+            clear,
+            apart,
+            friction,
+            gaps: Vec::new(),
+            passage,
+            fade: 1.0,
+            fewest: usize::MAX,
+            since: 0,
+        }
     }
 
     /// Looks for gaps at `x` (m); those that were there before go on.
@@ -157,6 +175,10 @@ impl Proximity {
         }
         gaps.extend(to_body);
         gaps.sort_unstable_by_key(|gap| gap.key);
+        if self.fade < 1.0 {
+            gap::stay(&self.gaps, &mut gaps);
+        }
+        let fade = self.fade;
         let mut before = self.gaps.iter().peekable();
         for gap in &mut gaps {
             while before.next_if(|b| b.key < gap.key).is_some() {}
@@ -165,19 +187,25 @@ impl Proximity {
             if gap.key.kind == gap::Kind::Crossing {
                 continue;
             }
-            if let Some(before) = again {
-                gap.continues(before, x);
+            match again {
+                Some(before) => gap.continues(before, x, fade),
+                None => gap.stiffness *= fade,
             }
             let depth = gap.depth(x);
             gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The pressure that is there stays as it is; what grows is how fast it grows from here on.
-            if depth > (1.0 - NARROW) * gap.goal {
+            if depth > (1.0 - NARROW) * gap.goal && fade == 1.0 {
                 gap.stiffness *= STIFFER.min(MOST_STIFF * gap.first / gap.stiffness);
             }
             gap.slip =
                 if gap.limit > 0.0 { gap.slip.clamp_length_max(super::friction::ELASTIC_SLIP) } else { DVec3::ZERO };
         }
         self.gaps = gaps;
+    }
+
+    /// From now on gaps come and go by this share of their stiffness at a refresh; 1 for at once.
+    pub(crate) fn fade(&mut self, share: f64) {
+        self.fade = share;
     }
 
     /// Adds the gradient (N) at `x`, but where a vertex is `held`; returns the energy, J.

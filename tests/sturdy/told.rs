@@ -1,0 +1,119 @@
+//! What it is asked, told before any time is spent on it; and what is kept when it is broken off.
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::Bench;
+
+#[test]
+fn options_that_cannot_be_are_refused_before_anything_is_solved() {
+    let bench = Bench::new();
+    for extent in ["nan", "inf", "-3"] {
+        bench
+            .drape(&["--no-save", &format!("--max-extent={extent}")])
+            .with(2, &["--max-extent", extent, "centimetres"]);
+    }
+    // Both end within moments; the garment of the first would take longer to make.
+    for line in [&["--watch", "--no-save", "--garment", "long-sleeved-dress@60000"][..], &["--watch", "--no-save"]] {
+        let refused = bench.run(line);
+        refused.with(2, &["--watch has no file to watch", "--table"]);
+        assert!(refused.took < Duration::from_secs(5), "{:?}", refused.took);
+    }
+    let denim = include_str!("../../assets/fabrics/denim.toml");
+    bench.write("stiff.toml", &denim.replace("shear_n_per_m = 27.0", "shear_n_per_m = 1e308"));
+    bench
+        .drape(&["--no-save", "--fabric", "stiff.toml"])
+        .with(2, &["stiff.toml", "shear_n_per_m is 1e308", "expected"]);
+}
+
+#[test]
+fn one_part_alone_is_solved_by_the_papers_equations_too() {
+    let bench = Bench::new();
+    bench.write("whole.toml", "name = \"whole\"\nunit = \"cm\"\nlevels = [[0, inf]]\n");
+    let ended = bench.drape(&["--no-save", "--model", "paper", "--table", "whole.toml"]);
+    ended.with(0, &[]);
+    assert!(!ended.said.contains("no three of"), "{}", ended.said);
+}
+
+#[test]
+fn a_search_takes_no_more_parts_than_there_are_vertices() {
+    let bench = Bench::new();
+    for most in ["100000000", "18446744073709551615"] {
+        let tuned =
+            bench.run(&["tune", "--garment", "flared-skirt@400", "--levels-only", "--max-parts", most, "--out", "t"]);
+        tuned.with(0, &[]);
+        assert!(!tuned.said.contains("memory allocation"), "{}", tuned.said);
+    }
+}
+
+/// The numbers in front of the rows of a table of levels.
+fn numbered(text: &str) -> Vec<u32> {
+    let row = |line: &str| line.trim_start_matches(['│', ' ']).split_whitespace().next()?.parse().ok();
+    text.lines().skip_while(|line| !line.contains("level ")).filter_map(row).collect()
+}
+
+#[test]
+fn levels_have_the_same_numbers_wherever_they_are_told() {
+    let bench = Bench::new();
+    let told = |arguments: &[&str]| {
+        let mut command = bench.command();
+        let done = command.args(arguments).args(["--garment", "flared-skirt@400", "--no-save"]).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        numbered(&String::from_utf8(done.stdout).unwrap())
+    };
+    let by_run = told(&["run", "--refine", "0"]);
+    let by_compare = told(&["compare", "table-3", "table-3", "--repeats", "1", "--accuracy", "none"]);
+    assert!(by_run.len() > 8 && by_run.is_sorted() && by_run.first() > Some(&0), "{by_run:?}");
+    assert!(by_run.iter().all(|level| by_compare.contains(level)), "{by_run:?} and {by_compare:?}");
+}
+
+#[test]
+fn the_times_of_a_row_add_up() {
+    let bench = Bench::new();
+    let sweep = "name = \"s\"\nrepeats = 1\n[base]\ngarment = \"flared-skirt@400\"\n[grid]\ntables = [\"table-3\"]\n";
+    bench.write("s.toml", sweep);
+    bench.run(&["sweep", "s.toml", "--out", "s", "--no-save"]).with(0, &[]);
+    let rows = fs::read_to_string(bench.path("s/rows.csv")).unwrap();
+    let lines: Vec<csv::StringRecord> = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(rows.as_bytes())
+        .records()
+        .map(Result::unwrap)
+        .collect();
+    let time = |name: &str| {
+        let column = lines[0].iter().position(|title| title == format!("time_{name}_ms")).unwrap();
+        lines[1][column].parse::<f64>().unwrap()
+    };
+    let stages: f64 = ["distance", "segment", "mechanics", "refine", "other"].map(time).iter().sum();
+    assert!((stages - time("total")).abs() < 1e-3 * time("total"), "{stages} of {} ms", time("total"));
+}
+
+#[test]
+fn ctrl_c_while_the_error_is_measured_keeps_the_drape() {
+    let bench = Bench::new();
+    let line =
+        ["--garment", "flared-skirt@400", "--accuracy", "--spread", "2000", "--save", "x.rrd", "--export", "x.obj"];
+    // On a machine so slow that nothing is draped by then, it says so and is asked later again.
+    for patience in [4, 30, 120] {
+        let mut command = bench.command();
+        let mut child = command.args(line).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs(patience));
+        let asked = Instant::now();
+        // Twice at once, as `timeout -s INT` does: that is one press.
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id, &id]).status().unwrap().success());
+        let mut said = String::new();
+        std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut said).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
+        if !said.contains("the drape is kept without its error") {
+            continue;
+        }
+        assert!(asked.elapsed() < Duration::from_secs(30), "{:?}", asked.elapsed());
+        assert!(
+            fs::read_to_string(bench.path("x.obj")).unwrap().lines().filter(|l| l.starts_with("v ")).count() == 400
+        );
+        return bench.run(&["view", "--check", "x.rrd"]).with(0, &[]);
+    }
+    panic!("never came so far");
+}
