@@ -102,8 +102,7 @@ fn skin_between_vertices_that_are_outside_is_told() {
     let said = warnings.join("\n");
     assert!(said.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{said}");
     assert!(said.contains("no vertex is inside"), "{said}");
-    // Places between them are kept off where cloth keeps off at all, and a fine mesh needs none.
-    assert_eq!(draped(&scene).0.body_crossing_pairs, 0);
+    // A fine mesh shows none even so.
     let (figures, warnings, _) = draped_by(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap(), &bare);
     assert_eq!(figures.body_crossing_pairs, 0);
     assert_eq!(warnings, [""; 0]);
