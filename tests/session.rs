@@ -71,6 +71,13 @@ fn a_bound_moves_parts_at_once_and_leaves_distances_cloth_and_rest() {
 fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
     let (session, mut workshop) = settled(true);
     let before = session.snapshot();
+    let told: Arc<Mutex<Vec<(bool, bool, f64)>>> = Arc::default();
+    let (handle, log) = (session.clone(), Arc::clone(&told));
+    session.listen(move |_| {
+        if let Some(rest) = handle.snapshot().rest.as_ref().filter(|rest| rest.state == 2) {
+            log.lock().unwrap().push((rest.balanced, rest.done, rest.residual_over_weight));
+        }
+    });
     session.submit(&edit(r#"{"fabric": "ponte"}"#), None).unwrap();
     let at_once = session.snapshot();
     let parts = |s: &Snapshot| Arc::clone(&s.sectioned.as_ref().unwrap().parts);
@@ -79,6 +86,10 @@ fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
     let done = work(&session, &mut workshop);
     let rest = done.rest.as_ref().unwrap();
     assert!(rest.state == 2 && rest.warm && rest.done && rest.residual_over_weight < 1e-3);
+    let told = told.lock().unwrap();
+    let balanced = told.iter().find(|rest| rest.0).unwrap();
+    assert!(!balanced.1 && balanced.2 < 1e-3, "told before it is looked at that it lasts: {told:?}");
+    assert!(told.iter().skip_while(|rest| !rest.0).all(|rest| rest.0), "once balanced, so it stays: {told:?}");
     assert_eq!(done.finished.as_ref().unwrap().figures.penetrating_vertices, 0);
     assert!(rms_mm(&rest.positions, &before.rest.as_ref().unwrap().positions) > 0.1);
 }

@@ -147,6 +147,10 @@ impl RunArgs {
         let mut snapshots = Vec::new();
         let drape = refining(name, |progress| {
             job.drape(&loaded.scene, &mut |step| {
+                if step.at_rest {
+                    // Told before, as the step that it is.
+                    return progress(step);
+                }
                 let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
                 snapshots.push(Snapshot {
                     iteration: step.iteration,

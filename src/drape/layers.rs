@@ -14,7 +14,9 @@ use glam::DVec3;
 use super::levels::Levels;
 use super::parts::stage_one;
 use super::pieces::{Distances, Made, refine_from, settled};
-use super::{Drape, DrapeError, Moved, PartOutcome, Settings, StageTimes, StageTwo, moved, needs_cloth, timed};
+use super::{
+    Drape, DrapeError, Moved, PartOutcome, Settings, StageTimes, StageTwo, StartsFrom, moved, needs_cloth, timed,
+};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Observer, Record, Step};
@@ -68,7 +70,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
         let start = scene.lifted_off(worn.positions.clone());
-        let refined = refine_from(scene, settings, &cloth, None, start, &mut |step| {
+        let refined = refine_from(scene, settings, &cloth, None, (start, StartsFrom::Parts), &mut |step| {
             if stopped {
                 return ControlFlow::Break(());
             }

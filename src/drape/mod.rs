@@ -28,7 +28,7 @@ pub use let_go::LetGo;
 pub(crate) use let_go::{Released, let_go};
 pub(crate) use levels::Levels;
 pub(crate) use parts::{ENOUGH, StageTwo, approach, stage_one, stage_two, told};
-pub(crate) use pieces::{Distances, Made, folds_of, refine_from, settled};
+pub(crate) use pieces::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
 /// How long each stage took.
@@ -196,7 +196,7 @@ fn moved(
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
     let Released { cloth, refined, let_go } = timed(&mut times.refine, || {
         let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
-        let refined = refine_from(scene, settings, &levels.cloth, Some(ground), start, observer)?;
+        let refined = refine_from(scene, settings, &levels.cloth, Some(ground), (start, StartsFrom::Parts), observer)?;
         let_go(scene, settings, refined, observer)
     })?;
     let cloth = cloth.as_ref().unwrap_or(&levels.cloth);

@@ -124,7 +124,7 @@ fn preview(found: &Preview) -> Value {
 
 fn rest(found: &AtRest) -> Value {
     json!({
-        "state": found.state, "done": found.done, "kept": found.kept, "warm": found.warm,
+        "state": found.state, "done": found.done, "balanced": found.balanced, "kept": found.kept, "warm": found.warm,
         "residual_over_weight": found.residual_over_weight, "steps": found.steps,
         "ms": found.ms, "after_ms": found.after_ms,
     })

@@ -87,8 +87,10 @@ pub struct AtRest {
     pub state: u64,
     /// What was draped.
     pub ground: Arc<Ground>,
-    /// Whether it is there.
+    /// Whether it is there: its forces balance, and it was looked at that this lasts.
     pub done: bool,
+    /// Whether its forces balance; that it lasts may yet be looked at, which moves little.
+    pub balanced: bool,
     /// Whether it is the drape of an earlier state, which the edit does not touch: where a cloth rests does not depend on the table.
     pub kept: bool,
     /// Whether it began at the drape before.

@@ -3,7 +3,8 @@
 //     node tests/browser/latency.mjs target/release/partwise [EDITS] [GARMENT] [SEED] [COLD RUNS of each kind]
 //
 // Every edit waits until the one before is finished. `parts`: PARTs and forces, in the answer to PATCH; `preview`: the first event with a
-// preview of the state; `rest`: the garment at rest; `all`: the two stages from the undraped garment and the figures too.
+// preview of the state; `balanced`: the garment whose forces balance; `at rest`: the same looked at that it lasts; `all`: the two stages
+// from the undraped garment and the figures too.
 
 import { execFile, spawn } from "node:child_process";
 import { promisify } from "node:util";
@@ -85,14 +86,15 @@ for (let i = 0; i < Number(edits); i += 1) {
   const n = state.state;
   const there = state.parts?.state === n ? Promise.resolve(answered) : when((s) => s.parts?.state === n);
   const kept = state.rest?.state === n && state.rest.done ? answered : null;
-  const [parts, preview, rest, all] = await Promise.all([
+  const [parts, preview, balanced, rest, all] = await Promise.all([
     there,
     when((s) => s.preview?.state === n),
+    kept ?? when((s) => s.rest?.state === n && (s.rest.balanced || s.rest.done)),
     kept ?? when((s) => s.rest?.state === n && s.rest.done),
     when((s) => s.state === n && s.idle),
   ]);
-  const row = { parts, preview, rest, all };
-  times[kind] ??= { parts: [], preview: [], rest: [], all: [], jobs: [] };
+  const row = { parts, preview, balanced, rest, all };
+  times[kind] ??= { parts: [], preview: [], balanced: [], rest: [], all: [], jobs: [] };
   for (const key of Object.keys(row)) times[kind][key].push(row[key] - began);
   times[kind].jobs.push(newest.job);
 }
@@ -105,7 +107,7 @@ const { join } = await import("node:path");
 const folder = mkdtempSync(join(tmpdir(), "latency-"));
 const quantile = (values, share) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(share * values.length))];
 console.log(`${garment}, ${edits} edits, seed ${seed}; ms, median (95th percentile)`);
-console.log("kind              n   parts        preview        rest           all            cold run");
+console.log("kind              n   parts        preview        balanced       at rest        all            cold run");
 for (const [kind, { jobs, ...measured }] of Object.entries(times)) {
   const cold = [];
   for (const job of jobs.slice(-Number(colds) || jobs.length)) {
@@ -120,7 +122,7 @@ for (const [kind, { jobs, ...measured }] of Object.entries(times)) {
     cold.push(performance.now() - began);
   }
   const cell = (values) => `${quantile(values, 0.5).toFixed(0)} (${quantile(values, 0.95).toFixed(0)})`.padEnd(15);
-  const cells = [measured.parts, measured.preview, measured.rest, measured.all].map(cell);
+  const cells = [measured.parts, measured.preview, measured.balanced, measured.rest, measured.all].map(cell);
   cells[0] = cells[0].trimEnd().padEnd(13);
   console.log(`${kind.padEnd(16)} ${String(jobs.length).padStart(3)}   ${cells.join("")}${quantile(cold, 0.5).toFixed(0)}`);
   // For who joins several runs.

@@ -90,9 +90,10 @@ function show() {
   const state = session.state;
   const { parts, preview, rest } = state;
   const done = (what) => (what?.state === state.state && what.done !== false ? "✓" : "…");
+  const lasts = rest?.state === state.state && rest.balanced && !rest.done ? "✓, looking whether it lasts" : done(rest);
   at("status").textContent =
     `state ${state.state} · PARTs ${parts?.count ?? "–"} ${done(parts)} · two stages ${preview?.warm ? "…" : done(preview)} · ` +
-    `at rest ${done(rest)}${state.idle ? "" : " · working"}`;
+    `at rest ${lasts}${state.idle ? "" : " · working"}`;
   document.body.classList.toggle("onlooker", state.may_steer === false);
   at("undo").disabled = state.undo === 0 || state.may_steer === false;
   at("redo").disabled = state.redo === 0 || state.may_steer === false;

@@ -69,6 +69,8 @@ pub struct Step<'a> {
     pub contacts: usize,
     /// Positions, m.
     pub positions: &'a [DVec3],
+    /// Whether it rests as far as its forces tell; told once, before it is looked at whether that lasts.
+    pub at_rest: bool,
 }
 
 /// Why a run ended.

@@ -29,8 +29,8 @@ const SOFT_TOLERANCE: f64 = 1e-2;
 const FARTHEST: f64 = 2.0;
 
 /// Looks at a rest whether it lasts, at most: see `newton::ways_out`. Without them the same twenty took 327 steps, and four of them were
-/// saddles or still moved; with four, one still did.
-const LOOKS: usize = 8;
+/// saddles or still moved; with four one still did, and from other previews with eight.
+const LOOKS: usize = 16;
 
 /// Iterations of a relaxation at the start and after a step.
 const RELAXING: usize = 20;
@@ -114,7 +114,7 @@ fn settle(
     let mut looks = 0;
     let mut swing = ToAndFro::default();
     let stop = loop {
-        if observer(&seen(&descent, iteration)).is_break() {
+        if observer(&seen(&descent, iteration, false)).is_break() {
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
@@ -125,6 +125,9 @@ fn settle(
                     break Stop::Converged;
                 }
                 looks += 1;
+                if looks == 1 && observer(&seen(&descent, iteration, true)).is_break() {
+                    break Stop::Interrupted;
+                }
                 match descent.look(&mut tangent, looks > 1, RELAXING)? {
                     Rest::Lasts => break Stop::Converged,
                     Rest::Moves => {}
@@ -191,13 +194,14 @@ fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
     residual > FAR_FROM_REST * GRAVITY * squares.sqrt() / cloth.weight
 }
 
-fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize) -> Step<'a> {
+fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize, at_rest: bool) -> Step<'a> {
     Step {
         iteration,
         energy: descent.energy,
         residual_over_weight: descent.residual,
         contacts: descent.contacts.touches().len(),
         positions: &descent.x,
+        at_rest,
     }
 }
 

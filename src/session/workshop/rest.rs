@@ -8,7 +8,8 @@ use glam::DVec3;
 use super::{Target, Workshop, ask};
 use crate::accuracy::{self, representable::representable};
 use crate::drape::{
-    ClothState, Drape, Levels, Made, Refine, Released, Settings, StageTimes, folds_of, let_go, refine_from, settled,
+    ClothState, Drape, Levels, Made, Refine, Released, Settings, StageTimes, StartsFrom, folds_of, let_go, refine_from,
+    settled,
 };
 use crate::figures::Figures;
 use crate::mechanics::coupled::Motion;
@@ -36,6 +37,7 @@ impl Way<'_> {
             state: target.state,
             ground: Arc::clone(&sectioned.ground),
             done: false,
+            balanced: false,
             kept: false,
             warm,
             positions: Arc::new(positions.to_vec()),
@@ -65,14 +67,19 @@ impl Workshop {
         let began = Instant::now();
         let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
         let way = Way { target, sectioned, warm, began };
+        let from = if warm { StartsFrom::Rest } else { StartsFrom::Parts };
+        let mut balanced = false;
         let mut show = |step: &Step<'_>| {
-            if step.iteration > 0 {
-                let step = Arc::new(way.at(step.positions, step.residual_over_weight, step.iteration));
+            // What is held balances before it is let go.
+            balanced |= step.at_rest && !scene.let_go;
+            if step.iteration > 0 || balanced {
+                let at = way.at(step.positions, step.residual_over_weight, step.iteration);
+                let step = Arc::new(AtRest { balanced, ..at });
                 session.publish(target.state, |desk| desk.view.rest = Some(step));
             }
             ask(session, target.state)
         };
-        let refined = refine_from(scene, settings, &levels.cloth, None, start, &mut show)?;
+        let refined = refine_from(scene, settings, &levels.cloth, None, (start, from), &mut show)?;
         // What is held is held where it was placed: the next drape goes on from before it is let go.
         self.rest = Some((sectioned.ground.generation, Arc::new(refined.positions.clone())));
         let Released { cloth, refined, let_go } = let_go(scene, settings, refined, &mut show)?;
@@ -85,6 +92,7 @@ impl Workshop {
         let (positions, state) = settled(scene, settings, cloth, None, refined);
         let rest = Arc::new(AtRest {
             done: true,
+            balanced: true,
             reaction_n: Arc::new(reactions(cloth, &positions, &state.fit.pressure_kpa)),
             let_go,
             ms: took.as_secs_f64() * 1e3,
