@@ -1,6 +1,7 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
 mod by_method;
+mod painted;
 mod watching;
 
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ use super::stages::StageArgs;
 use super::summary::Summary;
 use super::work::{cache, refining, use_threads};
 use super::{certified, console, interrupt};
+use painted::ExportColours;
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -68,6 +70,9 @@ pub(crate) struct RunArgs {
     /// where they lay flat), or as glTF in metres, y up
     #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
     export: Option<PathBuf>,
+    /// Colour the vertices of a `.glb` as the views of the recording do
+    #[arg(long, value_enum, value_name = "WHAT", requires = "export", help_heading = "Output")]
+    export_colours: Option<ExportColours>,
     /// What to print on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
@@ -83,6 +88,7 @@ impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
+        painted::refuse(self.export.as_deref(), self.export_colours)?;
         interrupt::listen_at_once();
         if self.method != by_method::TWO_STAGE {
             return self.run_by_method();
@@ -119,7 +125,7 @@ impl RunArgs {
 
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
         if let Some(path) = &self.export {
-            solved.loaded.write(path, &solved.drape.positions)?;
+            painted::write(solved, path, self.export_colours)?;
             solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
         }
         Ok(())

@@ -80,7 +80,7 @@ impl Solved {
     }
 
     /// What is shown on the draped garment: fit, and the error where it was measured.
-    fn overlays(&self) -> Vec<Overlay<'_>> {
+    pub(super) fn overlays(&self) -> Vec<Overlay<'_>> {
         let mut overlays = Vec::new();
         if let Some(state) = &self.drape.state {
             overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });

@@ -21,6 +21,7 @@ mod native;
 mod open;
 mod outfit;
 mod page;
+pub mod painted;
 mod panel;
 pub mod paths;
 mod pattern;

@@ -212,10 +212,13 @@ fn least(quantity: &str) -> f64 {
 
 /// The range of an overlay's colours, fixed by its first step.
 pub(super) fn scale(open: &Open, overlay: &Overlay<'_>) -> Range {
-    open.scale(overlay.name, || {
-        let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
-        Range { high: own.high.max(least(overlay.name)), ..own }
-    })
+    open.scale(overlay.name, || own_range(overlay))
+}
+
+/// The range that an overlay would have alone.
+pub(super) fn own_range(overlay: &Overlay<'_>) -> Range {
+    let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
+    Range { high: own.high.max(least(overlay.name)), ..own }
 }
 
 /// Values on the draped garment: `{branch}/garment`, and a colour bar where `legend` says.

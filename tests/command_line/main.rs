@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod beside;
+mod exported;
 mod fabrics;
 
 use std::fs;
@@ -155,19 +156,6 @@ fn the_same_bits_with_one_thread_and_with_two() {
     }
     assert_eq!(exports[0], exports[1]);
     assert_eq!(exports[1], exports[2]);
-}
-
-#[test]
-fn the_export_keeps_faces_groups_and_texture_coordinates() {
-    let bench = Bench::new();
-    let output = bench.drape(&["--export", "out.obj", "--no-save"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let out = fs::read_to_string(bench.path("out.obj")).unwrap();
-    let faces = |text: &str| text.lines().filter(|l| l.starts_with("f ")).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(faces(&out), faces(&sheet(12, 1.51)), "quads stay quads, vt stay where they were");
-    assert!(out.contains("g front") && out.contains("g back"));
-    assert_eq!(out.lines().filter(|l| l.starts_with("vt ")).count(), 4);
-    assert!(!out.contains("v 0 0 1.51"), "the garment moved");
 }
 
 #[test]

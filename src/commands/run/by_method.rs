@@ -70,6 +70,7 @@ impl RunArgs {
             ("--spread", self.spread > 0),
             ("--cache", self.cache.is_some()),
             ("--watch", self.watch),
+            ("--export-colours", self.export_colours.is_some()),
         ];
         let mut given: Vec<&str> = own.into_iter().filter(|(_, given)| *given).map(|(flag, _)| flag).collect();
         given.extend(self.stages.of_two_stages());

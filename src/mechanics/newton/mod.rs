@@ -55,7 +55,7 @@ const RELAXED_TRIALS: usize = 2;
 
 /// Lengths of a step that are refused for what crosses where they end relaxed; what is shorter is taken as it is. A cloth that begins far
 /// from its rest shape is carried as far by its relaxation however short the step.
-const RELAXED_CROSSINGS: usize = 4;
+const RELAXED_CROSSINGS: usize = 8;
 
 /// Where a step is taken from.
 pub(crate) struct State<'a> {
