@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Figures;
 use crate::mechanics::fit::TORN_PERCENT;
 use crate::mesh::TriMesh;
-use crate::quantile::nearest_rank;
+use crate::mesh::bridges::Bridges;
 use crate::scene::Scene;
 
 /// A top edge that sinks farther than this (mm) has not settled, it has slid: a neckline settles by one to two centimetres.
@@ -15,10 +15,6 @@ const SANK_MM: f64 = 100.0;
 
 /// An opening that is longer by more than this is told where the cloth is stretched too far.
 const STRETCHED: f64 = 1.1;
-
-/// Triangles this many times as long as half of them are, and longer than this (m), bridge something: no remesher leaves such.
-const BRIDGE: f64 = 5.0;
-const BRIDGE_M: f64 = 0.1;
 
 impl Figures {
     /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
@@ -107,21 +103,13 @@ impl TightestOpening {
 
 /// What to do about triangles that bridge open seams, where there are such: contact is felt at vertices, and they have none in between.
 fn bridges(garment: &TriMesh) -> Option<String> {
-    let at = |v: u32| garment.positions[v as usize];
-    let longest = |t: &[u32; 3]| (0..3).map(|i| at(t[i]).distance(at(t[(i + 1) % 3]))).fold(0.0, f64::max);
-    let lengths: Vec<f64> = garment.triangles.iter().map(longest).collect();
-    let usual = nearest_rank(&lengths, 0.5);
-    let far: Vec<f64> = lengths.into_iter().filter(|l| *l > BRIDGE_M && *l > BRIDGE * usual).collect();
-    let most = far.iter().copied().fold(0.0, f64::max);
-    (!far.is_empty()).then(|| {
-        format!(
-            "{} of its triangles are up to {:.0} cm long, where most are {:.1} cm: do they bridge open seams? The body passes between their \
-             corners; sew the pattern it was cut by (--pattern), or begin with the seams closed",
-            far.len(),
-            1e2 * most,
-            1e2 * usual
-        )
-    })
+    let Bridges { triangles, longest_m, usual_m } = Bridges::of(garment)?;
+    Some(format!(
+        "{triangles} of its triangles are up to {:.0} cm long, where most sides are {:.1} cm: do they bridge open seams? The body passes \
+         between their corners; sew the pattern it was cut by (--pattern), or begin with the seams closed",
+        1e2 * longest_m,
+        1e2 * usual_m
+    ))
 }
 
 /// How far the highest edge, or the highest tenth of a garment without edges, is lower at `positions` (m) than as placed, mm.

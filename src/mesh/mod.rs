@@ -4,6 +4,7 @@
 //! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
 //! triangles (barycentric area).
 
+pub mod bridges;
 pub mod coarse;
 mod decimate;
 mod draft;

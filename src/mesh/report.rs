@@ -27,6 +27,8 @@ pub enum Repair {
     WindingTurned { triangles: usize },
     /// Parts of the surface were turned inside out to face outward.
     TurnedOutward { components: usize },
+    /// Triangles that bridge open seams were given the size of the others at rest.
+    BridgesShut { triangles: usize, longest_m: f64, usual_m: f64 },
     /// A group was chosen and the rest left out.
     GroupChosen { name: String, left_out: usize },
 }
@@ -54,6 +56,13 @@ impl fmt::Display for Repair {
             Self::TurnedOutward { components } => {
                 write!(f, "turned {components} connected parts inside out, so that they face outward")
             }
+            Self::BridgesShut { triangles, longest_m, usual_m } => write!(
+                f,
+                "took {triangles} triangles up to {:.0} cm long, where most sides are {:.1} cm, for bridges over open seams, which \
+                 are as short as the others at rest (--rest own: as they are)",
+                1e2 * longest_m,
+                1e2 * usual_m
+            ),
             Self::GroupChosen { name, left_out } => write!(f, "took group \"{name}\" and left {left_out} faces out"),
         }
     }

@@ -231,7 +231,7 @@ impl SceneSpec {
             |scale: f64| RestShape::texture_of(&imported.mesh, &imported.texture, scale).map_err(about(&self.garment));
         let mut rest = match (self.rest.as_str(), pattern) {
             (REST_AUTO, Some(pattern)) => of_texture(pattern.metres_per_unit)?,
-            (REST_AUTO | "own", _) => RestShape::edges_of(&imported.mesh),
+            (how @ (REST_AUTO | "own"), _) => imported.own_rest(how == REST_AUTO),
             ("texture", _) => of_texture(1.0)?,
             (file, _) => {
                 let frame = imported.frame();

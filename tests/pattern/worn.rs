@@ -99,3 +99,16 @@ fn a_pattern_in_texture_coordinates_is_known_as_such() {
     assert_eq!(own.flat_pattern, None);
     assert!(area(&own.scene.rest) > 1.2 * area(&sewn.rest), "bridges over the seams and all");
 }
+
+#[test]
+fn without_its_pattern_a_mesh_with_open_seams_is_as_large_at_rest_as_what_it_was_cut_from() {
+    let sewn = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap().sew(0.02).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("box.obj").display().to_string();
+    partwise::mesh::export::write_mesh(Path::new(&path), &sewn.mesh).unwrap();
+    let found = SceneSpec { unit: Some(Unit::M), up: Some(Axis::Z), ..SceneSpec::new("form", &path) }.load().unwrap();
+    let area = |rest: &partwise::mesh::RestShape| rest.areas().iter().sum::<f64>();
+    let ratio = area(&found.scene.rest) / area(&sewn.rest);
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+    assert!(found.notes().iter().any(|note| note.contains("open seams") && note.contains("--rest own")));
+}
