@@ -3,7 +3,7 @@
 //! A garment that was sewn before it was put on, as GarmentCode writes it, has one vertex for both sides of a seam, half-way between panels
 //! that float about the body: the triangles along its seams are many times as long as all others and say nothing of the cloth. The others do,
 //! for a panel is still as flat as it was cut. A bridging triangle is taken to be like its neighbours: sides that are longer than
-//! [`LONG`] times what half of all sides are become as long as these, so that at rest the seam is shut.
+//! twice what half of all sides are become as long as these, so that at rest the seam is shut.
 //!
 //! Limits: a strip one triangle wide along the seams is known to a few millimetres, and its grain not at all. Where panels begin less than two
 //! sides apart the seam keeps that much cloth too many.
