@@ -17,7 +17,7 @@ use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use crate::mesh::{Topology, TriMesh};
 
 /// A way out of the body leads out of the cloth where its cosine with the cloth's normal is over this.
-const OUTWARD: f64 = 0.3;
+pub(crate) const OUTWARD: f64 = 0.3;
 
 /// Deeper than this in the body a triangle is stuck, m; what is less deep is pushed out by contact.
 const DEEP: f64 = 2e-3;

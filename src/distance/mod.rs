@@ -25,6 +25,7 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
 use rayon::prelude::*;
 
+pub(crate) use ends::OUTWARD;
 use tree::{Nearest, Tree};
 
 use crate::mesh::winding::signed_volumes;

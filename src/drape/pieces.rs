@@ -56,7 +56,7 @@ pub(crate) enum StartsFrom {
     Rest,
 }
 
-/// Damping from a drape that rested, 1/s²: it has a centimetre to go. Nine changes between four knits took a long dress 41 steps
+/// Damping from a drape that rested, 1/s². Nine changes between four knits took a long dress 41 steps
 /// until its forces balanced, with the 300 of a preview 51.
 const DAMPING_FROM_REST: f64 = 10.0;
 

@@ -87,7 +87,7 @@ pub struct AtRest {
     pub state: u64,
     /// What was draped.
     pub ground: Arc<Ground>,
-    /// Whether it is there: its forces balance, and it was looked at that this lasts.
+    /// Whether no step is left to take: where its forces balance, it was looked at that this lasts.
     pub done: bool,
     /// Whether its forces balance; that it lasts may yet be looked at, which moves little.
     pub balanced: bool,

@@ -125,11 +125,11 @@ fn settle(
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
-            let covered = |descent: &mut Descent<'_, '_>| descent.contacts.cover(cloth, &mut descent.x);
             if descent.contacts.penetration(&descent.x).0 > 0 {
                 descent.contacts.stiffen(4.0);
             } else {
-                let covered = if options.self_contact { covered(&mut descent) } else { Covered::Done };
+                let Descent { contacts, x, .. } = &mut descent;
+                let covered = if options.self_contact { contacts.cover(cloth, x) } else { Covered::Done };
                 covering = (covered != Covered::Done).then_some(iteration);
                 match covered {
                     Covered::Places => swing.anew(&mut descent),

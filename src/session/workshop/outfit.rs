@@ -51,7 +51,7 @@ impl Workshop {
                     .map_err(DrapeError::from)?;
             Ok(AtRest {
                 done: true,
-                balanced: true,
+                balanced: state.stop == Stop::Converged,
                 reaction_n: Arc::new(reactions(&cloth, &all.positions, &state.fit.pressure_kpa)),
                 told: Some(Arc::new(state.clone())),
                 ..way.at(&all.positions, state.residual_over_weight, state.steps)

@@ -92,7 +92,7 @@ impl Workshop {
         let (positions, state) = settled(scene, settings, cloth, None, refined);
         let rest = Arc::new(AtRest {
             done: true,
-            balanced: true,
+            balanced: state.stop == Stop::Converged,
             reaction_n: Arc::new(reactions(cloth, &positions, &state.fit.pressure_kpa)),
             let_go,
             ms: took.as_secs_f64() * 1e3,

@@ -6,16 +6,13 @@
 use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind, NONE};
-use crate::distance::{Body, SurfacePoint};
+use crate::distance::{Body, OUTWARD, SurfacePoint};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::membrane::Triangle;
 use crate::mesh::lattice;
 
 /// The distance that a place keeps is the cloth's thickness, but at least this, m: what the body rises between two places of a lattice.
 const LEAST_OFFSET: f64 = 6e-4;
-
-/// A way out of the body leads out of the cloth where its cosine with the cloth's normal is over this.
-const OUTWARD: f64 = 0.3;
 
 /// What is deeper than this is not asked out, m: contact may be felt too late by as much as a triangle sags, not by more.
 const DEEPEST: f64 = 0.015;
