@@ -213,7 +213,7 @@ impl References<'_> {
             let began = Instant::now();
             let mut stopped = false;
             let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, &mut |step| {
-                if self.scene.has_fallen(step.positions) {
+                if self.scene.fallen(step.positions).is_some() {
                     return ControlFlow::Break(());
                 }
                 let answer = observer(step);

@@ -2,13 +2,63 @@
 //!
 //! What is written grows beside its place under a random name that nobody can have planted (created with `O_EXCL`), and
 //! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What
-//! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was.
+//! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was. Whoever ends the
+//! program while files are in the making calls [`abandon_all`] first.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
+
+/// Where files grow, of all threads.
+static GROWING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn growing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    GROWING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every file in the making, for a program that ends at once and drops nothing. From then on no file begins or gets its place:
+/// whoever tries waits for the end.
+pub fn abandon_all() {
+    let growing = growing();
+    for path in &*growing {
+        // What cannot be removed stays under its hidden name, as it would after a power cut.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(growing);
+}
+
+/// A file beside its place, known to be there as long as it is.
+#[derive(Debug)]
+struct Beside(Option<TempPath>);
+
+impl Beside {
+    fn begin(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> io::Result<(File, Self)> {
+        let mut growing = growing();
+        let (file, path) = builder.tempfile_in(folder)?.into_parts();
+        growing.insert(path.to_path_buf());
+        Ok((file, Self(Some(path))))
+    }
+
+    /// Takes its place, whole, or is removed.
+    fn take_place(mut self, place: &Path) -> io::Result<()> {
+        let Some(path) = self.0.take() else { return Ok(()) };
+        let mut growing = growing();
+        growing.remove(&path.to_path_buf());
+        Ok(path.persist(place)?)
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        if let Some(path) = self.0.take() {
+            growing().remove(&path.to_path_buf());
+        }
+    }
+}
 
 /// Links to follow before a chain of them is taken for a circle: the system's own limit.
 const MOST_LINKS: usize = 40;
@@ -20,7 +70,7 @@ pub struct WholeFile {
     path: PathBuf,
     writer: BufWriter<File>,
     /// Where it grows; none for a device or a pipe.
-    beside: Option<TempPath>,
+    beside: Option<Beside>,
 }
 
 impl WholeFile {
@@ -44,7 +94,7 @@ impl WholeFile {
         // A new file is as readable as any other, less the user's umask; a replaced one keeps its permissions.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let (file, beside) = builder.tempfile_in(folder_of(&path))?.into_parts();
+        let (file, beside) = Beside::begin(&builder, folder_of(&path))?;
         if let Some(found) = found {
             file.set_permissions(found.permissions())?;
         }
@@ -84,7 +134,7 @@ impl WholeFile {
         file.sync_all()?;
         let length = file.metadata()?.len();
         drop(file);
-        beside.persist(&self.path)?;
+        beside.take_place(&self.path)?;
         sync_folder(&self.path);
         Ok(length)
     }

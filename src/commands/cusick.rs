@@ -36,7 +36,6 @@ impl CusickArgs {
         // Before any of them is draped.
         names.iter().try_for_each(|name| Fabric::by_name(name).map(|_| ()))?;
         // Seconds a fabric, and nothing is written before the last.
-        interrupt::listen_at_once();
         let bar = console::progress(Some(names.len() as u64), "drape test");
         let mut csv = String::new();
         for name in names {

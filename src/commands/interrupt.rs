@@ -11,18 +11,14 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 static KEEPING: AtomicBool = AtomicBool::new(false);
 static FIRST: OnceLock<Instant> = OnceLock::new();
 
-/// Listens from now on. Where no handler can be set, Ctrl-C just ends the program, as it would have.
+/// Listens from now on, while there is nothing to keep yet: until [`keep`] is called, Ctrl-C ends the program at once, and leaves no
+/// file half written. Where no handler can be set, Ctrl-C just ends the program, as it would have.
 pub(crate) fn listen() {
-    keep();
-    listen_at_once();
-}
-
-/// Listens from now on, while there is nothing to keep yet: until [`keep`] is called, Ctrl-C ends the program at once.
-pub(crate) fn listen_at_once() {
     let _ = ctrlc::set_handler(|| {
         let since = FIRST.get_or_init(Instant::now).elapsed();
         let again = REQUESTED.swap(true, Ordering::SeqCst);
         if !KEEPING.load(Ordering::SeqCst) || (again && since > ONE_PRESS) {
+            partwise::whole_file::abandon_all();
             std::process::exit(130);
         }
         if !again {

@@ -75,7 +75,7 @@ impl LiveArgs {
     /// Serves until Ctrl-C.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        interrupt::listen();
+        interrupt::keep();
         self.stages.cloth().only("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;

@@ -31,6 +31,7 @@ mod work;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use partwise::whole_file;
 
 const LONG_ABOUT: &str = "\
 Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun \
@@ -108,6 +109,7 @@ enum Command {
 /// Parses the arguments, runs the command, prints what went wrong.
 pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
+    interrupt::listen();
     let outcome = match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
@@ -123,6 +125,8 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Assets(args)) => args.execute(),
         Some(Command::View(args)) => args.execute(),
     };
+    // A thread that still writes dies with the program.
+    whole_file::abandon_all();
     match outcome {
         Ok(()) if interrupt::requested() => ExitCode::from(130),
         Ok(()) if !console::all_printed() => ExitCode::FAILURE,

@@ -89,7 +89,6 @@ impl RunArgs {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
         painted::refuse(self.export.as_deref(), self.export_colours)?;
-        interrupt::listen_at_once();
         if self.method != by_method::TWO_STAGE {
             return self.run_by_method();
         }

@@ -35,7 +35,7 @@ impl ViewArgs {
         if self.check {
             return Ok(web::check_file(&self.file)?);
         }
-        interrupt::listen();
+        interrupt::keep();
         self.try_to_read()?;
         // The decoder's panics come back as errors; what they print on the way is for nobody.
         let loud = std::panic::take_hook();

@@ -77,7 +77,7 @@ pub(crate) fn refine_from(
     let options = RefineOptions { max_steps, damping, self_contact: settings.self_contact, ..RefineOptions::default() };
     let contacts = met(cloth, scene, settings.refine, ground, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
-        if scene.has_fallen(step.positions) { ControlFlow::Break(()) } else { observer(step) }
+        if scene.fallen(step.positions).is_some() { ControlFlow::Break(()) } else { observer(step) }
     })?;
     Ok(refined)
 }
@@ -121,10 +121,7 @@ impl Made {
         if let Some(slides @ LetGo::Slides { .. }) = &let_go {
             warnings.push(format!("the garment {slides}"));
         }
-        if state.is_some() && scene.has_fallen(&positions) {
-            warnings
-                .push("the garment has fallen off the body; hold an edge of it (--hold), or place it better".into());
-        }
+        warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)).map(|fallen| fallen.to_string()));
         let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();

@@ -3,7 +3,8 @@
 
 use serde::Serialize;
 
-use super::{Figures, top_sank_mm};
+use super::warnings::{Slid, sank};
+use super::Figures;
 use crate::accuracy::{self, state::State};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
@@ -34,8 +35,11 @@ pub struct MethodFigures {
     pub body_crossing_pairs: usize,
     /// Pairs of triangles of the garment that cross: no reference method keeps cloth off cloth.
     pub self_intersecting_pairs: usize,
-    /// How far the garment's highest edge has sunk, mm.
+    /// How far the garment's highest edge has sunk, mm; of several connected parts that of the one which sank farthest.
     pub top_sank_mm: f64,
+    /// The connected parts that slid, with nothing held of them.
+    #[serde(skip)]
+    pub slid: Vec<Slid>,
     /// Energy by this project's own energy, J.
     pub energy_j: f64,
     /// ‖∇E‖ of it over the weight, friction holding as much as it can.
@@ -57,6 +61,7 @@ impl MethodFigures {
         let garment = scene.garment.with_positions(x.clone());
         let state = State::of(cloth, &scene.body, x);
         let fit = fit(cloth, cloth.contacts(&scene.body, x), x, cloth.contact_stiffness());
+        let (top_sank_mm, slid) = sank(scene, x);
         let figures = Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
@@ -69,7 +74,8 @@ impl MethodFigures {
             penetration_mm: state.penetration_mm,
             body_crossing_pairs: crossing_pairs(&garment, scene.body.mesh()).len(),
             self_intersecting_pairs: self_intersecting_pairs(&garment).len(),
-            top_sank_mm: top_sank_mm(scene, x),
+            top_sank_mm,
+            slid,
             energy_j: state.energy_j,
             residual_at_rest_over_weight: state.residual_over_weight,
             strain_p95: state.strain_p95,
@@ -119,6 +125,7 @@ impl MethodFigures {
             body_crossing_pairs: self.body_crossing_pairs,
             self_intersecting_pairs: self.self_intersecting_pairs,
             top_sank_mm: self.top_sank_mm,
+            slid: self.slid.clone(),
             strain_p95: Some(self.strain_p95),
             strain_max: Some(self.strain_max),
             pressure_max_kpa: Some(self.pressure_max_kpa),

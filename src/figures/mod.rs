@@ -12,8 +12,8 @@ pub use by_method::MethodFigures;
 pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
-pub use warnings::TightestOpening;
-use warnings::top_sank_mm;
+use warnings::sank;
+pub use warnings::{Slid, TightestOpening};
 
 use crate::accuracy::{self, Accuracy};
 use crate::assess::Assessment;
@@ -55,9 +55,13 @@ pub struct Figures {
     pub body_crossing_pairs: usize,
     /// Pairs of triangles of the garment that cross.
     pub self_intersecting_pairs: usize,
-    /// How far the garment's highest edge has sunk, mm; without an edge its highest tenth.
+    /// How far the garment's highest edge has sunk, mm; without an edge its highest tenth. Of several connected parts that of the
+    /// one which sank farthest.
     #[serde(default)]
     pub top_sank_mm: f64,
+    /// The connected parts that slid, with nothing held of them.
+    #[serde(skip)]
+    pub slid: Vec<Slid>,
     /// Energy, J.
     pub energy_j: Option<f64>,
     /// ‖∇E‖ over the garment's weight where the solver left it, friction as the cloth came to rest.
@@ -102,6 +106,7 @@ impl Figures {
     #[must_use]
     pub fn of(scene: &Scene, drape: &Drape) -> Self {
         let (parts, state) = (&drape.parts, drape.state.as_ref());
+        let (top_sank_mm, slid) = sank(scene, &drape.positions);
         Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
@@ -121,7 +126,8 @@ impl Figures {
                 scene.body.mesh(),
             )
             .len(),
-            top_sank_mm: top_sank_mm(scene, &drape.positions),
+            top_sank_mm,
+            slid,
             self_intersecting_pairs: drape.self_intersecting_pairs,
             energy_j: state.map(|s| s.energy),
             residual_over_weight: state.map(|s| s.residual_over_weight),

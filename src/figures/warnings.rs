@@ -21,21 +21,18 @@ impl Figures {
     #[must_use]
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         let mut found = Vec::new();
-        if self.top_sank_mm > SANK_MM && scene.held.is_empty() {
-            let parts = scene.topology.components().1;
-            let parts = if parts > 1 {
-                format!(", of its {parts} connected parts top:1 to top:{parts}")
+        if let [Slid { sank_mm, .. }, more @ ..] = self.slid.as_slice() {
+            let parts: Vec<usize> = self.slid.iter().map(|slid| slid.part).collect();
+            let [have, edge, holds] = if more.is_empty() {
+                ["has", "its highest edge sank by", "nothing holds it; if it has a waistband"]
             } else {
-                String::new()
-            };
-            let groups = match scene.garment.groups.as_slice() {
-                [] => parts,
-                groups => format!("{parts}, or one of its groups: {}", groups.join(", ")),
+                ["have", "their highest edges sank by up to", "nothing holds them; if they have waistbands"]
             };
             found.push(format!(
-                "the garment has slid down: its highest edge sank by {:.0} cm, and nothing holds it; if it has a waistband, hold \
-                 that (--hold top{groups})",
-                0.1 * self.top_sank_mm
+                "{} {have} slid down: {edge} {:.0} cm, and {holds}, {}",
+                scene.named(&parts),
+                0.1 * sank_mm,
+                scene.how_to_hold(&parts)
             ));
         }
         if let Some(bridges) = bridges(&scene.garment).filter(|_| self.top_sank_mm > SANK_MM) {
@@ -112,15 +109,42 @@ fn bridges(garment: &TriMesh) -> Option<String> {
     ))
 }
 
-/// How far the highest edge, or the highest tenth of a garment without edges, is lower at `positions` (m) than as placed, mm.
-pub(super) fn top_sank_mm(scene: &Scene, positions: &[DVec3]) -> f64 {
+/// A connected part of a garment that slid although nothing of it is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slid {
+    /// Its number, from 1, as `--hold top:2` counts them.
+    pub part: usize,
+    /// How far its highest edge is lower than as placed, or its highest tenth where it has no edge, mm.
+    pub sank_mm: f64,
+}
+
+/// How far the highest edge of each connected part is lower at `positions` (m) than as placed, mm; of a part without edges its
+/// highest tenth.
+fn tops_sank_mm(scene: &Scene, positions: &[DVec3]) -> Vec<f64> {
     let placed = &scene.garment.positions;
-    let top = scene.edge("top").unwrap_or_else(|_| {
-        let mut highest: Vec<u32> = (0..placed.len() as u32).collect();
-        highest.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
-        highest.truncate(placed.len().div_ceil(10));
-        highest
-    });
-    let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
-    1e3 * sank / top.len().max(1) as f64
+    let (part_of, parts) = scene.topology.components();
+    let mut of_part = vec![Vec::new(); parts];
+    (0_u32..).zip(&part_of).for_each(|(v, &part)| of_part[part as usize].push(v));
+    let sank = |(top, mut all): (Option<Vec<u32>>, Vec<u32>)| {
+        let top = top.unwrap_or_else(|| {
+            all.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
+            all.truncate(all.len().div_ceil(10));
+            all
+        });
+        let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
+        1e3 * sank / top.len().max(1) as f64
+    };
+    scene.tops().into_iter().zip(of_part).map(sank).collect()
+}
+
+/// How far the highest edge of a garment sank, mm: of its connected parts that of the one which sank farthest. And which of them
+/// slid, those that fell off left out, the one that slid farthest first.
+pub(super) fn sank(scene: &Scene, positions: &[DVec3]) -> (f64, Vec<Slid>) {
+    let tops = tops_sank_mm(scene, positions);
+    let fallen = scene.fallen_parts(positions);
+    let loose = scene.loose_parts().into_iter().filter(|part| !fallen.contains(part));
+    let slid = loose.map(|part| Slid { part, sank_mm: tops[part - 1] });
+    let mut slid: Vec<Slid> = slid.filter(|slid| slid.sank_mm > SANK_MM).collect();
+    slid.sort_by(|a, b| b.sank_mm.total_cmp(&a.sank_mm));
+    (tops.into_iter().fold(f64::NEG_INFINITY, f64::max), slid)
 }

@@ -1,7 +1,27 @@
 //! Which vertices are held, by what a user calls them: the highest edge of the garment or of one of its connected parts, or the edges that
-//! a group lies on.
+//! a group lies on. And what of a garment nothing held: its connected parts that have fallen off.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
 
 use super::{Scene, SceneError};
+
+/// Connected parts that are named in one message; of more their number is told.
+const NAMED: usize = 5;
+
+/// What of a garment has fallen off the body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fallen {
+    what: String,
+    hold: String,
+}
+
+impl std::fmt::Display for Fallen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} fallen off the body; {}, or place it better", self.what, self.hold)
+    }
+}
 
 impl Scene {
     /// The vertices of several edges, their names separated by commas; a group whose name has a comma in it counts as one.
@@ -48,10 +68,100 @@ impl Scene {
             Some(_) => return Err(SceneError::UnknownPart { found: what.to_owned(), parts }),
             None => return Err(SceneError::UnknownGroup { found: what.to_owned(), known: mesh.groups.clone() }),
         };
-        let height = |edge: &[u32]| edge.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() / edge.len() as f64;
         let edges = topology.boundary_loops().into_iter();
         let of_part = edges.filter(|edge| part.is_none_or(|part| part_of[edge[0] as usize] == part));
-        let highest = of_part.max_by(|a, b| height(a).total_cmp(&height(b)));
+        let highest = of_part.max_by(|a, b| self.height(a).total_cmp(&self.height(b)));
         highest.ok_or_else(|| SceneError::NoEdge { what: what.to_owned() })
+    }
+
+    /// Mean height of an edge as placed, m.
+    fn height(&self, edge: &[u32]) -> f64 {
+        edge.iter().map(|&v| self.garment.positions[v as usize].z).sum::<f64>() / edge.len() as f64
+    }
+
+    /// The highest edge of each connected part; `None` of one that has no edge.
+    pub(crate) fn tops(&self) -> Vec<Option<Vec<u32>>> {
+        let (part_of, parts) = self.topology.components();
+        let mut tops: Vec<Option<Vec<u32>>> = vec![None; parts];
+        for edge in self.topology.boundary_loops() {
+            let top = &mut tops[part_of[edge[0] as usize] as usize];
+            if top.as_ref().is_none_or(|top| self.height(top) <= self.height(&edge)) {
+                *top = Some(edge);
+            }
+        }
+        tops
+    }
+
+    /// Numbers, from 1, of the connected parts of which nothing is held.
+    pub(crate) fn loose_parts(&self) -> Vec<usize> {
+        let (part_of, parts) = self.topology.components();
+        let held: BTreeSet<u32> = self.held.iter().filter_map(|&v| part_of.get(v as usize)).copied().collect();
+        (0..parts as u32).filter(|part| !held.contains(part)).map(|part| part as usize + 1).collect()
+    }
+
+    /// What has fallen off the body at `x` (m): connected parts of which nothing is held and all is below the body. They
+    /// meet nothing any more, and would fall for ever.
+    #[must_use]
+    pub fn fallen(&self, x: &[DVec3]) -> Option<Fallen> {
+        let fallen = self.fallen_parts(x);
+        let what = format!("{} {}", self.named(&fallen), if fallen.len() > 1 { "have" } else { "has" });
+        (!fallen.is_empty()).then(|| Fallen { what, hold: self.how_to_hold(&fallen) })
+    }
+
+    /// Numbers, from 1, of the connected parts that have [`fallen`](Self::fallen).
+    pub(crate) fn fallen_parts(&self, x: &[DVec3]) -> Vec<usize> {
+        let low = self.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
+        // Mostly none is, and this is asked at every step.
+        if x.iter().all(|x| x.z >= low) {
+            return Vec::new();
+        }
+        let (part_of, _) = self.topology.components();
+        let above: BTreeSet<u32> = part_of.iter().zip(x).filter(|(_, x)| x.z >= low).map(|(part, _)| *part).collect();
+        self.loose_parts().into_iter().filter(|&part| !above.contains(&(part as u32 - 1))).collect()
+    }
+
+    /// Connected parts, numbered from 1, as a sentence begins with them.
+    pub(crate) fn named(&self, parts: &[usize]) -> String {
+        let (part_of, all) = self.topology.components();
+        let numbered = |part: &usize| {
+            let first = part_of.iter().position(|&of| of as usize + 1 == *part);
+            let layer = self.layers.iter().find(|layer| first.is_some_and(|v| layer.vertices.contains(&v)));
+            match layer.filter(|_| self.layers.len() > 1) {
+                Some(layer) => format!("{part} ({})", layer.name),
+                None => part.to_string(),
+            }
+        };
+        let numbers: Vec<String> = parts.iter().take(NAMED).map(numbered).collect();
+        let whole = if self.layers.len() > 1 { "outfit" } else { "garment" };
+        match parts.len().saturating_sub(NAMED) {
+            _ if all == 1 => "the garment".to_owned(),
+            0 if parts.len() == 1 => format!("connected part {} of the {whole}'s {all}", numbers[0]),
+            0 => format!("connected parts {} of the {whole}'s {all}", numbers.join(", ")),
+            more => format!("connected parts {} and {more} more of the {whole}'s {all}", numbers.join(", ")),
+        }
+    }
+
+    /// What to do about connected parts that nothing holds, as the user would write it.
+    pub(crate) fn how_to_hold(&self, parts: &[usize]) -> String {
+        let tops = self.tops();
+        let open: Vec<usize> = parts.iter().copied().filter(|part| tops[part - 1].is_some()).take(NAMED).collect();
+        if open.is_empty() {
+            return "it has no edge that could be held: join it to what stays on".to_owned();
+        }
+        let names: Vec<String> = open.iter().map(|part| format!("top:{part}")).collect();
+        let names = if tops.len() == 1 { "top".to_owned() } else { names.join(",") };
+        let (part_of, _) = self.topology.components();
+        let groups: BTreeSet<u32> = (self.garment.triangles.iter().zip(&self.garment.triangle_group))
+            .filter(|(corners, _)| parts.contains(&(part_of[corners[0] as usize] as usize + 1)))
+            .map(|(_, group)| *group)
+            .collect();
+        let names_of: Vec<&str> =
+            groups.iter().take(NAMED).filter_map(|&g| self.garment.groups.get(g as usize)).map(String::as_str).collect();
+        let or_group = match (names_of.as_slice(), groups.len().saturating_sub(NAMED)) {
+            ([], _) => String::new(),
+            (some, 0) => format!(", or one of its groups: {}", some.join(", ")),
+            (some, more) => format!(", or one of its groups: {} and {more} more", some.join(", ")),
+        };
+        format!("hold its edge (--hold {names}{or_group})")
     }
 }

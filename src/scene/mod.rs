@@ -15,13 +15,12 @@ mod spec;
 
 pub use cut::{CutError, PanelFabrics, Swatch};
 pub use error::SceneError;
+pub use hold::Fallen;
 pub use layers::{DistanceTo, Layer};
 pub use load::{Loaded, Tailored};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
 pub use spec::{DRESS_FORM, SceneSpec};
-
-use glam::DVec3;
 
 use crate::distance::{Body, SurfacePoint};
 use crate::fabric::Fabric;
@@ -105,12 +104,6 @@ impl Scene {
             }
         }
         held
-    }
-
-    /// Whether every vertex at `x` (m) is below the body: what has fallen past its feet meets nothing any more, and would fall for ever.
-    #[must_use]
-    pub fn has_fallen(&self, x: &[DVec3]) -> bool {
-        self.body.mesh().bounds().is_some_and(|(low, _)| x.iter().all(|x| x.z < low.z))
     }
 
     /// The nearest point of what each garment vertex, as placed, is over: the body, or what [`DistanceTo`] says.

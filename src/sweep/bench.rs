@@ -21,7 +21,7 @@ use crate::figures::Figures;
 use crate::job::Measured;
 use crate::mechanics::refine::{Step, Stop};
 use crate::said::said;
-use crate::scene::Loaded;
+use crate::scene::{Fallen, Loaded};
 use crate::shapes::MeshCache;
 
 /// Why a point has no result.
@@ -42,11 +42,10 @@ impl PointError {
         Self::Failed(said(error, ": "))
     }
 
-    /// A garment that nothing keeps on the body.
-    fn fallen() -> Self {
-        Self::Failed(
-            "the garment has fallen off the body; hold an edge of it (--hold, in a sweep file `hold`)".to_owned(),
-        )
+    /// A garment of which nothing keeps some or all on the body.
+    fn fallen(what: Option<Fallen>) -> Self {
+        let what = what.map_or_else(|| "the garment has fallen off the body".to_owned(), |fallen| fallen.to_string());
+        Self::Failed(format!("{what}; in a sweep file it is `hold` that holds an edge"))
     }
 }
 
@@ -190,7 +189,7 @@ impl<'a> Bench<'a> {
         let drape = drape.map_err(|e| PointError::failed(&e))?;
         if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
             // A garment that falls past the feet ends its own steps, not the sweep.
-            return Err(if self.listen().is_break() { PointError::Interrupted } else { PointError::fallen() });
+            return Err(if self.listen().is_break() { PointError::Interrupted } else { PointError::fallen(loaded.scene.fallen(&drape.positions)) });
         }
         let (times, result_hash) = (drape.times, result_hash(&drape.positions));
         Ok(Pass { value: (loaded, drape), times, result_hash })

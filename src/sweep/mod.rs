@@ -35,7 +35,7 @@ pub use error::{MergeError, PlanError, StoreError};
 pub use journal::Medium;
 pub use manifest::{Listed, Manifest, Shard, is_id};
 pub use merge::{join, merge};
-pub use plan::Plan;
+pub use plan::{MOST_PASSES, Plan};
 pub use point::{Point, VERSION};
 pub use row::{Row, Status, cell, columns, csv_text};
 pub use run::{Maker, Outcome, Run, SweepProgress, run_missing, sweep};

@@ -12,10 +12,13 @@ use std::path::Path;
 
 use super::axes::Axes;
 use super::error::PlanError;
-use super::file::{Grid, Source};
+use super::file::{At, Grid, Source};
 use super::inputs::{Inputs, unreadable};
 use super::point::Point;
 use crate::job::Job;
+
+/// Timed passes, and passes before them, that a point can be asked for: a median of more says nothing more, and takes for ever.
+pub const MOST_PASSES: usize = 100;
 
 /// All points of a sweep, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,10 +49,15 @@ impl Plan {
     pub fn parse(text: &str, name: &str, folder: &Path, start: &Job) -> Result<Self, PlanError> {
         let source = Source { text, name };
         let file = source.parse()?;
-        let repeats = "a whole number of passes, at least 1";
-        let warm_up = "a whole number of passes, 0 for none";
-        let repeats = file.repeats.as_ref().map_or(Ok(1), |v| source.count(v, "repeats", 1, repeats))?;
-        let warm_up = file.warm_up.as_ref().map_or(Ok(0), |v| source.count(v, "warm_up", 0, warm_up))?;
+        let passes = |value: &Option<At>, key, least| match value {
+            None => Ok(least),
+            Some(value) => {
+                let expected = format!("a whole number of passes, at least {least} and at most {MOST_PASSES}");
+                let found = source.count(value, key, least, &expected)?;
+                if found > MOST_PASSES { Err(source.wrong(value, key, &expected)) } else { Ok(found) }
+            }
+        };
+        let (repeats, warm_up) = (passes(&file.repeats, "repeats", 1)?, passes(&file.warm_up, "warm_up", 0)?);
         let mut inputs = Inputs::new(folder);
         let mut points = Vec::new();
         if let Some(grid) = &file.grid {

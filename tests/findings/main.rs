@@ -83,6 +83,44 @@ fn a_garment_that_slides_down_is_told_with_what_to_hold() {
     assert!(!warnings.join("\n").contains("slid"), "{warnings:?}");
 }
 
+/// Two garments' meshes as one, connected part after connected part.
+fn beside(mut mesh: TriMesh, other: &TriMesh) -> TriMesh {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(&other.positions);
+    mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+    mesh
+}
+
+#[test]
+fn the_connected_part_that_slides_or_falls_is_told_by_its_number() {
+    let tube = |radius: f64, top: f64| {
+        turned(&(0..6).map(|k| (radius, top - 0.05 * f64::from(k))).collect::<Vec<_>>(), 40, None)
+    };
+    let cape = turned(&[(0.03, 1.05), (0.06, 1.03), (0.1, 1.02), (0.13, 0.99)], 24, None);
+    // A cape that stays where it is, the highest edge of all, over trousers that do not.
+    let mut scene = Scene::of_meshes(&cone(), beside(cape.clone(), &tube(0.3, 0.9))).unwrap();
+    let (figures, warnings, x) = draped(&scene);
+    let of = |v: usize| scene.garment.positions[v].z - x[v].z;
+    let sank = [0..24, 96..136].map(|ring| ring.clone().map(of).sum::<f64>() / ring.len() as f64);
+    assert!(sank[0] < 0.05 && sank[1] > 0.15, "{sank:?}");
+    assert!((figures.top_sank_mm - 1e3 * sank[1]).abs() < 1e-9, "{} mm", figures.top_sank_mm);
+    let said = format!("connected part 2 of the garment's 2 has slid down: its highest edge sank by {:.0} cm", 1e2 * sank[1]);
+    assert!(warnings.iter().any(|w| w.contains(&said) && w.contains("(--hold top:2)")), "{warnings:?}");
+    // Another part held is no help; held itself, it stays, and nothing is said.
+    scene.held = scene.edge("top:1").unwrap();
+    assert!(draped(&scene).1.iter().any(|w| w.contains(&said[..50])), "{warnings:?}");
+    scene.held = scene.edge("top:2").unwrap();
+    assert!(!draped(&scene).1.iter().any(|w| w.contains("slid")));
+
+    // One that nothing is under falls past the feet, while the cape rests: said, and no more steps are taken.
+    let ring = turned(&[(0.6, 0.9), (0.6, 0.85), (0.6, 0.8)], 24, None);
+    let scene = Scene::of_meshes(&cone(), beside(cape, &ring)).unwrap();
+    let result = drape(&scene, &Job::default().settings, &mut unobserved).unwrap();
+    let said = "connected part 2 of the garment's 2 has fallen off the body; hold its edge (--hold top:2)";
+    assert!(result.warnings.iter().any(|w| w.contains(said)), "{:?}", result.warnings);
+    assert!(result.state.is_some_and(|state| state.steps < 100) && !draped(&scene).1.iter().any(|w| w.contains("slid")));
+}
+
 #[test]
 fn skin_between_vertices_that_are_outside_is_told() {
     // Triangles of 15 cm on a sphere of 30 cm: their middles sag a centimetre under their corners.
@@ -135,11 +173,9 @@ fn a_garment_that_falls_off_is_a_failed_row_and_the_sweep_goes_on() {
 fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
     // Two tubes about a cone, far too wide to stay where they are.
     let tube = |top: f64| turned(&[(0.35, top), (0.35, top - 0.05), (0.35, top - 0.1)], 24, None);
-    let mut both = tube(0.9);
-    let lower = tube(0.6);
-    let first = both.positions.len() as u32;
-    both.positions.extend(&lower.positions);
-    both.triangles.extend(lower.triangles.iter().map(|t| t.map(|v| v + first)));
+    let upper = tube(0.9);
+    let first = upper.positions.len() as u32;
+    let mut both = beside(upper, &tube(0.6));
     both.groups = ["upper", "inside", "lower"].map(str::to_owned).to_vec();
     both.triangle_group = (0..both.triangles.len()).map(|t| if t < 96 { 0 } else { 2 }).collect();
     let mut scene = Scene::of_meshes(&cone(), both).unwrap();

@@ -92,8 +92,15 @@ pub(crate) fn mutate(text: &str, others: &[String], (what, a, b): Mutation) -> S
             tokens.concat()
         }
         3 | 4 => {
-            let factor = [-1.0, 0.0, 0.999, 1.001, 10.0, 1e-3, 1e3, 1e6][b % 8];
-            scaled = tokens[at].parse::<f64>().map_or_else(|_| "7".to_owned(), |x| (x * factor).to_string());
+            // A number that stays one, so that what is read goes on to be used: of another size, or the next one to it.
+            let numbers: Vec<usize> = words.iter().copied().filter(|&i| tokens[i].parse::<f64>().is_ok()).collect();
+            let at = if numbers.is_empty() { at } else { numbers[a % numbers.len()] };
+            let factor = [-1.0, 0.0, 0.5, 0.9, 0.999, 1.001, 1.1, 2.0, 10.0, 1e-3, 1e3, 1e6][b % 12];
+            scaled = match (tokens[at].parse::<i64>(), tokens[at].parse::<f64>()) {
+                (Ok(n), _) if what == 3 => n.saturating_add([-2, -1, 1, 2][b % 4]).to_string(),
+                (_, Ok(x)) => (x * factor).to_string(),
+                _ => "7".to_owned(),
+            };
             tokens[at] = &scaled;
             tokens.concat()
         }

@@ -78,3 +78,30 @@ fn ctrl_c_while_a_mesh_is_made_ends_the_run_at_once() {
     assert_eq!(status.code(), Some(130), "{said}");
     assert!(!said.contains("keeping what is done") && asked.elapsed() < Duration::from_secs(5), "{said}");
 }
+
+#[test]
+fn whoever_is_ended_at_once_leaves_nothing_half_written() {
+    let bench = Bench::new();
+    let before = bench.names();
+    // Asked twice to stop, and told to end where nothing is kept; each time while its file grows.
+    let drape = ["--garment", "long-sleeved-dress@60000", "--no-cache", "--save", "x.rrd"];
+    let search = ["tune", "--garment", "flared-skirt@400", "--out", "tuned", "--save", "x.rrd"];
+    for (line, signals) in [(&drape[..], ["-INT", "-INT"]), (&drape, ["-TERM", "-TERM"]), (&search, ["-INT", "-INT"])] {
+        let mut command = bench.command();
+        let mut child = command.args(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let grows = || bench.names().iter().any(|name| name.ends_with(".part"));
+        let began = Instant::now();
+        while !grows() && began.elapsed() < Duration::from_secs(120) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(grows(), "{line:?} writes nothing beside its place");
+        for signal in signals {
+            let _ = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+            std::thread::sleep(Duration::from_millis(400));
+        }
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{line:?}");
+        let names = bench.names();
+        assert!(!names.iter().any(|name| name.ends_with(".part")), "{line:?}: {names:?}");
+    }
+    assert!(bench.names().len() >= before.len());
+}

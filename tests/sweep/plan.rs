@@ -225,6 +225,8 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
         (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),
         ("name = \"n\"\nrepeats = 0\n[grid]".to_owned(), "s.toml:2: repeats: found 0", "at least 1"),
+        ("name = \"n\"\nrepeats = 1000000\n[grid]".to_owned(), "s.toml:2: repeats: found 1000000", "at most 100"),
+        ("name = \"n\"\nwarm_up = 101\n[grid]".to_owned(), "s.toml:2: warm_up: found 101", "0 and at most 100"),
         ("name = \"n\"".to_owned(), "s.toml: found no points", "[grid]"),
     ] {
         let said = message(&text);

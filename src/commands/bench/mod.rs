@@ -112,7 +112,7 @@ impl TableFourArgs {
             std::fs::create_dir_all(folder)
                 .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
         }
-        interrupt::listen();
+        interrupt::keep();
         let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
         let kept = asked.len() - left.len();
         let runs = options.warm_up + options.rounds;

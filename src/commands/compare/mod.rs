@@ -3,7 +3,6 @@
 mod changes;
 mod table;
 
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,7 +12,7 @@ use partwise::job::Against;
 use partwise::parts::{Parts, segment};
 use partwise::range_table::{RangeTable, TableRule};
 use partwise::record::Tab;
-use partwise::sweep::{Bench, Plan, Row, Status};
+use partwise::sweep::{Bench, MOST_PASSES, Plan, Row, Status};
 use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
@@ -61,8 +60,8 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "N|converged", default_value_t = Job::preview().settings.refine, help_heading = "Stages")]
     refine: Refine,
     /// Timed passes of each; the median is reported
-    #[arg(long, value_name = "N", default_value = "3", help_heading = "Stages")]
-    repeats: NonZeroUsize,
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=MOST_PASSES as u64), help_heading = "Stages")]
+    repeats: u64,
     /// What they are measured against: `none`, `canonical` (the drape of garment, body and fabric), or `own`
     /// continuation too
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Stages")]
@@ -92,7 +91,7 @@ impl CompareArgs {
         }
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
-        interrupt::listen();
+        interrupt::keep();
         let plan = self.plan()?;
         let store = PointStore::in_memory();
         let bench = KeepingBench::new(&store, cache(self.cache.as_ref()));
@@ -105,7 +104,7 @@ impl CompareArgs {
         let mut rows: Vec<Row> = Vec::new();
         for point in &plan.points {
             bar.set_message(format!("{}, {}", point.garment, point.job.settings.table.name()));
-            let Some(row) = bench.row(point, (0, self.repeats.get())) else { break };
+            let Some(row) = bench.row(point, (0, self.repeats as usize)) else { break };
             rows.push(row);
             bar.inc(1);
         }

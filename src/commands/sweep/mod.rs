@@ -95,7 +95,7 @@ impl SweepArgs {
                 "--jobs {found}: found {found}, expected 1 to {MOST_THREADS} points at a time"
             )));
         }
-        interrupt::listen();
+        interrupt::keep();
         let plan = self.plan()?;
         let folder = self.folder();
         let store = PointStore::in_folder(&folder);

@@ -122,7 +122,7 @@ impl TuneArgs {
     /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        interrupt::listen();
+        interrupt::keep();
         let ladder = self.ladder()?;
         self.cloth.only("tune")?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
