@@ -227,6 +227,11 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         write_mesh(&body_file, &body(on)).unwrap();
     }
     write_mesh(&file, &mesh).unwrap();
+    // To be looked at: `PARTWISE_FAMILIES_KEEP=FOLDER`.
+    if let Some(kept) = std::env::var_os("PARTWISE_FAMILIES_KEEP").map(std::path::PathBuf::from) {
+        write_mesh(&kept.join(format!("{on}.obj")), &body(on)).unwrap();
+        write_mesh(&kept.join(format!("{name}.obj")), &mesh).unwrap();
+    }
     let spec = SceneSpec {
         unit: Some(Unit::M),
         up: Some(Axis::Z),

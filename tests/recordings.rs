@@ -172,6 +172,8 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
     assert_eq!(contents.entities[paths::DISTANCE].rows, 1, "the distance is the same for every table");
     for path in ["/numbers/part_count", "/numbers/ms/mechanics", "/numbers/error/rms_mm", paths::ROWS] {
         assert!(contents.entities[path].timelines.contains(paths::TABLE), "{path}");
+        let named = path == paths::ROWS || contents.entities[path].components.contains("SeriesLines:names");
+        assert!(named, "the line {path} has no name");
     }
     for slot in 0..4 {
         assert!(contents.entities.contains_key(&format!("{}/{slot}/garment", paths::COMPARE)));

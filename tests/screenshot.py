@@ -9,6 +9,7 @@ Exit code 1, with the reason, if there is no picture, it has too few colours, or
 
 import argparse
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -37,10 +38,14 @@ def shoot(rerun, recording, picture, size):
             environment = dict(os.environ, XDG_RUNTIME_DIR=runtime, RUST_LOG="off")
             command = [rerun, recording, "--headless", "--bind", "127.0.0.1", "--port", str(free_port()),
                        "--window-size", size, "--screenshot-to", picture]
+            # In a session of its own: `rerun` starts the viewer proper, which outlives it if it is killed alone.
+            viewer = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                      start_new_session=True)
             try:
-                done = subprocess.run(command, env=environment, timeout=120, capture_output=True, text=True)
-                reason = (done.stderr or done.stdout).strip()
+                reason = viewer.communicate(timeout=120)[0].strip()
             except subprocess.TimeoutExpired:
+                os.killpg(viewer.pid, signal.SIGKILL)
+                viewer.communicate()
                 reason = "the viewer did not finish within 120 s"
         if os.path.exists(picture):
             reason = fault(picture)

@@ -1,11 +1,13 @@
 //! A certificate, printed, and what it means for the exit code.
 
-use comfy_table::{Table, presets};
+use comfy_table::presets;
 use partwise::certificate::Certificate;
+
+use super::console;
 
 /// A certificate for people.
 pub(super) fn text(certificate: &Certificate) -> String {
-    let mut table = Table::new();
+    let mut table = console::table();
     table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["certificate", "", "found", "limit", "", ""]);
     for f in &certificate.findings {
         let number =

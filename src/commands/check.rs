@@ -2,7 +2,7 @@
 //! garment, a draped one, is at rest.
 
 use clap::Args;
-use comfy_table::{Table, presets};
+use comfy_table::presets;
 use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
@@ -82,9 +82,10 @@ fn connected_parts(scene: &Scene) -> Vec<(String, String)> {
         return Vec::new();
     }
     let mut parts = vec![(0, f64::INFINITY, f64::NEG_INFINITY); count];
+    let floor = scene.body.mesh().bounds().map_or(0.0, |(low, _)| low.z);
     for (&part, p) in part_of.iter().zip(&scene.garment.positions) {
         let (vertices, low, high) = &mut parts[part as usize];
-        (*vertices, *low, *high) = (*vertices + 1, low.min(p.z), high.max(p.z));
+        (*vertices, *low, *high) = (*vertices + 1, low.min(p.z - floor), high.max(p.z - floor));
     }
     let row = |(part, (vertices, low, high))| {
         (format!("  part {part} (--hold top:{part})"), format!("{vertices} vertices, {low:.2} to {high:.2} m high"))
@@ -113,7 +114,7 @@ impl CheckArgs {
         for note in &report.notes {
             console::note(note);
         }
-        let mut table = Table::new();
+        let mut table = console::table();
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["", &loaded.body_name, &loaded.garment_name]);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);

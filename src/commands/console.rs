@@ -6,6 +6,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use comfy_table::{ContentArrangement, Table};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use partwise::said::{plain, said};
 
@@ -21,6 +22,13 @@ pub(crate) fn result(text: &str) {
         UNPRINTED.store(true, Ordering::SeqCst);
         say(&paint("error: ", "31;1"), &format!("standard output: the result cannot be printed: {error}"));
     }
+}
+
+/// A table that is no wider than the terminal: what does not fit goes on below. In a file its lines are as long as they are.
+pub(crate) fn table() -> Table {
+    let mut table = Table::new();
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table
 }
 
 /// Whether every result could be printed.

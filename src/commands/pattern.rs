@@ -140,7 +140,7 @@ impl Report {
 }
 
 fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
+    let mut table = console::table();
     table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header.to_vec());
     table
 }

@@ -18,6 +18,8 @@ use partwise::scene::{Loaded, Swatch};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::console;
+
 /// The summary of one draped garment. Field names are the keys of `--format json`.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Summary {
@@ -221,11 +223,15 @@ impl Summary {
     }
 
     fn ease_table(&self) -> Table {
-        let mut table = Table::new();
+        let mut table = console::table();
         let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
         for (ease, garment_cm, ease_cm) in self.covered() {
-            let lengths = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
+            let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
+            if let Some(under) = ease.garment_height_cm.filter(|cm| cm + 0.5 < ease.height_cm) {
+                garment = format!("{garment}, under the sleeves at {under:.1}");
+            }
+            let lengths = [height, body, garment];
             table.add_row([ease.at.to_owned()].into_iter().chain(lengths).chain([format!("{ease_cm:+.1}")]));
         }
         for column in table.column_iter_mut().skip(1) {
@@ -235,7 +241,7 @@ impl Summary {
     }
 
     fn levels_table(&self) -> Table {
-        let mut table = Table::new();
+        let mut table = console::table();
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
         for l in self.levels.iter().filter(|l| l.vertices > 0) {

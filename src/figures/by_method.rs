@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use super::warnings::{Slid, sank};
 use super::Figures;
+use super::warnings::{Slid, sank};
 use crate::accuracy::{self, state::State};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};

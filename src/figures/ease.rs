@@ -6,12 +6,14 @@
 //!
 //! ease = ∮ cloth at rest − girth of the body by tape.
 //!
-//! Negative ease is cloth that has to stretch. Limits: for bodies whose landmarks are found; a garment that is open there, or ends there
-//! on one side, has no girth; of garments over each other the innermost is told.
+//! Negative ease is cloth that has to stretch. Where the curve goes round the arms too, as a pullover's does at the bust if its sleeves join lower,
+//! it is followed under the armholes, where a tailor measures the chest. Limits: for bodies whose landmarks are found; a garment that is open
+//! there, ends there on one side, or goes round the arms as a cape does, has no girth; of garments over each other the innermost is told.
 
 use glam::DVec2;
 use serde::Serialize;
 
+use crate::mesh::TriMesh;
 use crate::scene::Scene;
 use crate::sewing::Landmarks;
 use crate::shapes::girth::{Cut, Plane, SectionLoop, cuts, section};
@@ -25,8 +27,10 @@ pub struct GirthEase {
     pub height_cm: f64,
     /// Girth of the body, by tape, cm.
     pub body_cm: f64,
-    /// Girth of the garment as it was cut, cm; `None` where it does not go round the body there.
+    /// Girth of the garment as it was cut, cm; `None` where it does not go round the body there, or round the arms too.
     pub garment_cm: Option<f64>,
+    /// Height where that was measured, cm: lower than `height_cm` where the sleeves join lower.
+    pub garment_height_cm: Option<f64>,
     /// The difference, cm.
     pub ease_cm: Option<f64>,
 }
@@ -42,21 +46,58 @@ impl GirthEase {
         let garment = scene.garment.with_positions(positions.to_vec());
         let at = |(at, z): (&'static str, Option<f64>)| {
             let z = z?;
-            let trunk = around(&section(body, Plane::horizontal(z)), marks.middle, SectionLoop::tape_length)?;
-            let draped = cuts(&garment, Plane::horizontal(z));
-            let point = |&([a, b], share): &([u32; 2], f64)| positions[a as usize].lerp(positions[b as usize], share);
-            let round = draped.iter().filter(|cut| {
-                let on: Vec<DVec2> = cut.crossings.iter().map(|c| point(c).truncate()).collect();
-                cut.closed && encloses(&on, marks.middle)
+            let of_body = section(body, Plane::horizontal(z));
+            let trunk = around(&of_body, marks.middle, SectionLoop::tape_length)?;
+            let steps = if at == "bust" { LOWER_STEPS } else { 0 };
+            let girth = (0..=steps).find_map(|step| {
+                let z = z - LOWER_M * f64::from(step);
+                let arms = if step == 0 { &of_body } else { &section(body, Plane::horizontal(z)) };
+                match girth(scene, &garment, (z, marks.middle), arms) {
+                    Girth::OfArmsToo => None,
+                    Girth::None => Some(None),
+                    Girth::Of(cm) => Some(Some((cm, z))),
+                }
             });
-            let garment_cm =
-                round.map(|cut| 100.0 * at_rest(scene, cut)).min_by(f64::total_cmp).filter(|cm| cm.is_finite());
+            let girth = girth.flatten();
+            let (garment_cm, garment_height_cm) = (girth.map(|(cm, _)| cm), girth.map(|(_, z)| 100.0 * (z - low.z)));
             let body_cm = 100.0 * trunk;
             let ease_cm = garment_cm.map(|cm| cm - body_cm);
-            Some(Self { at, height_cm: 100.0 * (z - low.z), body_cm, garment_cm, ease_cm })
+            Some(Self { at, height_cm: 100.0 * (z - low.z), body_cm, garment_cm, garment_height_cm, ease_cm })
         };
         ["bust", "waist", "hip"].into_iter().zip(heights).filter_map(at).collect()
     }
+}
+
+/// Where sleeves join below the bust, the garment is looked at lower by so much, m, so many times.
+const LOWER_M: f64 = 0.01;
+const LOWER_STEPS: u32 = 12;
+
+/// What a garment goes round.
+enum Girth {
+    None,
+    /// The trunk and an arm.
+    OfArmsToo,
+    /// The trunk alone, as cut, cm.
+    Of(f64),
+}
+
+/// The girth of a draped garment round the `middle` of a body at height `z` (m), given the body's own curves there.
+fn girth(scene: &Scene, garment: &TriMesh, (z, middle): (f64, DVec2), of_body: &[SectionLoop]) -> Girth {
+    let draped = cuts(garment, Plane::horizontal(z));
+    let x = &garment.positions;
+    let point = |&([a, b], share): &([u32; 2], f64)| x[a as usize].lerp(x[b as usize], share).truncate();
+    let round = draped.iter().filter(|cut| cut.closed).filter_map(|cut| {
+        let on: Vec<DVec2> = cut.crossings.iter().map(point).collect();
+        encloses(&on, middle).then(|| (on, 100.0 * at_rest(scene, cut)))
+    });
+    let shortest = round.filter(|(_, cm)| cm.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((on, cm)) = shortest else { return Girth::None };
+    let arm = |curve: &&SectionLoop| {
+        let flat: Vec<DVec2> = curve.points.iter().map(|p| p.truncate()).collect();
+        let inside = flat.iter().filter(|p| encloses(&on, **p)).count();
+        curve.closed && !encloses(&flat, middle) && 2 * inside > flat.len()
+    };
+    if of_body.iter().any(|curve| arm(&curve)) { Girth::OfArmsToo } else { Girth::Of(cm) }
 }
 
 /// The largest of the closed curves round the middle, measured.
@@ -99,7 +140,7 @@ mod tests {
         let spec = BodySpec::default();
         let form = dress_form(&spec).unwrap();
         let (n, rows) = (64_u32, 40_u32);
-        let mut tube = crate::mesh::TriMesh::default();
+        let mut tube = TriMesh::default();
         for j in 0..rows {
             tube.positions.extend((0..n).map(|i| {
                 let (s, c) = (std::f64::consts::TAU * f64::from(i) / f64::from(n)).sin_cos();
@@ -128,6 +169,15 @@ mod tests {
         for (ease, found) in found.iter().zip(GirthEase::all(&scene, None, &placed)) {
             assert!((ease.height_cm - found.height_cm).abs() < 8.0, "{ease:?}, {found:?}");
             assert!((ease.body_cm - found.body_cm).abs() < 5.0, "{ease:?}, {found:?}");
+        }
+        // A pullover whose sleeves join below the bust is measured below them, not round the arms.
+        let pullover = crate::SceneSpec::new("form", "pullover-1@1500").load().unwrap().scene;
+        let cut = crate::shapes::GarmentSpec::by_name("pullover-1").unwrap().ease;
+        let worn = GirthEase::all(&pullover, Some(heights), &pullover.garment.positions);
+        let lower: Vec<bool> = worn.iter().map(|e| e.garment_height_cm.unwrap() < e.height_cm - 0.5).collect();
+        assert_eq!(lower, [true, false, false]);
+        for (ease, cut) in worn.iter().zip([cut.bust_cm, cut.waist_cm, cut.hip_cm]) {
+            assert!((ease.ease_cm.unwrap() - cut).abs() < 8.0, "{ease:?}, {cut} cm as cut");
         }
         // The tube begins under the bust.
         assert_eq!(found[0].garment_cm, None);

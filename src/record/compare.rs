@@ -8,8 +8,9 @@ use super::error::RecordError;
 use super::legend::{Legend, caption};
 use super::meshes;
 use super::open::Open;
+use super::overlay::Overlay;
 use super::paths;
-use super::step::{Overlay, covering};
+use super::step::covering;
 use crate::figures::LevelCount;
 use crate::parts::UNASSIGNED;
 

@@ -80,6 +80,19 @@ pub(super) fn caption(open: &Open, path: &str, text: &str, [column, row]: Cell) 
     open.log(path, &texts(vec![single(place)], vec![text.to_owned()]))
 }
 
+/// Letters of a caption that fit over the bars in a window 1280 wide.
+const CAPTION: usize = 40;
+
+/// A table's name and its PARTs, the middle of a long name left out: names of one search begin alike, and end in their round.
+pub(super) fn titled(table: &str, count: usize) -> String {
+    let letters: Vec<char> = format!("{table}, {count} PARTs").chars().collect();
+    match letters.len() {
+        0..=33 => format!("table: {table}, {count} PARTs"),
+        34..=CAPTION => letters.iter().collect(),
+        n => letters[..CAPTION / 2 - 1].iter().chain(&['…']).chain(&letters[n - CAPTION / 2..]).collect(),
+    }
+}
+
 fn single(place: [f64; 2]) -> [f32; 2] {
     place.map(|x| x as f32)
 }
@@ -114,7 +127,7 @@ pub(crate) fn number(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{number, steps};
+    use super::{CAPTION, number, steps, titled};
 
     #[test]
     fn ticks_are_round() {
@@ -137,6 +150,18 @@ mod tests {
             (1e-9, "1.00e-9"),
         ] {
             assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_title_fits_whatever_the_table_is_called() {
+        assert_eq!(titled("Table 3", 95), "table: Table 3, 95 PARTs");
+        for (name, count) in
+            [("table-3 x0.5, 20 cm as in the file", 7), ("best after levels and extents, round 4", 1200)]
+        {
+            let said = titled(name, count);
+            assert!(said.chars().count() <= CAPTION && said.ends_with(&format!("{count} PARTs")), "{said}");
+            assert!(said.starts_with(&name[..18]), "{said}");
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::colour_map::{ColourMap, Rgb};
 use super::colours::colour_parts;
-use super::step::{Overlay, covering, own_range};
+use super::overlay::{Overlay, own_range};
+use super::step::covering;
 use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 

@@ -8,7 +8,7 @@ use super::colour_map::ColourMap;
 use super::error::RecordError;
 use super::meshes::{self, CellMesh, singles};
 use super::open::Open;
-use super::step::{Overlay, scale};
+use super::overlay::{Overlay, scale};
 use super::{colours, paths};
 use crate::mesh::TriMesh;
 

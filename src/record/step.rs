@@ -10,8 +10,9 @@ use super::colour_map::{ColourMap, Range};
 use super::colours::{self, colour_parts};
 use super::error::RecordError;
 use super::eye::Eye;
-use super::legend::{Cell, Legend, caption};
+use super::legend::{Legend, caption, titled};
 use super::meshes::{self, single};
+use super::overlay::{self, Overlay, QUANTILE};
 use super::panel::Panel;
 use super::{Open, dots, levels, paths};
 use crate::mesh::TriMesh;
@@ -21,21 +22,8 @@ use crate::parts::UNASSIGNED;
 const LONGEST_ARROW: f64 = 0.16;
 /// With more arrows than this they shrink.
 const MANY_ARROWS: f64 = 150.0;
-/// Values above this quantile share the last colour.
-pub(super) const QUANTILE: f64 = 0.99;
 /// The same for forces, of which a few PARTs hold most: one of a single vertex can have any.
 pub(super) const FORCE_QUANTILE: f64 = 0.95;
-
-/// A value per vertex of the draped garment.
-#[derive(Debug, Clone, Copy)]
-pub struct Overlay<'a> {
-    /// `error`, or what the recording's layout lists under fit (`strain`, `pressure`).
-    pub name: &'a str,
-    /// Unit of the values.
-    pub unit: &'a str,
-    /// One value per vertex.
-    pub values: &'a [f64],
-}
 
 /// All that one range table gives. Slices are per vertex of the garment unless they say otherwise.
 #[derive(Debug, Clone, Copy)]
@@ -126,7 +114,7 @@ fn parts(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let mesh = open.cells.colours(|v| chosen.colour[step.part_of_vertex[v as usize] as usize]);
     open.log(paths::PARTS, &mesh)?;
     dots::log(open, step, dots::told(step))?;
-    let named = format!("table: {}, {count} PARTs", step.panel.table);
+    let named = titled(&step.panel.table, count);
     caption(open, &format!("{}/table", paths::STAGES_LEGEND), &named, [0, 0])
 }
 
@@ -141,8 +129,11 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     open.log(paths::FORCE, &mesh)?;
     let open_end = force_n.iter().any(|&f| f > scale.high);
     let range = Range { low: factor * scale.low, high: factor * scale.high };
-    let legend = Legend { title: "|F|", unit, map, range, open_end };
-    legend.log(open, &format!("{}/force", paths::STAGES_LEGEND), [0, 2])?;
+    // Where nobody sees the forces the bar of the error has their row.
+    if !open.layout().held {
+        let legend = Legend { title: "|F|", unit, map, range, open_end };
+        legend.log(open, &format!("{}/force", paths::STAGES_LEGEND), [0, 2])?;
+    }
     arrows(open, step, scale.high)
 }
 
@@ -193,50 +184,10 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
             let [branch, legend] = [paths::FIT, paths::FIT_LEGEND].map(|of| format!("{of}/{}", overlay.name));
             (branch, legend, [fit - 1, 0])
         };
-        self::overlay(open, &branch, &draped, overlay, (&legend, cell))?;
+        overlay::overlay(open, &branch, &draped, overlay, (&legend, cell))?;
     }
     open.draped = Some(draped);
     Ok(())
-}
-
-/// The least that a colour map's upper end stands for: under it a small value would look like a large one.
-fn least(quantity: &str) -> f64 {
-    match quantity {
-        "error" => 10.0,
-        "strain" => 5.0,
-        "folds" => 10.0,
-        "pressure" => 0.1,
-        _ => 0.0,
-    }
-}
-
-/// The range of an overlay's colours, fixed by its first step.
-pub(super) fn scale(open: &Open, overlay: &Overlay<'_>) -> Range {
-    open.scale(overlay.name, || own_range(overlay))
-}
-
-/// The range that an overlay would have alone.
-pub(super) fn own_range(overlay: &Overlay<'_>) -> Range {
-    let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
-    Range { high: own.high.max(least(overlay.name)), ..own }
-}
-
-/// Values on the draped garment: `{branch}/garment`, and a colour bar where `legend` says.
-pub(super) fn overlay(
-    open: &Open,
-    branch: &str,
-    draped: &TriMesh,
-    overlay: &Overlay<'_>,
-    (legend, cell): (&str, Cell),
-) -> Result<(), RecordError> {
-    let path = format!("{branch}/garment");
-    open.triangles_once(&path)?;
-    let range = scale(open, overlay);
-    let map = ColourMap::ALARM;
-    let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
-    open.log(&path, &coloured)?;
-    let open_end = overlay.values.iter().any(|&v| v > range.high);
-    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, legend, cell)
 }
 
 fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {

@@ -11,7 +11,7 @@ use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
 use super::open::Open;
-use super::step::{Overlay, QUANTILE, overlay};
+use super::overlay::{Overlay, QUANTILE, overlay};
 use super::{colours, paths};
 use crate::mesh::TriMesh;
 

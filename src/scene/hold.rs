@@ -10,6 +10,9 @@ use super::{Scene, SceneError};
 /// Connected parts that are named in one message; of more their number is told.
 const NAMED: usize = 5;
 
+/// Edges whose heights differ by less are as high as each other, m.
+const AS_HIGH_M: f64 = 0.005;
+
 /// What of a garment has fallen off the body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fallen {
@@ -70,26 +73,30 @@ impl Scene {
         };
         let edges = topology.boundary_loops().into_iter();
         let of_part = edges.filter(|edge| part.is_none_or(|part| part_of[edge[0] as usize] == part));
-        let highest = of_part.max_by(|a, b| self.height(a).total_cmp(&self.height(b)));
-        highest.ok_or_else(|| SceneError::NoEdge { what: what.to_owned() })
+        self.highest(of_part.collect()).ok_or_else(|| SceneError::NoEdge { what: what.to_owned() })
     }
 
-    /// Mean height of an edge as placed, m.
-    fn height(&self, edge: &[u32]) -> f64 {
-        edge.iter().map(|&v| self.garment.positions[v as usize].z).sum::<f64>() / edge.len() as f64
+    /// The highest of some edges, by their mean height as placed; of those that are as high, the shortest: the neckline of a poncho
+    /// that is laid flat, and not its hem.
+    fn highest(&self, edges: Vec<Vec<u32>>) -> Option<Vec<u32>> {
+        let at = |v: &u32| self.garment.positions[*v as usize];
+        let height = |edge: &[u32]| edge.iter().map(|v| at(v).z).sum::<f64>() / edge.len() as f64;
+        let length = |edge: &[u32]| {
+            edge.iter().zip(edge.iter().cycle().skip(1)).map(|(a, b)| at(a).distance(at(b))).sum::<f64>()
+        };
+        let top = edges.iter().map(|edge| height(edge)).max_by(f64::total_cmp)?;
+        let highest = edges.into_iter().filter(|edge| height(edge) >= top - AS_HIGH_M);
+        highest.min_by(|a, b| length(a).total_cmp(&length(b)))
     }
 
     /// The highest edge of each connected part; `None` of one that has no edge.
     pub(crate) fn tops(&self) -> Vec<Option<Vec<u32>>> {
         let (part_of, parts) = self.topology.components();
-        let mut tops: Vec<Option<Vec<u32>>> = vec![None; parts];
+        let mut edges = vec![Vec::new(); parts];
         for edge in self.topology.boundary_loops() {
-            let top = &mut tops[part_of[edge[0] as usize] as usize];
-            if top.as_ref().is_none_or(|top| self.height(top) <= self.height(&edge)) {
-                *top = Some(edge);
-            }
+            edges[part_of[edge[0] as usize] as usize].push(edge);
         }
-        tops
+        edges.into_iter().map(|edges| self.highest(edges)).collect()
     }
 
     /// Numbers, from 1, of the connected parts of which nothing is held.
@@ -155,8 +162,12 @@ impl Scene {
             .filter(|(corners, _)| parts.contains(&(part_of[corners[0] as usize] as usize + 1)))
             .map(|(_, group)| *group)
             .collect();
-        let names_of: Vec<&str> =
-            groups.iter().take(NAMED).filter_map(|&g| self.garment.groups.get(g as usize)).map(String::as_str).collect();
+        let names_of: Vec<&str> = groups
+            .iter()
+            .take(NAMED)
+            .filter_map(|&g| self.garment.groups.get(g as usize))
+            .map(String::as_str)
+            .collect();
         let or_group = match (names_of.as_slice(), groups.len().saturating_sub(NAMED)) {
             ([], _) => String::new(),
             (some, 0) => format!(", or one of its groups: {}", some.join(", ")),

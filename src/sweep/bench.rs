@@ -189,7 +189,11 @@ impl<'a> Bench<'a> {
         let drape = drape.map_err(|e| PointError::failed(&e))?;
         if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
             // A garment that falls past the feet ends its own steps, not the sweep.
-            return Err(if self.listen().is_break() { PointError::Interrupted } else { PointError::fallen(loaded.scene.fallen(&drape.positions)) });
+            return Err(if self.listen().is_break() {
+                PointError::Interrupted
+            } else {
+                PointError::fallen(loaded.scene.fallen(&drape.positions))
+            });
         }
         let (times, result_hash) = (drape.times, result_hash(&drape.positions));
         Ok(Pass { value: (loaded, drape), times, result_hash })

@@ -47,6 +47,30 @@ fn a_search_takes_no_more_parts_than_there_are_vertices() {
     }
 }
 
+#[test]
+fn a_check_ends_in_a_verdict_and_tables_that_cannot_be_compared_in_their_reasons() {
+    let bench = Bench::new();
+    let told = |arguments: &[&str]| {
+        let done = bench.command().args(arguments).output().unwrap();
+        (String::from_utf8(done.stdout).unwrap(), done.status.code())
+    };
+    let (said, code) = told(&["check", "form", "flared-skirt@400"]);
+    assert!(said.contains("verdict: nothing is in the way of a drape") && code == Some(0), "{said}");
+    bench.write("low.obj", &super::GARMENT.replace("v 0 0 1.65", "v 0 0 1.55"));
+    let (said, _) = told(&["check", "body.obj", "low.obj"]);
+    assert!(said.contains("verdict: look at 1 garment vertices inside the body"), "{said}");
+    // A ring that nothing is under: no table's fault, told in each one's row.
+    let ring: String = (0..2)
+        .flat_map(|j| (0..12).map(move |i| (f64::from(i) * std::f64::consts::TAU / 12.0, j)))
+        .map(|(a, j)| format!("v {:.4} {:.4} {}\n", 0.9 * a.cos(), 0.9 * a.sin(), 1.5 - 0.1 * f64::from(j)))
+        .chain((0..12).map(|i| format!("f {} {} {} {}\n", i + 1, i + 13, (i + 1) % 12 + 13, (i + 1) % 12 + 1)))
+        .collect();
+    bench.write("ring.obj", &ring);
+    let scene = ["--body", "body.obj", "--garment", "ring.obj", "--repeats", "1", "--no-save", "--refine", "converged"];
+    let (said, code) = told(&[&["compare", "table-3", "table-3"], &scene[..]].concat());
+    assert!(said.contains("fallen off the body; hold its edge (--hold top)") && code == Some(2), "{said}");
+}
+
 /// The numbers in front of the rows of a table of levels.
 fn numbered(text: &str) -> Vec<u32> {
     let row = |line: &str| line.trim_start_matches(['│', ' ']).split_whitespace().next()?.parse().ok();

@@ -234,7 +234,7 @@ impl TableFourArgs {
 fn text(journal: &Journal, rows: &[ContestRow]) -> String {
     let mut out = journal.conditions.said();
     for cells in contest::tables(rows).into_iter().chain(contest::exponents(rows)) {
-        let mut table = Table::new();
+        let mut table = console::table();
         table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&cells.header);
         for row in &cells.rows {
             table.add_row(row);

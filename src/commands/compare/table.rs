@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{Table, presets};
+use comfy_table::presets;
 use partwise::figures::LevelCount;
 use partwise::range_table::Extent;
 use partwise::sweep::{Row, Status, cell};
@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::changes::Changes;
+use crate::commands::console;
 use crate::commands::sweep::report::{explained, right, rows_table};
 
 /// One table on one garment.
@@ -42,7 +43,7 @@ pub(super) fn text(all: &[Compared]) -> String {
             "\n{}: PARTs by levels alone, and what became of the first table's",
             of_garment[0].row.garment
         );
-        let mut table = Table::new();
+        let mut table = console::table();
         table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["table", "PARTs", "kept", "split", "merged"]);
         for c in of_garment {
             let Changes { kept, split, merged } = c.changes;
@@ -51,7 +52,7 @@ pub(super) fn text(all: &[Compared]) -> String {
         }
         right(&mut table, 1..5);
         let _ = writeln!(out, "{table}");
-        let mut table = Table::new();
+        let mut table = console::table();
         let pairs = of_garment.iter().flat_map(|c| [c.row.table.clone(), "PARTs".to_owned()]);
         table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(std::iter::once("level".to_owned()).chain(pairs));
         let most = of_garment.iter().map(|c| c.per_level.len()).max().unwrap_or(0);

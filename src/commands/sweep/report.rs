@@ -1,12 +1,13 @@
 //! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
 
 use clap::ValueEnum;
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{CellAlignment, Table, presets};
 use partwise::record::RecordSummary;
 use partwise::sweep::{Row, Status, csv_text};
 use serde_json::json;
 
 use super::chosen::{labels, total_ms};
+use crate::commands::console;
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -124,8 +125,8 @@ pub(crate) fn explained(rows: &[Row]) -> &'static str {
 
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    let mut table = console::table();
+    table.load_preset(presets::UTF8_BORDERS_ONLY);
     table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"]);
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));

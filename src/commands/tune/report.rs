@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::check::Taken;
 use super::garment::{Garment, Holds, Worth};
+use crate::commands::console;
 use crate::commands::summary::command_line;
 
 /// A tuned table beside Table 3 on one garment.
@@ -80,7 +81,7 @@ impl Verdict {
 
 /// The verdicts for the terminal.
 pub(super) fn verdicts(all: &[Verdict]) -> Table {
-    let mut table = Table::new();
+    let mut table = console::table();
     table.load_preset(presets::UTF8_BORDERS_ONLY).set_header([
         "tuned on",
         "what",
@@ -131,7 +132,7 @@ const SHOWN: usize = 12;
 
 /// A front for the terminal, thinned.
 pub(super) fn front(title: &str, front: &Front, garments: &[&Garment], exact: bool) -> String {
-    let mut table = Table::new();
+    let mut table = console::table();
     table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extents cm"]);
     let last = front.points.len().saturating_sub(1);
     let mut shown: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();

@@ -112,6 +112,9 @@ pub(crate) struct Given<'a> {
     pub(crate) least_share: f64,
 }
 
+/// Length that hangs of a garment laid flat, over its widest extent.
+const FLAT: f64 = 0.25;
+
 /// Steps by which the end of a solve is told that need not be followed to it.
 const LATE: usize = 6;
 
@@ -135,7 +138,8 @@ pub(crate) fn solve_given(
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
     let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion))?;
     let loose = cloth.clone().with_slack(&slack::shares(mesh, parts, cloth));
-    let height = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
+    // What is laid flat hangs no less for that: without a height its cloth would be as soft as air, and stretch over any head.
+    let height = mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT * (high - low).max_element()));
     let soft = loose.softened(height, options.soft_strain).unwrap_or(loose);
     let setup = began.elapsed();
 

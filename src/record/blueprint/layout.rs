@@ -169,7 +169,7 @@ impl Layout {
             (1.0, View::bars("PARTs per level", &[paths::LEVEL_PARTS]).into()),
         ];
         if self.several_tables {
-            below.push((0.8, self.plot("PARTs over tables", "/numbers/part_count", false)));
+            below.push((0.8, self.plot("All PARTs", "/numbers/part_count", false)));
         }
         below.push((1.0, View::plane("Colours", &[paths::STAGES_LEGEND], visible([1, self.stage_bars()])).into()));
         let left = Node::Column(
@@ -211,12 +211,13 @@ impl Layout {
         let all = self.eye(Tab::Outfit, eye);
         let rows = self.outfit.len() as f64;
         let one = eye.through(ASPECT / 6.0 * rows);
-        let stages = [("PARTs", "parts"), ("force", "force"), ("drape", "drape")];
         let row = |(k, worn): (usize, &Worn)| {
             let branch = outfit::branch(k, worn);
+            // The drape bears the garment's name: all three would be cut with it.
+            let stages = [("PARTs", "parts"), ("Force per PART", "force"), (worn.name.as_str(), "drape")];
             let view = |(title, leaf): (&str, &str)| {
                 let path = format!("{branch}/{leaf}");
-                (1.0, View::spatial(format!("{}: {title}", worn.name), &[paths::BODY, &path], &one).into())
+                (1.0, View::spatial(title, &[paths::BODY, &path], &one).into())
             };
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };
