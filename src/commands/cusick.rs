@@ -7,8 +7,8 @@ use comfy_table::presets;
 use partwise::fabric::{BUILT_IN, Fabric};
 use partwise::mechanics::cusick::results_csv;
 
+use super::console;
 use super::work::write_csv;
-use super::{console, interrupt};
 
 /// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
 const MOST_ROWS: u64 = 100;

@@ -15,7 +15,6 @@ use super::meshes::{self, single};
 use super::overlay::{self, Overlay, QUANTILE};
 use super::panel::Panel;
 use super::{Open, dots, levels, paths};
-use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
 
 /// Share of the garment's height that the longest arrow takes.

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, presets};
 use partwise::SceneSpec;
 use partwise::contest::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
