@@ -41,6 +41,20 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     text.chars().flat_map(|c| if harmful(c) { c.escape_default().collect() } else { vec![c] }).collect()
 }
 
+/// A value as one line of JSON that is [`plain`] already: what JSON lets stand raw (delete, and the control characters after it) is
+/// escaped as JSON escapes, and reads back as it was.
+///
+/// # Errors
+/// What cannot be written as JSON.
+pub fn json(value: &impl serde::Serialize) -> serde_json::Result<String> {
+    let text = serde_json::to_string(value)?;
+    if !text.contains(char::is_control) {
+        return Ok(text);
+    }
+    let escaped = |c: char| if c.is_control() { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    Ok(text.chars().map(escaped).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,5 +66,15 @@ mod tests {
         let short = said(&long, ": ");
         assert!(short.starts_with("a\\u{1b}]0;title\\u{7}b\\ré") && short.ends_with("éwrong"), "{short}");
         assert!(short.contains("(18018 bytes in all)") && short.len() < 5_000, "{short}");
+    }
+
+    #[test]
+    fn json_reads_back_as_it_was_and_is_plain() {
+        for name in ["denim", "d\u{8e}nim\u{7f}", "a\u{1b}]0;\n\t\"é\u{9b}31m"] {
+            let text = json(&[name]).unwrap();
+            assert_eq!(plain(&text), text);
+            assert!(!text.contains(char::is_control), "{text:?}");
+            assert_eq!(serde_json::from_str::<[String; 1]>(&text).unwrap(), [name]);
+        }
     }
 }

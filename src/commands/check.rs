@@ -108,7 +108,7 @@ impl CheckArgs {
         let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, scene, draped)).transpose()?;
         let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
         if self.format == Format::Json {
-            console::result(&serde_json::to_string(&report)?);
+            console::result(&partwise::said::json(&report)?);
             return certified::verified(report.certificate.as_ref());
         }
         for note in &report.notes {

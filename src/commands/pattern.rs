@@ -96,7 +96,7 @@ impl PatternArgs {
                 .map_err(|e| anyhow::anyhow!("{}: cannot be written: {e}", path.display()))?;
         }
         if self.format == Format::Json {
-            console::result(&serde_json::to_string(&report)?);
+            console::result(&partwise::said::json(&report)?);
             return Ok(());
         }
         report.notes.iter().for_each(|note| console::note(note));

@@ -151,7 +151,7 @@ impl Summary {
 
     /// One JSON object.
     pub(crate) fn json(&self) -> anyhow::Result<String> {
-        Ok(serde_json::to_string(self)?)
+        Ok(partwise::said::json(self)?)
     }
 
     /// For the terminal.

@@ -219,7 +219,7 @@ impl TableFourArgs {
             Format::Csv => console::result(&csv),
             Format::Json => {
                 let json = json!({ "conditions": journal.conditions, "rows": rows, "missing_rows": missing });
-                console::result(&serde_json::to_string(&json)?);
+                console::result(&partwise::said::json(&json)?);
             }
             Format::Text => console::result(&text(journal, &rows)),
         }

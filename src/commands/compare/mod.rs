@@ -121,7 +121,7 @@ impl CompareArgs {
         let lines: String = recordings.iter().map(line).collect();
         match self.format {
             Format::Text => console::result(&format!("{}{lines}", table::text(&compared))),
-            Format::Json => console::result(&serde_json::to_string(&compared)?),
+            Format::Json => console::result(&partwise::said::json(&compared)?),
             Format::Csv => console::result(&table::csv(&compared)?),
         }
         let failed = rows.iter().filter(|row| row.status == Status::Error).count();

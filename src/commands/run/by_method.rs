@@ -164,7 +164,7 @@ impl RunArgs {
             outputs,
         };
         match self.format {
-            Format::Json => console::result(&serde_json::to_string(&report)?),
+            Format::Json => console::result(&partwise::said::json(&report)?),
             Format::Text => {
                 console::result(&report.text(&drape, &timings));
                 if let Some(certificate) = &certificate {

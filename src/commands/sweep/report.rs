@@ -45,7 +45,7 @@ impl Report<'_> {
     pub(crate) fn text(&self, format: Format) -> anyhow::Result<String> {
         match format {
             Format::Text => Ok(self.table()),
-            Format::Json => Ok(serde_json::to_string(&self.json())?),
+            Format::Json => Ok(partwise::said::json(&self.json())?),
             Format::Csv => Ok(String::from_utf8(csv_text(self.rows))?),
         }
     }

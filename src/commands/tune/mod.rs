@@ -156,7 +156,7 @@ impl TuneArgs {
         let name = |path: &PathBuf| path.display().to_string();
         match self.format {
             Format::Csv => console::result(&front),
-            Format::Json => console::result(&serde_json::to_string(&serde_json::json!({
+            Format::Json => console::result(&partwise::said::json(&serde_json::json!({
                 "verdicts": results.verdicts,
                 "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
                 "front": name(&self.out.join("front.csv")),
