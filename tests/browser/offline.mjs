@@ -66,7 +66,7 @@ async function look(name, address, viewport, colorScheme) {
   });
   const url = new URL(address);
   url.searchParams.set("renderer", "webgl");
-  await page.goto(url.href);
+  await page.goto(url.href, { timeout: 180000 });
   await page.waitForFunction(() => document.getElementById("message").hidden, null, { timeout: 180000 });
   // Whoever asks late, or tries again, does so by then.
   await page.waitForTimeout(15000);
