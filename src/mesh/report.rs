@@ -29,6 +29,8 @@ pub enum Repair {
     TurnedOutward { components: usize },
     /// Triangles that bridge open seams were given the size of the others at rest.
     BridgesShut { triangles: usize, longest_m: f64, usual_m: f64 },
+    /// Open seams were drawn shut over the body.
+    SeamsDrawnShut { longest_m: f64, steps: usize, farthest_m: f64 },
     /// A group was chosen and the rest left out.
     GroupChosen { name: String, left_out: usize },
 }
@@ -62,6 +64,12 @@ impl fmt::Display for Repair {
                  are as short as the others at rest (--rest own: as they are)",
                 1e2 * longest_m,
                 1e2 * usual_m
+            ),
+            Self::SeamsDrawnShut { longest_m, steps, farthest_m } => write!(
+                f,
+                "drew open seams, bridged by triangles up to {:.0} cm long, shut over the body in {steps} steps; a vertex went up to {:.0} cm",
+                1e2 * longest_m,
+                1e2 * farthest_m
             ),
             Self::GroupChosen { name, left_out } => write!(f, "took group \"{name}\" and left {left_out} faces out"),
         }

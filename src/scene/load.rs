@@ -17,7 +17,7 @@ use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_g
 use crate::mesh::report::MeshReport;
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
 use crate::pattern::{SewingPattern, SewnGarment};
-use crate::sewing::{PutOn, put_on};
+use crate::sewing::{PutOn, draw_shut, put_on};
 use crate::shapes::MeshCache;
 
 /// A scene with its origin.
@@ -65,6 +65,11 @@ struct Unplaced {
 }
 
 impl Unplaced {
+    fn new(mesh: TriMesh, rest: RestShape) -> Self {
+        let (held, cut) = (Vec::new(), Cut::default());
+        Self { mesh, rest, held, cut, tailored: None, imported: None, pattern: None }
+    }
+
     /// What follows on so many vertices and triangles.
     fn layer(&self, name: String, (vertices, triangles): (usize, usize)) -> Layer {
         Layer { name, vertices: vertices..self.mesh.vertex_count(), triangles: triangles..self.mesh.triangles.len() }
@@ -178,15 +183,7 @@ impl SceneSpec {
             }
             let (spec, vertices) = self.described()?;
             let made = meshes.garment(&spec, &self.form()?, vertices)?;
-            Ok(Unplaced {
-                mesh: made.mesh,
-                rest: made.rest,
-                held: made.held,
-                cut: Cut::default(),
-                tailored: None,
-                imported: None,
-                pattern: None,
-            })
+            Ok(Unplaced { held: made.held, ..Unplaced::new(made.mesh, made.rest) })
         };
         Some(make())
     }
@@ -202,15 +199,11 @@ impl SceneSpec {
         imported.turn_outward(&facing_body(&imported.mesh, body));
         let pattern = if self.rest == REST_AUTO { FlatPattern::find(&imported.mesh, &imported.texture) } else { None };
         let rest = self.imported_rest(&mut imported, pattern)?;
-        Ok(Unplaced {
-            mesh: imported.mesh.clone(),
-            rest,
-            held: Vec::new(),
-            cut: Cut::default(),
-            tailored: None,
-            imported: Some(imported),
-            pattern,
-        })
+        if self.push_out {
+            draw_shut(&mut imported, &rest, body);
+        }
+        let mesh = imported.mesh.clone();
+        Ok(Unplaced { imported: Some(imported), pattern, ..Unplaced::new(mesh, rest) })
     }
 
     /// A sewing pattern, sewn and put on the body.
@@ -219,8 +212,7 @@ impl SceneSpec {
         let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
-        let (cut, tailored) = (Cut::default(), Some(Tailored { pattern, put_on }));
-        Ok(Unplaced { mesh, rest, held, cut, tailored, imported: None, pattern: None })
+        Ok(Unplaced { held, tailored: Some(Tailored { pattern, put_on }), ..Unplaced::new(mesh, rest) })
     }
 
     /// The rest shape of a garment, which loses the triangles that have no area in it.

@@ -211,6 +211,20 @@ fn nearest_turn(u: DVec3, v: DVec3) -> [DVec3; 2] {
     [turn.extend(0.0), turn.perp().extend(0.0)]
 }
 
+/// A surface with less of its waves: (M + ℓ² L) y = M x, one implicit step of its heat, with areas M and stiffness L of the rest shape; ℓ (m)
+/// is what waves are worn down under.
+pub(super) fn faired(mesh: &TriMesh, rest: &RestShape, x: &[DVec3], length: f64) -> Vec<DVec3> {
+    let mut shape = Shape::new(mesh, rest, &[]);
+    let mut mass = vec![0.0; x.len()];
+    for (triangle, area) in mesh.triangles.iter().zip(&shape.areas) {
+        triangle.iter().for_each(|&v| mass[v as usize] += area / (3.0 * length * length));
+    }
+    let diagonal = shape.entries.iter_mut().filter(|e| e.row == e.col);
+    diagonal.zip(&mass).for_each(|(entry, mass)| entry.val += mass);
+    let side: Vec<DVec3> = x.iter().zip(&mass).map(|(x, mass)| (STAY + mass) * *x).collect();
+    solve(&shape.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
+}
+
 /// One solve for three right sides; `None` where the matrix is not positive.
 fn solve(
     entries: &[Triplet<u32, u32, f64>],

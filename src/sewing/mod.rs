@@ -4,8 +4,9 @@
 //! second, and each finer garment begins where the one before ends, laid over it in the flat panels.
 
 mod arrange;
-mod close;
+pub mod close;
 mod landmarks;
+mod shut;
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -15,6 +16,7 @@ use glam::DVec3;
 pub use arrange::Arranged;
 pub use close::laid_flat;
 pub use landmarks::Landmarks;
+pub(crate) use shut::draw_shut;
 
 use crate::distance::Body;
 use crate::pattern::{PatternError, SewingPattern, SewnGarment};

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use partwise::mesh::import::{Beside, ImportOptions, import_garment};
+use partwise::mesh::self_intersection::self_intersecting_pairs;
 use partwise::mesh::{Axis, Unit};
 use partwise::pattern::SewingPattern;
+use partwise::scene::Loaded;
 use partwise::sewing::Landmarks;
 use partwise::shapes::{BodySpec, dress_form};
 use partwise::{DVec3, SceneSpec};
@@ -95,7 +97,9 @@ fn a_pattern_in_texture_coordinates_is_known_as_such() {
     let area = |rest: &partwise::mesh::RestShape| rest.areas().iter().sum::<f64>();
     assert!((area(&found.scene.rest) / area(&sewn.rest) - 1.0).abs() < 1e-9);
     assert!(found.notes().iter().any(|note| note.contains("flat pattern") && note.contains("--rest own")));
+    seams_are_shut(&found);
     let own = SceneSpec { rest: "own".into(), ..spec }.load().unwrap();
+    assert!(!own.notes().iter().any(|note| note.contains("drew open seams")), "{:?}", own.notes());
     assert_eq!(own.flat_pattern, None);
     assert!(area(&own.scene.rest) > 1.2 * area(&sewn.rest), "bridges over the seams and all");
 }
@@ -111,4 +115,17 @@ fn without_its_pattern_a_mesh_with_open_seams_is_as_large_at_rest_as_what_it_was
     let ratio = area(&found.scene.rest) / area(&sewn.rest);
     assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
     assert!(found.notes().iter().any(|note| note.contains("open seams") && note.contains("--rest own")));
+    seams_are_shut(&found);
+}
+
+/// On the body without a seam open, cloth through cloth or a vertex inside, in edges of 2 cm.
+fn seams_are_shut(found: &Loaded) {
+    assert!(found.notes().iter().any(|note| note.contains("drew open seams")), "{:?}", found.notes());
+    let (garment, body) = (&found.scene.garment, &found.scene.body);
+    let sides = garment.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+    let ends = sides.map(|side| side.map(|v| garment.positions[v as usize]));
+    let longest = ends.map(|[a, b]| a.distance(b)).fold(0.0, f64::max);
+    assert!(longest < 0.06, "{longest} m");
+    assert!(self_intersecting_pairs(garment).is_empty());
+    assert!(body.nearest_all(&garment.positions).iter().all(|near| near.signed_distance > 0.0));
 }
