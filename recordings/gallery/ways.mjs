@@ -43,7 +43,7 @@ const browser = await chromium.launch({
 });
 async function look(at, size) {
   const page = await browser.newPage({ viewport: size, colorScheme: "dark" });
-  await page.goto(at);
+  await page.goto(at, { timeout: 120000 });
   await sleep(Number(process.env.SETTLE ?? 20000));
   const png = (await page.screenshot()).toString("base64");
   await page.close();
