@@ -95,6 +95,45 @@ fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
 }
 
 #[test]
+fn a_fabric_tried_before_hangs_at_once_as_it_did_and_one_goes_on_from_there() {
+    let (session, mut workshop) = settled(true);
+    let interlock = session.snapshot().rest.unwrap();
+    let fabric = |name: &str| edit(&format!(r#"{{"fabric": "{name}"}}"#));
+    session.submit(&fabric("ponte"), None).unwrap();
+    let ponte = work(&session, &mut workshop).rest.unwrap();
+    // In another table meanwhile: the forces are those of its PARTs.
+    session.submit(&edit(TWO_LEVELS), None).unwrap();
+    session.submit(&fabric("interlock"), None).unwrap();
+    let at_once = session.snapshot();
+    let rest = at_once.rest.as_ref().unwrap();
+    assert!(rest.kept && rest.done && rest.state == 4 && Arc::ptr_eq(&rest.positions, &interlock.positions));
+    let total = |s: &Snapshot| s.sectioned.as_ref().unwrap().force_n.iter().map(|f| f.z).sum::<f64>();
+    let done = work(&session, &mut workshop);
+    assert_eq!(total(&done), total(&at_once));
+    assert_eq!(done.finished.as_ref().unwrap().drape.positions, *interlock.positions);
+    let from = |told: &mut Option<Arc<Vec<partwise::DVec3>>>, snapshot: Snapshot| {
+        let rest = snapshot.rest.filter(|rest| rest.state == snapshot.state && !rest.kept);
+        *told = told.take().or(rest.map(|rest| Arc::clone(&rest.positions)));
+    };
+    let first: Arc<Mutex<Option<Arc<Vec<partwise::DVec3>>>>> = Arc::default();
+    let (handle, log) = (session.clone(), Arc::clone(&first));
+    session.listen(move |_| from(&mut log.lock().unwrap(), handle.snapshot()));
+    session.submit(&fabric("rib-knit"), None).unwrap();
+    work(&session, &mut workshop);
+    let first = first.lock().unwrap().take().unwrap();
+    let off = |other: &[partwise::DVec3]| rms_mm(&first, other);
+    assert!(off(&interlock.positions) < off(&ponte.positions), "it goes on from what is shown");
+    // Whether cloth keeps off itself is another matter, and so is another form.
+    for change in
+        [r#"{"fabric": "ponte", "self_contact": false}"#, r#"{"fabric": "ponte", "measurements": {"waist": 76}}"#]
+    {
+        session.submit(&edit(change), None).unwrap();
+        assert!(session.snapshot().rest.is_none_or(|rest| rest.state < session.snapshot().state), "{change}");
+        work(&session, &mut workshop);
+    }
+}
+
+#[test]
 fn a_fabric_that_nothing_is_cut_from_is_refused_and_another_garment_has_none_of_its_own() {
     let own = SceneSpec { fabrics: vec!["denim".to_owned()], ..job().scene };
     let session = Session::new(Job { scene: own, ..job() }, true);

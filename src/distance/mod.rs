@@ -15,6 +15,7 @@
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
 mod ends;
+mod lattice;
 mod tree;
 mod worn;
 
@@ -26,6 +27,8 @@ use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocati
 use rayon::prelude::*;
 
 pub(crate) use ends::OUTWARD;
+pub(crate) use lattice::LATTICE_SIDE;
+use lattice::Lattice;
 use tree::{Nearest, Tree};
 
 use crate::mesh::winding::signed_volumes;
@@ -86,6 +89,7 @@ pub struct Body {
     shape: Arc<ParryMesh>,
     tree: Arc<Tree>,
     worn: Option<worn::Worn>,
+    lattice: Arc<Lattice>,
 }
 
 impl std::fmt::Debug for Body {
@@ -121,7 +125,13 @@ impl Body {
         let shape = || ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED);
         let (shape, tree) = rayon::join(shape, || Tree::new(mesh));
         let shape = shape.map_err(|e| DistanceError::Refused(e.to_string()))?;
-        Ok(Self { mesh: Arc::new(mesh.clone()), shape: Arc::new(shape), tree: Arc::new(tree), worn: None })
+        Ok(Self {
+            mesh: Arc::new(mesh.clone()),
+            shape: Arc::new(shape),
+            tree: Arc::new(tree),
+            worn: None,
+            lattice: Arc::default(),
+        })
     }
 
     /// The surface, m, without what it wears.

@@ -15,6 +15,8 @@
 //!
 //! Limits: the cloth's sides are told by its normals; where it lies in a pleat the way out is that of the nearest sheet.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use parry3d_f64::shape::TrianglePointLocation;
 
@@ -39,7 +41,7 @@ impl Body {
     pub fn wearing(&self, cloth: &TriMesh) -> Result<Self, DistanceError> {
         let on_edge = Topology::new(cloth).boundary_vertices();
         let worn = Worn { cloth: Box::new(Self::new_open(cloth)?), on_edge };
-        Ok(Self { worn: Some(worn), ..self.clone() })
+        Ok(Self { worn: Some(worn), lattice: Arc::default(), ..self.clone() })
     }
 }
 

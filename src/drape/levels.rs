@@ -3,6 +3,8 @@
 //! Each level has a quarter of the vertices of the one before ([`Coarse`]). PARTs are those of the full garment, as far as they have
 //! vertices there. Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985).
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::fabric::Fabric;
@@ -22,7 +24,7 @@ const LEAST_VERTICES: usize = 400;
 /// A coarser garment.
 #[derive(Debug)]
 pub(crate) struct Level {
-    coarse: Coarse,
+    coarse: Arc<Coarse>,
     cloth: Cloth,
 }
 
@@ -36,18 +38,36 @@ pub(crate) struct Levels {
 impl Levels {
     /// The cloth of `scene`, `fabric` being that of what names none, and as many coarser ones as there are.
     pub(crate) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
-        let Scene { garment, topology, rest, held, .. } = scene;
         let fabrics = &scene.fabrics(fabric);
-        let (cloth, coarser) = rayon::join(
-            || Cloth::new(garment, topology, rest, fabrics, held),
-            || {
-                let mut coarser: Vec<Level> = Vec::new();
-                while let Some(next) = Level::below(scene, coarser.last(), fabrics) {
-                    coarser.push(next);
-                }
-                coarser
-            },
-        );
+        Self::beside(scene, fabrics, || {
+            let mut coarser: Vec<Level> = Vec::new();
+            while let Some(next) = Level::below(scene, coarser.last(), fabrics) {
+                coarser.push(next);
+            }
+            coarser
+        })
+    }
+
+    /// The same garment in another fabric: how its coarser ones are meshed does not depend on it.
+    pub(crate) fn recut(&self, scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
+        let fabrics = &scene.fabrics(fabric);
+        Self::beside(scene, fabrics, || {
+            let mut coarser: Vec<Level> = Vec::new();
+            for level in &self.coarser {
+                let coarse = Arc::clone(&level.coarse);
+                coarser.extend(Level::of(scene, coarser.last(), coarse, fabrics));
+            }
+            coarser
+        })
+    }
+
+    fn beside(
+        scene: &Scene,
+        fabrics: &[Fabric],
+        coarser: impl FnOnce() -> Vec<Level> + Send,
+    ) -> Result<Self, EnergyError> {
+        let Scene { garment, topology, rest, held, .. } = scene;
+        let (cloth, coarser) = rayon::join(|| Cloth::new(garment, topology, rest, fabrics, held), coarser);
         Ok(Self { cloth: cloth?, coarser })
     }
 
@@ -76,7 +96,10 @@ impl Level {
         if count < LEAST_VERTICES {
             return None;
         }
-        let coarse = Coarse::new(mesh, rest, count)?;
+        Self::of(scene, above, Arc::new(Coarse::new(mesh, rest, count)?), fabrics)
+    }
+
+    fn of(scene: &Scene, above: Option<&Self>, coarse: Arc<Coarse>, fabrics: &[Fabric]) -> Option<Self> {
         let held = above.map_or_else(|| scene.is_held(), |above| above.cloth.held.clone());
         let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
         let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabrics, &held).ok()?;

@@ -8,13 +8,16 @@ use glam::DVec3;
 use super::history::History;
 use super::results::{AtRest, Ground, Refusal, Sectioned, Snapshot, TrailPoint};
 use super::{Edit, EditError};
-use crate::drape::{Refine, stage_one};
+use crate::drape::{Refine, Settings, stage_one};
 use crate::job::Job;
 use crate::parts::{Parts, UNASSIGNED};
 use crate::scene::SceneSpec;
 
 /// States that the trail remembers.
 const TRAIL: usize = 300;
+
+/// Drapes at rest that are remembered: a quarter of a megabyte each at ten thousand vertices.
+const RESTS: usize = 8;
 
 /// What is known, and what is needed to go on.
 pub(super) struct Desk {
@@ -30,6 +33,8 @@ pub(super) struct Desk {
     /// Body and garment while their files are read again.
     before: Option<Arc<Ground>>,
     pub(super) pins_made: u64,
+    /// Drapes of the body and garment at hand that came to rest, the newest last.
+    rests: Vec<Arc<AtRest>>,
 }
 
 impl Desk {
@@ -64,6 +69,7 @@ impl Desk {
             good_job: None,
             before: None,
             pins_made: 0,
+            rests: Vec::new(),
         }
     }
 
@@ -140,6 +146,7 @@ impl Desk {
     pub(super) fn found_ground(&mut self, ground: Arc<Ground>) -> Result<(), EditError> {
         let (job, state, accepted) = (Arc::clone(&self.view.job), self.view.state, self.accepted);
         self.view.rest = None;
+        self.rests.clear();
         let sectioned = self.section(&ground, &job, state, accepted)?;
         self.good_scene = Some(ground.spec.clone());
         self.view.ground = Some(ground);
@@ -154,6 +161,11 @@ impl Desk {
         if let Some(sectioned) = &mut self.view.sectioned {
             let force_n = Arc::new(sums(&sectioned.parts, &rest.reaction_n));
             *sectioned = Arc::new(Sectioned { force_n, ..Sectioned::clone(sectioned) });
+        }
+        if rest.balanced {
+            self.rests.retain(|other| other.of != rest.of);
+            self.rests.push(Arc::clone(&rest));
+            self.rests.drain(..self.rests.len().saturating_sub(RESTS));
         }
         self.view.rest = Some(rest);
     }
@@ -222,21 +234,16 @@ impl Desk {
         Err(EditError::value("fabric", found, "a change of the file that names their fabrics"))
     }
 
-    /// Where the cloth rests does not depend on the table: an edit that touches neither garment nor fabric leaves the drape.
+    /// Where the cloth rests does not depend on the table: an edit that touches neither garment nor fabric leaves the drape, and a fabric
+    /// that it was in before hangs as it did.
     fn keep_rest(&mut self) {
-        let settings = &self.view.job.settings;
-        let of = (&settings.fabric, settings.refine);
-        let Some(rest) = self
-            .view
-            .rest
-            .as_ref()
-            .filter(|rest| self.warm && rest.done && of.1 == Refine::Converged && (&rest.of.0, rest.of.1) == of)
-        else {
-            return;
-        };
+        let Settings { fabric, refine, self_contact, .. } = &self.view.job.settings;
+        let same = |rest: &&Arc<AtRest>| (&rest.of.0, rest.of.1, rest.of.2) == (fabric, *refine, *self_contact);
+        let newest = self.view.rest.as_ref().filter(|rest| rest.done);
+        let known = newest.filter(same).or_else(|| self.rests.iter().find(same));
+        let Some(rest) = known.filter(|_| self.warm && *refine == Refine::Converged) else { return };
         let (state, after_ms) = (self.view.state, ms_since(self.accepted));
-        self.view.rest =
-            Some(Arc::new(AtRest { state, kept: true, steps: 0, ms: 0.0, after_ms, ..AtRest::clone(rest) }));
+        self.found_rest(Arc::new(AtRest { state, kept: true, steps: 0, ms: 0.0, after_ms, ..AtRest::clone(rest) }));
     }
 
     /// `state` cannot be: back to the last good one. `scene` says that body or garment were to blame.

@@ -7,11 +7,12 @@
 //! | an edit of | computes anew | keeps |
 //! |---|---|---|
 //! | the table, extents, the gap rule | PARTs, stage two | body, garment, distances, cloth, the drape at rest |
-//! | the fabric | cloth, stage two, the drape at rest | body, garment, distances, PARTs |
+//! | the fabric | cloth, stage two, the drape at rest unless it was in that fabric before | body, garment, distances, PARTs |
 //! | a measurement, the garment | all | nothing |
 //!
 //! **Warm starts.** Stage two first goes on from the preview before, which takes a few steps ([`Preview::warm`]), and the drape at rest
-//! begins at the one before. Where a cloth rests does not depend on the range table, so an edit of the table leaves it ([`AtRest::kept`]). At the end the
+//! begins at the one before. Where a cloth rests does not depend on the range table, so an edit of the table leaves it, and the last few fabrics
+//! of a garment hang as they did when one goes back to them ([`AtRest::kept`]). At the end the
 //! two stages are computed from the undraped garment, as `run` does it: that is what the figures tell. Without warm starts all of it
 //! is as `run` does it, bit for bit.
 //!

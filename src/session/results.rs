@@ -91,7 +91,8 @@ pub struct AtRest {
     pub done: bool,
     /// Whether its forces balance; that it lasts may yet be looked at, which moves little.
     pub balanced: bool,
-    /// Whether it is the drape of an earlier state, which the edit does not touch: where a cloth rests does not depend on the table.
+    /// Whether it is the drape of an earlier state: where a cloth rests does not depend on the table, and a fabric that it was in before
+    /// hangs as it did.
     pub kept: bool,
     /// Whether it began at the drape before.
     pub warm: bool,
@@ -109,7 +110,9 @@ pub struct AtRest {
     pub let_go: Option<LetGo>,
     pub(crate) reaction_n: Arc<Vec<DVec3>>,
     pub(crate) told: Option<Arc<ClothState>>,
-    pub(crate) of: (Fabric, Refine),
+    pub(crate) of: (Fabric, Refine, bool),
+    /// Where the next drape goes on from: what is let go at the end is held there.
+    pub(crate) held: Arc<Vec<DVec3>>,
 }
 
 /// A state with nothing left to compute.

@@ -4,7 +4,8 @@
 //
 // Every edit waits until the one before is finished. `parts`: PARTs and forces, in the answer to PATCH; `preview`: the first event with a
 // preview of the state; `balanced`: the garment whose forces balance; `at rest`: the same looked at that it lasts; `all`: the two stages
-// from the undraped garment and the figures too.
+// from the undraped garment and the figures too. A fabric that the garment was in before (`again`) hangs as it did; waists are of tenths of a
+// centimetre, so that hardly any form was made before.
 
 import { execFile, spawn } from "node:child_process";
 import { promisify } from "node:util";
@@ -67,12 +68,12 @@ const KINDS = {
     const others = ["interlock", "jersey", "rib-knit", "ponte"].filter((name) => name !== newest.job.fabric);
     return { fabric: others[next(others.length)] };
   },
-  measurement: () => ({ measurements: { waist: 68 + next(12) } }),
+  measurement: () => ({ measurements: { waist: 68 + next(120) / 10 } }),
 };
 const order = ["bound", "bound", "bound", "bound", "bound", "fabric, knit", "fabric, knit", "extents", "extents", "measurement"];
 const times = {};
 for (let i = 0; i < Number(edits); i += 1) {
-  const kind = order[next(order.length)];
+  let kind = order[next(order.length)];
   const edit = KINDS[kind]();
   const began = performance.now();
   const answer = await fetch(`${base}api/state`, {
@@ -86,6 +87,7 @@ for (let i = 0; i < Number(edits); i += 1) {
   const n = state.state;
   const there = state.parts?.state === n ? Promise.resolve(answered) : when((s) => s.parts?.state === n);
   const kept = state.rest?.state === n && state.rest.done ? answered : null;
+  if (kind.startsWith("fabric") && kept) kind = "fabric, again";
   const [parts, preview, balanced, rest, all] = await Promise.all([
     there,
     when((s) => s.preview?.state === n),

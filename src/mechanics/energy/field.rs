@@ -15,28 +15,25 @@
 //! | q | exact signed distance | m |
 //! | h | side of the lattice, [`SIDE`] | m |
 //!
-//! Values are asked for where they are first needed and kept; each is a function of its lattice point alone, so they are the same
-//! whatever was asked before and on any number of threads. Limits: what is thinner than h (a finger's tip, a brim) is
+//! Values are asked for where they are first needed and kept with the body; each is a function of its lattice point alone, so they are the
+//! same whatever was asked before and on any number of threads. Limits: what is thinner than h (a finger's tip, a brim) is
 //! rounded away. Whether a vertex is inside the body is always told by the exact distance.
-
-use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
 
-use crate::distance::Body;
+use crate::distance::{Body, LATTICE_SIDE};
 
 /// h, m. A surface of 5 cm radius is off by 0.06 mm for each of its curvatures; two planes that meet at 10 degrees by 0.1 to 0.2 mm
 /// in the crease.
-pub const SIDE: f64 = 5e-3;
+pub const SIDE: f64 = LATTICE_SIDE;
 
 /// Lattice values about one cell, x slowest.
 type Stencil = [f64; 27];
 
-/// The rounded distance, with the lattice values found so far.
+/// The rounded distance.
 #[derive(Debug, Clone)]
 pub struct Field<'b> {
     body: &'b Body,
-    values: HashMap<IVec3, f64>,
     /// The cell each vertex was last seen in, and its values: it seldom leaves it in one step.
     kept: Vec<Option<(IVec3, Box<Stencil>)>>,
 }
@@ -45,7 +42,7 @@ impl<'b> Field<'b> {
     /// Of a body, for so many vertices.
     #[must_use]
     pub fn new(body: &'b Body, vertices: usize) -> Self {
-        Self { body, values: HashMap::new(), kept: vec![None; vertices] }
+        Self { body, kept: vec![None; vertices] }
     }
 
     /// The body.
@@ -58,24 +55,10 @@ impl<'b> Field<'b> {
     pub fn at(&mut self, vertices: &[u32], x: &[DVec3]) -> Vec<(f64, DVec3)> {
         let moved = |&&v: &&u32| self.kept[v as usize].as_ref().is_none_or(|(cell, _)| *cell != cell_of(x[v as usize]));
         let moved: Vec<u32> = vertices.iter().filter(moved).copied().collect();
-        let mut missing: Vec<IVec3> = moved
-            .iter()
-            .flat_map(|&v| around(cell_of(x[v as usize])))
-            .filter(|i| !self.values.contains_key(i))
-            .collect();
-        missing.sort_unstable_by_key(IVec3::to_array);
-        missing.dedup();
-        let body = self.body;
-        let points: Vec<DVec3> = missing.iter().map(|i| i.as_dvec3() * SIDE).collect();
-        let found = body.nearest_all(&points).into_iter().map(|near| near.signed_distance);
-        self.values.extend(missing.into_iter().zip(found));
-        for v in moved {
-            let cell = cell_of(x[v as usize]);
-            let mut stencil = Box::new([0.0; 27]);
-            for (value, i) in stencil.iter_mut().zip(around(cell)) {
-                *value = self.values.get(&i).copied().unwrap_or_default();
-            }
-            self.kept[v as usize] = Some((cell, stencil));
+        let cells: Vec<IVec3> = moved.iter().flat_map(|&v| around(cell_of(x[v as usize]))).collect();
+        let values = self.body.at_lattice(&cells);
+        for (&v, values) in moved.iter().zip(values.as_chunks::<27>().0) {
+            self.kept[v as usize] = Some((cell_of(x[v as usize]), Box::new(*values)));
         }
         let value = |&v: &u32| match &self.kept[v as usize] {
             Some((cell, stencil)) => spline(x[v as usize] / SIDE - cell.as_dvec3(), stencil),

@@ -119,22 +119,29 @@ impl Workshop {
         if needs_cloth && levels.is_none() {
             return self.sew(sectioned, &settings.fabric);
         }
+        if let Some(rest) = target.rest.as_ref().filter(|rest| rest.kept) {
+            self.rest = Some((generation, Arc::clone(&rest.held)));
+        }
         let of_this = |kept: &Option<(u64, Arc<Vec<DVec3>>)>| {
             kept.as_ref().filter(|(of, _)| target.warm && *of == generation).map(|(_, x)| Arc::clone(x))
         };
         let (before, at_rest) = (of_this(&self.preview), of_this(&self.rest));
+        let at_rest = at_rest.filter(|_| settings.refine == Refine::Converged);
         match (&levels, &settings.model) {
             (Some(levels), Model::Coupled(options)) if !self.done.warmed => {
                 self.done.warmed = true;
                 match before {
-                    Some(start) => return self.go_on(session, target, sectioned, levels, options, &start),
+                    Some(start) => {
+                        let rest_follows = at_rest.is_some() && target.rest.is_none();
+                        return self.go_on(session, target, sectioned, levels, options, (&start, rest_follows));
+                    }
                     None => return Ok(()),
                 }
             }
             _ => {}
         }
         if let (Some(levels), None, None) = (&levels, &target.rest, self.done.rested)
-            && let Some(start) = at_rest.filter(|_| settings.refine == Refine::Converged)
+            && let Some(start) = at_rest
         {
             return self.settle(session, target, sectioned, levels, start.to_vec(), true);
         }

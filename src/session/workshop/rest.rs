@@ -48,7 +48,8 @@ impl Way<'_> {
             reaction_n: Arc::default(),
             told: None,
             let_go: None,
-            of: (settings.fabric.clone(), settings.refine),
+            of: (settings.fabric.clone(), settings.refine, settings.self_contact),
+            held: Arc::default(),
         }
     }
 }
@@ -79,9 +80,11 @@ impl Workshop {
             }
             ask(session, target.state)
         };
-        let refined = refine_from(scene, settings, &levels.cloth, None, (start, from), &mut show)?;
+        let refined =
+            refine_from(scene, settings, &levels.cloth, Some(&sectioned.ground.distances), (start, from), &mut show)?;
         // What is held is held where it was placed: the next drape goes on from before it is let go.
-        self.rest = Some((sectioned.ground.generation, Arc::new(refined.positions.clone())));
+        let held = Arc::new(refined.positions.clone());
+        self.rest = Some((sectioned.ground.generation, Arc::clone(&held)));
         let Released { cloth, refined, let_go } = let_go(scene, settings, refined, &mut show)?;
         if refined.stop == Stop::Interrupted && session.overtaken(target.state) {
             // A drape that falls off is interrupted too, and shown.
@@ -89,12 +92,13 @@ impl Workshop {
         }
         let took = began.elapsed();
         let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
-        let (positions, state) = settled(scene, settings, cloth, None, refined);
+        let (positions, state) = settled(scene, settings, cloth, Some(&sectioned.ground.distances), refined);
         let rest = Arc::new(AtRest {
             done: true,
             balanced: state.stop == Stop::Converged,
             reaction_n: Arc::new(reactions(cloth, &positions, &state.fit.pressure_kpa)),
             let_go,
+            held,
             ms: took.as_secs_f64() * 1e3,
             told: Some(Arc::new(state.clone())),
             ..way.at(&positions, state.residual_over_weight, state.steps)

@@ -43,9 +43,12 @@ impl Workshop {
 
     pub(super) fn sew(&mut self, sectioned: &Sectioned, fabric: &Fabric) -> Result<(), EditError> {
         let began = Instant::now();
-        self.cloth = None;
-        let levels = Levels::new(&sectioned.ground.loaded.scene, fabric).map_err(DrapeError::from)?;
-        let (generation, fabric) = (sectioned.ground.generation, fabric.clone());
+        let (scene, generation) = (&sectioned.ground.loaded.scene, sectioned.ground.generation);
+        let levels = match self.cloth.take().filter(|sewn| sewn.generation == generation) {
+            Some(sewn) => sewn.levels.recut(scene, fabric),
+            None => Levels::new(scene, fabric),
+        };
+        let (levels, fabric) = (levels.map_err(DrapeError::from)?, fabric.clone());
         self.cloth = Some(Sewn { generation, fabric, levels: Arc::new(levels), took: began.elapsed() });
         Ok(())
     }
@@ -58,7 +61,7 @@ impl Workshop {
         sectioned: &Sectioned,
         levels: &Levels,
         options: &CoupledOptions,
-        start: &[DVec3],
+        (start, rest_follows): (&[DVec3], bool),
     ) -> Result<(), EditError> {
         let began = Instant::now();
         let scene = &sectioned.ground.loaded.scene;
@@ -84,9 +87,14 @@ impl Workshop {
             reached = glance;
             let shown = Arc::new(preview(&reached));
             session.publish(target.state, |desk| desk.view.preview = Some(shown));
+            if rest_follows {
+                self.preview = Some((sectioned.ground.generation, Arc::new(reached)));
+                return Ok(());
+            }
         }
         let start = reached.clone();
-        let few = CoupledOptions { max_steps: WARM_STEPS, ..options.clone() };
+        let max_steps = if rest_follows { GLANCE_STEPS } else { WARM_STEPS };
+        let few = CoupledOptions { max_steps, ..options.clone() };
         let solved = coupled::solve_before(&garment, &scene.body, &parts, &start, &few, &mut |x| {
             reached.clear();
             reached.extend_from_slice(x);
