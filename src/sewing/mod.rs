@@ -4,7 +4,7 @@
 //! second, and each finer garment begins where the one before ends, laid over it in the flat panels.
 
 mod arrange;
-pub mod close;
+mod close;
 mod landmarks;
 mod shut;
 
