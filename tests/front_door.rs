@@ -113,7 +113,8 @@ fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
     let measured = job.measure(&scene, &draped, None, &mut unobserved).unwrap();
     let figures = &measured.figures;
     assert!(figures.canonical_rms_mm.unwrap() > 0.0, "{figures:?}");
-    assert!(figures.representable_rms_mm.unwrap() < figures.displacement_rms_mm, "{figures:?}");
+    // What translates can turn and stretch as well.
+    assert!(figures.representable_affine_rms_mm.unwrap() < figures.representable_rms_mm.unwrap(), "{figures:?}");
     assert!(figures.rms_mm.is_none() && measured.error_mm.len() == figures.vertices);
     job.seed = 7;
     let moved = job.drape(&scene, &mut unobserved).unwrap();
