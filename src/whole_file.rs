@@ -47,7 +47,7 @@ impl Beside {
     fn take_place(mut self, place: &Path) -> io::Result<()> {
         let Some(path) = self.0.take() else { return Ok(()) };
         let mut growing = growing();
-        growing.remove(&path.to_path_buf());
+        growing.remove::<Path>(&path);
         Ok(path.persist(place)?)
     }
 }
@@ -55,7 +55,7 @@ impl Beside {
 impl Drop for Beside {
     fn drop(&mut self) {
         if let Some(path) = self.0.take() {
-            growing().remove(&path.to_path_buf());
+            growing().remove::<Path>(&path);
         }
     }
 }

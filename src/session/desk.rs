@@ -16,7 +16,7 @@ use crate::scene::SceneSpec;
 /// States that the trail remembers.
 const TRAIL: usize = 300;
 
-/// Drapes at rest that are remembered: a quarter of a megabyte each at ten thousand vertices.
+/// Drapes at rest that are remembered: at ten thousand vertices three lists of vectors, a quarter of a megabyte each, and what the figures tell.
 const RESTS: usize = 8;
 
 /// What is known, and what is needed to go on.

@@ -3,6 +3,9 @@
 //! Where more than two panels meet such a mesh crosses itself from the start, and as-rigid-as-possible steps, which feel no bending, make a
 //! crumple of it that nothing opens again. So steps and fairing take turns, wide waves first: as a bending energy would, split off from
 //! the rest. Where cloth crosses itself still it is faired wider.
+//!
+//! Source: own; steps and fairing are those of `close.rs`. Limits: no level is coarser, so a step costs what the mesh costs; what crosses
+//! itself after the last round is left to the drape, which draws it apart or says that it crosses.
 
 use glam::DVec3;
 
@@ -21,7 +24,8 @@ const SHUT: f64 = 3.0;
 /// Steps until the seams are shut at most: three times as many as a T-shirt's 34 cm took.
 const FIRST: usize = 100;
 
-/// Turns of fairing and of two steps; waves of this length (m) are worn down in the first, and each time of this share of it.
+/// Turns of fairing and of two steps; waves of this length (m) are worn down in the first, and each time of this share of it. From two
+/// or three centimetres GarmentCode's T-shirt comes out of them without a crossing, from one with 152 pairs.
 const TURNS: usize = 12;
 const WAVES: f64 = 0.025;
 const NARROWER: f64 = 0.85;

@@ -5,14 +5,17 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 #![cfg(feature = "viewer")]
 
+#[path = "../inspect/mod.rs"]
 mod inspect;
+#[path = "../scene/mod.rs"]
 mod scene;
+mod served;
 
 use std::path::{Path, PathBuf};
 
 use partwise::record::{
-    Chosen, Colours, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
-    StepView, Tab, When, WrinkleView, paths, web,
+    Chosen, Colours, Layout, Overlay, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView,
+    Tab, When, WrinkleView, paths,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -300,53 +303,4 @@ fn a_step_that_does_not_fit_the_garment_is_refused() {
     let error = recorder.step(&short).unwrap_err();
     let count = scene.draped.len();
     assert!(error.to_string().contains(&format!("{} values for {count} vertices", count - 1)), "{error}");
-}
-
-#[test]
-fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("one.rrd");
-    let serve = Sink::Serve { web_port: None, grpc_port: None, history_bytes: 1 << 28 };
-    let mut both = options(&path, Layout { follow: true, ..Layout::default() });
-    both.sinks.push(serve);
-    let mut recorder = Recorder::open(both).unwrap();
-    let url = recorder.web_url().unwrap().to_owned();
-    assert!(url.starts_with("http://127.0.0.1:") && url.ends_with('/'), "{url}");
-    let scene = Scene::new(1);
-    let solved = scene.solve("Table 3", &PAPER_LIKE);
-    recorder.body(0, &scene.body).unwrap();
-    recorder.garment(0, &scene.garment).unwrap();
-    recorder.step(&step(0, &scene, &solved, &[])).unwrap();
-    let page = get(&url);
-    assert!(page.contains("200 OK") && page.contains("<html"), "{page}");
-    recorder.finish().unwrap();
-    assert!(inspect::read(&path).entities.contains_key(paths::DRAPE));
-}
-
-#[test]
-fn any_recording_is_served_and_what_is_none_is_refused() {
-    let folder = Folder::new();
-    let path = folder.file("viewed.rrd");
-    record_one(&path, 1);
-    let served = web::serve_file(&path, None, None).unwrap();
-    assert!(get(served.url()).contains("200 OK"));
-    for (name, content) in [("text.rrd", "not a recording"), ("empty.rrd", "")] {
-        let other = folder.file(name);
-        std::fs::write(&other, content).unwrap();
-        let error = web::serve_file(&other, None, None).err().unwrap();
-        assert!(matches!(error, RecordError::NotARecording { .. }), "{error}");
-    }
-    let error = web::serve_file(&folder.file("none.rrd"), None, None).err().unwrap();
-    assert!(matches!(error, RecordError::Unreadable { .. }), "{error}");
-}
-
-/// The answer to one HTTP request, headers and all.
-fn get(url: &str) -> String {
-    use std::io::{Read as _, Write as _};
-    let (host, path) = url.trim_start_matches("http://").split_once('/').unwrap();
-    let mut stream = std::net::TcpStream::connect(host).unwrap();
-    write!(stream, "GET /{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
-    let mut answer = Vec::new();
-    stream.read_to_end(&mut answer).unwrap();
-    String::from_utf8_lossy(&answer).into_owned()
 }
