@@ -14,8 +14,8 @@ mod served;
 use std::path::{Path, PathBuf};
 
 use partwise::record::{
-    Chosen, Colours, Layout, Overlay, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink, StepView,
-    Tab, When, WrinkleView, paths,
+    Chosen, Colours, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
+    StepView, Tab, When, WrinkleView, paths,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
