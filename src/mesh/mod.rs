@@ -27,7 +27,7 @@ mod scan;
 pub mod self_intersection;
 mod source;
 mod topology;
-mod triangle_crossing;
+pub(crate) mod triangle_crossing;
 pub(crate) mod winding;
 
 use glam::DVec3;

@@ -6,13 +6,26 @@
 //! decision is the sign of a determinant, taken exactly (Shewchuk: "Adaptive precision floating-point arithmetic and fast robust
 //! geometric predicates", Discrete & Computational Geometry 18, 1997; the `robust` crate).
 //!
+//! Most pairs that are asked about are neighbours in smooth cloth. What a plane through all that they share keeps apart by far more than
+//! rounding is not looked at exactly.
+//!
 //! Limits: a triangle without area crosses nothing in its own plane.
 
 use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
+/// Cosine of an angle that rounding does not take for none.
+const FOLDED: f64 = 0.9;
+
+/// And a sine that it does not take for none.
+const CLEARLY: f64 = 1e-6;
+
 /// Whether triangles `a` and `b` cross. Symmetric, and the same for any order of the corners.
-pub(super) fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+pub(crate) fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    !neighbours_apart(a, b) && cross_exactly(a, b)
+}
+
+fn cross_exactly(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
     let a_sides = a.map(|p| side(b, p));
     if same_side(a_sides) {
         return false;
@@ -25,6 +38,45 @@ pub(super) fn cross(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
         return overlap(a, b);
     }
     pierces(a, a_sides, b) || pierces(b, b_sides, a)
+}
+
+/// Whether both share an edge or a corner and surely nothing else; `false` says nothing.
+fn neighbours_apart(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    let is_shared = a.map(|p| b.contains(&p));
+    match is_shared.iter().filter(|shared| **shared).count() {
+        // Over an edge they cross only if one lies on the other: both heights above the edge point the same way.
+        2 => {
+            let own = is_shared.iter().position(|shared| !shared).unwrap_or(0);
+            let ([p, q], Some(other)) = ([a[(own + 1) % 3], a[(own + 2) % 3]], b.into_iter().find(|p| !a.contains(p)))
+            else {
+                return false;
+            };
+            let above = |corner: DVec3| (q - p).cross(corner - p);
+            let sure = |corner: DVec3| {
+                let most = (q - p).length_squared() * (corner - p).length_squared();
+                above(corner).length_squared() > CLEARLY * CLEARLY * most
+            };
+            let (one, two) = (above(a[own]), above(other));
+            let along = one.dot(two);
+            let folded = along > 0.0 && along * along >= FOLDED * FOLDED * one.length_squared() * two.length_squared();
+            !folded && sure(a[own]) && sure(other)
+        }
+        // About a corner: its other sides on either side of a plane through it.
+        1 => {
+            let at = is_shared.iter().position(|shared| *shared).unwrap_or(0);
+            let Some(other) = b.iter().position(|p| *p == a[at]) else { return false };
+            let sides = |t: [DVec3; 3], i: usize| [t[(i + 1) % 3] - t[i], t[(i + 2) % 3] - t[i]];
+            let (of_a, of_b) = (sides(a, at), sides(b, other));
+            let across = of_b[0] + of_b[1] - of_a[0] - of_a[1];
+            let ahead = |side: DVec3| {
+                let along = side.dot(across);
+                let most = side.length_squared() * across.length_squared();
+                along > 0.0 && along * along > CLEARLY * CLEARLY * most
+            };
+            of_b.into_iter().all(ahead) && of_a.into_iter().all(|side| ahead(-side))
+        }
+        _ => false,
+    }
 }
 
 /// Positive, zero or negative: where `p` lies against the plane of the triangle.
@@ -116,6 +168,15 @@ mod tests {
     }
 
     #[test]
+    fn neighbours_in_a_smooth_sheet_are_told_at_a_glance() {
+        let around = |k: u32| (f64::from(k) * std::f64::consts::FRAC_PI_3).sin_cos();
+        let corner = |k: u32| p(around(k).1, around(k).0, 0.1 * around(2 * k).0);
+        let [one, beside, next, opposite] = [0, 1, 2, 3].map(|k| [DVec3::ZERO, corner(k), corner(k + 1)]);
+        assert!([beside, next, opposite].iter().all(|other| neighbours_apart(one, *other)));
+        assert!(!neighbours_apart(one, [one[0], one[1], one[2] * 0.9]));
+    }
+
+    #[test]
     fn a_triangle_without_area_crosses_nothing_in_its_plane() {
         let thin = [p(1.0, 1.0, 0.0), p(2.0, 1.0, 0.0), p(3.0, 1.0, 0.0)];
         assert!(!cross(FLAT, thin) && !cross(thin, FLAT) && !cross(thin, thin));
@@ -133,6 +194,20 @@ mod tests {
             for order in [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
                 prop_assert_eq!(cross(order.map(|k| a[k]), b), expected);
                 prop_assert_eq!(cross(b, order.map(|k| a[k])), expected);
+            }
+        }
+
+        /// Neighbours that are told to be apart without looking exactly are so, flat or folded.
+        #[test]
+        fn neighbours_that_are_apart_at_a_glance_are_apart(
+            c in prop::array::uniform12(-1.0..1.0f64), flat in prop::sample::select(vec![1.0, 1e-3, 1e-9, 1e-14, 0.0]),
+        ) {
+            let at = |k: usize| p(c[k], c[k + 1], flat * c[k + 2]);
+            let spare = p(c[2], c[5], flat * c[8]);
+            for (a, b) in [([at(0), at(3), at(6)], [at(3), at(0), at(9)]), ([at(0), at(3), at(6)], [spare, at(9), at(0)])] {
+                if neighbours_apart(a, b) {
+                    prop_assert!(!cross_exactly(a, b) && !cross_exactly(b, a));
+                }
             }
         }
 

@@ -32,6 +32,7 @@
 //! gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
 
 mod gap;
+mod near;
 mod passage;
 mod place;
 mod search;
@@ -135,7 +136,7 @@ impl Proximity {
     ) -> Self {
         let least = (LEAST_OF_EDGE * skin.edge_m).min(LEAST_OF_ANY);
         let apart = Apart { thickness, bounds: [least, (MOST_OF_EDGE * skin.edge_m).max(least)] };
-        let passage = Passage::new(Arc::clone(&skin));
+        let passage = Passage::new(Arc::clone(&skin), REACH * apart.most());
         Self {
             skin,
             placed,
@@ -159,7 +160,7 @@ impl Proximity {
     pub(super) fn refresh_with(&mut self, x: &[DVec3], to_body: Vec<Gap>) {
         let Self { skin, placed, apart, friction, passage, .. } = self;
         let most = apart.most();
-        let mut gaps = search::gaps(skin, x, placed, apart, REACH * most);
+        let mut gaps = search::gaps(skin, passage.near(x), x, placed, apart, REACH * most);
         let crossing = passage.known(x);
         self.since = if crossing.len() < self.fewest { 0 } else { self.since + 1 };
         self.fewest = self.fewest.min(crossing.len());

@@ -1,7 +1,7 @@
 //! Steps that take no cloth through cloth.
 //!
 //! Where a step from x to x' ends, and a few times on its way where it is long, all pairs of triangles that cross are found, exactly
-//! (`mesh::self_intersection`). If one did not cross at x, a long step is refused, and tried again half as long; a short one is cut: the
+//! (`mesh::triangle_crossing`). If one did not cross at x, a long step is refused, and tried again half as long; a short one is cut: the
 //! corners that cross go back towards where they came from, half the way each time, and after a few times all the way, their
 //! neighbours with them. As x has no crossing, this ends.
 //!
@@ -11,10 +11,11 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::near::Near;
 use super::skin::Skin;
-use crate::mesh::TriMesh;
-use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::mesh::triangle_crossing::cross;
 
 /// A step whose longest move is more than so many edges is not cut but refused: to cut it would tear the cloth.
 const LONG: f64 = 1.0;
@@ -48,7 +49,7 @@ pub(crate) enum Looked {
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     skin: Arc<Skin>,
-    mesh: TriMesh,
+    near: Near,
     /// Pairs of triangles that cross where the last step ended; `None` before the first.
     crossing: Option<Vec<[u32; 2]>>,
     /// Whether each vertex is about what crosses there; empty where nothing does.
@@ -56,9 +57,16 @@ pub(super) struct Passage {
 }
 
 impl Passage {
-    pub(super) fn new(skin: Arc<Skin>) -> Self {
-        let mesh = TriMesh::new(Vec::new(), skin.triangles.clone());
-        Self { skin, mesh, crossing: None, tangled: Vec::new() }
+    /// None looked at yet; what is [`near`](Self::near) is so within `reach`, m.
+    pub(super) fn new(skin: Arc<Skin>, reach: f64) -> Self {
+        let near = Near::new(Arc::clone(&skin), reach);
+        Self { skin, near, crossing: None, tangled: Vec::new() }
+    }
+
+    /// Which triangles are near each other at `x`, m.
+    pub(super) fn near(&mut self, x: &[DVec3]) -> &Near {
+        self.near.hold_for(x);
+        &self.near
     }
 
     /// Pairs of triangles that cross at `x`, where the last step ended.
@@ -89,9 +97,11 @@ impl Passage {
 
     /// Pairs that cross at `x`, wherever the last step ended.
     pub(super) fn anew(&mut self, x: &[DVec3]) -> Vec<[u32; 2]> {
-        self.mesh.positions.clear();
-        self.mesh.positions.extend_from_slice(x);
-        let mut pairs = self_intersecting_pairs(&self.mesh);
+        self.near.hold_for(x);
+        let Self { skin, near, .. } = &*self;
+        let corners = |t: usize| skin.triangles[t].map(|v| x[v as usize]);
+        let crossing = near.pairs(0.0).filter(|&[t, u]| cross(corners(t), corners(u)));
+        let mut pairs: Vec<[u32; 2]> = crossing.map(|pair| pair.map(|t| t as u32)).collect();
         // A sliver turns over at a breath, and then crosses its neighbours by as much as it is high.
         pairs.retain(|pair| {
             let [a, b] = pair.map(|t| self.skin.triangles[t as usize]);

@@ -1,6 +1,6 @@
 //! Which places of a cloth are near each other.
 //!
-//! Candidates come from parry3d's bounding volume hierarchy over the triangles. A vertex faces the nearest point of a triangle; where
+//! Candidates are the triangles that are near each other ([`near`](super::near)). A vertex faces the nearest point of a triangle; where
 //! that lies on an edge or a corner, it faces the edge or the corner, and only if it does so from every triangle there: else another
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
@@ -11,7 +11,6 @@
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::query::details::closest_points_segment_segment_with_locations_nD as nearest_of_segments;
 use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
@@ -19,6 +18,7 @@ use rayon::prelude::*;
 
 use super::Apart;
 use super::gap::{Gap, Key, Kind, NONE};
+use super::near::Near;
 use super::skin::Skin;
 
 /// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.
@@ -36,26 +36,22 @@ const LEAST_GOAL: f64 = 1e-5;
 /// A share of a vertex's area that its edges stand for, of which it has some three and each faces several others.
 const OF_EDGES: f64 = 0.25;
 
-/// All gaps under `reach` (m) at `x`, sorted by key; `placed` is where nothing was folded yet. Same bits on any number of threads.
-pub(super) fn gaps(skin: &Skin, x: &[DVec3], placed: &[DVec3], apart: &Apart, reach: f64) -> Vec<Gap> {
-    let boxes: Vec<Aabb> = skin.triangles.iter().map(|t| bounds(t, x)).collect();
-    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+/// All gaps under `reach` (m) at `x`, sorted by key, among triangles that are `near`; `placed` is where nothing was folded yet. Same bits on
+/// any number of threads.
+pub(super) fn gaps(skin: &Skin, near: &Near, x: &[DVec3], placed: &[DVec3], apart: &Apart, reach: f64) -> Vec<Gap> {
     let look = Look { skin, x, placed, reach, apart };
-    let mut found: Vec<Found> = (0..skin.triangles.len())
-        .into_par_iter()
-        .with_min_len(64)
-        .flat_map_iter(|t| {
+    let mut found: Vec<Found> = near
+        .pairs(reach)
+        .flat_map_iter(|[t, u]| {
             let mut found = Vec::new();
-            for u in tree.intersect_aabb(&boxes[t].loosened(reach)) {
-                look.vertices_of(t, u as usize, &mut found);
-                if t < u as usize {
-                    look.edges_of(t, u as usize, &mut found);
-                }
-            }
+            look.vertices_of(t, u, &near.bounds(u).loosened(reach), &mut found);
+            look.vertices_of(u, t, &near.bounds(t).loosened(reach), &mut found);
+            look.edges_of(t, u, &mut found);
             found
         })
         .collect();
-    found.sort_unstable_by_key(|f| f.gap.key);
+    // Stable: of the same gap, seen from several triangles, the first counts, whatever the list was made for.
+    found.par_sort_by_key(|f| f.gap.key);
     let seen_from_all = |same: &[Found]| same.len() as u32 >= same[0].faces;
     found.chunk_by(|a, b| a.gap.key == b.gap.key).filter(|same| seen_from_all(same)).map(|same| same[0].gap).collect()
 }
@@ -75,12 +71,15 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The vertices that triangle `t` owns, against triangle `u`.
-    fn vertices_of(&self, t: usize, u: usize, found: &mut Vec<Found>) {
+    /// The vertices that triangle `t` owns, against triangle `u`, whose box loosened by the reach is `around`.
+    fn vertices_of(&self, t: usize, u: usize, around: &Aabb, found: &mut Vec<Found>) {
         let corners = self.skin.triangles[u];
         for v in self.skin.own_vertices[t].into_iter().filter(|v| *v != NONE && !corners.contains(v)) {
-            let [a, b, c] = corners.map(|v| self.x[v as usize]);
             let p = self.x[v as usize];
+            if !around.contains_local_point(p) {
+                continue;
+            }
+            let [a, b, c] = corners.map(|v| self.x[v as usize]);
             let (nearest, at) = Triangle::new(a, b, c).project_local_point_and_get_location(p, true);
             if p.distance_squared(nearest.point) > self.reach * self.reach {
                 continue;
@@ -128,6 +127,10 @@ impl Look<'_> {
             return;
         }
         let [p, q, r, s] = [a, b, c, d].map(|v| self.x[v as usize]);
+        let apart = (p.min(q) - r.max(s)).max(r.min(s) - p.max(q));
+        if apart.max_element() > self.reach {
+            return;
+        }
         let (SegmentPointLocation::OnEdge([p_share, q_share]), SegmentPointLocation::OnEdge([r_share, s_share])) =
             nearest_of_segments((&p, &q), (&r, &s))
         else {
@@ -171,9 +174,4 @@ impl Look<'_> {
         };
         one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize])
     }
-}
-
-fn bounds(triangle: &[u32; 3], x: &[DVec3]) -> Aabb {
-    let [a, b, c] = triangle.map(|v| x[v as usize]);
-    Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
