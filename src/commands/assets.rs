@@ -19,6 +19,12 @@ use super::measurements::MeasurementArgs;
 /// Triangles of the form as `run` makes it.
 const FORM_TRIANGLES: usize = partwise::shapes::body::DEFAULT_TRIANGLES;
 
+/// Sewing patterns of our own, by name.
+const PATTERNS: [(&str, &str); 2] = [
+    ("skirt", include_str!("../../assets/patterns/skirt.json")),
+    ("tshirt", include_str!("../../assets/patterns/tshirt.json")),
+];
+
 /// Arguments of `assets`.
 #[derive(Debug, Args)]
 pub(crate) struct AssetsArgs {
@@ -33,9 +39,9 @@ pub(crate) struct AssetsArgs {
 }
 
 impl AssetsArgs {
-    /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specs as TOML.
+    /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specs as TOML; sewing patterns as JSON.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
-        for folder in ["tables", "fabrics", "bodies", "garments"] {
+        for folder in ["tables", "fabrics", "bodies", "garments", "patterns"] {
             let folder = self.out.join(folder);
             std::fs::create_dir_all(&folder)
                 .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
@@ -53,6 +59,9 @@ impl AssetsArgs {
         self.text("tables/table-3.toml", &RangeTable::table_3().to_toml())?;
         for name in fabric::BUILT_IN {
             self.text(&format!("fabrics/{name}.toml"), &toml::to_string(&fabric::Fabric::by_name(name)?)?)?;
+        }
+        for (name, text) in PATTERNS {
+            self.text(&format!("patterns/{name}.json"), text)?;
         }
         console::result(&self.out.display().to_string());
         Ok(())

@@ -23,7 +23,7 @@ const TALL_ENOUGH: f64 = 0.8;
 /// The height found and the tallest axis, where no unit makes it a body's.
 pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
     if let (Some(unit), Some(up)) = (unit, up) {
-        return Ok(Frame::given(unit, up));
+        return Ok(given(raw, unit, up));
     }
     let Some((lo, hi)) = bounds(raw) else { return Err(0.0) };
     let extent = (hi - lo).to_array();
@@ -31,10 +31,7 @@ pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -
     let height = extent[up_found.index()];
     let unit_found = match unit {
         Some(unit) => unit,
-        None => [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm]
-            .into_iter()
-            .find(|unit| BODY_HEIGHT.contains(&(height * unit.metres())))
-            .ok_or(height)?,
+        None => unit_of_a_body(height).ok_or(height)?,
     };
     let tall = height * unit_found.metres();
     let axis = if up.is_some() { "given" } else { "guessed" };
@@ -44,6 +41,23 @@ pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -
          0.5 to 2.5 m tall)"
     );
     Ok(Frame { unit: unit_found, up: up_found, guessed: true, reason })
+}
+
+/// The unit in which a body of this height, as it stands in the file, is as tall as one.
+fn unit_of_a_body(height: f64) -> Option<Unit> {
+    [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm].into_iter().find(|unit| BODY_HEIGHT.contains(&(height * unit.metres())))
+}
+
+/// Both are given and taken as they are; where another unit would make it a body's, that is said.
+fn given(raw: &[DVec3], unit: Unit, up: Axis) -> Frame {
+    let mut frame = Frame::given(unit, up);
+    let height = bounds(raw).map_or(0.0, |(lo, hi)| (hi - lo)[up.index()]);
+    let tall = height * unit.metres();
+    if let Some(other) = unit_of_a_body(height).filter(|_| !BODY_HEIGHT.contains(&tall)) {
+        let would = height * other.metres();
+        frame.reason += &format!("; the body is {tall:.2} m tall in that, and would be {would:.2} m in {other}");
+    }
+    frame
 }
 
 /// Unit and up axis of a garment from its vertices as they stand in the file, where the body is known in metres, z up
