@@ -9,12 +9,11 @@ use super::*;
 const FAR: f64 = 8.0;
 
 /// What became of some starts.
-#[derive(Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default)]
 struct Ended {
     began_crossing: usize,
-    end_crossing: usize,
-    end_inside: usize,
-    not_at_rest: usize,
+    /// Those that did not end at rest without a crossing and with nothing inside, and what is told of each.
+    failed: Vec<String>,
 }
 
 /// Drapes a garment of so many vertices from the starts with these seeds: four garments, two fabrics.
@@ -32,11 +31,15 @@ fn from_starts(seeds: std::ops::RangeInclusive<u64>, vertices: usize) -> Ended {
         let fabric = Fabric::by_name(if seed % 3 == 0 { "cotton" } else { "interlock" }).unwrap();
         let draped = drape(&scene, &Settings { fabric, ..Settings::default() }, &mut unobserved).unwrap();
         let residual = draped.state.as_ref().unwrap().residual_over_weight;
-        let (crossing, inside) = (draped.self_intersecting_pairs, draped.penetrating_vertices);
         ended.began_crossing += usize::from(began > 0);
-        ended.end_crossing += usize::from(crossing > 0);
-        ended.end_inside += usize::from(inside > 0);
-        ended.not_at_rest += usize::from(residual >= 1e-3);
+        // What is told is what is there, counted once more.
+        let (crossing, inside) = (draped.self_intersecting_pairs, draped.penetrating_vertices);
+        assert_eq!(crossing, crossings(&scene.garment, &draped.positions), "seed {seed}");
+        if crossing + inside > 0 || residual >= 1e-3 {
+            let told = format!("seed {seed}: {began} crossed, {crossing} do, {inside} inside, residual {residual:.1e}");
+            eprintln!("{told}");
+            ended.failed.push(told);
+        }
     }
     ended
 }
@@ -45,14 +48,14 @@ fn from_starts(seeds: std::ops::RangeInclusive<u64>, vertices: usize) -> Ended {
 fn perturbed_starts_end_without_a_crossing() {
     let ended = from_starts(1..=8, 600);
     assert!(ended.began_crossing >= 3, "{ended:?}");
-    assert_eq!(ended, Ended { began_crossing: ended.began_crossing, ..Ended::default() });
+    assert!(ended.failed.is_empty(), "{ended:?}");
 }
 
 #[test]
 #[ignore = "some minutes: cargo test --release --test self_contact hundred -- --ignored"]
-fn of_a_hundred_perturbed_starts_four_at_most_end_crossing() {
+fn of_a_hundred_perturbed_starts_four_at_most_fail() {
     let ended = from_starts(1..=100, 1500);
     assert!(ended.began_crossing >= 40, "{ended:?}");
-    // Measured: four of the 45 that begin so, one of which comes to no rest.
-    assert!(ended.end_crossing <= 4 && ended.end_inside <= 1 && ended.not_at_rest <= 1, "{ended:?}");
+    // Measured: three, all of those that were moved far.
+    assert!(ended.failed.len() <= 4, "{ended:?}");
 }
