@@ -14,6 +14,7 @@
 //! Limits: the sign is exact for closed, consistently wound surfaces without self-intersections; where a body intersects
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
+mod curve;
 mod ends;
 mod lattice;
 mod tree;
@@ -21,6 +22,7 @@ mod worn;
 
 use std::sync::Arc;
 
+use curve::along_a_curve;
 use glam::DVec3;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
@@ -149,11 +151,16 @@ impl Body {
     /// [`nearest`](Self::nearest) of every point, in parallel; the order, and every bit, is that of the input.
     #[must_use]
     pub fn nearest_all(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
-        let chunk = |chunk: &[DVec3]| {
-            let found = self.tree.nearest(chunk);
-            chunk.iter().zip(found).map(|(x, near)| self.outermost(*x, self.bare(*x, near).0)).collect::<Vec<_>>()
+        let order = along_a_curve(points);
+        let chunk = |chunk: &[u32]| {
+            let here: Vec<DVec3> = chunk.iter().map(|&i| points[i as usize]).collect();
+            let found = self.tree.nearest(&here);
+            here.into_iter().zip(found).map(|(x, near)| self.outermost(x, self.bare(x, near).0)).collect::<Vec<_>>()
         };
-        points.par_chunks(CHUNK).flat_map_iter(chunk).collect()
+        let found: Vec<SurfacePoint> = order.par_chunks(CHUNK).flat_map_iter(chunk).collect();
+        let mut place = vec![0; points.len()];
+        (0..).zip(&order).for_each(|(k, &i): (usize, _)| place[i as usize] = k);
+        place.into_iter().map(|k| found[k]).collect()
     }
 
     /// The nearest point of the surface itself, and where on its triangle that is.
