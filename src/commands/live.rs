@@ -40,7 +40,7 @@ pub(crate) struct LiveArgs {
     #[command(flatten)]
     stages: StageArgs,
     /// Port of the page; 0 takes any free one [default: 7279, or any where that is taken]
-    #[arg(long, value_name = "PORT", help_heading = "Page")]
+    #[arg(long, visible_alias = "web-port", value_name = "PORT", help_heading = "Page")]
     port: Option<u16>,
     /// Address to listen on; others than this machine's own need a token, which is made and printed
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]

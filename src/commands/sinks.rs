@@ -67,7 +67,7 @@ pub(crate) struct SinkArgs {
     #[arg(long, value_enum, default_value_t = SeenFrom::Front)]
     pub(crate) seen_from: SeenFrom,
     /// Port of the served page; 0 takes any free one [default: 7278, or any where that is taken]
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, visible_alias = "port", value_name = "PORT")]
     pub(crate) web_port: Option<u16>,
     /// Port the served page reads the data from [default: any free one]
     #[arg(long, value_name = "PORT")]

@@ -16,7 +16,7 @@ pub(crate) struct ViewArgs {
     #[arg(value_name = "FILE.rrd")]
     file: PathBuf,
     /// Port of the page; 0 takes any free one [default: 7278, or any where that is taken]
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, visible_alias = "port", value_name = "PORT")]
     web_port: Option<u16>,
     /// Port the page reads the recording from [default: any free one]
     #[arg(long, value_name = "PORT")]

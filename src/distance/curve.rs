@@ -25,11 +25,7 @@ pub(super) fn along_a_curve(points: &[DVec3]) -> Vec<u32> {
     };
     let keyed = points.par_iter().enumerate().with_min_len(ALONE).map(|(i, p)| key(p) << 32 | i as u64);
     let mut order: Vec<u64> = keyed.collect();
-    if order.len() < ALONE {
-        order.sort_unstable()
-    } else {
-        order.par_sort_unstable()
-    }
+    order.par_sort_unstable();
     order.into_iter().map(|keyed| keyed as u32).collect()
 }
 

@@ -1,6 +1,6 @@
 //! What becomes of PARTs from one range table to another.
 
-use partwise::parts::Parts;
+use partwise::parts::{Parts, UNASSIGNED};
 
 /// PARTs of one table seen from another's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
@@ -14,7 +14,7 @@ pub(crate) struct Changes {
 }
 
 impl Changes {
-    /// From one cut of a garment to another. Vertices in no PART count as one more PART.
+    /// From one cut of a garment to another. Vertices in no PART count as one more PART where others go to it or come from it.
     pub(crate) fn between(from: &Parts, to: &Parts) -> Self {
         let pairs = from.part_of_vertex.iter().zip(&to.part_of_vertex);
         let mut meet: Vec<(u32, u32)> = pairs.map(|(&a, &b)| (a, b)).collect();
@@ -27,7 +27,7 @@ impl Changes {
             let first = pairs.partition_point(|p| p.0 < key);
             pairs.get(first + 1).is_none_or(|p| p.0 != key)
         };
-        let kept = meet.iter().filter(|&&(a, b)| alone(&meet, a) && alone(&back, b)).count();
+        let kept = meet.iter().filter(|&&(a, b)| a != UNASSIGNED && alone(&meet, a) && alone(&back, b)).count();
         Self { kept, split: runs(&meet), merged: runs(&back) }
     }
 }
@@ -42,12 +42,16 @@ mod tests {
 
     /// A strip of vertices at 0, 1, 2, ... cm from the body.
     fn cut(bounds_cm: &[f64]) -> Parts {
+        cut_by(&RangeTable::from_inner_bounds("t", bounds_cm).unwrap())
+    }
+
+    fn cut_by(table: &RangeTable) -> Parts {
         let n = 12_u32;
         let positions = (0..n).map(|i| DVec3::new(f64::from(i / 2), f64::from(i % 2), 0.0)).collect();
         let triangles = (0..n - 2).map(|i| [i, i + 1, i + 2]).collect();
         let topology = Topology::new(&TriMesh::new(positions, triangles));
         let distance: Vec<f64> = (0..n).map(|i| 0.01 * f64::from(i / 2) + 0.001).collect();
-        segment(&topology, &distance, &RangeTable::from_inner_bounds("t", bounds_cm).unwrap())
+        segment(&topology, &distance, table)
     }
 
     #[test]
@@ -58,5 +62,8 @@ mod tests {
         assert_eq!(Changes::between(&fine, &fine), Changes { kept: 4, split: 0, merged: 0 });
         // A bound that moves splits one and merges into its neighbour.
         assert_eq!(Changes::between(&cut(&[2.0]), &cut(&[3.0])), Changes { kept: 0, split: 1, merged: 1 });
+        // Vertices in no PART are none that is kept.
+        let none = cut_by(&RangeTable::from_bounds("none", &[50.0, 60.0]).unwrap());
+        assert_eq!(Changes::between(&none, &none), Changes::default());
     }
 }
