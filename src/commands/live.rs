@@ -7,17 +7,15 @@ use std::time::Duration;
 
 use clap::Args;
 use partwise::Job;
-use partwise::job::Against;
 use partwise::live::{LiveError, LiveOptions, LiveServer, random_token};
-use partwise::record::{RecordSummary, Recorder};
+use partwise::record::RecordSummary;
 use partwise::session::{Session, Workshop};
 
 use super::inputs::InputArgs;
 use super::sinks::{SeenFrom, SinkArgs};
-use super::solved::Solved;
 use super::stages::StageArgs;
 use super::work::use_threads;
-use super::{browser, console, interrupt};
+use super::{browser, console, followed, interrupt};
 
 /// How long to wait for news before Ctrl-C is looked at.
 const GLANCE: Duration = Duration::from_millis(100);
@@ -60,7 +58,7 @@ pub(crate) struct LiveArgs {
     /// Keep the session as a timeline of its edits, for `partwise view`
     #[arg(long, value_name = "FILE.rrd", help_heading = "Recording")]
     record: Option<PathBuf>,
-    /// Send the same to a viewer that is already running, e.g. rerun+http://127.0.0.1:9876/proxy
+    /// Send the same to a viewer elsewhere, which may come and go, e.g. rerun+http://127.0.0.1:9876/proxy
     #[arg(long, value_name = "URL", help_heading = "Recording")]
     connect: Option<String>,
     /// Where the views look from
@@ -90,15 +88,15 @@ impl LiveArgs {
             let (session, mut workshop) = (session.clone(), Workshop::new(self.input.meshes()));
             std::thread::spawn(move || session.work(&mut workshop))
         };
-        let recorder = self.record(&session);
+        let (recorder, shower) = (self.keep(&session), self.show(&session));
         while !interrupt::requested() && !worker.is_finished() {
             std::thread::sleep(GLANCE);
         }
         session.close();
         drop(server);
         let worked = worker.join();
-        let recorded = recorder.map(JoinHandle::join);
-        if worked.is_err() || matches!(recorded, Some(Err(_))) {
+        let (recorded, shown) = (recorder.map(JoinHandle::join), shower.map(JoinHandle::join));
+        if worked.is_err() || matches!(recorded, Some(Err(_))) || matches!(shown, Some(Err(_))) {
             anyhow::bail!("the session broke off; this is a mistake of the program");
         }
         if let Some(Ok(summary)) = recorded
@@ -162,49 +160,19 @@ impl LiveArgs {
         }
     }
 
-    /// Records every state that is finished, on a thread of its own: a viewer that reads slowly makes it skip some.
-    fn record(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
-        if self.record.is_none() && self.connect.is_none() {
-            return None;
-        }
-        let sinks = SinkArgs {
-            save: self.record.clone(),
-            no_save: self.record.is_none(),
-            connect: self.connect.clone(),
-            seen_from: self.seen_from,
-            ..SinkArgs::default()
-        };
+    /// Keeps every state that is finished in a file, on a thread of its own: a disk that is slow makes it skip some.
+    fn keep(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
+        let file = self.record.clone()?;
+        let sinks = SinkArgs { save: Some(file), seen_from: self.seen_from, ..SinkArgs::default() };
         let session = session.clone();
-        Some(std::thread::spawn(move || {
-            let recorded = follow(&session, &sinks);
-            if let Err(error) = &recorded {
-                console::error(error);
-                console::note("the session goes on without the recording");
-            }
-            recorded
-        }))
+        Some(std::thread::spawn(move || followed::keep(&session, &sinks)))
     }
-}
 
-/// Records what is finished until the session is closed.
-fn follow(session: &Session, sinks: &SinkArgs) -> anyhow::Result<RecordSummary> {
-    let mut recorder: Option<Recorder> = None;
-    let (mut serial, mut last, mut index) = (0, 0, 0);
-    while !session.is_closed() {
-        let now = session.newer_than(serial, GLANCE);
-        serial = now.serial;
-        let Some(finished) = now.finished.as_ref().filter(|f| f.state > last && f.state == now.state) else { continue };
-        last = finished.state;
-        let job = Job { accuracy: Against::None, ..(*now.job).clone() };
-        let measured =
-            job.measure(&finished.ground.loaded.scene, &finished.drape, None, &mut partwise::drape::unobserved)?;
-        let mut solved = Solved::of_session(&job, finished, measured)?;
-        let recorder = match &mut recorder {
-            Some(recorder) => recorder,
-            none => none.insert(Recorder::open(solved.record_options(sinks, false, true))?),
-        };
-        solved.record(recorder, index, false)?;
-        index += 1;
+    /// Shows them to a viewer elsewhere, on another: one that is slow, silent or gone keeps nobody waiting.
+    fn show(&self, session: &Session) -> Option<JoinHandle<()>> {
+        let connect = Some(self.connect.clone()?);
+        let sinks = SinkArgs { no_save: true, connect, seen_from: self.seen_from, ..SinkArgs::default() };
+        let session = session.clone();
+        Some(std::thread::spawn(move || followed::show(&session, &sinks)))
     }
-    Ok(recorder.map(Recorder::finish).transpose()?.unwrap_or_default())
 }

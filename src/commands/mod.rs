@@ -10,6 +10,7 @@ mod console;
 mod cusick;
 mod fabrics;
 mod failure;
+mod followed;
 mod inputs;
 mod interrupt;
 mod live;

@@ -248,6 +248,14 @@ impl Recorder {
         self.timed(|open| scatter::scatter(open, when, picture, points))
     }
 
+    /// Sends what is on its way, where someone watches.
+    ///
+    /// # Errors
+    /// A file that cannot be written, a viewer that went away.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        self.timed(|open| open.flush_live())
+    }
+
     /// Sends what is left, closes the file and gives it its name.
     ///
     /// # Errors
