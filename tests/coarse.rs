@@ -3,10 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 use glam::{DMat3, DQuat, DVec3};
 use partwise::drape::unobserved;
 use partwise::job::{Against, Job};
+use partwise::mechanics::refine::Stop;
 use partwise::mesh::coarse::Coarse;
 use partwise::mesh::{RestShape, Topology, TriMesh};
 use partwise::range_table::TableRule;
@@ -160,6 +162,10 @@ fn what_is_no_manifold_or_far_from_its_rest_shape_has_none() {
     let mesh = tube(0.2, 0.6, 60, 33);
     let mut rest = RestShape::from_edges(&mesh).unwrap();
     rest.corners[7] = rest.corners[7].map(|p| 0.2 * p);
+    assert!(Coarse::new(&mesh, &rest, 400).is_some(), "the point of a dart");
+    for row in 0..32 {
+        rest.corners[120 * row + 7] = rest.corners[120 * row + 9].map(|p| 0.2 * p);
+    }
     assert!(Coarse::new(&mesh, &rest, 400).is_none(), "a seam that stands open");
     let mut three = mesh.clone();
     three.triangles.push([0, 1, 300]);
@@ -182,4 +188,39 @@ fn a_preview_that_begins_on_it_hangs_as_its_parts_can_whatever_the_threads() {
     let figures = job.measure(&input.scene, &one, None, &mut unobserved).unwrap().figures;
     let (error, bound) = (figures.rms_mm.unwrap(), figures.own_affine_rms_mm.unwrap());
     assert!(figures.penetrating_vertices == 0 && error <= 1.5 * bound + 3.0, "{error} mm, the bound is {bound} mm");
+}
+
+#[test]
+fn a_large_garment_rests_on_it_first_whatever_the_threads_and_may_be_stopped_there() {
+    let job = Job { scene: partwise::SceneSpec::new("form", "flared-skirt@6000"), ..Job::default() };
+    let scene = job.scene.load().unwrap().scene;
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut told = Vec::new();
+        let draped = pool.install(|| {
+            job.drape(&scene, &mut |step| {
+                told.push(step.iteration);
+                ControlFlow::Continue(())
+            })
+        });
+        (draped.unwrap(), told)
+    };
+    let ((one, told), (two, _)) = (on(1), on(2));
+    assert_eq!(one.positions, two.positions);
+    let state = one.state.as_ref().unwrap();
+    assert!(state.stop == Stop::Converged && one.self_intersecting_pairs == 0 && one.penetrating_vertices == 0);
+    // What the coarse garment does is told as step 0 of the full one: its start, twenty steps at most, its rest, and the full one's start.
+    let before = told.iter().filter(|iteration| **iteration == 0).count();
+    assert!((4..=23).contains(&before) && state.steps <= 12, "{before} before, then {}", state.steps);
+
+    let mut seen = 0;
+    let stopped = job.drape(&scene, &mut |step| {
+        assert_eq!(step.positions.len(), scene.garment.vertex_count());
+        seen += 1;
+        if seen > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    let stopped = stopped.unwrap();
+    assert_eq!(stopped.state.unwrap().stop, Stop::Interrupted);
+    assert_eq!(stopped.preview, one.preview);
+    assert_eq!(seen, 4, "once more where the full garment begins");
 }

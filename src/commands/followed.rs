@@ -12,7 +12,7 @@ use super::sinks::SinkArgs;
 use super::solved::Solved;
 
 /// How long to wait for news before it is looked whether the session goes on.
-const GLANCE: Duration = Duration::from_millis(100);
+pub(super) const GLANCE: Duration = Duration::from_millis(100);
 
 /// How often it is looked whether a viewer is still there, or there again.
 const AGAIN: Duration = Duration::from_secs(2);

@@ -3,7 +3,6 @@
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use clap::Args;
 use partwise::Job;
@@ -11,14 +10,13 @@ use partwise::live::{LiveError, LiveOptions, LiveServer, random_token};
 use partwise::record::RecordSummary;
 use partwise::session::{Session, Workshop};
 
+use super::followed::GLANCE;
 use super::inputs::InputArgs;
 use super::sinks::{SeenFrom, SinkArgs};
 use super::stages::StageArgs;
 use super::work::use_threads;
 use super::{browser, console, followed, interrupt};
 
-/// How long to wait for news before Ctrl-C is looked at.
-const GLANCE: Duration = Duration::from_millis(100);
 /// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again.
 const PORT: u16 = 7279;
 

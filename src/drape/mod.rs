@@ -3,6 +3,7 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
+mod approach;
 mod error;
 mod layers;
 mod let_go;
@@ -23,11 +24,12 @@ use crate::mechanics::refine::{self, Observer, Stop};
 use crate::parts::Parts;
 use crate::range_table::RangeTable;
 pub use crate::scene::Scene;
+pub(crate) use approach::approach;
 pub use error::DrapeError;
 pub use let_go::LetGo;
 pub(crate) use let_go::{Released, let_go};
 pub(crate) use levels::Levels;
-pub(crate) use parts::{ENOUGH, StageTwo, approach, stage_one, stage_two, told};
+pub(crate) use parts::{ENOUGH, StageTwo, stage_one, stage_two, told};
 pub(crate) use pieces::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
 
@@ -195,7 +197,8 @@ fn moved(
     let folds = folds_of(settings, cloth, &stage);
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
     let Released { cloth, refined, let_go } = timed(&mut times.refine, || {
-        let start = approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, &on);
+        let start =
+            approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, (&on, &mut *observer));
         let refined = refine_from(scene, settings, &levels.cloth, Some(ground), (start, StartsFrom::Parts), observer)?;
         let_go(scene, settings, refined, observer)
     })?;

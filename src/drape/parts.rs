@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::levels::{Level, Levels};
-use super::{DrapeError, Model, PartOutcome, Refine, Settings};
+use super::{DrapeError, Model, PartOutcome, Settings};
 use crate::distance::SurfacePoint;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Given};
 use crate::mechanics::paper::{self, Cut, PartForces};
@@ -157,36 +157,4 @@ fn through_levels(
     // That they go on moving after so few steps is meant.
     solved.warnings.clear();
     Ok(solved)
-}
-
-/// Extent of the PARTs that a drape goes on with from its table's, before the steps at full resolution, m: about half a fold, so that they
-/// make the folds which rings leave to tension field theory. Without them a skirt takes 21 steps from Table 3 and a dress 12; with
-/// them 12 and 2, each dearer than ten of these.
-const APPROACH_EXTENT: f64 = 0.12;
-
-/// Steps of these PARTs: the later ones bring less than a step at full resolution does.
-const APPROACH_STEPS: usize = 10;
-
-/// The same model once more, by finer PARTs, from where stage two ended; where that fails, nothing is lost.
-pub(crate) fn approach(
-    scene: &Scene,
-    settings: &Settings,
-    levels: &Levels,
-    surface: &[SurfacePoint],
-    parts: &Parts,
-    start: &[DVec3],
-    asked: Asked<'_>,
-) -> Vec<DVec3> {
-    let Model::Coupled(options) = &settings.model else { return start.to_vec() };
-    let Scene { garment: mesh, topology, body, .. } = scene;
-    let finer = parts.cut_to_extent(mesh, topology, APPROACH_EXTENT);
-    if settings.refine != Refine::Converged || finer.len() == parts.len() {
-        return start.to_vec();
-    }
-    let options = CoupledOptions { max_steps: APPROACH_STEPS, motion: coupled::Motion::Affine, ..options.clone() };
-    let garment = Garment { mesh, topology, cloth: &levels.cloth };
-    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
-    let given = Given { distance_m: &distance, least_share: 0.0 };
-    let solved = coupled::solve_given(&garment, body, &finer, start, given, &options, &mut |_| asked());
-    solved.map_or_else(|_| start.to_vec(), |result| result.positions)
 }

@@ -158,6 +158,10 @@ mod tests {
     fn what_is_given_is_not_guessed_and_the_impossible_is_refused() {
         assert_eq!(guess_frame(&t_pose(66.0), Some(Unit::In), None).unwrap().unit, Unit::In);
         assert_eq!(guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X)).unwrap(), Frame::given(Unit::M, Axis::X));
+        // Taken as it is given, and said where another unit would make it a body.
+        let tiny = guess_frame(&t_pose(16.8), Some(Unit::Cm), Some(Axis::Y)).unwrap();
+        assert_eq!((tiny.unit, tiny.up), (Unit::Cm, Axis::Y));
+        assert!(tiny.reason.contains("0.17 m tall in that, and would be 1.68 m in dm"), "{}", tiny.reason);
         assert!((guess_frame(&t_pose(40.0), None, None).unwrap_err() - 40.0).abs() < 1e-12);
     }
 

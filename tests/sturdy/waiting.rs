@@ -144,3 +144,52 @@ fn whoever_is_ended_at_once_leaves_nothing_half_written() {
         assert_eq!(bench.names(), ["body.obj", "garment.obj"]);
     }
 }
+
+#[test]
+fn a_session_is_shown_to_a_viewer_that_comes_late_and_to_one_that_comes_back() {
+    let bench = Bench::new();
+    bench.drape(&["--save", "any.rrd"]).with(0, &[]);
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
+    // What serves a recording takes one as well.
+    let viewer = || {
+        let mut command = bench.command();
+        command.args(["view", "any.rrd", "--port", "0", "--grpc-port", &port]);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let mut command = bench.command();
+    command.arg("live").args(super::SCENE).args(["--port", "0", "--record", "kept.rrd"]);
+    command.args(["--connect", &format!("rerun+http://127.0.0.1:{port}/proxy")]);
+    let mut session = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let said = std::io::BufRead::lines(std::io::BufReader::new(session.stderr.take().unwrap()));
+    let (tell, told) = std::sync::mpsc::channel();
+    std::thread::spawn(move || said.map_while(Result::ok).try_for_each(|line| tell.send(line)));
+    let mut all = Vec::new();
+    let mut until = |words: &str| {
+        while !all.last().is_some_and(|line: &String| line.contains(words)) {
+            let Ok(line) = told.recv_timeout(Duration::from_secs(60)) else { return Err(format!("{words}: {all:?}")) };
+            all.push(line);
+        }
+        Ok(())
+    };
+    let heard = (|| {
+        until("a viewer that is there later sees it")?;
+        let mut there = viewer();
+        let came = until("a viewer is there");
+        there.kill().unwrap();
+        there.wait().unwrap();
+        came?;
+        // Nothing is edited: that nobody is there any more is found out all the same.
+        until("a viewer that is there later sees it")?;
+        let mut again = viewer();
+        let came = until("a viewer is there");
+        let _ = Command::new("kill").args(["-INT", &session.id().to_string()]).status().unwrap();
+        let kept = until("recording: kept.rrd");
+        again.kill().unwrap();
+        again.wait().unwrap();
+        came.and(kept)
+    })();
+    let _ = session.kill();
+    let _ = session.wait().unwrap();
+    assert_eq!(heard, Ok(()));
+    assert!(bench.path("kept.rrd").is_file());
+}

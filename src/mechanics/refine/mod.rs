@@ -18,6 +18,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 pub use super::newton::{Record, SolveError, Solver};
+pub(crate) use settle::untangled;
 pub use settle::{refine, refine_with};
 
 /// When to stop, and how carefully to go.

@@ -214,6 +214,17 @@ fn settle(
     })
 }
 
+/// `x` relaxed until nothing crosses, in a few rounds; `None` where something still does.
+pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>) -> Option<Vec<DVec3>> {
+    contacts.proximity = Some(cloth.proximity());
+    contacts.update(&x);
+    contacts.refresh(&x);
+    let mut descent = Descent::new(cloth, contacts, x, RefineOptions::default().damping);
+    descent.untangle(UNTANGLING, RELAXING);
+    let left = descent.contacts.proximity.as_mut().map_or(0, |itself| itself.crossings(&descent.x));
+    (left == 0).then_some(descent.x)
+}
+
 /// Whether a residual is that of cloth which nothing carries yet.
 fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
     let free = cloth.masses.iter().zip(&cloth.held).filter(|(_, held)| !**held);

@@ -17,6 +17,7 @@ use super::{EditError, Session};
 use crate::drape::{Levels, Model, Refine, StageTwo, approach};
 use crate::fabric::Fabric;
 use crate::job::Job;
+use crate::mechanics::refine::Step;
 use crate::said::said;
 use crate::shapes::MeshCache;
 
@@ -152,7 +153,8 @@ impl Workshop {
             let asked = || ask(session, target.state);
             let scene = &sectioned.ground.loaded.scene;
             let surface = &sectioned.ground.distances.surface;
-            let start = approach(scene, settings, levels, surface, &stage.parts, &stage.positions, &asked);
+            let told = &mut |_: &Step<'_>| asked();
+            let start = approach(scene, settings, levels, surface, &stage.parts, &stage.positions, (&asked, told));
             return self.settle(session, target, sectioned, levels, start, false);
         }
         self.finish(session, target, sectioned, levels.as_deref());
