@@ -18,8 +18,9 @@
 use faer::{Mat, Side};
 use glam::DVec3;
 
+use super::columns::{Columns, dot, flat, vectors};
 use super::energy::{Cloth, Contacts, Held, HessianLayout, Scratch};
-use super::newton::{SolveError, dot};
+use super::newton::SolveError;
 
 /// Steps of Lanczos' method for whoever asks whether a rest lasts.
 pub(crate) const STEPS: usize = 40;
@@ -106,7 +107,7 @@ impl Curved<'_> {
         mut solve: impl FnMut(&mut [DVec3]) -> Result<(), SolveError>,
     ) -> Result<Ritz, SolveError> {
         let n = self.layout.order.len();
-        let (mut basis, mut turned): (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>) = (Vec::new(), Vec::new());
+        let (mut basis, mut turned) = (Columns::default(), Columns::default());
         let mut scratch = Scratch::default();
         let mut matrix = Mat::<f64>::zeros(until.steps.min(3 * n), until.steps.min(3 * n));
         // A start that leans to no side, the same on every machine: multiples of the golden section.
@@ -117,28 +118,23 @@ impl Curved<'_> {
         while steps < matrix.nrows() {
             let mut w = r.clone();
             solve(&mut w)?;
-            // Twice is enough (Parlett, section 6.9).
-            for _ in 0..2 {
-                for (v, u) in basis.iter().zip(&turned) {
-                    let share = dot(&w, u);
-                    add(&mut w, v, -share);
-                    add(&mut r, u, -share);
-                }
+            let (mut w, mut v) = (flat(&w), flat(&r));
+            // Of the last two first, which in exact arithmetic are all there is to take off; then of all, what rounding has left.
+            for first in [steps.saturating_sub(2), 0] {
+                let shares = turned.times(first, &w);
+                basis.less(first, &shares, &mut w);
+                turned.less(first, &shares, &mut v);
             }
-            let length = dot(&w, &r).max(0.0).sqrt();
+            let length = dot(&w, &v).max(0.0).sqrt();
             if length <= 1e-12 || length.is_nan() {
                 break;
             }
-            for (w, r) in w.iter_mut().zip(&mut r) {
-                *w /= length;
-                *r /= length;
-            }
-            let hv = self.turned(&w, &mut scratch);
+            w.iter_mut().chain(&mut v).for_each(|x| *x /= length);
+            r = self.turned(&vectors(&w), &mut scratch);
             basis.push(w);
-            turned.push(std::mem::replace(&mut r, hv));
+            turned.push(v);
             // The whole row, not two of its numbers: H is by differences, and only nearly symmetric.
-            for (j, v) in basis.iter().enumerate() {
-                let value = dot(v, &r);
+            for (j, value) in basis.times(0, &flat(&r)).into_iter().enumerate() {
                 matrix[(steps, j)] = value;
                 matrix[(j, steps)] = value;
             }
@@ -158,11 +154,8 @@ impl Curved<'_> {
         let values: Vec<f64> = (0..steps).map(|i| eigen.S()[i]).collect();
         let wanted = values.iter().filter(|l| **l < NEGATIVE).count().max(1);
         let vector = |k: usize| {
-            let mut vector = vec![DVec3::ZERO; n];
-            for (i, v) in basis.iter().enumerate() {
-                add(&mut vector, v, eigen.U()[(i, k)]);
-            }
-            vector
+            let shares: Vec<f64> = (0..steps).map(|i| eigen.U()[(i, k)]).collect();
+            vectors(&basis.sum(&shares))
         };
         let vectors = (0..wanted).map(|k| if k < steps { vector(k) } else { vec![DVec3::ZERO; n] }).collect();
         Ok(Ritz { values, vectors })
@@ -173,11 +166,4 @@ impl Curved<'_> {
 fn lowest_of(matrix: &Mat<f64>, steps: usize) -> f64 {
     let small = matrix.submatrix(0, 0, steps, steps).to_owned();
     small.self_adjoint_eigenvalues(Side::Lower).map_or(0.0, |values| values[0])
-}
-
-/// a ← a + t b.
-fn add(a: &mut [DVec3], b: &[DVec3], t: f64) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a += *b * t;
-    }
 }

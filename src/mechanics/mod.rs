@@ -1,5 +1,6 @@
 //! Mechanics: what moves the PARTs and the cloth.
 
+mod columns;
 pub mod coupled;
 pub(crate) mod curvature;
 pub mod cusick;
