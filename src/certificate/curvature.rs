@@ -62,9 +62,7 @@ impl Curvature {
         let mut step = curved.gather(&forces.rest);
         step.iter_mut().for_each(|d| *d = -*d);
         solver.solve(&layout.pattern, &blocks, &damped, true, &mut step)?;
-        let ritz = curved.lanczos(Until { steps: STEPS, clear: f64::NEG_INFINITY }, |r| {
-            solver.solve_again(&layout.pattern, &blocks, &damped, r)
-        })?;
+        let ritz = curved.lanczos(Until { steps: STEPS, clear: None }, &mut solver);
         let softest = &ritz.vectors[0];
         let turned = curved.turned(softest, &mut Scratch::default());
         let mass: f64 =

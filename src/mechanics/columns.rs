@@ -3,7 +3,6 @@
 //! Each goes over memory once, a piece of w that stays in the processor's nearest cache at a time, and the pieces go over the threads. They
 //! are cut the same way whatever their number, and sums are taken in their order, hence the same bits.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// Numbers of a piece: 24 kB of w.
@@ -61,16 +60,6 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// The coordinates of vectors, one after the other.
-pub(super) fn flat(vectors: &[DVec3]) -> Vec<f64> {
-    vectors.iter().flat_map(|v| v.to_array()).collect()
-}
-
-/// Vectors from their coordinates.
-pub(super) fn vectors(flat: &[f64]) -> Vec<DVec3> {
-    flat.as_chunks::<3>().0.iter().map(|v| DVec3::from_array(*v)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,7 +68,8 @@ mod tests {
     fn what_is_taken_off_leaves_a_vector_orthogonal_to_all() {
         let n = 3 * PIECE + 5;
         // Half a wave, a whole one, ...: orthogonal as they are, each of length √(n/2).
-        let wave = |k: usize| (0..n).map(|i| ((k as f64 + 1.0) * (i as f64 + 0.5) / n as f64 * std::f64::consts::PI).sin());
+        let wave =
+            |k: usize| (0..n).map(|i| ((k as f64 + 1.0) * (i as f64 + 0.5) / n as f64 * std::f64::consts::PI).sin());
         let length = (n as f64 / 2.0).sqrt();
         let mut columns = Columns::default();
         (0..4).for_each(|k| columns.push(wave(k).map(|x| x / length).collect()));

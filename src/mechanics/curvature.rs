@@ -2,14 +2,16 @@
 //!
 //! H is the Hessian of gravity, membrane and bending as it is, by differences of the gradient, with what contact and friction hold as
 //! they hold it there. B is any positive matrix near to it that is factorised: Newton's own, where what is negative was taken away.
-//! Lanczos' method on B⁻¹H in the inner product of B finds the smallest λ with H z = λ B z; most of the spectrum lies at one, so what
-//! is soft or negative stands apart and comes first. By Sylvester's law there are as many negative λ as H has ways on which the energy
-//! falls, whatever B.
+//! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y; most of the spectrum lies near one, so
+//! what is soft or negative stands apart and comes first. By Sylvester's law there are as many negative λ as H has ways on which the energy
+//! falls, whatever B, so that of single precision does. (On B⁻¹H in the inner product of B, which needs no halves of a solve, each vector
+//! and B times it part by a third more every step, and after some 28 nothing is left but rounding.)
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | H, B | Hessian, and what Newton takes for it | N/m |
 //! | λ | curvature relative to B | – |
+//! | L | B's factor | √(N/m) |
 //! | z | a way out, of every free vertex, of length one by B | m |
 //!
 //! Source: Lanczos' method for a pencil (Parlett: "The Symmetric Eigenvalue Problem", chapter 15), with full reorthogonalisation. Limits:
@@ -18,9 +20,9 @@
 use faer::{Mat, Side};
 use glam::DVec3;
 
-use super::columns::{Columns, dot, flat, vectors};
+use super::columns::{Columns, dot};
 use super::energy::{Cloth, Contacts, Held, HessianLayout, Scratch};
-use super::newton::SolveError;
+use super::newton::Solver;
 
 /// Steps of Lanczos' method for whoever asks whether a rest lasts.
 pub(crate) const STEPS: usize = 40;
@@ -34,17 +36,22 @@ const DIFFERENCE: f64 = 1e-6;
 /// λ above this is no way out but rounding.
 pub(crate) const NEGATIVE: f64 = -1e-6;
 
-/// Steps after which the lowest λ is asked for again, and the change of it that ends a search for a negative one.
+/// What is left of a step over what it was, under which it is rounding in single precision: the ways there are have been found.
+const EXHAUSTED: f64 = 1e-6;
+
+/// Steps after which the lowest λ is asked for again, and the changes of it that end a search: one that leads out need not be known well;
+/// of none one must be sure. Of thirty searches none that had changed by less than a hundredth found a way out later.
 const AGAIN: usize = 4;
 const SETTLED: f64 = 0.05;
+const SURE: f64 = 0.01;
 
 /// How long to search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Until {
     /// Steps at most.
     pub(crate) steps: usize,
-    /// A λ under this, and settled, is enough.
-    pub(crate) clear: f64,
+    /// λ under which a way leads out, if that alone is asked: once it has settled which side the lowest is on, that is enough.
+    pub(crate) clear: Option<f64>,
 }
 
 /// H, over the free vertices in elimination order.
@@ -100,48 +107,43 @@ impl Curved<'_> {
         turned
     }
 
-    /// As many steps as asked for, with `solve` for B⁻¹ r in place; each costs that and two gradients.
-    pub(crate) fn lanczos(
-        &self,
-        until: Until,
-        mut solve: impl FnMut(&mut [DVec3]) -> Result<(), SolveError>,
-    ) -> Result<Ritz, SolveError> {
+    /// As many steps as asked for, by the factor in `solver`; each costs a solve with it and two gradients.
+    pub(crate) fn lanczos(&self, until: Until, solver: &mut Solver) -> Ritz {
         let n = self.layout.order.len();
-        let (mut basis, mut turned) = (Columns::default(), Columns::default());
+        let mut basis = Columns::default();
         let mut scratch = Scratch::default();
         let mut matrix = Mat::<f64>::zeros(until.steps.min(3 * n), until.steps.min(3 * n));
         // A start that leans to no side, the same on every machine: multiples of the golden section.
         let start = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
-        let mut r: Vec<DVec3> =
+        let first: Vec<DVec3> =
             (0..n).map(|i| DVec3::new(start(3 * i + 1), start(3 * i + 2), start(3 * i + 3))).collect();
+        let mut y = solver.lower(&first);
         let (mut steps, mut before) = (0, 0.0);
         while steps < matrix.nrows() {
-            let mut w = r.clone();
-            solve(&mut w)?;
-            let (mut w, mut v) = (flat(&w), flat(&r));
+            let whole = dot(&y, &y).sqrt();
             // Of the last two first, which in exact arithmetic are all there is to take off; then of all, what rounding has left.
             for first in [steps.saturating_sub(2), 0] {
-                let shares = turned.times(first, &w);
-                basis.less(first, &shares, &mut w);
-                turned.less(first, &shares, &mut v);
+                let shares = basis.times(first, &y);
+                basis.less(first, &shares, &mut y);
             }
-            let length = dot(&w, &v).max(0.0).sqrt();
-            if length <= 1e-12 || length.is_nan() {
+            let length = dot(&y, &y).sqrt();
+            // Also where nothing was there.
+            if length.is_nan() || length <= EXHAUSTED * whole {
                 break;
             }
-            w.iter_mut().chain(&mut v).for_each(|x| *x /= length);
-            r = self.turned(&vectors(&w), &mut scratch);
-            basis.push(w);
-            turned.push(v);
+            y.iter_mut().for_each(|y| *y /= length);
+            let turned = self.turned(&solver.upper(&y), &mut scratch);
+            basis.push(std::mem::replace(&mut y, solver.lower(&turned)));
             // The whole row, not two of its numbers: H is by differences, and only nearly symmetric.
-            for (j, value) in basis.times(0, &flat(&r)).into_iter().enumerate() {
+            for (j, value) in basis.times(0, &y).into_iter().enumerate() {
                 matrix[(steps, j)] = value;
                 matrix[(j, steps)] = value;
             }
             steps += 1;
             if steps % AGAIN == 0 {
                 let lowest = lowest_of(&matrix, steps);
-                if lowest < until.clear && lowest > (1.0 + SETTLED) * before {
+                let still = |clear: f64| if lowest < clear { SETTLED } else { SURE };
+                if until.clear.is_some_and(|clear| (lowest - before).abs() < still(clear) * before.abs()) {
                     break;
                 }
                 before = lowest;
@@ -149,16 +151,16 @@ impl Curved<'_> {
         }
         let small = matrix.submatrix(0, 0, steps, steps).to_owned();
         let Ok(eigen) = small.self_adjoint_eigen(Side::Lower) else {
-            return Ok(Ritz { values: Vec::new(), vectors: vec![vec![DVec3::ZERO; n]] });
+            return Ritz { values: Vec::new(), vectors: vec![vec![DVec3::ZERO; n]] };
         };
         let values: Vec<f64> = (0..steps).map(|i| eigen.S()[i]).collect();
         let wanted = values.iter().filter(|l| **l < NEGATIVE).count().max(1);
-        let vector = |k: usize| {
+        let mut vector = |k: usize| {
             let shares: Vec<f64> = (0..steps).map(|i| eigen.U()[(i, k)]).collect();
-            vectors(&basis.sum(&shares))
+            if k < steps { solver.upper(&basis.sum(&shares)) } else { vec![DVec3::ZERO; n] }
         };
-        let vectors = (0..wanted).map(|k| if k < steps { vector(k) } else { vec![DVec3::ZERO; n] }).collect();
-        Ok(Ritz { values, vectors })
+        let vectors = (0..wanted).map(&mut vector).collect();
+        Ritz { values, vectors }
     }
 }
 

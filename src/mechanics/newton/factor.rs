@@ -248,13 +248,39 @@ fn extend<T: Precision>(
     }
 }
 
-/// Right side and solution of a factor's solve: see `substitute.rs`.
+/// Right sides and solutions: see `substitute.rs`.
 impl<T: Precision> Factor<T> {
+    /// L⁻ᵀ L⁻¹ x, in place.
     pub(super) fn solve(&mut self, forest: &Forest, x: &mut [DVec3]) {
+        self.take(forest, x);
+        self.forward(forest);
+        self.backward(forest);
+        self.give(forest, x);
+    }
+
+    /// L⁻¹ x, in the factor's own order.
+    pub(super) fn lower(&mut self, forest: &Forest, x: &[DVec3]) -> Vec<f64> {
+        self.take(forest, x);
+        self.forward(forest);
+        self.side.iter().map(|s| s.wide()).collect()
+    }
+
+    /// L⁻ᵀ y, of what is in the factor's own order.
+    pub(super) fn upper(&mut self, forest: &Forest, y: &[f64]) -> Vec<DVec3> {
+        self.side.iter_mut().zip(y).for_each(|(s, y)| *s = T::of(*y));
+        self.backward(forest);
+        let mut x = vec![DVec3::ZERO; forest.order.len()];
+        self.give(forest, &mut x);
+        x
+    }
+
+    fn take(&mut self, forest: &Forest, x: &[DVec3]) {
         for (s, &old) in self.side.chunks_exact_mut(3).zip(&forest.order) {
             s.copy_from_slice(&x[old as usize].to_array().map(T::of));
         }
-        self.substitute(forest);
+    }
+
+    fn give(&self, forest: &Forest, x: &mut [DVec3]) {
         for (s, &old) in self.side.chunks_exact(3).zip(&forest.order) {
             x[old as usize] = DVec3::new(s[0].wide(), s[1].wide(), s[2].wide());
         }

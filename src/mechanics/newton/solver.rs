@@ -127,36 +127,16 @@ impl Solver {
         done
     }
 
-    /// Solves once more with the matrix of the last [`solve`](Self::solve), whose factor is kept; where single precision does not do for
-    /// this right side, it is factorised in double.
-    ///
-    /// # Errors
-    /// As there.
-    pub(crate) fn solve_again(
-        &mut self,
-        pattern: &Pattern,
-        blocks: &[DMat3],
-        diagonal: &[f64],
-        x: &mut [DVec3],
-    ) -> Result<(), SolveError> {
-        let matrix = Matrix { blocks, diagonal };
-        if let Some(single) = &mut self.single {
-            if mended(single, &self.forest, pattern, matrix, x) {
-                return Ok(());
-            }
-            self.single = None;
-            self.factorise_in_double(pattern, matrix, true)?;
-        }
-        self.double.solve(&self.forest, x);
-        Ok(())
+    /// L⁻¹ x with the factor of the last [`solve`](Self::solve), L Lᵀ being a positive matrix near to that one; in an order of its own.
+    pub(crate) fn lower(&mut self, x: &[DVec3]) -> Vec<f64> {
+        let Self { forest, single, double } = self;
+        single.as_mut().map_or_else(|| double.lower(forest, x), |single| single.lower(forest, x))
     }
 
-    /// L⁻ᵀ L⁻¹ x, in place, with the factor of the last [`solve`](Self::solve) as it is: a positive matrix near to that one.
-    pub(crate) fn substitute(&mut self, x: &mut [DVec3]) {
-        match &mut self.single {
-            Some(single) => single.solve(&self.forest, x),
-            None => self.double.solve(&self.forest, x),
-        }
+    /// L⁻ᵀ y, y being as [`lower`](Self::lower) gives it.
+    pub(crate) fn upper(&mut self, y: &[f64]) -> Vec<DVec3> {
+        let Self { forest, single, double } = self;
+        single.as_mut().map_or_else(|| double.upper(forest, y), |single| single.upper(forest, y))
     }
 }
 

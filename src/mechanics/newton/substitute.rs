@@ -1,4 +1,4 @@
-//! L y = b, then Lᵀ x = y: front by front, groves side by side, each adding to the crown's unknowns in a memory of its own.
+//! L y = b, and Lᵀ x = y: front by front, groves side by side, each adding to the crown's unknowns in a memory of its own.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -9,17 +9,10 @@ use super::factor::{Factor, Planted, Precision};
 use super::forest::{Forest, Front, Grove};
 
 impl<T: Precision> Factor<T> {
-    /// Solves for what is in `side`, numbered anew.
-    pub(super) fn substitute(&mut self, forest: &Forest) {
+    /// L⁻¹ of what is in `side`, numbered anew.
+    pub(super) fn forward(&mut self, forest: &Forest) {
         let Self { groves, crown, side, .. } = self;
-        let (low, high) = side.split_at_mut(3 * forest.crown.1);
-        let mut own = Vec::with_capacity(groves.len());
-        let mut rest = low;
-        for grove in &forest.groves {
-            let (one, others) = rest.split_at_mut(3 * grove.unknowns.len());
-            own.push(one);
-            rest = others;
-        }
+        let (mut own, high) = by_grove(forest, side);
         (groves.par_iter_mut().zip(&forest.groves).zip(&mut own).with_max_len(1))
             .for_each(|((planted, grove), own)| planted.forward(forest, grove, own));
         for planted in &mut *groves {
@@ -32,9 +25,8 @@ impl<T: Precision> Factor<T> {
                 }
             }
         }
-        let fronts = &forest.fronts[forest.crown.0..];
         let mut rows = Vec::new();
-        for (front, (panel, _)) in fronts.iter().zip(&*crown) {
+        for (front, (panel, _)) in forest.fronts[forest.crown.0..].iter().zip(&*crown) {
             let at = 3 * (front.first - forest.crown.1);
             down(front, panel, &mut high[at..at + 3 * front.columns], &mut rows);
             for (&row, some) in forest.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
@@ -44,7 +36,14 @@ impl<T: Precision> Factor<T> {
                 }
             }
         }
-        for (front, (panel, _)) in fronts.iter().zip(&*crown).rev() {
+    }
+
+    /// L⁻ᵀ of what is in `side`, numbered anew.
+    pub(super) fn backward(&mut self, forest: &Forest) {
+        let Self { groves, crown, side, .. } = self;
+        let (mut own, high) = by_grove(forest, side);
+        let mut rows = Vec::new();
+        for (front, (panel, _)) in forest.fronts[forest.crown.0..].iter().zip(&*crown).rev() {
             gather(forest, front, &mut rows, |row| &high[3 * (row - forest.crown.1)..]);
             let at = 3 * (front.first - forest.crown.1);
             up(front, panel, &mut high[at..at + 3 * front.columns], &rows);
@@ -53,6 +52,18 @@ impl<T: Precision> Factor<T> {
         (groves.par_iter_mut().zip(&forest.groves).zip(&mut own).with_max_len(1))
             .for_each(|((planted, grove), own)| planted.backward(forest, grove, own, high));
     }
+}
+
+/// The unknowns of each grove, and the crown's.
+fn by_grove<'a, T>(forest: &Forest, side: &'a mut [T]) -> (Vec<&'a mut [T]>, &'a mut [T]) {
+    let (mut low, high) = side.split_at_mut(3 * forest.crown.1);
+    let mut own = Vec::with_capacity(forest.groves.len());
+    for grove in &forest.groves {
+        let (one, others) = low.split_at_mut(3 * grove.unknowns.len());
+        own.push(one);
+        low = others;
+    }
+    (own, high)
 }
 
 impl<T: Precision> Planted<T> {

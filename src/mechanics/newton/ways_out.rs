@@ -46,7 +46,7 @@ impl Descent<'_, '_> {
         if moves && !stubborn {
             return Ok(Rest::Moves);
         }
-        let ways = tangent.ways_out(&here)?;
+        let ways = tangent.ways_out(&here);
         let left = self.leave(&ways, relaxing);
         Ok(if left {
             Rest::Left
@@ -112,16 +112,13 @@ impl Whole {
     }
 
     /// Ways on which the energy falls, told with the factor of the last solve.
-    fn ways_out(&mut self, here: &State<'_>) -> Result<Vec<Vec<DVec3>>, SolveError> {
+    fn ways_out(&mut self, here: &State<'_>) -> Vec<Vec<DVec3>> {
         let State { cloth, x, contacts, .. } = *here;
         let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
-        let Some(solver) = &mut self.solver else { return Ok(Vec::new()) };
+        let Some(solver) = &mut self.solver else { return Vec::new() };
         let curved = Curved { cloth, layout, x, held: cloth.held_in(layout, x, contacts) };
-        let ritz = curved.lanczos(Until { steps: STEPS, clear: LEADS_OUT }, |r| {
-            solver.substitute(r);
-            Ok(())
-        })?;
+        let ritz = curved.lanczos(Until { steps: STEPS, clear: Some(LEADS_OUT) }, solver);
         let out = ritz.vectors.iter().zip(&ritz.values).filter(|(_, l)| **l < LEADS_OUT);
-        Ok(out.map(|(z, _)| curved.scatter(z)).collect())
+        out.map(|(z, _)| curved.scatter(z)).collect()
     }
 }
