@@ -68,8 +68,10 @@ mod tests {
     fn what_is_taken_off_leaves_a_vector_orthogonal_to_all() {
         let n = 3 * PIECE + 5;
         // Half a wave, a whole one, ...: orthogonal as they are, each of length √(n/2).
-        let wave =
-            |k: usize| (0..n).map(|i| ((k as f64 + 1.0) * (i as f64 + 0.5) / n as f64 * std::f64::consts::PI).sin());
+        let wave = |k: usize| {
+            let turns = (k as f64 + 1.0) * std::f64::consts::PI / n as f64;
+            (0..n).map(move |i| ((i as f64 + 0.5) * turns).sin())
+        };
         let length = (n as f64 / 2.0).sqrt();
         let mut columns = Columns::default();
         (0..4).for_each(|k| columns.push(wave(k).map(|x| x / length).collect()));
