@@ -82,30 +82,19 @@ pub struct Journal {
 
 /// Why a journal cannot be gone on with.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum JournalError {
     /// It cannot be read.
     #[error(transparent)]
     Unreadable(#[from] crate::files::Unreadable),
     /// It is no journal.
     #[error("{file}: this is no journal of a contest ({reason}); choose another file with --rows-file")]
-    Syntax {
-        /// The file.
-        file: String,
-        /// What serde said.
-        reason: String,
-    },
+    Syntax { file: String, reason: String },
     /// Its rows were made under other conditions.
     #[error(
         "{file}: its rows were made under other conditions: found {found}, expected {expected}; choose another file with --rows-file"
     )]
-    Other {
-        /// The file.
-        file: String,
-        /// Its conditions.
-        found: String,
-        /// Those of this run.
-        expected: String,
-    },
+    Other { file: String, found: String, expected: String },
 }
 
 impl Journal {
