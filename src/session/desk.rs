@@ -40,31 +40,12 @@ pub(super) struct Desk {
 impl Desk {
     pub(super) fn new(job: Job, warm: bool) -> Self {
         let job = Arc::new(job);
-        let view = Snapshot {
-            serial: 1,
-            state: 1,
-            job: Arc::clone(&job),
-            idle: false,
-            ground: None,
-            sectioned: None,
-            preview: None,
-            rest: None,
-            finished: None,
-            refused: None,
-            pins: Arc::default(),
-            trail: Arc::default(),
-            undo: 0,
-            redo: 0,
-            superseded: 0,
-        };
-        let history = History::new(job);
-        let accepted = Instant::now();
         Self {
-            view,
+            view: Snapshot { serial: 1, state: 1, job: Arc::clone(&job), ..Snapshot::default() },
             warm,
-            accepted,
+            accepted: Instant::now(),
             failed: None,
-            history,
+            history: History::new(job),
             good_scene: None,
             good_job: None,
             before: None,

@@ -182,7 +182,7 @@ pub struct TrailPoint {
 }
 
 /// All that is known at one moment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Snapshot {
     /// Grows with everything that becomes known.
     pub serial: u64,
