@@ -3,13 +3,14 @@
 
 use super::super::eye::Eye;
 use super::super::legend::visible;
-use super::super::outfit::{self, Worn};
+use super::super::outfit;
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
 use super::rows::{grid, in_rows};
 use super::view::View;
 use super::{Node, TimePanel};
 use super::{closer, contest};
+use crate::scene::Layer;
 
 /// Width over height of a tab in a window of 16:10, below the bars of the viewer.
 pub(crate) const ASPECT: f64 = 1.8;
@@ -38,7 +39,7 @@ pub struct Layout {
     /// The flat panels of a sewing pattern will come.
     pub pattern: bool,
     /// The garments of an outfit, inner to outer, where there are several.
-    pub outfit: Vec<Worn>,
+    pub outfit: Vec<Layer>,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -211,7 +212,7 @@ impl Layout {
         let all = self.eye(Tab::Outfit, eye);
         let rows = self.outfit.len() as f64;
         let one = eye.through(ASPECT / 6.0 * rows);
-        let row = |(k, worn): (usize, &Worn)| {
+        let row = |(k, worn): (usize, &Layer)| {
             let branch = outfit::branch(k, worn);
             // The drape bears the garment's name: all three would be cut with it.
             let stages = [("PARTs", "parts"), ("Force per PART", "force"), (worn.name.as_str(), "drape")];
