@@ -1,12 +1,11 @@
 //! What goes on while somebody reads: events of the state, and the viewer's pieces. At most 30 a second, the newest alone.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use hyper::body::Bytes;
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use tokio::sync::watch;
+use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
 use super::answer::Site;
@@ -21,26 +20,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Readers at a time.
 pub(super) const MOST_FLOWS: usize = 64;
 
-/// A reader's place; free again when it is dropped.
-pub(super) struct Place(Arc<AtomicUsize>);
-
-impl Place {
-    /// A place, if there is one.
-    pub(super) fn take(flows: &Arc<AtomicUsize>) -> Option<Self> {
-        let place = Self(Arc::clone(flows));
-        let taken = flows.fetch_add(1, Ordering::SeqCst);
-        (taken < MOST_FLOWS).then_some(place)
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
-    }
-}
-
 /// The state now, and whenever it changes: server-sent events.
-pub(super) fn events(site: &Arc<Site>, place: Place) -> Receiver<Bytes> {
+pub(super) fn events(site: &Arc<Site>, place: OwnedSemaphorePermit) -> Receiver<Bytes> {
     let (sender, receiver) = channel(1);
     let site = Arc::clone(site);
     tokio::spawn(async move {
@@ -70,7 +51,7 @@ pub(super) fn events(site: &Arc<Site>, place: Place) -> Receiver<Bytes> {
 }
 
 /// The viewer's pieces, each after its length (four bytes, the least first).
-pub(super) fn stream(site: &Arc<Site>, place: Place) -> Receiver<Bytes> {
+pub(super) fn stream(site: &Arc<Site>, place: OwnedSemaphorePermit) -> Receiver<Bytes> {
     let (sender, receiver) = channel(1);
     let site = Arc::clone(site);
     tokio::spawn(async move {

@@ -48,10 +48,10 @@ pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
 pub use method::MethodView;
-pub use outfit::{OutfitView, Worn};
+pub use outfit::OutfitView;
 pub use overlay::Overlay;
 pub use page::{Bundled, bundled};
-pub(crate) use page::{name_of_run, takes_gzip};
+pub(crate) use page::{Server, answer, name_of_run, takes_gzip};
 pub use panel::Panel;
 pub use pattern::PatternView;
 pub use scatter::{Picture, ScatterPoint, When};
@@ -100,6 +100,14 @@ pub struct RecordSummary {
     pub raw_bytes: u64,
     /// Time spent here, ms.
     pub log_ms: f64,
+}
+
+impl RecordSummary {
+    /// Where the file is, in words, where there is one.
+    #[must_use]
+    pub fn said(&self) -> Option<String> {
+        self.path.as_ref().map(|path| format!("recording: {}", path.display()))
+    }
 }
 
 /// A recording in the making. What logs to it fails with what Rerun refuses, and where a slice does not fit the garment.
@@ -193,13 +201,7 @@ impl Recorder {
             open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
             // Plots have no logarithmic axis.
             step::series(open, paths::RESIDUAL_LOG10, "residual over weight, log10", 0, residual_over_weight.log10())?;
-            match positions {
-                Some(x) if x.len() == open.garment.positions.len() => {
-                    let moved = open.garment.with_positions(x.to_vec());
-                    open.log(paths::DRAPE, &meshes::shape(&moved))
-                }
-                _ => Ok(()),
-            }
+            open.garment_at(positions)
         })
     }
 
