@@ -50,7 +50,7 @@ pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError
     };
     let lists = [("positions", chosen.draped.len()), (what, values)];
     RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
-    let [columns, _] = open.layout().captions(open.eye());
+    let [columns, _] = open.layout().captions(&open.eye);
     let path = format!("{}/{}/garment", paths::COMPARE, chosen.slot);
     let draped = open.garment.with_positions(chosen.draped.to_vec());
     open.at(chosen.index, 6);

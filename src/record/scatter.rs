@@ -159,23 +159,20 @@ fn axes(open: &Open, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<()
     let mut shades = Vec::new();
     let mut places = vec![plane([0.5 * width, -13.0]), plane([0.0, height + 16.0])];
     let mut labels = vec![picture.x.to_owned(), picture.y.to_owned()];
-    let mut line = |from: [f64; 2], to: [f64; 2], major: bool| {
-        lines.push(vec![plane(from), plane(to)]);
-        shades.push(if major { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
-    };
-    for (multiple, value) in along.ticks() {
+    // The line of each tick, and where its number stands.
+    let upright = along.ticks().map(|(multiple, value)| {
         let x = along.place(value);
-        line([x, 0.0], [x, height], multiple == 1);
-        if matches!(multiple, 1 | 2 | 5) {
-            places.push(plane([x, -1.0]));
-            labels.push(number(value));
-        }
-    }
-    for (multiple, value) in up.ticks() {
+        (multiple, value, [[x, 0.0], [x, height]], [x, -1.0])
+    });
+    let level = up.ticks().map(|(multiple, value)| {
         let y = up.place(value);
-        line([0.0, y], [width, y], multiple == 1);
+        (multiple, value, [[0.0, y], [width, y]], [-16.0, y + 6.0])
+    });
+    for (multiple, value, line, place) in upright.chain(level) {
+        lines.push(line.map(plane).to_vec());
+        shades.push(if multiple == 1 { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
         if matches!(multiple, 1 | 2 | 5) {
-            places.push(plane([-16.0, y + 6.0]));
+            places.push(plane(place));
             labels.push(number(value));
         }
     }

@@ -5,13 +5,12 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
     ViewBlueprint, ViewContents, VisualBounds2D,
 };
 use rerun::external::re_sdk_types::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind};
-use rerun::external::re_sdk_types::components::Color;
 use rerun::external::re_sdk_types::datatypes::{Range2D, TimeRange, TimeRangeBoundary};
 use rerun::{AsComponents, RecordingStream, SerializedComponentBatch};
 
 use super::super::RecordError;
 use super::super::eye::Eye;
-use super::super::meshes::single;
+use super::super::meshes::{colour, single};
 
 /// Behind the garments: a calm dark grey, a shade lighter than the viewer's own panels.
 const BACKDROP: [u8; 3] = [31, 34, 39];
@@ -43,8 +42,7 @@ impl View {
             .with_position(single(eye.position))
             .with_look_target(single(eye.target))
             .with_eye_up([0.0, 0.0, 1.0]);
-        let [r, g, b] = BACKDROP;
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(r, g, b));
+        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(colour(BACKDROP));
         Self::new("3D", name, contents)
             .with("EyeControls3D", &controls)
             .with("Background", &backdrop)
@@ -54,7 +52,7 @@ impl View {
 
     /// A drawing in the plane, of which `[x, y]` is seen. Black, so that its texts read in the light theme too.
     pub(crate) fn plane(name: impl Into<String>, contents: &[&str], [x, y]: [[f64; 2]; 2]) -> Self {
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(0, 0, 0));
+        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(colour([0; 3]));
         let seen = VisualBounds2D::new(Range2D { x_range: x.into(), y_range: y.into() });
         Self::new("2D", name, contents).with("Background", &backdrop).with("VisualBounds2D", &seen)
     }
