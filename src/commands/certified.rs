@@ -1,14 +1,12 @@
 //! A certificate, printed, and what it means for the exit code.
 
-use comfy_table::presets;
 use partwise::certificate::Certificate;
 
 use super::console;
 
 /// A certificate for people.
 pub(super) fn text(certificate: &Certificate) -> String {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["certificate", "", "found", "limit", "", ""]);
+    let mut table = console::table(console::RULED, ["certificate", "", "found", "limit", "", ""], []);
     for f in &certificate.findings {
         let number =
             |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };

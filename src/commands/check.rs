@@ -2,7 +2,6 @@
 //! garment, a draped one, is at rest.
 
 use clap::Args;
-use comfy_table::presets;
 use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
@@ -114,8 +113,7 @@ impl CheckArgs {
         for note in &report.notes {
             console::note(note);
         }
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["", &loaded.body_name, &loaded.garment_name]);
+        let mut table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], []);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);
         }
@@ -131,9 +129,7 @@ impl CheckArgs {
         }
         certified::verified(report.certificate.as_ref())
     }
-}
 
-impl CheckArgs {
     /// The certificate of a file whose vertices are those of the garment, in their order.
     fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
         let spec = SceneSpec {

@@ -97,10 +97,8 @@ impl LiveArgs {
         if worked.is_err() || matches!(recorded, Some(Err(_))) || matches!(shown, Some(Err(_))) {
             anyhow::bail!("the session broke off; this is a mistake of the program");
         }
-        if let Some(Ok(summary)) = recorded
-            && let Some(path) = summary?.path
-        {
-            console::note(&format!("recording: {}", path.display()));
+        if let Some(Ok(summary)) = recorded {
+            summary?.said().iter().for_each(|said| console::note(said));
         }
         Ok(())
     }

@@ -81,6 +81,16 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
+/// Says where a recording is served, and ends it once the user has seen enough.
+fn show(recorder: Recorder) -> anyhow::Result<()> {
+    if let Some(url) = recorder.web_url() {
+        console::note(&format!("look at it: {url}"));
+    }
+    interrupt::wait();
+    recorder.finish()?.said().iter().for_each(|said| console::note(said));
+    Ok(())
+}
+
 /// The recording gets the mesh at every so many steps: enough to see it settle, a few megabytes at most.
 const MESH_EVERY: usize = 8;
 
@@ -104,18 +114,10 @@ impl RunArgs {
         self.export(&mut solved)?;
         if self.sinks.serve {
             self.print(&solved)?;
-            if let Some(url) = recorder.web_url() {
-                console::note(&format!("look at it: {url}"));
-            }
-            interrupt::wait();
-            if let Some(path) = recorder.finish()?.path {
-                console::note(&format!("recording: {}", path.display()));
-            }
+            show(recorder)?;
         } else {
             let finished = Instant::now();
-            if let Some(path) = recorder.finish()?.path {
-                solved.summary.outputs.push(format!("recording: {}", path.display()));
-            }
+            solved.summary.outputs.extend(recorder.finish()?.said());
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
@@ -133,14 +135,9 @@ impl RunArgs {
     /// The job that the flags ask for, its small files read.
     fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
+        let scene = self.stages.cloth().give(self.input.spec()?)?;
         let accuracy = if self.accuracy { Against::Own } else { Against::None };
-        Ok(Job {
-            scene: self.stages.cloth().give(self.input.spec()?)?,
-            settings,
-            seed: 0,
-            accuracy,
-            spread_starts: self.spread,
-        })
+        Ok(Job { scene, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
 
     /// Runs every stage of a job.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use partwise::Settings;
 use partwise::accuracy::Accuracy;
 use partwise::certificate::Certificate;
@@ -84,11 +84,6 @@ impl Cut {
     }
 }
 
-/// Milliseconds, for people.
-fn ms(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e3
-}
-
 impl Summary {
     /// Reads the figures off a result.
     pub(crate) fn new(
@@ -101,7 +96,7 @@ impl Summary {
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
         let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
-        let summary = Self {
+        let mut summary = Self {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
             body: loaded.body_name.clone(),
@@ -134,19 +129,15 @@ impl Summary {
             ("refine", times.refine),
             ("other", times.other()),
         ];
-        Ok(stages.into_iter().fold(summary, |summary, (stage, time)| summary.with_time(stage, time)))
+        stages.into_iter().for_each(|(stage, time)| summary.add_time(stage, time));
+        Ok(summary)
     }
 
     /// Adds time to a stage and to the total, which is the sum of all.
     pub(crate) fn add_time(&mut self, stage: &'static str, time: Duration) {
         for name in [stage, "total"] {
-            *self.timings_ms.entry(name).or_default() += ms(time);
+            *self.timings_ms.entry(name).or_default() += time.as_secs_f64() * 1e3;
         }
-    }
-
-    fn with_time(mut self, stage: &'static str, time: Duration) -> Self {
-        self.add_time(stage, time);
-        self
     }
 
     /// One JSON object.
@@ -184,10 +175,7 @@ impl Summary {
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        let order =
-            ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
-        let times: Vec<String> =
-            order.iter().filter_map(|stage| self.timings_ms.get(stage).map(|t| format!("{stage} {t:.1}"))).collect();
+        let times: Vec<String> = self.times().map(|(stage, ms)| format!("{stage} {ms:.1}")).collect();
         let _ = writeln!(out, "milliseconds: {}", times.join(", "));
         for output in &self.outputs {
             let _ = writeln!(out, "{output}");
@@ -208,13 +196,22 @@ impl Summary {
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
             fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(Cut::fact)).collect(),
-            timings_ms: ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
-                .iter()
-                .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))
+            // How long the recording takes is not known while it is made.
+            timings_ms: self
+                .times()
+                .filter(|(stage, _)| *stage != "record")
+                .map(|(s, ms)| (s.to_owned(), ms))
                 .collect(),
             warnings: self.warnings.clone(),
             command_line: self.command_line.clone(),
         }
+    }
+
+    /// Milliseconds of the stages there were, in their order.
+    fn times(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"]
+            .into_iter()
+            .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
     }
 
     /// Where the garment goes round the body: its girth and its ease, cm.
@@ -223,9 +220,8 @@ impl Summary {
     }
 
     fn ease_table(&self) -> Table {
-        let mut table = console::table();
         let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+        let mut table = console::table(console::RULED, header, 1..);
         for (ease, garment_cm, ease_cm) in self.covered() {
             let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
             if let Some(under) = ease.garment_height_cm.filter(|cm| cm + 0.5 < ease.height_cm) {
@@ -234,22 +230,15 @@ impl Summary {
             let lengths = [height, body, garment];
             table.add_row([ease.at.to_owned()].into_iter().chain(lengths).chain([format!("{ease_cm:+.1}")]));
         }
-        for column in table.column_iter_mut().skip(1) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
         table
     }
 
     fn levels_table(&self) -> Table {
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
+        let mut table = console::table(console::RULED, ["level", "from cm", "to cm", "PARTs", "vertices"], 0..);
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
         for l in self.levels.iter().filter(|l| l.vertices > 0) {
             let cells = [l.level.to_string(), bound(l.lower_cm), bound(l.upper_cm)];
             table.add_row(cells.into_iter().chain([l.parts.to_string(), l.vertices.to_string()]));
-        }
-        for column in table.column_iter_mut() {
-            column.set_cell_alignment(CellAlignment::Right);
         }
         table
     }

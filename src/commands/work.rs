@@ -1,6 +1,5 @@
 //! What every command that computes needs: threads, references, progress that Ctrl-C is heard beside.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use partwise::accuracy::reference::ReferenceCache;
@@ -43,7 +42,7 @@ pub(crate) fn refining<T>(what: &str, work: impl FnOnce(Observer<'_>) -> T) -> T
     let bar = console::progress(None, what);
     let out = work(&mut |step| {
         bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
-        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        interrupt::go_on()
     });
     bar.finish_and_clear();
     out

@@ -2,11 +2,9 @@
 
 mod recorded;
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use comfy_table::{CellAlignment, presets};
 use partwise::SceneSpec;
 use partwise::contest::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
@@ -127,7 +125,7 @@ impl TableFourArgs {
                     begun = (begun + 1).min((runs * ENTRANTS.len()) as u64);
                     bar.set_message(format!("{name}@{vertices}: {what}, round {} of {of}", (round + 1).min(of)));
                 }
-                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                interrupt::go_on()
             };
             let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
             let loaded = spec.load_with(&MeshCache::in_user_cache())?;
@@ -234,19 +232,13 @@ impl TableFourArgs {
 fn text(journal: &Journal, rows: &[ContestRow]) -> String {
     let mut out = journal.conditions.said();
     for cells in contest::tables(rows).into_iter().chain(contest::exponents(rows)) {
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&cells.header);
-        for row in &cells.rows {
-            table.add_row(row);
-        }
-        table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+        let mut table = console::table(console::RULED, &cells.header, 1..);
+        table.add_rows(&cells.rows);
         out += &format!("\n\n{}\n{table}", cells.title);
     }
-    for row in rows {
-        for entry in &row.entries {
-            if let Some(error) = &entry.error {
-                out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
-            }
+    for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {
+        if let Some(error) = &entry.error {
+            out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
         }
     }
     out

@@ -77,8 +77,8 @@ impl RunArgs {
             outcome = outcome.and(Err(anyhow::anyhow!("the session broke off; this is a mistake of the program")));
         }
         outcome?;
-        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.path) {
-            Some(path) => console::note(&format!("recording: {}", path.display())),
+        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.said()) {
+            Some(said) => console::note(&said),
             None if told.recorded == 0 => console::note("interrupted before the first drape: nothing is recorded"),
             None => {}
         }

@@ -1,7 +1,7 @@
 //! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
 
 use clap::ValueEnum;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use partwise::record::RecordSummary;
 use partwise::sweep::{Row, Status, csv_text};
 use serde_json::json;
@@ -125,9 +125,8 @@ pub(crate) fn explained(rows: &[Row]) -> &'static str {
 
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_BORDERS_ONLY);
-    table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"]);
+    let header = ["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"];
+    let mut table = console::table(console::OPEN, header, [0].into_iter().chain(3..));
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
     for (row, label) in rows.iter().zip(labels(&refs)) {
@@ -149,15 +148,5 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             mm(figures.representable_rms_mm),
         ]);
     }
-    right(&mut table, [0].into_iter().chain(3..9));
     table
-}
-
-/// Sets columns of numbers to the right.
-pub(crate) fn right(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
-    for column in columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
 }

@@ -1,7 +1,5 @@
 //! A garment to tune a table on, or to try one on: its distances, its reference drape, and what a table can hold of it.
 
-use std::ops::ControlFlow;
-
 use glam::DVec3;
 use partwise::accuracy::{self, representable};
 use partwise::assess::{AssessError, AssessOptions, assess, canonical};
@@ -14,10 +12,10 @@ use partwise::range_table::RangeTable;
 use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
 
+use crate::commands::console;
 use crate::commands::fabrics::FabricArgs;
 use crate::commands::failure::UserError;
 use crate::commands::work::refining;
-use crate::commands::{console, interrupt};
 
 /// PARTs of a table on a garment, and the error that guides the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,10 +77,7 @@ impl Garment {
         let (loaded, fabric) = (SceneSpec::new(body, name).load()?, cloth.first()?);
         cloth.check_used(&loaded)?;
         let found = refining(&format!("{name}: reference drape"), |observer| {
-            canonical(&loaded.scene, &fabric, options, &mut |step| {
-                let _ = observer(step);
-                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
+            canonical(&loaded.scene, &fabric, options, observer)
         });
         let (reference, warnings) = match found {
             Ok(found) => found,

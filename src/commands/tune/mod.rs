@@ -21,7 +21,7 @@ use partwise::table_search::Front;
 use partwise::whole_file::WholeFile;
 
 use self::check::{Taken, check};
-use self::find::{Found, SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
+use self::find::{SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
 use self::garment::Garment;
 use self::report::Verdict;
 use super::fabrics::FabricArgs;
@@ -149,9 +149,9 @@ impl TuneArgs {
             }
             self.tune(set, &held_out, (&ladder.0, &ladder.1), &mut results)?;
         }
-        let front = report::csv(&results.fronts)?;
+        let front = report::csv(results.fronts.iter().flat_map(report::lines))?;
         self.write(&self.out.join("front.csv"), &front)?;
-        self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
+        self.write(&self.out.join("verdicts.csv"), &report::csv(&results.verdicts)?)?;
         // JSON is Unicode; names of files need not be.
         let name = |path: &PathBuf| path.display().to_string();
         match self.format {
@@ -218,21 +218,10 @@ impl TuneArgs {
             }
             taken.push((kind, best));
         }
-        self.record(set, &found, &taken, results)
-    }
-
-    fn record(
-        &self,
-        set: &[&Garment],
-        found: &Found,
-        taken: &[(&'static str, Taken)],
-        results: &mut Results,
-    ) -> anyhow::Result<()> {
-        let taken: Vec<(&'static str, &Taken)> = taken.iter().map(|(kind, t)| (*kind, t)).collect();
         for garment in set {
             let sinks = self.sinks.sinks_in(&self.out, &stem(&garment.name));
             if !sinks.is_empty() {
-                results.recordings.push(recording::record(garment, set, found, &taken, sinks)?);
+                results.recordings.push(recording::record(garment, set, &found, &taken, sinks)?);
             }
         }
         Ok(())

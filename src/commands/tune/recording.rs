@@ -30,7 +30,7 @@ pub(super) fn record(
     garment: &Garment,
     all: &[&Garment],
     found: &Found,
-    taken: &[(&'static str, &Taken)],
+    taken: &[(&'static str, Taken)],
     sinks: Vec<Sink>,
 ) -> anyhow::Result<RecordSummary> {
     let titles =
