@@ -3,8 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use super::disk::{self, Append};
-use super::error::StoreError;
+use super::{Append, StoreError, disk};
 
 /// Makes the media rows are appended to from opened files.
 pub type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;

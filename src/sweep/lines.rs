@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use super::disk;
-use super::error::StoreError;
-use super::manifest::Manifest;
-use super::row::{Row, Status, json_line};
+use super::row::json_line;
+use super::{Manifest, Row, Status, StoreError, disk};
 
 /// The rows as JSON lines.
 pub(super) fn json_text(rows: &[Row]) -> Vec<u8> {

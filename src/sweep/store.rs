@@ -16,11 +16,11 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use super::disk::{self, make};
-use super::error::StoreError;
-use super::journal::{Journal, Medium, take_lock};
+use super::journal::{Journal, take_lock};
 use super::lines::{json_text, read_rows};
-use super::manifest::{MANIFEST, Manifest};
-use super::row::{Row, Status, csv_text, json_line};
+use super::manifest::MANIFEST;
+use super::row::json_line;
+use super::{Manifest, Medium, Row, Status, StoreError, csv_text};
 
 /// Name of the JSON lines in a sweep's folder.
 pub const JSON_LINES: &str = "rows.jsonl";

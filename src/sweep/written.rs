@@ -9,8 +9,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::error::PlanError;
-use super::plan::Plan;
+use super::{Plan, PlanError};
 use crate::drape::{Model, Refine};
 use crate::fabric::Fabric;
 use crate::files::names_a_file;

@@ -132,18 +132,14 @@ impl SweepArgs {
         let outcome = outcome?;
         self.mend(&plan, &outcome.rows, &store, &bench);
         let seconds = started.elapsed().as_secs_f64();
-        for warning in bench.bench.warnings() {
-            console::warning(&warning);
-        }
+        console::warnings(&bench.bench.warnings());
         let recordings = record_all(&outcome.rows, &store, &plan.name, &folder, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &plan.name,
-            folder: folder.display().to_string(),
-            total: outcome.total,
-            skipped: outcome.skipped,
+            folder: &folder,
+            outcome: &outcome,
             seconds,
             keeping_ms: bench.keeping_ms(),
-            rows: &outcome.rows,
             recordings: &recordings,
         };
         console::result(&report.text(self.format)?);
@@ -160,9 +156,7 @@ impl SweepArgs {
 
     fn plan(&self) -> anyhow::Result<Plan> {
         let plan = Plan::read(&self.file, &Job { accuracy: self.accuracy, ..Job::preview() })?;
-        for note in &plan.notes {
-            console::note(note);
-        }
+        console::notes(&plan.notes);
         Ok(plan)
     }
 

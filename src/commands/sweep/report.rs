@@ -1,9 +1,11 @@
 //! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
 
+use std::path::Path;
+
 use clap::ValueEnum;
 use comfy_table::Table;
 use partwise::record::RecordSummary;
-use partwise::sweep::{Row, Status, csv_text};
+use partwise::sweep::{Outcome, Row, Status, csv_text};
 use serde_json::json;
 
 use super::chosen::{labels, total_ms};
@@ -22,21 +24,13 @@ pub(crate) enum Format {
 
 /// What became of a sweep.
 pub(crate) struct Report<'a> {
-    /// Its name.
     pub(crate) name: &'a str,
-    /// Where it is.
-    pub(crate) folder: String,
-    /// Points of the sweep or shard.
-    pub(crate) total: usize,
-    /// Rows found at the start.
-    pub(crate) skipped: usize,
+    pub(crate) folder: &'a Path,
+    pub(crate) outcome: &'a Outcome,
     /// Wall time of the points, s.
     pub(crate) seconds: f64,
     /// Time spent on keeping points for the recording, ms.
     pub(crate) keeping_ms: f64,
-    /// The rows.
-    pub(crate) rows: &'a [Row],
-    /// The recordings.
     pub(crate) recordings: &'a [RecordSummary],
 }
 
@@ -46,12 +40,8 @@ impl Report<'_> {
         match format {
             Format::Text => Ok(self.table()),
             Format::Json => Ok(partwise::said::json(&self.json())?),
-            Format::Csv => Ok(String::from_utf8(csv_text(self.rows))?),
+            Format::Csv => Ok(String::from_utf8(csv_text(&self.outcome.rows))?),
         }
-    }
-
-    fn failed(&self) -> usize {
-        self.rows.iter().filter(|row| row.status == Status::Error).count()
     }
 
     /// Time to keep points and to write the recordings, ms.
@@ -69,27 +59,25 @@ impl Report<'_> {
             .collect();
         json!({
             "sweep": self.name,
-            "folder": self.folder,
-            "points": self.total,
-            "skipped": self.skipped,
-            "failed": self.failed(),
+            "folder": self.folder.display().to_string(),
+            "points": self.outcome.total,
+            "skipped": self.outcome.skipped,
+            "failed": self.outcome.failed,
             "seconds": self.seconds,
             "logging_ms": self.logging_ms(),
             "recordings": recordings,
-            "rows": self.rows,
+            "rows": self.outcome.rows,
         })
     }
 
     fn table(&self) -> String {
-        let mut out = format!("{}\n{}", rows_table(self.rows), explained(self.rows));
+        let Outcome { total, skipped, failed, rows, .. } = self.outcome;
+        let mut out = format!("{}\n{}", rows_table(rows), explained(rows));
         out.push_str(&format!(
-            "{} of {} points done, {} failed; {} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
-            self.rows.len(),
-            self.total,
-            self.failed(),
-            self.skipped,
+            "{} of {total} points done, {failed} failed; {skipped} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
+            rows.len(),
             self.seconds,
-            self.folder
+            self.folder.display()
         ));
         for recording in self.recordings {
             out.push_str(&line(recording));
