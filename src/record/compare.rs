@@ -2,15 +2,10 @@
 
 use glam::DVec3;
 
-use super::colour_map::{ColourMap, Range};
-use super::colours;
-use super::error::RecordError;
+use super::colour_map::ColourMap;
 use super::legend::{Legend, caption};
-use super::meshes;
-use super::open::Open;
-use super::overlay::Overlay;
-use super::paths;
 use super::step::covering;
+use super::{Open, Overlay, Range, RecordError, colours, meshes, paths};
 use crate::figures::LevelCount;
 use crate::parts::UNASSIGNED;
 

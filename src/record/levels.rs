@@ -2,10 +2,7 @@
 
 use rerun::{BarChart, Clear};
 
-use super::colour_map::Range;
-use super::error::RecordError;
-use super::step::StepView;
-use super::{Open, colours, meshes, paths};
+use super::{Open, Range, RecordError, StepView, colours, meshes, paths};
 use crate::figures::LevelCount;
 
 /// Bars of the distance histogram, about.

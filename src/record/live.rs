@@ -19,14 +19,13 @@ use rerun::{Arrows3D, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::view::View;
 use super::blueprint::{self, Node, TimePanel};
-use super::colour_map::{Range, Rgb};
+use super::colour_map::Rgb;
 use super::colours::{self, colour_parts};
-use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::open::application;
-use super::paths;
 use super::step::{FORCE_QUANTILE, covering, part_arrows};
+use super::{Range, RecordError, paths};
 use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 

@@ -2,13 +2,10 @@
 
 use rerun::{LineStrips3D, Radius, TextDocument};
 
-use super::error::RecordError;
 use super::meshes::{self, rerun_colours, singles};
-use super::open::Open;
-use super::overlay::{Overlay, overlay};
-use super::panel::Panel;
+use super::overlay::overlay;
 use super::step::series;
-use super::{colours, paths};
+use super::{Open, Overlay, Panel, RecordError, colours, paths};
 use crate::methods::Exhibit;
 use glam::DVec3;
 

@@ -54,7 +54,7 @@ pub use page::{Bundled, bundled};
 pub(crate) use page::{Server, answer, name_of_run, takes_gzip};
 pub use panel::Panel;
 pub use pattern::PatternView;
-pub use scatter::{Picture, ScatterPoint, When};
+pub use scatter::{Picture, ScatterPoint};
 pub use sinks::Sink;
 pub use step::StepView;
 pub use wrinkles::WrinkleView;
@@ -240,14 +240,14 @@ impl Recorder {
         self.timed(|open| compare::chosen(open, chosen))
     }
 
-    /// All points of a picture so far.
+    /// All points of a picture so far, as of this step of the timeline `table`.
     pub fn scatter(
         &mut self,
-        when: When,
+        index: i64,
         picture: Picture<'_>,
         points: &[ScatterPoint<'_>],
     ) -> Result<(), RecordError> {
-        self.timed(|open| scatter::scatter(open, when, picture, points))
+        self.timed(|open| scatter::scatter(open, index, picture, points))
     }
 
     /// Sends what is on its way, where someone watches.

@@ -8,13 +8,12 @@ use glam::DVec3;
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::layout::Layout;
-use super::colour_map::{Range, Rgb};
-use super::error::RecordError;
+use super::colour_map::Rgb;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::sinks::{OpenSinks, Target};
 use super::web::WebViewer;
-use super::{RecordOptions, RecordSummary, blueprint, colours, paths};
+use super::{Range, RecordError, RecordOptions, RecordSummary, blueprint, colours, paths};
 use crate::mesh::TriMesh;
 
 /// Bytes of an application's name.

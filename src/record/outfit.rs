@@ -3,12 +3,10 @@
 use glam::DVec3;
 use rerun::Mesh3D;
 
-use super::colour_map::{ColourMap, Range, Rgb};
-use super::error::RecordError;
+use super::colour_map::{ColourMap, Rgb};
 use super::meshes::{self, CellMesh};
-use super::open::Open;
 use super::step::FORCE_QUANTILE;
-use super::{colours, paths};
+use super::{Open, Range, RecordError, colours, paths};
 use crate::scene::Layer;
 
 /// What the garments of an outfit do. Slices are per vertex of all of them.

@@ -4,11 +4,9 @@ use glam::DVec3;
 
 use super::blueprint::layout::Tab;
 use super::colour_map::ColourMap;
-use super::error::RecordError;
 use super::meshes::{self, CellMesh};
-use super::open::Open;
-use super::overlay::{Overlay, scale};
-use super::{colours, paths};
+use super::overlay::scale;
+use super::{Open, Overlay, RecordError, colours, paths};
 use crate::mesh::TriMesh;
 
 /// Share of the height in a view that the panels take.

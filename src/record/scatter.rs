@@ -4,13 +4,9 @@
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::colours;
-use super::error::RecordError;
 use super::labels::{Labels, Rect};
 use super::legend::{number, texts};
-use super::meshes;
-use super::open::Open;
-use super::paths;
+use super::{Open, RecordError, colours, meshes, paths};
 
 /// A picture: where it lies and what its axes are called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,15 +46,6 @@ pub struct ScatterPoint<'a> {
     pub group: usize,
     /// Whether its name is written beside it, where there is room.
     pub named: bool,
-}
-
-/// The moment a picture belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// A step of the timeline `table`.
-    Table(i64),
-    /// A step of the timeline `iteration`: a search.
-    Iteration(i64),
 }
 
 /// Width and height of the picture, in its own units: about two pixels of the view.
@@ -115,15 +102,12 @@ fn round(value: f64, up: bool) -> f64 {
 /// Points that are not positive and finite cannot be placed and are left out.
 pub(super) fn scatter(
     open: &Open,
-    when: When,
+    index: i64,
     picture: Picture<'_>,
     points: &[ScatterPoint<'_>],
 ) -> Result<(), RecordError> {
     let path = picture.path;
-    match when {
-        When::Table(index) => open.at(index, 6),
-        When::Iteration(iteration) => open.at_iteration(iteration),
-    }
+    open.at(index, 6);
     let placed: Vec<&ScatterPoint<'_>> =
         points.iter().filter(|p| p.x.is_finite() && p.y.is_finite() && p.x > 0.0 && p.y > 0.0).collect();
     let along = Axis::around(placed.iter().map(|p| p.x), PICTURE[0]);

@@ -6,15 +6,13 @@ use glam::DVec3;
 use rerun::components::{Scalar, Text};
 use rerun::{AnyValues, Arrows3D, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument};
 
-use super::colour_map::{ColourMap, Range};
+use super::colour_map::ColourMap;
 use super::colours::{self, colour_parts};
-use super::error::RecordError;
 use super::eye::Eye;
 use super::legend::{Legend, caption, titled};
 use super::meshes::{self, single};
-use super::overlay::{self, Overlay, QUANTILE};
-use super::panel::Panel;
-use super::{Open, dots, levels, paths};
+use super::overlay::{self, QUANTILE};
+use super::{Open, Overlay, Panel, Range, RecordError, dots, levels, paths};
 use crate::parts::UNASSIGNED;
 
 /// Share of the garment's height that the longest arrow takes.

@@ -9,7 +9,7 @@ use partwise::parts::Parts;
 use partwise::range_table::RangeTable;
 use partwise::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
-    StepView, When,
+    StepView,
 };
 use partwise::table_search::Front;
 
@@ -134,5 +134,5 @@ fn scatter(recorder: &mut Recorder, index: i64, all: &[&Garment], front: &Front)
         group: 0,
         named: false,
     }));
-    Ok(recorder.scatter(When::Table(index), Picture::of_error("PARTs"), &points)?)
+    Ok(recorder.scatter(index, Picture::of_error("PARTs"), &points)?)
 }
