@@ -4,8 +4,9 @@ use partwise::certificate::Certificate;
 
 use super::console;
 
-/// A certificate for people.
-pub(super) fn text(certificate: &Certificate) -> String {
+/// A certificate for people, where one was asked for.
+pub(super) fn print(certificate: Option<&Certificate>) {
+    let Some(certificate) = certificate else { return };
     let mut table = console::table(console::RULED, ["certificate", "", "found", "limit", "", ""], []);
     for f in &certificate.findings {
         let number =
@@ -21,7 +22,7 @@ pub(super) fn text(certificate: &Certificate) -> String {
         ]);
     }
     let verdict = if certificate.passes { "a drape at rest" } else { "not certified" };
-    format!("{table}\n{verdict}")
+    console::result(&format!("{table}\n{verdict}"));
 }
 
 /// Ends with 1 where a line fails.

@@ -110,9 +110,7 @@ impl CheckArgs {
             console::result(&partwise::said::json(&report)?);
             return certified::verified(report.certificate.as_ref());
         }
-        for note in &report.notes {
-            console::note(note);
-        }
+        console::notes(&report.notes);
         let mut table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], []);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);
@@ -124,9 +122,7 @@ impl CheckArgs {
             table.add_row([name.to_owned(), String::new(), value]);
         }
         console::result(&format!("{table}\nverdict: {}", report.verdict));
-        if let Some(certificate) = &report.certificate {
-            console::result(&certified::text(certificate));
-        }
+        certified::print(report.certificate.as_ref());
         certified::verified(report.certificate.as_ref())
     }
 

@@ -49,6 +49,11 @@ pub(crate) fn note(text: &str) {
     say("", text);
 }
 
+/// Things worth knowing.
+pub(crate) fn notes(texts: &[String]) {
+    texts.iter().for_each(|text| note(text));
+}
+
 /// Writes to stderr; `mark` may hold colours, `text` may come from a file and may not.
 fn say(mark: &str, text: &str) {
     // Where stderr is closed there is nobody left to tell.
@@ -58,6 +63,11 @@ fn say(mark: &str, text: &str) {
 /// Something to act upon, on stderr.
 pub(crate) fn warning(text: &str) {
     say(&paint("warning: ", "33;1"), text);
+}
+
+/// Things to act upon.
+pub(crate) fn warnings(texts: &[String]) {
+    texts.iter().for_each(|text| warning(text));
 }
 
 /// An error with its causes, on stderr.

@@ -98,7 +98,7 @@ impl LiveArgs {
             anyhow::bail!("the session broke off; this is a mistake of the program");
         }
         if let Some(Ok(summary)) = recorded {
-            summary?.said().iter().for_each(|said| console::note(said));
+            console::notes(summary?.said().as_slice());
         }
         Ok(())
     }

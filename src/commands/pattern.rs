@@ -98,7 +98,7 @@ impl PatternArgs {
             console::result(&partwise::said::json(&report)?);
             return Ok(());
         }
-        report.notes.iter().for_each(|note| console::note(note));
+        console::notes(&report.notes);
         console::result(&report.text());
         if let Some(path) = &self.svg {
             console::note(&format!("drawing: {}", path.display()));

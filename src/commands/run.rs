@@ -87,7 +87,7 @@ fn show(recorder: Recorder) -> anyhow::Result<()> {
         console::note(&format!("look at it: {url}"));
     }
     interrupt::wait();
-    recorder.finish()?.said().iter().for_each(|said| console::note(said));
+    console::notes(recorder.finish()?.said().as_slice());
     Ok(())
 }
 
@@ -198,18 +198,12 @@ impl RunArgs {
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
-        for warning in &solved.summary.warnings {
-            console::warning(warning);
-        }
-        for note in solved.loaded.notes() {
-            console::note(&note);
-        }
+        console::warnings(&solved.summary.warnings);
+        console::notes(&solved.loaded.notes());
         match self.format {
             Format::Text => {
                 console::result(&solved.summary.text());
-                if let Some(certificate) = &solved.summary.certificate {
-                    console::result(&certified::text(certificate));
-                }
+                certified::print(solved.summary.certificate.as_ref());
             }
             Format::Json => console::result(&solved.summary.json()?),
         }

@@ -32,7 +32,7 @@ pub(crate) struct Summary {
     fabric: String,
     /// Which garment or panel is cut from which, where that was said.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    cut: Vec<Cut>,
+    cut: Vec<Swatch>,
     /// Constants of all of them, for people.
     #[serde(skip)]
     fabrics: Vec<Fabric>,
@@ -63,27 +63,6 @@ pub(crate) struct Summary {
     pub(crate) outputs: Vec<String>,
 }
 
-/// A share of a garment that is cut from one fabric.
-#[derive(Debug, Clone, Serialize)]
-struct Cut {
-    garment: String,
-    fabric: String,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    panels: Vec<String>,
-}
-
-impl Cut {
-    fn of(swatch: &Swatch, of_settings: &Fabric) -> Self {
-        let fabric = swatch.fabric.as_ref().unwrap_or(&of_settings.name);
-        Self { garment: swatch.garment.clone(), fabric: fabric.clone(), panels: swatch.panels.clone() }
-    }
-
-    fn fact(&self) -> (String, String) {
-        let panels = if self.panels.is_empty() { String::new() } else { format!(": {}", listed(&self.panels)) };
-        (format!("cut from {}", self.fabric), format!("{}{panels}", self.garment))
-    }
-}
-
 impl Summary {
     /// Reads the figures off a result.
     pub(crate) fn new(
@@ -104,7 +83,7 @@ impl Summary {
             model: settings.model.name(),
             motion: settings.model.motion().name(),
             fabric: loaded.scene.fabric_names(&settings.fabric),
-            cut: loaded.swatches.iter().map(|swatch| Cut::of(swatch, &settings.fabric)).collect(),
+            cut: loaded.swatches.iter().map(|swatch| swatch.cut_from(&settings.fabric)).collect(),
             fabrics: loaded.scene.fabrics(&settings.fabric),
             table: drape.table.name.clone(),
             figures: measured.figures.clone(),
@@ -175,12 +154,7 @@ impl Summary {
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        let times: Vec<String> = self.times().map(|(stage, ms)| format!("{stage} {ms:.1}")).collect();
-        let _ = writeln!(out, "milliseconds: {}", times.join(", "));
-        for output in &self.outputs {
-            let _ = writeln!(out, "{output}");
-        }
-        out
+        out + &ended(self.times(), &self.outputs)
     }
 
     /// For the recording's text panel.
@@ -195,7 +169,7 @@ impl Summary {
             table: self.table.clone(),
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
-            fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(Cut::fact)).collect(),
+            fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(swatch_fact)).collect(),
             // How long the recording takes is not known while it is made.
             timings_ms: self
                 .times()
@@ -244,6 +218,13 @@ impl Summary {
     }
 }
 
+/// How a run for the terminal ends: its times, and what was written.
+pub(crate) fn ended(times_ms: impl Iterator<Item = (&'static str, f64)>, outputs: &[String]) -> String {
+    let times: Vec<String> = times_ms.map(|(stage, ms)| format!("{stage} {ms:.1}")).collect();
+    let times = format!("milliseconds: {}\n", times.join(", "));
+    outputs.iter().fold(times, |text, output| text + output + "\n")
+}
+
 /// An accuracy's JSON without the state of the drape, which the figures tell: one key, one meaning.
 fn without_state(accuracy: &Accuracy) -> serde_json::Result<Value> {
     let mut all: Map<String, Value> = serde_json::from_value(serde_json::to_value(accuracy)?)?;
@@ -258,6 +239,11 @@ pub(crate) fn command_line() -> String {
     let typed = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
     let arguments = typed.map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
+fn swatch_fact(cut: &Swatch) -> (String, String) {
+    let panels = if cut.panels.is_empty() { String::new() } else { format!(": {}", listed(&cut.panels)) };
+    (format!("cut from {}", cut.fabric.as_deref().unwrap_or_default()), format!("{}{panels}", cut.garment))
 }
 
 pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {

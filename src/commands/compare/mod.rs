@@ -109,9 +109,7 @@ impl CompareArgs {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        for warning in bench.bench.warnings() {
-            console::warning(&warning);
-        }
+        console::warnings(&bench.bench.warnings());
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
             write_csv(path, &table::csv(&compared)?)?;
@@ -152,9 +150,7 @@ impl CompareArgs {
             }));
         }
         let plan = Plan::of_jobs("compare", jobs)?;
-        for note in &plan.notes {
-            console::note(note);
-        }
+        console::notes(&plan.notes);
         Ok(plan)
     }
 }

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::{Format, RunArgs, show};
 use crate::commands::failure::UserError;
-use crate::commands::summary::{command_line, fabric_facts};
+use crate::commands::summary::{command_line, ended, fabric_facts};
 use crate::commands::{certified, console, interrupt};
 
 /// Our own: PARTs and what follows.
@@ -147,8 +147,8 @@ impl RunArgs {
             outputs.extend(recorder.finish()?.said());
         }
         timings.push(("total", ms(began.elapsed())));
-        loaded.notes().iter().chain(&drape.notes).for_each(|note| console::note(note));
-        warnings.iter().for_each(|warning| console::warning(warning));
+        console::notes(&[loaded.notes(), drape.notes.clone()].concat());
+        console::warnings(&warnings);
         let report = Report {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
@@ -168,9 +168,7 @@ impl RunArgs {
             Format::Json => console::result(&partwise::said::json(&report)?),
             Format::Text => {
                 console::result(&report.text(drape, &timings));
-                if let Some(certificate) = &certificate {
-                    console::result(&certified::text(certificate));
-                }
+                certified::print(certificate.as_ref());
             }
         }
         served.map_or(Ok(()), show)?;
@@ -252,11 +250,6 @@ impl Report<'_> {
         }
         let counts: Vec<String> = drape.counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
         let _ = writeln!(out, "{:<20}{}", "counted", counts.join(", "));
-        let times: Vec<String> = timings_ms.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
-        let _ = writeln!(out, "milliseconds: {}", times.join(", "));
-        for output in &self.outputs {
-            let _ = writeln!(out, "{output}");
-        }
-        out
+        out + &ended(timings_ms.iter().copied(), &self.outputs)
     }
 }
