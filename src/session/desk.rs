@@ -27,7 +27,7 @@ pub(super) struct Desk {
     pub(super) accepted: Instant,
     /// The state that failed, after which there is nothing to go back to.
     pub(super) failed: Option<u64>,
-    history: History,
+    pub(super) history: History,
     good_scene: Option<SceneSpec>,
     good_job: Option<Arc<Job>>,
     /// Body and garment while their files are read again.
@@ -52,14 +52,6 @@ impl Desk {
             pins_made: 0,
             rests: Vec::new(),
         }
-    }
-
-    pub(super) fn job(&self) -> &Job {
-        &self.view.job
-    }
-
-    pub(super) fn steps(&self) -> (usize, usize) {
-        self.history.depth()
     }
 
     /// Takes the next job, unless it is the one that stands.

@@ -81,7 +81,7 @@ impl Session {
     /// [`EditError`]: the session stays as it was.
     pub fn submit(&self, edit: &Edit, gesture: Option<u64>) -> Result<u64, EditError> {
         self.change(|desk| {
-            let job = edit.applied(desk.job())?;
+            let job = edit.applied(&desk.view.job)?;
             desk.check_fabric(edit, &job)?;
             desk.take(job, gesture)
         })
@@ -192,7 +192,7 @@ impl Session {
         let mut desk = self.desk();
         let done = change(&mut desk)?;
         desk.view.serial += 1;
-        (desk.view.undo, desk.view.redo) = desk.steps();
+        (desk.view.undo, desk.view.redo) = desk.history.depth();
         self.0.newest.store(desk.view.state, Ordering::SeqCst);
         let serial = desk.view.serial;
         drop(desk);
