@@ -56,18 +56,10 @@ impl Conditions {
     /// In one line.
     #[must_use]
     pub fn said(&self) -> String {
-        let [speed, over] = self.rest;
-        format!(
-            "{}; {} threads; fabric {}; {} counted rounds after {}; {} perturbed starts; rest: RMS speed under {} cm/s over {} s",
-            self.machine,
-            self.threads,
-            self.fabric,
-            self.rounds,
-            self.warm_up,
-            self.starts,
-            100.0 * speed,
-            over
-        )
+        let Self { machine, threads, fabric, rounds, warm_up, starts, rest: [speed, over], .. } = self;
+        let rest = format!("rest: RMS speed under {} cm/s over {over} s", 100.0 * speed);
+        let counted = format!("{rounds} counted rounds after {warm_up}; {starts} perturbed starts");
+        format!("{machine}; {threads} threads; fabric {fabric}; {counted}; {rest}")
     }
 }
 
