@@ -78,7 +78,12 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
     may(right, request.method())?;
     let method = request.method().clone();
     match (&method, of_api) {
-        (&Method::GET, "state") => Ok(json_of(&for_reader(report::state(&site.session.snapshot()), right, &site.run))),
+        (&Method::GET, "state") => {
+            let mut state = report::state(&site.session.snapshot());
+            state["may_steer"] = json!(right == Right::Control);
+            state["run"] = json!(site.run);
+            Ok(json_of(&state))
+        }
         (&Method::GET, "choices") => Ok(json_of(&report::choices())),
         (&Method::GET, "events") => flow(site, "text/event-stream", events),
         (&Method::GET, "stream") => match site.pieces.broken() {
@@ -257,12 +262,6 @@ fn label(bytes: &Bytes) -> Result<Option<String>, Refused> {
         Some(Value::String(label)) => Ok(Some(label.chars().filter(|c| !c.is_control()).take(60).collect())),
         Some(other) => Err((StatusCode::BAD_REQUEST, format!("found label = {other}, expected a text"))),
     }
-}
-
-fn for_reader(mut state: Value, right: Right, run: &str) -> Value {
-    state["may_steer"] = json!(right == Right::Control);
-    state["run"] = json!(run);
-    state
 }
 
 fn json_of(value: &Value) -> Response<Answer> {

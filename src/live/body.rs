@@ -56,7 +56,6 @@ pub(super) fn answer(status: StatusCode, kind: &'static str, body: Answer) -> Re
     response
 }
 
-/// A whole answer.
 pub(super) fn whole(status: StatusCode, kind: &'static str, bytes: impl Into<Bytes>) -> Response<Answer> {
     answer(status, kind, Answer::Whole(Some(bytes.into())))
 }

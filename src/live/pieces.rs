@@ -23,7 +23,7 @@ const PACE: Duration = Duration::from_millis(33);
 /// The newest piece of each kind: layout and triangles, PARTs, preview, rest.
 type Slots = [Option<(u64, Bytes)>; 4];
 
-/// The pieces.
+#[derive(Default)]
 pub(super) struct Pieces {
     slots: Mutex<Slots>,
     told: watch::Sender<u64>,
@@ -43,16 +43,6 @@ struct Encoded {
 }
 
 impl Pieces {
-    pub(super) fn new() -> Self {
-        Self {
-            slots: Mutex::new(Slots::default()),
-            told: watch::channel(0).0,
-            viewers: Arc::default(),
-            stopped: AtomicBool::new(false),
-            broken: Mutex::new(None),
-        }
-    }
-
     /// A viewer holds this for as long as it looks.
     pub(super) fn attach(&self) -> Arc<()> {
         Arc::clone(&self.viewers)

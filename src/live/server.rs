@@ -39,7 +39,7 @@ impl LiveServer {
             // The number alone: whoever is told asks for the newest.
             serial.send_replace(known);
         });
-        let pieces = Arc::new(Pieces::new());
+        let pieces = Arc::new(Pieces::default());
         let site = Arc::new(Site {
             session: session.clone(),
             access,

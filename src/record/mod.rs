@@ -1,7 +1,7 @@
 //! The recording: every stage of a drape as Rerun shows it. The only module that knows Rerun.
 //!
 //! Results come in as plain meshes and slices; [`paths`] lists what a recording holds. Triangles are logged once, later
-//! steps send only what changed. Without a sink nothing is made: see [`Recorder::disabled`].
+//! steps send only what changed. Without a sink nothing is made.
 
 mod blueprint;
 mod colour_map;
@@ -116,19 +116,13 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder that makes nothing and costs nothing.
-    #[must_use]
-    pub fn disabled() -> Self {
-        Self { open: None }
-    }
-
-    /// Opens every sink, or none.
+    /// Opens every sink, or none. Without a sink it makes nothing and costs nothing.
     ///
     /// # Errors
     /// An unwritable file, a port in use, a viewer that is not there.
     pub fn open(options: RecordOptions) -> Result<Self, RecordError> {
         if options.sinks.is_empty() {
-            return Ok(Self::disabled());
+            return Ok(Self { open: None });
         }
         Ok(Self { open: Some(Box::new(Open::new(options)?)) })
     }

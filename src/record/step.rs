@@ -71,7 +71,6 @@ impl StepView<'_> {
     }
 }
 
-/// Logs the whole step.
 pub(crate) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let part_of_vertex = covering(step.part_of_vertex, step.part_force_n.len());
     // Nothing pulls at what is in no PART.

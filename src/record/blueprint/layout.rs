@@ -91,30 +91,22 @@ impl Layout {
             return Node::Tabs(0, vec![self.side_by_side(eye), contest::numbers()]);
         }
         let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
-        let mut tabs = vec![(Tab::Stages, first)];
-        if !self.compare.is_empty() {
-            tabs.push((Tab::SideBySide, self.side_by_side(eye)));
+        let further: [(Tab, bool, &dyn Fn() -> Node); 7] = [
+            (Tab::SideBySide, !self.compare.is_empty(), &|| self.side_by_side(eye)),
+            (Tab::Numbers, self.several_tables || self.scatter, &|| self.numbers()),
+            (Tab::Fit, !self.fit.is_empty(), &|| self.fit(eye)),
+            (Tab::Pattern, self.pattern, &|| self.panels(eye)),
+            (Tab::Outfit, !self.outfit.is_empty(), &|| self.wardrobe(eye)),
+            (Tab::Wrinkles, self.wrinkles, &|| closer::wrinkles(&self.eye(Tab::Wrinkles, eye))),
+            (Tab::Solver, self.iterations && self.method.is_none(), &|| closer::solver(&self.eye(Tab::Solver, eye))),
+        ];
+        let there = further.into_iter().filter(|(_, there, _)| *there);
+        let (mut tabs, mut nodes) = (vec![Tab::Stages], vec![first]);
+        for (tab, _, node) in there {
+            tabs.push(tab);
+            nodes.push(node());
         }
-        if self.several_tables || self.scatter {
-            tabs.push((Tab::Numbers, self.numbers()));
-        }
-        if !self.fit.is_empty() {
-            tabs.push((Tab::Fit, self.fit(eye)));
-        }
-        if self.pattern {
-            tabs.push((Tab::Pattern, self.panels(eye)));
-        }
-        if !self.outfit.is_empty() {
-            tabs.push((Tab::Outfit, self.wardrobe(eye)));
-        }
-        if self.wrinkles {
-            tabs.push((Tab::Wrinkles, closer::wrinkles(&self.eye(Tab::Wrinkles, eye))));
-        }
-        if self.iterations && self.method.is_none() {
-            tabs.push((Tab::Solver, closer::solver(&self.eye(Tab::Solver, eye))));
-        }
-        let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
-        let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
+        let open = tabs.iter().position(|tab| *tab == self.opens_on).unwrap_or(0);
         match nodes.pop() {
             Some(only) if nodes.is_empty() => only,
             last => Node::Tabs(open, nodes.into_iter().chain(last).collect()),

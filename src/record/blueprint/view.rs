@@ -15,7 +15,6 @@ use super::super::meshes::{colour, single};
 /// Behind the garments: a calm dark grey, a shade lighter than the viewer's own panels.
 const BACKDROP: [u8; 3] = [31, 34, 39];
 
-/// One view.
 pub(crate) struct View {
     class: &'static str,
     name: String,
@@ -57,7 +56,6 @@ impl View {
         Self::new("2D", name, contents).with("Background", &backdrop).with("VisualBounds2D", &seen)
     }
 
-    /// A text.
     pub(crate) fn text(name: impl Into<String>, path: &str) -> Self {
         let mut view = Self::new("TextDocument", name, &[path]);
         path.clone_into(&mut view.origin);
@@ -77,7 +75,6 @@ impl View {
         self.with("TimeAxis", &TimeAxis::new().with_view_range(TimeRange { start, end }))
     }
 
-    /// Bars.
     pub(crate) fn bars(name: impl Into<String>, contents: &[&str]) -> Self {
         Self::new("BarChart", name, contents).with("PlotLegend", &PlotLegend::new().with_visible(false))
     }
