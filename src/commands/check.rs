@@ -8,12 +8,8 @@ use partwise::scene::Placement;
 use partwise::{Scene, SceneSpec};
 use serde::Serialize;
 
-use super::certified;
-use super::console;
-use super::fabrics::FabricArgs;
-use super::failure::UserError;
-use super::inputs::InputArgs;
 use super::run::Format;
+use super::{FabricArgs, InputArgs, UserError, certified, console};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]

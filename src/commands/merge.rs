@@ -8,11 +8,10 @@ use clap::Args;
 use partwise::record::Tab;
 use partwise::sweep::{Outcome, Status, merge, store};
 
-use super::console;
-use super::sinks::SinkArgs;
 use super::sweep::record_all;
 use super::sweep::report::{Format, Report};
 use super::sweep::store::PointStore;
+use super::{SinkArgs, console};
 
 /// Arguments of `merge`.
 #[derive(Debug, Clone, Args)]

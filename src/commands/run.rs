@@ -16,13 +16,11 @@ use partwise::drape::{self, LetGo};
 use partwise::job::Against;
 use partwise::record::Recorder;
 
-use super::inputs::InputArgs;
-use super::sinks::{SinkArgs, mesh_file};
+use super::sinks::mesh_file;
 use super::solved::{Snapshot, Solved};
-use super::stages::StageArgs;
 use super::summary::Summary;
 use super::work::{cache, refining, use_threads};
-use super::{certified, console, interrupt};
+use super::{InputArgs, SinkArgs, StageArgs, certified, console, interrupt};
 use painted::ExportColours;
 
 /// What stdout is for.
@@ -135,7 +133,7 @@ impl RunArgs {
     /// The job that the flags ask for, its small files read.
     fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
-        let scene = self.stages.cloth().give(self.input.spec()?)?;
+        let scene = self.stages.dials.cloth.give(self.input.spec()?)?;
         let accuracy = if self.accuracy { Against::Own } else { Against::None };
         Ok(Job { scene, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
@@ -143,7 +141,7 @@ impl RunArgs {
     /// Runs every stage of a job.
     fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
         let loaded = self.input.load(&job.scene)?;
-        self.stages.cloth().check_used(&loaded)?;
+        self.stages.dials.cloth.check_used(&loaded)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
         let mut snapshots = Vec::new();

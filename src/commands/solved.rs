@@ -13,7 +13,7 @@ use partwise::record::{
 use partwise::scene::{Loaded, Tailored};
 use partwise::session::Finished;
 
-use super::sinks::SinkArgs;
+use super::SinkArgs;
 use super::summary::Summary;
 
 /// A garment through every stage.

@@ -119,7 +119,6 @@ impl Summary {
         }
     }
 
-    /// One JSON object.
     pub(crate) fn json(&self) -> anyhow::Result<String> {
         Ok(partwise::said::json(self)?)
     }
@@ -129,15 +128,10 @@ impl Summary {
         let figures = &self.figures;
         let (vertices, triangles) = (figures.vertices, figures.triangles);
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
-        let _ = writeln!(
-            out,
-            "{:<20}table {}: {} in {} levels, {} of them single vertices",
-            "stage one",
-            self.table,
-            figures.parts_text(),
-            figures.levels,
-            figures.singletons
-        );
+        let (table, parts, levels, singletons) =
+            (&self.table, figures.parts_text(), figures.levels, figures.singletons);
+        let stage_one = format!("table {table}: {parts} in {levels} levels, {singletons} of them single vertices");
+        let _ = writeln!(out, "{:<20}{stage_one}", "stage one");
         let _ = writeln!(
             out,
             "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
@@ -249,13 +243,11 @@ fn swatch_fact(cut: &Swatch) -> (String, String) {
 pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let [weft, bias, warp] = fabric.bending_nm.map(|b| b * 1e6);
+    let [stretch_weft, stretch_warp] = [fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m];
     vec![
         fact("name", fabric.name.clone()),
         fact("density", format!("{} kg/m²", fabric.density_kg_per_m2)),
-        fact(
-            "stretch, weft and warp",
-            format!("{} and {} N/m", fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m),
-        ),
+        fact("stretch, weft and warp", format!("{stretch_weft} and {stretch_warp} N/m")),
         fact("shear", format!("{} N/m", fabric.shear_n_per_m)),
         fact("bending, weft, bias, warp", format!("{weft:.0}, {bias:.0}, {warp:.0} µN·m")),
         fact("thickness", format!("{:.2} mm", 1e3 * fabric.thickness_m)),

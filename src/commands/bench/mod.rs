@@ -11,10 +11,9 @@ use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::shapes::{GarmentRequest, MeshCache};
 use serde_json::json;
 
-use crate::commands::failure::UserError;
 use crate::commands::sweep::report::Format;
-use crate::commands::work::{use_threads, write_csv};
-use crate::commands::{console, interrupt};
+use crate::commands::work::{make_folder, unwritable, use_threads, write_csv};
+use crate::commands::{UserError, console, interrupt};
 
 const LONG_ABOUT: &str = "\
 Drapes the paper's garments in every way there is: its reference methods [19], [20] and [21], its own equations (`paper`), the coupled \
@@ -107,8 +106,7 @@ impl TableFourArgs {
             Journal::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
         };
         if let Some(folder) = &self.recordings {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         interrupt::keep();
         let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
@@ -134,7 +132,8 @@ impl TableFourArgs {
                     journal.rows.push(contested.row.clone());
                     // Kept before it is recorded: a disk that is full then costs a picture and no row.
                     if !self.quick {
-                        self.keep(&journal)?;
+                        let file = &self.rows_file;
+                        journal.write(file).map_err(unwritable(file, "file with --rows-file"))?;
                     }
                     if let Some(folder) = &self.recordings {
                         let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
@@ -189,13 +188,6 @@ impl TableFourArgs {
             SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}")).check_names()?;
         }
         Ok(asked)
-    }
-
-    fn keep(&self, journal: &Journal) -> anyhow::Result<()> {
-        journal.write(&self.rows_file).map_err(|e| {
-            let file = self.rows_file.display();
-            UserError::new(format!("{file}: cannot be written: {e}; choose another file with --rows-file"))
-        })
     }
 
     fn report(&self, journal: &Journal, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {

@@ -17,9 +17,8 @@ use partwise::scene::Loaded;
 use serde::Serialize;
 
 use super::{Format, RunArgs, show};
-use crate::commands::failure::UserError;
 use crate::commands::summary::{command_line, ended, fabric_facts};
-use crate::commands::{certified, console, interrupt};
+use crate::commands::{UserError, certified, console, interrupt};
 
 /// Our own: PARTs and what follows.
 pub(super) const TWO_STAGE: &str = "two-stage";
@@ -87,7 +86,7 @@ impl RunArgs {
     pub(super) fn run_by_method(&self) -> anyhow::Result<()> {
         self.refuse_beside_a_method()?;
         let began = Instant::now();
-        let (spec, fabric) = (self.stages.cloth().give(self.input.spec()?)?, self.stages.cloth().first()?);
+        let (spec, fabric) = (self.stages.dials.cloth.give(self.input.spec()?)?, self.stages.dials.cloth.first()?);
         if !spec.over.is_empty() {
             return Err(UserError::new(format!(
                 "--method {}: found {} garments over each other, expected one: it keeps no cloth off cloth",
@@ -97,7 +96,7 @@ impl RunArgs {
         }
         self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
         let loaded = self.input.load(&spec)?;
-        self.stages.cloth().check_used(&loaded)?;
+        self.stages.dials.cloth.check_used(&loaded)?;
         let load = began.elapsed();
         let sewn = loaded.tailored.as_ref().map(|tailored| &tailored.put_on.garment);
         let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty(), sewn);

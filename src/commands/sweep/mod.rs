@@ -16,7 +16,7 @@ use clap::Args;
 use partwise::Job;
 use partwise::job::Against;
 use partwise::record::{RecordSummary, Tab};
-use partwise::sweep::{Existing, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
+use partwise::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
 
 use self::points::KeepingBench;
 use self::report::{Format, Report};
@@ -144,11 +144,9 @@ impl SweepArgs {
         };
         console::result(&report.text(self.format)?);
         if outcome.failed > 0 && !interrupt::requested() {
+            let (Outcome { failed, total, .. }, folder) = (outcome, folder.display());
             anyhow::bail!(
-                "{} of {} points failed: the column `error` of {}/rows.csv says why; --resume tries them again",
-                outcome.failed,
-                outcome.total,
-                folder.display()
+                "{failed} of {total} points failed: the column `error` of {folder}/rows.csv says why; --resume tries them again"
             );
         }
         Ok(())

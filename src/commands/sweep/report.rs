@@ -73,11 +73,9 @@ impl Report<'_> {
     fn table(&self) -> String {
         let Outcome { total, skipped, failed, rows, .. } = self.outcome;
         let mut out = format!("{}\n{}", rows_table(rows), explained(rows));
+        let (done, seconds, folder) = (rows.len(), self.seconds, self.folder.display());
         out.push_str(&format!(
-            "{} of {total} points done, {failed} failed; {skipped} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
-            rows.len(),
-            self.seconds,
-            self.folder.display()
+            "{done} of {total} points done, {failed} failed; {skipped} found there, the others took {seconds:.1} s\nrows: {folder}/rows.csv\n"
         ));
         for recording in self.recordings {
             out.push_str(&line(recording));
@@ -91,14 +89,10 @@ impl Report<'_> {
 
 /// A recording, its size and its cost in a line.
 pub(crate) fn line(recording: &RecordSummary) -> String {
-    let Some(path) = &recording.path else { return String::new() };
-    format!(
-        "recording: {} ({:.1} MB, {:.2} of the bytes that changed, {:.1} s)\n",
-        path.display(),
-        recording.bytes as f64 / 1e6,
-        recording.bytes as f64 / recording.raw_bytes.max(1) as f64,
-        recording.log_ms / 1e3
-    )
+    let Some(said) = recording.said() else { return String::new() };
+    let [bytes, raw] = [recording.bytes, recording.raw_bytes.max(1)].map(|bytes| bytes as f64);
+    let (mb, share, seconds) = (bytes / 1e6, bytes / raw, recording.log_ms / 1e3);
+    format!("{said} ({mb:.1} MB, {share:.2} of the bytes that changed, {seconds:.1} s)\n")
 }
 
 /// What the columns of [`rows_table`] are, where an error was measured.

@@ -25,7 +25,6 @@ const BOUNDS: usize = 3;
 /// A table taken from a front.
 #[derive(Debug, Clone)]
 pub(crate) struct Taken {
-    /// The table.
     pub(crate) table: RangeTable,
     /// What it holds, garment by garment, in the order of the garments it was tuned on.
     pub(crate) holds: Vec<Holds>,

@@ -8,7 +8,6 @@ use crate::commands::{console, interrupt};
 /// One iteration: a round of one search.
 #[derive(Debug, Clone)]
 pub(crate) struct Iteration {
-    /// What was searched.
     pub(crate) what: &'static str,
     /// Its round, from 1.
     pub(crate) round: usize,

@@ -12,15 +12,12 @@ use partwise::range_table::RangeTable;
 use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
 
-use crate::commands::console;
-use crate::commands::fabrics::FabricArgs;
-use crate::commands::failure::UserError;
 use crate::commands::work::refining;
+use crate::commands::{FabricArgs, UserError, console};
 
 /// PARTs of a table on a garment, and the error that guides the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Holds {
-    /// PARTs.
     pub(crate) parts: usize,
     /// What a motion of each PART's own leaves, mm.
     pub(crate) rms_mm: f64,

@@ -28,7 +28,7 @@ use super::fabrics::FabricArgs;
 use super::failure::UserError;
 use super::sinks::SinkArgs;
 use super::sweep::report::{Format, line};
-use super::work::{cache, use_threads};
+use super::work::{cache, unwritable, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -119,7 +119,6 @@ struct Results {
 }
 
 impl TuneArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::keep();
@@ -249,8 +248,6 @@ impl TuneArgs {
 
     fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
         let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
-        written.map_err(|e| {
-            UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
-        })
+        written.map_err(unwritable(path, "folder with --out"))
     }
 }
