@@ -13,7 +13,7 @@ use tokio::sync::mpsc::Receiver;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::access::{Access, Refused, Right, check_site, may, query};
-use super::body::{Answer, answer, refusal, whole};
+use super::body::{Answer, flowing, refusal, whole};
 use super::events::{MOST_FLOWS, events, stream};
 use super::pieces::Pieces;
 use super::{garment, report};
@@ -140,7 +140,7 @@ fn flow(
 ) -> Result<Response<Answer>, Refused> {
     let full = |_| (StatusCode::SERVICE_UNAVAILABLE, format!("{MOST_FLOWS} readers are there already; close a page"));
     let place = Arc::clone(&site.flows).try_acquire_owned().map_err(full)?;
-    Ok(answer(StatusCode::OK, kind, Answer::Flow(open(site, place))))
+    Ok(flowing(kind, open(site, place)))
 }
 
 /// An edit as JSON, or a range table or a whole job as TOML.
