@@ -7,7 +7,7 @@ use super::super::outfit;
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
 use super::rows::{grid, in_rows};
-use super::view::View;
+use super::view::{View, on_the_body};
 use super::{Node, TimePanel};
 use super::{closer, contest};
 use crate::scene::Layer;
@@ -140,7 +140,7 @@ impl Layout {
     fn stages(&self, eye: &Eye) -> Node {
         let (rows, _) = self.stage_grid(eye);
         let eye = &self.eye(Tab::Stages, eye);
-        let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
+        let seen = |name: &str, path: &str| on_the_body(name, path, eye);
         let mut views = vec![seen("Distance", "/distance"), seen("PARTs", "/parts")];
         if !self.held {
             views.push(seen("Force per PART", "/force"));
@@ -208,10 +208,7 @@ impl Layout {
             let branch = outfit::branch(k, worn);
             // The drape bears the garment's name: all three would be cut with it.
             let stages = [("PARTs", "parts"), ("Force per PART", "force"), (worn.name.as_str(), "drape")];
-            let view = |(title, leaf): (&str, &str)| {
-                let path = format!("{branch}/{leaf}");
-                (1.0, View::spatial(title, &[paths::BODY, &path], &one).into())
-            };
+            let view = |(title, leaf): (&str, &str)| on_the_body(title, &format!("{branch}/{leaf}"), &one);
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };
         let garments = Node::Column("Garments", self.outfit.iter().enumerate().map(row).collect());
@@ -223,12 +220,8 @@ impl Layout {
 
     fn fit(&self, eye: &Eye) -> Node {
         let eye = &self.eye(Tab::Fit, eye);
-        let mut views: Vec<(f32, Node)> = Vec::new();
-        for name in &self.fit {
-            let path = format!("{}/{name}", paths::FIT);
-            views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
-        }
-        over("Fit", views, "Colours", paths::FIT_LEGEND, self.fit.len())
+        let view = |name: &String| on_the_body(capital(name), &format!("{}/{name}", paths::FIT), eye);
+        over("Fit", self.fit.iter().map(view).collect(), "Colours", paths::FIT_LEGEND, self.fit.len())
     }
 }
 

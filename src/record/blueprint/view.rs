@@ -11,6 +11,13 @@ use rerun::{AsComponents, RecordingStream, SerializedComponentBatch};
 use super::super::RecordError;
 use super::super::eye::Eye;
 use super::super::meshes::{colour, single};
+use super::super::paths;
+use super::Node;
+
+/// A view of what lies at `path` on the body, one share wide.
+pub(crate) fn on_the_body(name: impl Into<String>, path: &str, eye: &Eye) -> (f32, Node) {
+    (1.0, View::spatial(name, &[paths::BODY, path], eye).into())
+}
 
 /// Behind the garments: a calm dark grey, a shade lighter than the viewer's own panels.
 const BACKDROP: [u8; 3] = [31, 34, 39];
