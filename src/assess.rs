@@ -45,10 +45,8 @@ pub enum AssessError {
         "garments worn over each other have no canonical drape, as each waits for what is below it: found {garments} of them, expected \
          one; leave --accuracy out, or measure each by itself"
     )]
-    Layers {
-        /// How many there are.
-        garments: usize,
-    },
+    #[allow(missing_docs, reason = "the message says what it is")]
+    Layers { garments: usize },
     /// Nothing keeps the garment on the body.
     #[error(
         "the garment falls off the body where it goes on to rest, so it has no reference; hold an edge of it (--hold)"

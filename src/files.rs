@@ -39,9 +39,14 @@ pub fn stem(name: &str) -> String {
 /// Names in a sentence, the first twenty of many.
 #[must_use]
 pub fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 20;
-    let shown = names[..names.len().min(SHOWN)].join(", ");
-    match names.len().saturating_sub(SHOWN) {
+    first_of(names, 20)
+}
+
+/// Names in a sentence, the first so many of more.
+#[must_use]
+pub fn first_of(names: &[String], most: usize) -> String {
+    let shown = names[..names.len().min(most)].join(", ");
+    match names.len().saturating_sub(most) {
         0 => shown,
         more => format!("{shown} and {more} more"),
     }

@@ -3,8 +3,12 @@
 //! What does not match its kind or its hash is no value of ours, half of one, or damaged: it opens as nothing, and
 //! whoever asked makes it again.
 
+use std::path::Path;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+use crate::whole_file::{WholeFile, folder_of};
 
 /// First bytes of a sealed value: what it is, and the version of its format.
 pub type Kind = [u8; 8];
@@ -15,6 +19,12 @@ pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
     let hash = blake3::hash(&bytes);
     bytes.extend(hash.as_bytes());
     Ok(bytes)
+}
+
+/// Writes `value` sealed as the whole of `path`, whose folder is made if it is not there.
+pub fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder_of(path))?;
+    WholeFile::write(path, seal(kind, value)?)
 }
 
 /// A hash of `value` by its bytes, for use as a name.
@@ -39,22 +49,6 @@ pub fn peek<T: DeserializeOwned>(kind: &Kind, head: &[u8]) -> Option<T> {
     Some(postcard::take_from_bytes(head.strip_prefix(kind)?).ok()?.0)
 }
 
-/// Points in double precision: `#[serde(with = "sealed::points")]`.
-pub mod points {
-    use glam::DVec3;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    /// As triples.
-    pub fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(points.iter().map(DVec3::to_array))
-    }
-
-    /// From triples.
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
-        Ok(Vec::<[f64; 3]>::deserialize(from)?.into_iter().map(DVec3::from_array).collect())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,7 +58,6 @@ mod tests {
     struct Value {
         name: String,
         numbers: Vec<f64>,
-        #[serde(with = "points")]
         places: Vec<glam::DVec3>,
     }
 
@@ -81,6 +74,7 @@ mod tests {
         let opened: Value = open(KIND, &bytes).unwrap();
         assert_eq!(opened, value);
         assert!(opened.numbers[2].is_sign_negative());
+        assert_eq!(hash(KIND, &value.places), hash(KIND, &[[0.5, -0.25, 1.0 / 3.0]].to_vec()), "points are triples");
         assert_eq!(peek::<String>(KIND, &bytes[..20]).unwrap(), "scene");
         assert!(open::<Value>(b"PWTEST02", &bytes).is_none());
         for length in 0..bytes.len() {

@@ -8,7 +8,7 @@
 //! half of one. A file that does not match its hash, its key or its garment is no error: the reference is computed again,
 //! and the caller gets a warning to show.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,6 @@ use crate::fabric::Fabric;
 use crate::files::user_cache;
 use crate::mesh::{RestShape, TriMesh};
 use crate::sealed::{self, Kind};
-use crate::whole_file::WholeFile;
 
 /// First bytes of a file, and part of every key; the digit goes up with the format and with the mechanics, so that a drape
 /// of an older solver is never taken for the reference of a newer one.
@@ -50,19 +49,20 @@ impl ReferenceKey {
     /// Hashes everything a reference depends on.
     #[must_use]
     pub fn new(input: &ReferenceInput<'_>) -> Self {
-        let points = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<_>>();
-        let mesh = |mesh: &TriMesh| (points(&mesh.positions), mesh.triangles.clone());
-        let rest: Vec<[[f64; 2]; 3]> = input.rest.corners.iter().map(|t| t.map(|corner| corner.to_array())).collect();
+        fn mesh(mesh: &TriMesh) -> (&[DVec3], &[[u32; 3]]) {
+            (&mesh.positions, &mesh.triangles)
+        }
         // What a fabric is called changes nothing.
         let nameless = |fabric: &Fabric| Fabric { name: String::new(), source: String::new(), ..fabric.clone() };
         let fabrics: Vec<Fabric> = input.fabrics.iter().map(nameless).collect();
-        let solve = (mesh(input.body), points(input.start), input.options);
+        let (version, rest) = (env!("CARGO_PKG_VERSION"), &input.rest.corners);
+        let solve = (mesh(input.body), input.start, input.options);
         if let [fabric] = &fabrics[..] {
             let cloth = (mesh(input.garment), rest, fabric, input.held);
-            return Self(sealed::hash(KIND, &(env!("CARGO_PKG_VERSION"), cloth, solve)));
+            return Self(sealed::hash(KIND, &(version, cloth, solve)));
         }
         let cloth = (mesh(input.garment), rest, (&input.rest.cut_from, fabrics), input.held);
-        Self(sealed::hash(KIND, &(env!("CARGO_PKG_VERSION"), cloth, solve)))
+        Self(sealed::hash(KIND, &(version, cloth, solve)))
     }
 
     /// File name in the cache.
@@ -76,7 +76,6 @@ impl ReferenceKey {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reference {
     /// Vertex positions, m.
-    #[serde(with = "sealed::points")]
     pub positions: Vec<DVec3>,
     /// Energy, J.
     pub energy_j: f64,
@@ -143,14 +142,9 @@ impl ReferenceCache {
             Err(e) => warnings.push(format!("a cached reference cannot be read ({e}): {}", path.display())),
         }
         let reference = compute()?;
-        if let Err(e) = self.write(&path, key, &reference) {
+        if let Err(e) = sealed::write(&path, KIND, &(key.0.as_bytes(), &reference)) {
             warnings.push(format!("the reference cannot be kept for the next run ({e}): {}", path.display()));
         }
         Ok(Found { reference, cached: false, warnings })
-    }
-
-    fn write(&self, path: &Path, key: &ReferenceKey, reference: &Reference) -> std::io::Result<()> {
-        std::fs::create_dir_all(&self.directory)?;
-        WholeFile::write(path, sealed::seal(KIND, &(key.0.as_bytes(), reference))?)
     }
 }

@@ -13,7 +13,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::moments::Moments;
-use super::quantile::{ErrorSummary, MM_PER_M};
+use super::quantile::MM_PER_M;
+use super::rms_mm;
 use crate::mechanics::coupled::{Motion, Motions, Weights};
 use crate::mechanics::newton::SolveError;
 use crate::mesh::Topology;
@@ -46,10 +47,7 @@ pub fn representable(
     let weights = Weights::new(topology, start, parts).without(held);
     let blended = |motion| {
         let fit = Motions::new(parts, weights.clone(), start, motion).nearest(start, &u);
-        fit.map_or(f64::NAN, |fit| {
-            let errors: Vec<f64> = u.iter().zip(&fit).map(|(u, fit)| u.distance(*fit)).collect();
-            ErrorSummary::of(&errors).rms_mm
-        })
+        fit.map_or(f64::NAN, |fit| rms_mm(&u, &fit))
     };
     Representable {
         translation_rms_mm: MM_PER_M * unblended_rms_m(parts, start, &u, Motion::Translation),

@@ -55,21 +55,14 @@ const LASTS: f64 = -1e-2;
 
 /// Why nothing could be certified.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum CertifyError {
     /// Positions for another mesh.
     #[error("{found} positions for a garment of {expected} vertices: give those of this very garment")]
-    Count {
-        /// Positions given.
-        found: usize,
-        /// Vertices there are.
-        expected: usize,
-    },
+    Count { found: usize, expected: usize },
     /// A position that is not a number.
     #[error("the position of vertex number {} is not finite", .vertex + 1)]
-    NotFinite {
-        /// Its index, from 0.
-        vertex: usize,
-    },
+    NotFinite { vertex: usize },
     /// The cloth cannot be set up.
     #[error(transparent)]
     Energy(#[from] EnergyError),

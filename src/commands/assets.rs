@@ -12,9 +12,8 @@ use partwise::shapes::garment::{BUILT_IN, GarmentSpec, garment_on};
 use partwise::whole_file::WholeFile;
 use rayon::prelude::*;
 
-use super::console;
-use super::failure::UserError;
-use super::measurements::MeasurementArgs;
+use super::work::make_folder;
+use super::{MeasurementArgs, console};
 
 /// Triangles of the form as `run` makes it.
 const FORM_TRIANGLES: usize = partwise::shapes::body::DEFAULT_TRIANGLES;
@@ -42,9 +41,7 @@ impl AssetsArgs {
     /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specs as TOML; sewing patterns as JSON.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         for folder in ["tables", "fabrics", "bodies", "garments", "patterns"] {
-            let folder = self.out.join(folder);
-            std::fs::create_dir_all(&folder)
-                .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
+            make_folder(&self.out.join(folder))?;
         }
         let spec = self.measurements.spec()?;
         let form = DressForm::new(&spec)?;

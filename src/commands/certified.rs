@@ -1,14 +1,13 @@
 //! A certificate, printed, and what it means for the exit code.
 
-use comfy_table::presets;
 use partwise::certificate::Certificate;
 
 use super::console;
 
-/// A certificate for people.
-pub(super) fn text(certificate: &Certificate) -> String {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["certificate", "", "found", "limit", "", ""]);
+/// A certificate for people, where one was asked for.
+pub(super) fn print(certificate: Option<&Certificate>) {
+    let Some(certificate) = certificate else { return };
+    let mut table = console::table(console::RULED, ["certificate", "", "found", "limit", "", ""], []);
     for f in &certificate.findings {
         let number =
             |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };
@@ -23,7 +22,7 @@ pub(super) fn text(certificate: &Certificate) -> String {
         ]);
     }
     let verdict = if certificate.passes { "a drape at rest" } else { "not certified" };
-    format!("{table}\n{verdict}")
+    console::result(&format!("{table}\n{verdict}"));
 }
 
 /// Ends with 1 where a line fails.

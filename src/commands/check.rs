@@ -2,19 +2,14 @@
 //! garment, a draped one, is at rest.
 
 use clap::Args;
-use comfy_table::presets;
 use partwise::certificate::{Certificate, CertifyError, certify};
 use partwise::mesh::health::{Health, health};
 use partwise::scene::Placement;
 use partwise::{Scene, SceneSpec};
 use serde::Serialize;
 
-use super::certified;
-use super::console;
-use super::fabrics::FabricArgs;
-use super::failure::UserError;
-use super::inputs::InputArgs;
 use super::run::Format;
+use super::{FabricArgs, InputArgs, UserError, certified, console};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -111,11 +106,8 @@ impl CheckArgs {
             console::result(&partwise::said::json(&report)?);
             return certified::verified(report.certificate.as_ref());
         }
-        for note in &report.notes {
-            console::note(note);
-        }
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["", &loaded.body_name, &loaded.garment_name]);
+        console::notes(&report.notes);
+        let mut table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], []);
         for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
             table.add_row([name.to_owned(), body, garment]);
         }
@@ -126,14 +118,10 @@ impl CheckArgs {
             table.add_row([name.to_owned(), String::new(), value]);
         }
         console::result(&format!("{table}\nverdict: {}", report.verdict));
-        if let Some(certificate) = &report.certificate {
-            console::result(&certified::text(certificate));
-        }
+        certified::print(report.certificate.as_ref());
         certified::verified(report.certificate.as_ref())
     }
-}
 
-impl CheckArgs {
     /// The certificate of a file whose vertices are those of the garment, in their order.
     fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
         let spec = SceneSpec {

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use comfy_table::{ContentArrangement, Table};
+use comfy_table::{CellAlignment, ContentArrangement, Row, Table};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use partwise::said::{plain, said};
 
@@ -24,10 +24,18 @@ pub(crate) fn result(text: &str) {
     }
 }
 
-/// A table that is no wider than the terminal: what does not fit goes on below. In a file its lines are as long as they are.
-pub(crate) fn table() -> Table {
+/// The looks of tables: with lines between the columns, or around all alone.
+pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
+
+/// A table that is no wider than the terminal: what does not fit goes on below. In a file its lines are as long as they are. Columns of
+/// numbers, ascending, are set to the right.
+pub(crate) fn table(look: &str, header: impl Into<Row>, numbers: impl IntoIterator<Item = usize>) -> Table {
     let mut table = Table::new();
-    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table.load_preset(look).set_content_arrangement(ContentArrangement::Dynamic).set_header(header);
+    for column in numbers {
+        let Some(column) = table.column_mut(column) else { break };
+        column.set_cell_alignment(CellAlignment::Right);
+    }
     table
 }
 
@@ -41,6 +49,11 @@ pub(crate) fn note(text: &str) {
     say("", text);
 }
 
+/// Things worth knowing.
+pub(crate) fn notes(texts: &[String]) {
+    texts.iter().for_each(|text| note(text));
+}
+
 /// Writes to stderr; `mark` may hold colours, `text` may come from a file and may not.
 fn say(mark: &str, text: &str) {
     // Where stderr is closed there is nobody left to tell.
@@ -50,6 +63,11 @@ fn say(mark: &str, text: &str) {
 /// Something to act upon, on stderr.
 pub(crate) fn warning(text: &str) {
     say(&paint("warning: ", "33;1"), text);
+}
+
+/// Things to act upon.
+pub(crate) fn warnings(texts: &[String]) {
+    texts.iter().for_each(|text| warning(text));
 }
 
 /// An error with its causes, on stderr.

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::presets;
 use partwise::fabric::{BUILT_IN, Fabric};
 use partwise::mechanics::cusick::results_csv;
 
@@ -51,10 +50,8 @@ impl CusickArgs {
         if let Some(path) = &self.csv {
             write_csv(path, &csv)?;
         }
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED);
         let mut reader = csv::Reader::from_reader(csv.as_bytes());
-        table.set_header(reader.headers()?.iter());
+        let mut table = console::table(console::RULED, reader.headers()?.iter(), []);
         for row in reader.records() {
             table.add_row(row?.iter());
         }

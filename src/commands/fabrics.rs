@@ -5,7 +5,7 @@ use partwise::SceneSpec;
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::scene::{CutError, Loaded, SceneError};
 
-use super::failure::UserError;
+use super::UserError;
 
 /// The fabrics.
 #[derive(Debug, Clone, Args)]

@@ -7,9 +7,8 @@ use partwise::job::Against;
 use partwise::record::{RecordError, RecordSummary, Recorder};
 use partwise::session::Session;
 
-use super::console;
-use super::sinks::SinkArgs;
 use super::solved::Solved;
+use super::{SinkArgs, console};
 
 /// How long to wait for news before it is looked whether the session goes on.
 pub(super) const GLANCE: Duration = Duration::from_millis(100);

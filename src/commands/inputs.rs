@@ -1,14 +1,12 @@
 //! Body and garment: the arguments shared by every command that needs them.
 
-use std::path::Path;
-
 use clap::Args;
 use partwise::SceneSpec;
 use partwise::mesh::{Axis, Unit};
 use partwise::scene::{DistanceTo, Loaded, SceneError};
 use partwise::shapes::MeshCache;
 
-use super::measurements::MeasurementArgs;
+use super::MeasurementArgs;
 
 /// Body and garment.
 #[derive(Debug, Clone, Args)]
@@ -67,7 +65,7 @@ pub(crate) struct InputArgs {
     #[arg(long)]
     no_cache: bool,
     #[command(flatten)]
-    measurements: MeasurementArgs,
+    pub(crate) measurements: MeasurementArgs,
 }
 
 impl InputArgs {
@@ -105,10 +103,5 @@ impl InputArgs {
             SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
             other => other.into(),
         })
-    }
-
-    /// The file of measurements, for `--watch`.
-    pub(crate) fn measurements(&self) -> Option<&Path> {
-        self.measurements.file()
     }
 }

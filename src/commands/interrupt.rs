@@ -1,5 +1,6 @@
 //! Ctrl-C: the first asks the work in hand to stop and keep what is done, the second ends the program.
 
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -35,6 +36,11 @@ pub(crate) fn keep() {
 /// Whether Ctrl-C was pressed.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
+}
+
+/// The same, as whoever takes step by step is told.
+pub(crate) fn go_on() -> ControlFlow<()> {
+    if requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 /// The same as a flag that work of its own looks at.

@@ -11,11 +11,9 @@ use partwise::record::RecordSummary;
 use partwise::session::{Session, Workshop};
 
 use super::followed::GLANCE;
-use super::inputs::InputArgs;
-use super::sinks::{SeenFrom, SinkArgs};
-use super::stages::StageArgs;
+use super::sinks::SeenFrom;
 use super::work::use_threads;
-use super::{browser, console, followed, interrupt};
+use super::{InputArgs, SinkArgs, StageArgs, browser, console, followed, interrupt};
 
 /// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again.
 const PORT: u16 = 7279;
@@ -72,11 +70,11 @@ impl LiveArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::keep();
-        self.stages.cloth().only("live")?;
+        self.stages.dials.cloth.only("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;
         if job.scene.names_of_fabrics().is_some() {
-            self.stages.cloth().check_used(&self.input.load(&job.scene)?)?;
+            self.stages.dials.cloth.check_used(&self.input.load(&job.scene)?)?;
         }
         let session = Session::new(job.clone(), !self.cold);
         let options = self.options(&job)?;
@@ -97,10 +95,8 @@ impl LiveArgs {
         if worked.is_err() || matches!(recorded, Some(Err(_))) || matches!(shown, Some(Err(_))) {
             anyhow::bail!("the session broke off; this is a mistake of the program");
         }
-        if let Some(Ok(summary)) = recorded
-            && let Some(path) = summary?.path
-        {
-            console::note(&format!("recording: {}", path.display()));
+        if let Some(Ok(summary)) = recorded {
+            console::notes(summary?.said().as_slice());
         }
         Ok(())
     }

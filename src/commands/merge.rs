@@ -6,13 +6,12 @@ use std::time::Instant;
 use anyhow::Context as _;
 use clap::Args;
 use partwise::record::Tab;
-use partwise::sweep::{Status, merge, store};
+use partwise::sweep::{Outcome, Status, merge, store};
 
-use super::console;
-use super::sinks::SinkArgs;
 use super::sweep::record_all;
 use super::sweep::report::{Format, Report};
 use super::sweep::store::PointStore;
+use super::{SinkArgs, console};
 
 /// Arguments of `merge`.
 #[derive(Debug, Clone, Args)]
@@ -48,12 +47,10 @@ impl MergeArgs {
         let recordings = record_all(&rows, &points, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &manifest.name,
-            folder: self.out.display().to_string(),
-            total: rows.len(),
-            skipped: rows.len(),
+            folder: &self.out,
+            outcome: &Outcome::found(rows),
             seconds: started.elapsed().as_secs_f64(),
             keeping_ms: 0.0,
-            rows: &rows,
             recordings: &recordings,
         };
         console::result(&report.text(self.format)?);

@@ -34,6 +34,14 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use partwise::whole_file;
 
+// What most commands take and say goes by one name in all of them.
+use fabrics::FabricArgs;
+use failure::UserError;
+use inputs::InputArgs;
+use measurements::MeasurementArgs;
+use sinks::SinkArgs;
+use stages::StageArgs;
+
 const LONG_ABOUT: &str = "\
 Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun \
 viewer.

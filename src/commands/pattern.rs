@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
 use partwise::SceneSpec;
 use partwise::pattern::SewingPattern;
 use partwise::whole_file::WholeFile;
@@ -99,7 +98,7 @@ impl PatternArgs {
             console::result(&partwise::said::json(&report)?);
             return Ok(());
         }
-        report.notes.iter().for_each(|note| console::note(note));
+        console::notes(&report.notes);
         console::result(&report.text());
         if let Some(path) = &self.svg {
             console::note(&format!("drawing: {}", path.display()));
@@ -110,13 +109,13 @@ impl PatternArgs {
 
 impl Report {
     fn text(&self) -> String {
-        let mut panels = table(&["panel", "for", "edges", "cm²", "vertices"]);
+        let mut panels = console::table(console::RULED, ["panel", "for", "edges", "cm²", "vertices"], 3..);
         for p in &self.panels {
             let label = p.label.clone().unwrap_or_default();
             let numbers = [p.edges.to_string(), format!("{:.0}", p.area_cm2), p.vertices.to_string()];
             panels.add_row([p.name.clone(), label].into_iter().chain(numbers));
         }
-        let mut seams = table(&["seam", "of", "and", "cm", "cm", ""]);
+        let mut seams = console::table(console::RULED, ["seam", "of", "and", "cm", "cm", ""], 3..);
         for s in &self.seams {
             let gathered = if s.gathered_percent > 100.0 * SewingPattern::GATHERED {
                 format!("gathered {:.0} %", s.gathered_percent)
@@ -129,18 +128,7 @@ impl Report {
             let [la, lb] = s.length_cm.map(|l| format!("{l:.1}"));
             seams.add_row([s.number.to_string(), a.clone(), b.clone(), la, lb, gathered]);
         }
-        for table in [&mut panels, &mut seams] {
-            for column in table.column_iter_mut().skip(3) {
-                column.set_cell_alignment(CellAlignment::Right);
-            }
-        }
         let (name, vertices, triangles) = (&self.name, self.vertices, self.triangles);
         format!("{name}: sewn, {vertices} vertices and {triangles} triangles\n{panels}\n{seams}\n")
     }
-}
-
-fn table(header: &[&str]) -> Table {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header.to_vec());
-    table
 }

@@ -16,13 +16,11 @@ use partwise::drape::{self, LetGo};
 use partwise::job::Against;
 use partwise::record::Recorder;
 
-use super::inputs::InputArgs;
-use super::sinks::{SinkArgs, mesh_file};
+use super::sinks::mesh_file;
 use super::solved::{Snapshot, Solved};
-use super::stages::StageArgs;
 use super::summary::Summary;
 use super::work::{cache, refining, use_threads};
-use super::{certified, console, interrupt};
+use super::{InputArgs, SinkArgs, StageArgs, certified, console, interrupt};
 use painted::ExportColours;
 
 /// What stdout is for.
@@ -81,6 +79,16 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
+/// Says where a recording is served, and ends it once the user has seen enough.
+fn show(recorder: Recorder) -> anyhow::Result<()> {
+    if let Some(url) = recorder.web_url() {
+        console::note(&format!("look at it: {url}"));
+    }
+    interrupt::wait();
+    console::notes(recorder.finish()?.said().as_slice());
+    Ok(())
+}
+
 /// The recording gets the mesh at every so many steps: enough to see it settle, a few megabytes at most.
 const MESH_EVERY: usize = 8;
 
@@ -104,18 +112,10 @@ impl RunArgs {
         self.export(&mut solved)?;
         if self.sinks.serve {
             self.print(&solved)?;
-            if let Some(url) = recorder.web_url() {
-                console::note(&format!("look at it: {url}"));
-            }
-            interrupt::wait();
-            if let Some(path) = recorder.finish()?.path {
-                console::note(&format!("recording: {}", path.display()));
-            }
+            show(recorder)?;
         } else {
             let finished = Instant::now();
-            if let Some(path) = recorder.finish()?.path {
-                solved.summary.outputs.push(format!("recording: {}", path.display()));
-            }
+            solved.summary.outputs.extend(recorder.finish()?.said());
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
@@ -133,20 +133,15 @@ impl RunArgs {
     /// The job that the flags ask for, its small files read.
     fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
+        let scene = self.stages.dials.cloth.give(self.input.spec()?)?;
         let accuracy = if self.accuracy { Against::Own } else { Against::None };
-        Ok(Job {
-            scene: self.stages.cloth().give(self.input.spec()?)?,
-            settings,
-            seed: 0,
-            accuracy,
-            spread_starts: self.spread,
-        })
+        Ok(Job { scene, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
 
     /// Runs every stage of a job.
     fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
         let loaded = self.input.load(&job.scene)?;
-        self.stages.cloth().check_used(&loaded)?;
+        self.stages.dials.cloth.check_used(&loaded)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
         let mut snapshots = Vec::new();
@@ -201,18 +196,12 @@ impl RunArgs {
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
-        for warning in &solved.summary.warnings {
-            console::warning(warning);
-        }
-        for note in solved.loaded.notes() {
-            console::note(&note);
-        }
+        console::warnings(&solved.summary.warnings);
+        console::notes(&solved.loaded.notes());
         match self.format {
             Format::Text => {
                 console::result(&solved.summary.text());
-                if let Some(certificate) = &solved.summary.certificate {
-                    console::result(&certified::text(certificate));
-                }
+                certified::print(solved.summary.certificate.as_ref());
             }
             Format::Json => console::result(&solved.summary.json()?),
         }

@@ -8,7 +8,7 @@ use partwise::mesh::MeshError;
 use partwise::record::Sink;
 use partwise::whole_file::{WholeFile, same_place};
 
-use super::failure::UserError;
+use super::UserError;
 
 /// Where the views of a recording look from when it opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

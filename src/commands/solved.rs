@@ -8,12 +8,12 @@ use partwise::Job;
 use partwise::drape::Drape;
 use partwise::job::Measured;
 use partwise::record::{
-    FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Tab, Worn, WrinkleView,
+    FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Tab, WrinkleView,
 };
-use partwise::scene::{Layer, Loaded, Tailored};
+use partwise::scene::{Loaded, Tailored};
 use partwise::session::Finished;
 
-use super::sinks::SinkArgs;
+use super::SinkArgs;
 use super::summary::Summary;
 
 /// A garment through every stage.
@@ -45,7 +45,8 @@ impl Solved {
     /// How to record it; `live` where more steps follow, whose meshes may be others.
     pub(super) fn record_options(&self, sinks: &SinkArgs, iterations: bool, live: bool) -> RecordOptions {
         let overlays = self.overlays();
-        let several = self.loaded.scene.layers.len() > 1;
+        let layers = &self.loaded.scene.layers;
+        let several = layers.len() > 1;
         let of_cloth = overlays.iter().map(|overlay| overlay.name).filter(|name| *name != "error");
         RecordOptions {
             sinks: sinks.sinks(&self.loaded.garment_name),
@@ -56,7 +57,7 @@ impl Solved {
                 iterations: iterations && self.snapshots.len() > 1,
                 error: self.measured.assessment.is_some(),
                 pattern: self.loaded.tailored.is_some(),
-                outfit: self.garments(),
+                outfit: if several { layers.clone() } else { Vec::new() },
                 wrinkles: self.measured.assessment.is_some(),
                 fit: of_cloth.map(str::to_owned).collect(),
                 // Who drapes an outfit looks at that first.
@@ -66,17 +67,6 @@ impl Solved {
             replaceable: live,
             front: sinks.seen_from.direction(),
         }
-    }
-
-    /// The garments, where several are worn over each other.
-    fn garments(&self) -> Vec<Worn> {
-        let layers = self.loaded.scene.layers.iter();
-        let all = layers.map(|Layer { name, vertices, triangles }| Worn {
-            name: name.clone(),
-            vertices: vertices.clone(),
-            triangles: triangles.clone(),
-        });
-        if self.loaded.scene.layers.len() > 1 { all.collect() } else { Vec::new() }
     }
 
     /// What is shown on the draped garment: fit, and the error where it was measured.

@@ -9,9 +9,8 @@ use partwise::mechanics::coupled::Motion;
 use partwise::range_table::{GapRule, RangeTable, TABLE_3};
 use partwise::word::word;
 
-use super::fabrics::FabricArgs;
-use super::failure::UserError;
 use super::readings::{self, Reading};
+use super::{FabricArgs, UserError};
 
 /// Stage one's and stage two's arguments beside the range table.
 #[derive(Debug, Clone, Args)]
@@ -35,7 +34,7 @@ pub(crate) struct DialArgs {
     #[arg(long = "reading", value_name = "KEY=VALUE", value_parser = readings::parse, help = readings::HELP)]
     readings: Vec<Reading>,
     #[command(flatten)]
-    cloth: FabricArgs,
+    pub(crate) cloth: FabricArgs,
     /// Let cloth go through cloth: for comparing, and for garments that are known not to touch themselves
     #[arg(long)]
     no_self_contact: bool,
@@ -55,15 +54,10 @@ pub(crate) struct StageArgs {
     #[arg(long, value_name = "RULE", value_parser = gap_rule)]
     gap: Option<GapRule>,
     #[command(flatten)]
-    dials: DialArgs,
+    pub(crate) dials: DialArgs,
 }
 
 impl DialArgs {
-    /// The fabrics.
-    pub(crate) fn cloth(&self) -> &FabricArgs {
-        &self.cloth
-    }
-
     /// The dials over those of `start`.
     pub(crate) fn over(&self, start: Settings) -> anyhow::Result<Settings> {
         let extents: Vec<f64> = self.max_extent.iter().copied().filter(|cm| *cm != 0.0).collect();
@@ -98,11 +92,6 @@ impl StageArgs {
             ("--no-self-contact", *no_self_contact),
         ];
         all.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect()
-    }
-
-    /// The fabrics alone.
-    pub(crate) fn cloth(&self) -> &FabricArgs {
-        &self.dials.cloth
     }
 
     /// The files behind the arguments, for `--watch`.

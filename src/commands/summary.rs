@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use partwise::Settings;
 use partwise::accuracy::Accuracy;
 use partwise::certificate::Certificate;
@@ -32,7 +32,7 @@ pub(crate) struct Summary {
     fabric: String,
     /// Which garment or panel is cut from which, where that was said.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    cut: Vec<Cut>,
+    cut: Vec<Swatch>,
     /// Constants of all of them, for people.
     #[serde(skip)]
     fabrics: Vec<Fabric>,
@@ -63,32 +63,6 @@ pub(crate) struct Summary {
     pub(crate) outputs: Vec<String>,
 }
 
-/// A share of a garment that is cut from one fabric.
-#[derive(Debug, Clone, Serialize)]
-struct Cut {
-    garment: String,
-    fabric: String,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    panels: Vec<String>,
-}
-
-impl Cut {
-    fn of(swatch: &Swatch, of_settings: &Fabric) -> Self {
-        let fabric = swatch.fabric.as_ref().unwrap_or(&of_settings.name);
-        Self { garment: swatch.garment.clone(), fabric: fabric.clone(), panels: swatch.panels.clone() }
-    }
-
-    fn fact(&self) -> (String, String) {
-        let panels = if self.panels.is_empty() { String::new() } else { format!(": {}", listed(&self.panels)) };
-        (format!("cut from {}", self.fabric), format!("{}{panels}", self.garment))
-    }
-}
-
-/// Milliseconds, for people.
-fn ms(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e3
-}
-
 impl Summary {
     /// Reads the figures off a result.
     pub(crate) fn new(
@@ -101,7 +75,7 @@ impl Summary {
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
         let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
-        let summary = Self {
+        let mut summary = Self {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
             body: loaded.body_name.clone(),
@@ -109,7 +83,7 @@ impl Summary {
             model: settings.model.name(),
             motion: settings.model.motion().name(),
             fabric: loaded.scene.fabric_names(&settings.fabric),
-            cut: loaded.swatches.iter().map(|swatch| Cut::of(swatch, &settings.fabric)).collect(),
+            cut: loaded.swatches.iter().map(|swatch| swatch.cut_from(&settings.fabric)).collect(),
             fabrics: loaded.scene.fabrics(&settings.fabric),
             table: drape.table.name.clone(),
             figures: measured.figures.clone(),
@@ -134,22 +108,17 @@ impl Summary {
             ("refine", times.refine),
             ("other", times.other()),
         ];
-        Ok(stages.into_iter().fold(summary, |summary, (stage, time)| summary.with_time(stage, time)))
+        stages.into_iter().for_each(|(stage, time)| summary.add_time(stage, time));
+        Ok(summary)
     }
 
     /// Adds time to a stage and to the total, which is the sum of all.
     pub(crate) fn add_time(&mut self, stage: &'static str, time: Duration) {
         for name in [stage, "total"] {
-            *self.timings_ms.entry(name).or_default() += ms(time);
+            *self.timings_ms.entry(name).or_default() += time.as_secs_f64() * 1e3;
         }
     }
 
-    fn with_time(mut self, stage: &'static str, time: Duration) -> Self {
-        self.add_time(stage, time);
-        self
-    }
-
-    /// One JSON object.
     pub(crate) fn json(&self) -> anyhow::Result<String> {
         Ok(partwise::said::json(self)?)
     }
@@ -159,15 +128,10 @@ impl Summary {
         let figures = &self.figures;
         let (vertices, triangles) = (figures.vertices, figures.triangles);
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
-        let _ = writeln!(
-            out,
-            "{:<20}table {}: {} in {} levels, {} of them single vertices",
-            "stage one",
-            self.table,
-            figures.parts_text(),
-            figures.levels,
-            figures.singletons
-        );
+        let (table, parts, levels, singletons) =
+            (&self.table, figures.parts_text(), figures.levels, figures.singletons);
+        let stage_one = format!("table {table}: {parts} in {levels} levels, {singletons} of them single vertices");
+        let _ = writeln!(out, "{:<20}{stage_one}", "stage one");
         let _ = writeln!(
             out,
             "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
@@ -184,15 +148,7 @@ impl Summary {
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        let order =
-            ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"];
-        let times: Vec<String> =
-            order.iter().filter_map(|stage| self.timings_ms.get(stage).map(|t| format!("{stage} {t:.1}"))).collect();
-        let _ = writeln!(out, "milliseconds: {}", times.join(", "));
-        for output in &self.outputs {
-            let _ = writeln!(out, "{output}");
-        }
-        out
+        out + &ended(self.times(), &self.outputs)
     }
 
     /// For the recording's text panel.
@@ -207,14 +163,23 @@ impl Summary {
             table: self.table.clone(),
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
-            fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(Cut::fact)).collect(),
-            timings_ms: ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "total"]
-                .iter()
-                .filter_map(|stage| self.timings_ms.get(stage).map(|&t| ((*stage).to_owned(), t)))
+            fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(swatch_fact)).collect(),
+            // How long the recording takes is not known while it is made.
+            timings_ms: self
+                .times()
+                .filter(|(stage, _)| *stage != "record")
+                .map(|(s, ms)| (s.to_owned(), ms))
                 .collect(),
             warnings: self.warnings.clone(),
             command_line: self.command_line.clone(),
         }
+    }
+
+    /// Milliseconds of the stages there were, in their order.
+    fn times(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"]
+            .into_iter()
+            .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
     }
 
     /// Where the garment goes round the body: its girth and its ease, cm.
@@ -223,9 +188,8 @@ impl Summary {
     }
 
     fn ease_table(&self) -> Table {
-        let mut table = console::table();
         let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+        let mut table = console::table(console::RULED, header, 1..);
         for (ease, garment_cm, ease_cm) in self.covered() {
             let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
             if let Some(under) = ease.garment_height_cm.filter(|cm| cm + 0.5 < ease.height_cm) {
@@ -234,25 +198,25 @@ impl Summary {
             let lengths = [height, body, garment];
             table.add_row([ease.at.to_owned()].into_iter().chain(lengths).chain([format!("{ease_cm:+.1}")]));
         }
-        for column in table.column_iter_mut().skip(1) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
         table
     }
 
     fn levels_table(&self) -> Table {
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["level", "from cm", "to cm", "PARTs", "vertices"]);
+        let mut table = console::table(console::RULED, ["level", "from cm", "to cm", "PARTs", "vertices"], 0..);
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
         for l in self.levels.iter().filter(|l| l.vertices > 0) {
             let cells = [l.level.to_string(), bound(l.lower_cm), bound(l.upper_cm)];
             table.add_row(cells.into_iter().chain([l.parts.to_string(), l.vertices.to_string()]));
         }
-        for column in table.column_iter_mut() {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
         table
     }
+}
+
+/// How a run for the terminal ends: its times, and what was written.
+pub(crate) fn ended(times_ms: impl Iterator<Item = (&'static str, f64)>, outputs: &[String]) -> String {
+    let times: Vec<String> = times_ms.map(|(stage, ms)| format!("{stage} {ms:.1}")).collect();
+    let times = format!("milliseconds: {}\n", times.join(", "));
+    outputs.iter().fold(times, |text, output| text + output + "\n")
 }
 
 /// An accuracy's JSON without the state of the drape, which the figures tell: one key, one meaning.
@@ -271,16 +235,19 @@ pub(crate) fn command_line() -> String {
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
+fn swatch_fact(cut: &Swatch) -> (String, String) {
+    let panels = if cut.panels.is_empty() { String::new() } else { format!(": {}", listed(&cut.panels)) };
+    (format!("cut from {}", cut.fabric.as_deref().unwrap_or_default()), format!("{}{panels}", cut.garment))
+}
+
 pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let [weft, bias, warp] = fabric.bending_nm.map(|b| b * 1e6);
+    let [stretch_weft, stretch_warp] = [fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m];
     vec![
         fact("name", fabric.name.clone()),
         fact("density", format!("{} kg/m²", fabric.density_kg_per_m2)),
-        fact(
-            "stretch, weft and warp",
-            format!("{} and {} N/m", fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m),
-        ),
+        fact("stretch, weft and warp", format!("{stretch_weft} and {stretch_warp} N/m")),
         fact("shear", format!("{} N/m", fabric.shear_n_per_m)),
         fact("bending, weft, bias, warp", format!("{weft:.0}, {bias:.0}, {warp:.0} µN·m")),
         fact("thickness", format!("{:.2} mm", 1e3 * fabric.thickness_m)),

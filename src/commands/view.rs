@@ -6,8 +6,7 @@ use std::process::{Command, Stdio};
 use clap::Args;
 use partwise::record::web;
 
-use super::failure::UserError;
-use super::{browser, console, interrupt};
+use super::{UserError, browser, console, interrupt};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]

@@ -1,14 +1,13 @@
 //! What every command that computes needs: threads, references, progress that Ctrl-C is heard beside.
 
-use std::ops::ControlFlow;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use partwise::accuracy::reference::ReferenceCache;
 use partwise::mechanics::refine::Observer;
 use partwise::whole_file::WholeFile;
 
-use super::failure::UserError;
-use super::{console, interrupt};
+use super::{UserError, console, interrupt};
 
 /// The folder of references: the one given, else the user's.
 pub(crate) fn cache(given: Option<&PathBuf>) -> Option<ReferenceCache> {
@@ -32,9 +31,17 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
 
 /// Writes a CSV that was asked for beside what is printed.
 pub(crate) fn write_csv(path: &Path, text: &str) -> anyhow::Result<()> {
-    WholeFile::write(path, text).map_err(|e| {
-        UserError::new(format!("{}: cannot be written: {e}; choose another file with --csv", path.display()))
-    })
+    WholeFile::write(path, text).map_err(unwritable(path, "file with --csv"))
+}
+
+/// What to make of a file that cannot be written where another one can be chosen.
+pub(crate) fn unwritable<'a>(path: &'a Path, other: &'a str) -> impl FnOnce(io::Error) -> anyhow::Error + 'a {
+    move |e| UserError::new(format!("{}: cannot be written: {e}; choose another {other}", path.display()))
+}
+
+/// Makes a folder that was asked for.
+pub(crate) fn make_folder(path: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(path).map_err(|e| UserError::new(format!("{}: cannot be made: {e}", path.display())))
 }
 
 /// Runs `work` with the solver's progress shown and Ctrl-C heard.
@@ -43,7 +50,7 @@ pub(crate) fn refining<T>(what: &str, work: impl FnOnce(Observer<'_>) -> T) -> T
     let bar = console::progress(None, what);
     let out = work(&mut |step| {
         bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
-        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        interrupt::go_on()
     });
     bar.finish_and_clear();
     out

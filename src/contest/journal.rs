@@ -56,18 +56,10 @@ impl Conditions {
     /// In one line.
     #[must_use]
     pub fn said(&self) -> String {
-        let [speed, over] = self.rest;
-        format!(
-            "{}; {} threads; fabric {}; {} counted rounds after {}; {} perturbed starts; rest: RMS speed under {} cm/s over {} s",
-            self.machine,
-            self.threads,
-            self.fabric,
-            self.rounds,
-            self.warm_up,
-            self.starts,
-            100.0 * speed,
-            over
-        )
+        let Self { machine, threads, fabric, rounds, warm_up, starts, rest: [speed, over], .. } = self;
+        let rest = format!("rest: RMS speed under {} cm/s over {over} s", 100.0 * speed);
+        let counted = format!("{rounds} counted rounds after {warm_up}; {starts} perturbed starts");
+        format!("{machine}; {threads} threads; fabric {fabric}; {counted}; {rest}")
     }
 }
 
@@ -82,30 +74,19 @@ pub struct Journal {
 
 /// Why a journal cannot be gone on with.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum JournalError {
     /// It cannot be read.
     #[error(transparent)]
     Unreadable(#[from] crate::files::Unreadable),
     /// It is no journal.
     #[error("{file}: this is no journal of a contest ({reason}); choose another file with --rows-file")]
-    Syntax {
-        /// The file.
-        file: String,
-        /// What serde said.
-        reason: String,
-    },
+    Syntax { file: String, reason: String },
     /// Its rows were made under other conditions.
     #[error(
         "{file}: its rows were made under other conditions: found {found}, expected {expected}; choose another file with --rows-file"
     )]
-    Other {
-        /// The file.
-        file: String,
-        /// Its conditions.
-        found: String,
-        /// Those of this run.
-        expected: String,
-    },
+    Other { file: String, found: String, expected: String },
 }
 
 impl Journal {

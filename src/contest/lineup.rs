@@ -27,9 +27,6 @@ impl Entrant {
             Self::Converged => "converged",
         }
     }
-}
-
-impl Entrant {
     /// Its name for people: the paper's number of the reference, first author and year.
     #[must_use]
     pub fn title(self) -> &'static str {

@@ -210,12 +210,21 @@ pub fn row(
         let mut entry = Entry { entrant: entrant.name().to_owned(), ..Entry::default() };
         match outcome {
             Some(Ok(outcome)) => {
-                let own = settle(&outcome.positions, "own continuations")?;
-                entry.own_rms_mm = accuracy::rms_mm(&outcome.positions, &own);
-                entry.silhouette = tape.measure(scene, &outcome.positions);
-                entry.canonical_rms_mm = accuracy::rms_mm(&outcome.positions, &canonical);
-                measure(&mut entry, &outcome, times_ms, &base, &cloth, scene);
-                draped.push(Some(outcome.positions));
+                let x = outcome.positions;
+                entry.own_rms_mm = accuracy::rms_mm(&x, &settle(&x, "own continuations")?);
+                entry.silhouette = tape.measure(scene, &x);
+                entry.canonical_rms_mm = accuracy::rms_mm(&x, &canonical);
+                let state = State::of(&cloth, &scene.body, &x);
+                entry.residual_over_weight = state.residual_over_weight;
+                (entry.strain_p95, entry.strain_max) = (state.strain_p95, state.strain_max);
+                (entry.penetrating_vertices, entry.penetration_mm) = (state.penetrating_vertices, state.penetration_mm);
+                let ratios: Vec<f64> = times_ms.iter().zip(&base).map(|(own, base)| own / base).collect();
+                (entry.median_ms, entry.spread_ms) = quartiles(&times_ms);
+                (entry.ratio, entry.ratio_spread) = quartiles(&ratios);
+                entry.times_ms = times_ms;
+                (entry.ended, entry.steps) = (outcome.ended, outcome.steps);
+                (entry.simulated_s, entry.counts) = (outcome.simulated_s, outcome.counts);
+                draped.push(Some(x));
             }
             failed => {
                 entry.error = Some(failed.and_then(Result::err).unwrap_or_else(|| "no round was run".to_owned()));
@@ -230,17 +239,7 @@ pub fn row(
     Ok(Contested { row, draped, canonical })
 }
 
-/// Fills in what needs no reference.
-fn measure(entry: &mut Entry, outcome: &Outcome, times_ms: Vec<f64>, base: &[f64], cloth: &Cloth, scene: &Scene) {
-    let State { residual_over_weight, strain_p95, strain_max, penetrating_vertices, penetration_mm, .. } =
-        State::of(cloth, &scene.body, &outcome.positions);
-    let quartiles = |list: &[f64]| (interpolated(list, 0.5), interpolated(list, 0.75) - interpolated(list, 0.25));
-    let ratios: Vec<f64> = times_ms.iter().zip(base).map(|(own, base)| own / base).collect();
-    (entry.median_ms, entry.spread_ms) = quartiles(&times_ms);
-    (entry.ratio, entry.ratio_spread) = quartiles(&ratios);
-    entry.times_ms = times_ms;
-    (entry.residual_over_weight, entry.strain_p95, entry.strain_max) = (residual_over_weight, strain_p95, strain_max);
-    (entry.penetrating_vertices, entry.penetration_mm) = (penetrating_vertices, penetration_mm);
-    (entry.ended, entry.steps) = (outcome.ended.clone(), outcome.steps);
-    (entry.simulated_s, entry.counts) = (outcome.simulated_s, outcome.counts.clone());
+/// Median and interquartile range.
+fn quartiles(list: &[f64]) -> (f64, f64) {
+    (interpolated(list, 0.5), interpolated(list, 0.75) - interpolated(list, 0.25))
 }

@@ -133,71 +133,50 @@ fn slope(points: &[(f64, f64)]) -> Option<[f64; 2]> {
     (points.len() > 2 && xx > 0.0).then(|| [xy / xx, (left / (n - 2.0) / xx).sqrt()])
 }
 
+/// What an entrant did in a row, column by column: of who failed only who it was and why.
+fn columns(row: &ContestRow, e: &Entry) -> [(&'static str, String); 25] {
+    let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
+    let number = |x: f64| if e.error.is_some() { String::new() } else { x.to_string() };
+    let [near_hem, half_way, near_top] = e.silhouette.girths_cm.map(optional);
+    let times: Vec<String> = e.times_ms.iter().map(|ms| format!("{ms:.3}")).collect();
+    [
+        ("garment", row.garment.clone()),
+        ("vertices", row.vertices.to_string()),
+        ("entrant", e.entrant.clone()),
+        ("median_ms", number(e.median_ms)),
+        ("spread_ms", number(e.spread_ms)),
+        ("ratio_to_converged", number(e.ratio)),
+        ("ratio_spread", number(e.ratio_spread)),
+        ("canonical_rms_mm", number(e.canonical_rms_mm)),
+        ("own_rms_mm", number(e.own_rms_mm)),
+        ("canonical_spread_mm", optional(row.spread_mm)),
+        ("residual_over_weight", number(e.residual_over_weight)),
+        ("strain_p95", number(e.strain_p95)),
+        ("strain_max", number(e.strain_max)),
+        ("hem_cm", optional(e.silhouette.hem_cm)),
+        ("girth_near_hem_cm", near_hem),
+        ("girth_half_way_cm", half_way),
+        ("girth_near_top_cm", near_top),
+        ("canonical_hem_cm", optional(row.canonical.hem_cm)),
+        ("penetrating_vertices", number(e.penetrating_vertices as f64)),
+        ("penetration_mm", number(e.penetration_mm)),
+        ("ended", e.ended.clone()),
+        ("steps", number(e.steps as f64)),
+        ("simulated_s", optional(e.simulated_s)),
+        ("times_ms", times.join(" ")),
+        ("error", e.error.clone().unwrap_or_default()),
+    ]
+}
+
 /// A line of CSV for every entrant of every row, with a header.
 ///
 /// # Errors
 /// Those of the CSV writer, which writes to memory.
 pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "garment",
-        "vertices",
-        "entrant",
-        "median_ms",
-        "spread_ms",
-        "ratio_to_converged",
-        "ratio_spread",
-        "canonical_rms_mm",
-        "own_rms_mm",
-        "canonical_spread_mm",
-        "residual_over_weight",
-        "strain_p95",
-        "strain_max",
-        "hem_cm",
-        "girth_near_hem_cm",
-        "girth_half_way_cm",
-        "girth_near_top_cm",
-        "canonical_hem_cm",
-        "penetrating_vertices",
-        "penetration_mm",
-        "ended",
-        "steps",
-        "simulated_s",
-        "times_ms",
-        "error",
-    ])?;
-    let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
-    for row in rows {
-        for e in &row.entries {
-            let number = |x: f64| if e.error.is_some() { String::new() } else { x.to_string() };
-            writer.write_record([
-                row.garment.clone(),
-                row.vertices.to_string(),
-                e.entrant.clone(),
-                number(e.median_ms),
-                number(e.spread_ms),
-                number(e.ratio),
-                number(e.ratio_spread),
-                number(e.canonical_rms_mm),
-                number(e.own_rms_mm),
-                optional(row.spread_mm),
-                number(e.residual_over_weight),
-                number(e.strain_p95),
-                number(e.strain_max),
-                optional(e.silhouette.hem_cm),
-                optional(e.silhouette.girths_cm[0]),
-                optional(e.silhouette.girths_cm[1]),
-                optional(e.silhouette.girths_cm[2]),
-                optional(row.canonical.hem_cm),
-                number(e.penetrating_vertices as f64),
-                number(e.penetration_mm),
-                e.ended.clone(),
-                number(e.steps as f64),
-                optional(e.simulated_s),
-                e.times_ms.iter().map(|ms| format!("{ms:.3}")).collect::<Vec<_>>().join(" "),
-                e.error.clone().unwrap_or_default(),
-            ])?;
-        }
+    writer.write_record(columns(&ContestRow::default(), &Entry::default()).map(|(name, _)| name))?;
+    for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {
+        writer.write_record(columns(row, entry).map(|(_, cell)| cell))?;
     }
     let bytes = writer.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())

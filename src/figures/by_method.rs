@@ -10,12 +10,11 @@ use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use crate::methods::{Dressing, Ended, MethodDrape};
 
-/// The figures of one such drape. Names as those of [`Figures`].
+/// The figures of one such drape. Those named as in [`Figures`] mean the same, energy and pressure by this project's own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as in `Figures`; what is of runs in time alone is said")]
 pub struct MethodFigures {
-    /// Vertices of the garment.
     pub vertices: usize,
-    /// Its triangles.
     pub triangles: usize,
     /// Why the run in time ended.
     pub ended: Ended,
@@ -25,30 +24,19 @@ pub struct MethodFigures {
     pub simulated_s: f64,
     /// RMS speed of the free vertices at the end, m/s.
     pub rms_speed_m_per_s: f64,
-    /// RMS displacement from undraped to draped, mm.
     pub displacement_rms_mm: f64,
-    /// Vertices inside the body at the end.
     pub penetrating_vertices: usize,
-    /// How deep the deepest of them is, mm.
     pub penetration_mm: f64,
-    /// Pairs of a triangle of the garment and one of the body that cross.
     pub body_crossing_pairs: usize,
-    /// Pairs of triangles of the garment that cross: no reference method keeps cloth off cloth.
+    /// No reference method keeps cloth off cloth.
     pub self_intersecting_pairs: usize,
-    /// How far the garment's highest edge has sunk, mm; of several connected parts that of the one which sank farthest.
     pub top_sank_mm: f64,
-    /// The connected parts that slid, with nothing held of them.
     #[serde(skip)]
     pub slid: Vec<Slid>,
-    /// Energy by this project's own energy, J.
     pub energy_j: f64,
-    /// ‖∇E‖ of it over the weight, friction holding as much as it can.
     pub residual_at_rest_over_weight: f64,
-    /// 95th percentile of the largest principal strain.
     pub strain_p95: f64,
-    /// Its largest value.
     pub strain_max: f64,
-    /// Largest contact pressure by this project's own contact, kPa.
     pub pressure_max_kpa: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::parts::Parts;
 use crate::range_table::{Extent, METRES_PER_CM, RangeTable};
 
 /// One level of a range table on a garment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LevelCount {
     /// Its number, from 1, nearest the body.
     pub level: usize,
@@ -34,8 +34,7 @@ impl LevelCount {
                 lower_cm: l.lower_cm,
                 upper_cm: l.upper_cm,
                 extent: l.extent,
-                vertices: 0,
-                parts: 0,
+                ..Self::default()
             })
             .collect();
         for part in &parts.parts {

@@ -107,6 +107,7 @@ impl Figures {
     pub fn of(scene: &Scene, drape: &Drape) -> Self {
         let (parts, state) = (&drape.parts, drape.state.as_ref());
         let (top_sank_mm, slid) = sank(scene, &drape.positions);
+        let draped = scene.garment.with_positions(drape.positions.clone());
         Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
@@ -121,11 +122,7 @@ impl Figures {
             displacement_rms_mm: accuracy::rms_mm(&drape.positions, &scene.garment.positions),
             penetrating_vertices: drape.penetrating_vertices,
             penetration_mm: 1e3 * drape.penetration,
-            body_crossing_pairs: crossing_pairs(
-                &scene.garment.with_positions(drape.positions.clone()),
-                scene.body.mesh(),
-            )
-            .len(),
+            body_crossing_pairs: crossing_pairs(&draped, scene.body.mesh()).len(),
             top_sank_mm,
             slid,
             self_intersecting_pairs: drape.self_intersecting_pairs,

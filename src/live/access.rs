@@ -127,18 +127,9 @@ fn same(a: &str, b: &str) -> bool {
 /// # Errors
 /// Where the system has none.
 pub fn random_token() -> std::io::Result<String> {
-    use std::hash::{BuildHasher as _, Hasher as _};
-    // The standard library's hasher is keyed by the system's random numbers, anew for each; its keys are what is hashed here.
-    let mut seed = blake3::Hasher::new();
-    for _ in 0..8 {
-        seed.update(&std::hash::RandomState::new().build_hasher().finish().to_le_bytes());
-    }
-    let mut bytes = [0_u8; 32];
-    if let Ok(mut random) = std::fs::File::open("/dev/urandom") {
-        std::io::Read::read_exact(&mut random, &mut bytes)?;
-        seed.update(&bytes);
-    }
-    Ok(seed.finalize().to_hex()[..32].to_owned())
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes).map_err(|e| std::io::Error::other(e.to_string()))?;
+    Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
 #[cfg(test)]

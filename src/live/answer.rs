@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 use std::time::Duration;
 
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
@@ -10,17 +9,18 @@ use hyper::body::{Body, Bytes, Incoming};
 use hyper::header::{self, HeaderValue};
 use hyper::{Method, Request, Response, StatusCode, Uri};
 use serde_json::{Value, json};
-use tokio::sync::watch;
+use tokio::sync::mpsc::Receiver;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::access::{Access, Refused, Right, check_site, may, query};
-use super::body::{Answer, answer, refusal, whole};
-use super::events::{MOST_FLOWS, Place, events, stream};
+use super::body::{Answer, flowing, refusal, whole};
+use super::events::{MOST_FLOWS, events, stream};
 use super::pieces::Pieces;
 use super::{garment, report};
 use crate::files::names_a_file;
 use crate::job::Job;
 use crate::range_table::RangeTable;
-use crate::record::{Bundled, bundled};
+use crate::record::{bundled, takes_gzip};
 use crate::session::{Edit, EditError, Session, TableEdit};
 use crate::sweep::sweep_file;
 
@@ -48,7 +48,8 @@ pub(super) struct Site {
     pub(super) files: Vec<PathBuf>,
     pub(super) pieces: Arc<Pieces>,
     pub(super) news: watch::Receiver<u64>,
-    pub(super) flows: Arc<AtomicUsize>,
+    /// Places of readers of what goes on.
+    pub(super) flows: Arc<Semaphore>,
     /// By which a page knows this server again.
     pub(super) run: String,
 }
@@ -77,7 +78,12 @@ async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response
     may(right, request.method())?;
     let method = request.method().clone();
     match (&method, of_api) {
-        (&Method::GET, "state") => Ok(json_of(&for_reader(report::state(&site.session.snapshot()), right, &site.run))),
+        (&Method::GET, "state") => {
+            let mut state = report::state(&site.session.snapshot());
+            state["may_steer"] = json!(right == Right::Control);
+            state["run"] = json!(site.run);
+            Ok(json_of(&state))
+        }
         (&Method::GET, "choices") => Ok(json_of(&report::choices())),
         (&Method::GET, "events") => flow(site, "text/event-stream", events),
         (&Method::GET, "stream") => match site.pieces.broken() {
@@ -122,26 +128,19 @@ fn file(request: &Request<Incoming>, path: &str) -> Result<Response<Answer>, Ref
     if let Some((_, kind, text)) = FILES.iter().find(|(known, _, _)| *known == path) {
         return Ok(whole(StatusCode::OK, kind, Bytes::from_static(text.as_bytes())));
     }
-    let takes_gzip = crate::record::takes_gzip(request.headers());
-    let Some(Bundled { kind, bytes, packed, whole: length }) = bundled(path, takes_gzip) else {
-        return Err((StatusCode::NOT_FOUND, format!("found {path}, expected / or what `partwise live --help` lists")));
-    };
-    let mut response = whole(StatusCode::OK, kind, bytes);
-    response.headers_mut().insert("rerun-final-length", length.into());
-    if packed {
-        response.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-    }
-    Ok(response)
+    let none = || (StatusCode::NOT_FOUND, format!("found {path}, expected / or what `partwise live --help` lists"));
+    let bundled = bundled(path, takes_gzip(request.headers())).ok_or_else(none)?;
+    Ok(bundled.measured(whole(StatusCode::OK, bundled.kind, bundled.bytes.clone())))
 }
 
 fn flow(
     site: &Arc<Site>,
     kind: &'static str,
-    open: fn(&Arc<Site>, Place) -> tokio::sync::mpsc::Receiver<Bytes>,
+    open: fn(&Arc<Site>, OwnedSemaphorePermit) -> Receiver<Bytes>,
 ) -> Result<Response<Answer>, Refused> {
-    let full = || (StatusCode::SERVICE_UNAVAILABLE, format!("{MOST_FLOWS} readers are there already; close a page"));
-    let place = Place::take(&site.flows).ok_or_else(full)?;
-    Ok(answer(StatusCode::OK, kind, Answer::Flow(open(site, place))))
+    let full = |_| (StatusCode::SERVICE_UNAVAILABLE, format!("{MOST_FLOWS} readers are there already; close a page"));
+    let place = Arc::clone(&site.flows).try_acquire_owned().map_err(full)?;
+    Ok(flowing(kind, open(site, place)))
 }
 
 /// An edit as JSON, or a range table or a whole job as TOML.
@@ -263,12 +262,6 @@ fn label(bytes: &Bytes) -> Result<Option<String>, Refused> {
         Some(Value::String(label)) => Ok(Some(label.chars().filter(|c| !c.is_control()).take(60).collect())),
         Some(other) => Err((StatusCode::BAD_REQUEST, format!("found label = {other}, expected a text"))),
     }
-}
-
-fn for_reader(mut state: Value, right: Right, run: &str) -> Value {
-    state["may_steer"] = json!(right == Right::Control);
-    state["run"] = json!(run);
-    state
 }
 
 fn json_of(value: &Value) -> Response<Answer> {

@@ -1,13 +1,15 @@
 //! Answers: whole ones, and those that go on while somebody reads.
 
 use std::convert::Infallible;
-use std::pin::Pin;
-use std::task::{Context, Poll};
 
-use hyper::body::{Body, Bytes, Frame, SizeHint};
-use hyper::header::{self, HeaderValue};
+use http_body_util::combinators::UnsyncBoxBody;
+use http_body_util::{BodyExt as _, Full, StreamBody};
+use hyper::body::{Bytes, Frame};
+use hyper::header::HeaderValue;
 use hyper::{Response, StatusCode};
 use tokio::sync::mpsc::Receiver;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
 
 /// What a browser may do on the page. WebAssembly is compiled code, which needs leave of its own; the viewer sets styles and draws
 /// pictures it made.
@@ -15,60 +17,24 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
     style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// The body of an answer.
-pub(super) enum Answer {
-    /// All at once.
-    Whole(Option<Bytes>),
-    /// Piece by piece, as long as they come.
-    Flow(Receiver<Bytes>),
-}
-
-impl Body for Answer {
-    type Data = Bytes;
-    type Error = Infallible;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
-        match &mut *self {
-            Self::Whole(bytes) => Poll::Ready(bytes.take().map(|bytes| Ok(Frame::data(bytes)))),
-            Self::Flow(pieces) => pieces.poll_recv(context).map(|piece| piece.map(|bytes| Ok(Frame::data(bytes)))),
-        }
-    }
-
-    fn is_end_stream(&self) -> bool {
-        matches!(self, Self::Whole(None))
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        match self {
-            Self::Whole(bytes) => SizeHint::with_exact(bytes.as_ref().map_or(0, |bytes| bytes.len() as u64)),
-            Self::Flow(_) => SizeHint::default(),
-        }
-    }
-}
+/// The body of an answer: all at once, or piece by piece as long as they come.
+pub(super) type Answer = UnsyncBoxBody<Bytes, Infallible>;
 
 /// An answer of this kind.
-pub(super) fn answer(status: StatusCode, kind: &'static str, body: Answer) -> Response<Answer> {
-    let mut response = Response::new(body);
-    *response.status_mut() = status;
-    for (name, value) in [
-        (header::CONTENT_TYPE, kind),
-        (header::CONTENT_SECURITY_POLICY, POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-        (header::HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-        (header::CACHE_CONTROL, "no-cache"),
-    ] {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
-    }
+fn answer(status: StatusCode, kind: &'static str, body: Answer) -> Response<Answer> {
+    let mut response = crate::record::answer(status, kind, POLICY, body);
+    response.headers_mut().insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
     response
 }
 
-/// A whole answer.
 pub(super) fn whole(status: StatusCode, kind: &'static str, bytes: impl Into<Bytes>) -> Response<Answer> {
-    answer(status, kind, Answer::Whole(Some(bytes.into())))
+    answer(status, kind, Full::new(bytes.into()).boxed_unsync())
+}
+
+/// An answer that goes on.
+pub(super) fn flowing(kind: &'static str, pieces: Receiver<Bytes>) -> Response<Answer> {
+    let frames = ReceiverStream::new(pieces).map(|bytes| Ok(Frame::data(bytes)));
+    answer(StatusCode::OK, kind, StreamBody::new(frames).boxed_unsync())
 }
 
 /// A refusal, as JSON: `{"error": sentence}`.

@@ -44,15 +44,11 @@ pub struct LiveOptions {
 
 /// Why a session is not served.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum LiveError {
     /// The address cannot be listened on.
     #[error("{address}: cannot listen there: {source}; choose another port with --port, 0 takes any free one")]
-    Address {
-        /// The address.
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    Address { address: SocketAddr, source: std::io::Error },
     /// An address that others reach, without a token.
     #[error(
         "{0} can be reached from elsewhere: a token is needed for control there; leave --token out and one is made"

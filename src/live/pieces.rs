@@ -1,6 +1,6 @@
 //! What viewers are sent, encoded once for all of them on a thread of its own, while anybody looks.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -23,22 +23,14 @@ const PACE: Duration = Duration::from_millis(33);
 /// The newest piece of each kind: layout and triangles, PARTs, preview, rest.
 type Slots = [Option<(u64, Bytes)>; 4];
 
-/// The pieces.
+#[derive(Default)]
 pub(super) struct Pieces {
     slots: Mutex<Slots>,
     told: watch::Sender<u64>,
-    viewers: AtomicUsize,
+    /// Held by every viewer, and here.
+    viewers: Arc<()>,
     stopped: AtomicBool,
     broken: Mutex<Option<String>>,
-}
-
-/// A viewer, counted until it is dropped.
-pub(super) struct Attached(Arc<Pieces>);
-
-impl Drop for Attached {
-    fn drop(&mut self) {
-        self.0.viewers.fetch_sub(1, Ordering::SeqCst);
-    }
 }
 
 /// What was encoded last; held, so that what is at the same place is the same.
@@ -51,19 +43,13 @@ struct Encoded {
 }
 
 impl Pieces {
-    pub(super) fn new() -> Self {
-        Self {
-            slots: Mutex::new(Slots::default()),
-            told: watch::channel(0).0,
-            viewers: AtomicUsize::new(0),
-            stopped: AtomicBool::new(false),
-            broken: Mutex::new(None),
-        }
+    /// A viewer holds this for as long as it looks.
+    pub(super) fn attach(&self) -> Arc<()> {
+        Arc::clone(&self.viewers)
     }
 
-    pub(super) fn attach(self: &Arc<Self>) -> Attached {
-        self.viewers.fetch_add(1, Ordering::SeqCst);
-        Attached(Arc::clone(self))
+    fn is_seen(&self) -> bool {
+        Arc::strong_count(&self.viewers) > 1
     }
 
     pub(super) fn news(&self) -> watch::Receiver<u64> {
@@ -113,9 +99,9 @@ impl Pieces {
         let mut encoded = Encoded::default();
         let (mut serial, mut number) = (0, 0);
         while !self.stopped.load(Ordering::SeqCst) {
-            let wait = if self.viewers.load(Ordering::SeqCst) == 0 { Duration::ZERO } else { GLANCE };
+            let wait = if self.is_seen() { GLANCE } else { Duration::ZERO };
             let now = session.newer_than(serial, wait);
-            if self.viewers.load(Ordering::SeqCst) == 0 {
+            if !self.is_seen() {
                 // Nobody looks: what is in the slots stays until somebody does.
                 std::thread::sleep(GLANCE);
                 continue;

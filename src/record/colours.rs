@@ -191,9 +191,9 @@ mod tests {
             level: index + 1,
             lower_cm: index as f64,
             upper_cm: index as f64 + 1.0,
-            extent: None,
             vertices: 10 * parts,
             parts,
+            ..LevelCount::default()
         };
         parts.iter().enumerate().map(level).collect()
     }

@@ -2,15 +2,10 @@
 
 use glam::DVec3;
 
-use super::colour_map::{ColourMap, Range};
-use super::colours;
-use super::error::RecordError;
+use super::colour_map::ColourMap;
 use super::legend::{Legend, caption};
-use super::meshes;
-use super::open::Open;
-use super::overlay::Overlay;
-use super::paths;
 use super::step::covering;
+use super::{Open, Overlay, Range, RecordError, colours, meshes, paths};
 use crate::figures::LevelCount;
 use crate::parts::UNASSIGNED;
 
@@ -50,7 +45,7 @@ pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError
     };
     let lists = [("positions", chosen.draped.len()), (what, values)];
     RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
-    let [columns, _] = open.layout().captions(open.eye());
+    let [columns, _] = open.layout().captions(&open.eye);
     let path = format!("{}/{}/garment", paths::COMPARE, chosen.slot);
     let draped = open.garment.with_positions(chosen.draped.to_vec());
     open.at(chosen.index, 6);

@@ -4,14 +4,11 @@ use glam::DVec3;
 use rerun::{Color, Points3D, Radius};
 
 use super::colours::level_of_part;
-use super::error::RecordError;
 use super::eye::Eye;
 use super::legend::number;
 use super::meshes::single;
-use super::open::Open;
 use super::panel::range_cm;
-use super::paths;
-use super::step::StepView;
+use super::{Open, RecordError, StepView, paths};
 
 /// More dots than this would hide the PARTs.
 const MOST: usize = 400;

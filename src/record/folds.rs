@@ -6,10 +6,8 @@
 use glam::DVec3;
 use rerun::{Color, LineStrips3D, Radius};
 
-use super::error::RecordError;
 use super::meshes::single;
-use super::open::Open;
-use super::paths;
+use super::{Open, RecordError, paths};
 
 /// Length of a line per share of excess length, m: a fifth too much cloth gives two centimetres.
 const LENGTH_M: f64 = 0.1;

@@ -5,9 +5,9 @@
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::colour_map::{ColourMap, Range};
+use super::colour_map::ColourMap;
 use super::meshes::rerun_colours;
-use super::{Open, RecordError};
+use super::{Open, Range, RecordError};
 
 /// Texts in a view. The viewer draws a box behind them that lets two fifths through, dark in its dark theme and light grey in
 /// its light one: white is read on both if what lies behind is dark. Without a colour of their own Rerun gives each path another.

@@ -1,11 +1,8 @@
 //! The range table over the garment's distances: a histogram, each level in the hue of its PARTs, and under it the levels themselves.
 
-use rerun::{BarChart, Clear, Color};
+use rerun::{BarChart, Clear};
 
-use super::colour_map::Range;
-use super::error::RecordError;
-use super::step::StepView;
-use super::{Open, colours, paths};
+use super::{Open, Range, RecordError, StepView, colours, meshes, paths};
 use crate::figures::LevelCount;
 
 /// Bars of the distance histogram, about.
@@ -34,10 +31,7 @@ pub(super) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordErro
     let rows = &step.panel.levels;
     let end = Range::to_quantile(step.distance_m.iter().copied(), 0.995).high;
     let places = colours::places(rows);
-    let shade = |level: usize| {
-        let [r, g, b] = colours::shade(places[level], 0);
-        Color::from_rgb(r, g, b)
-    };
+    let shade = |level: usize| meshes::colour(colours::shade(places[level], 0));
     let widest = end / BINS as f64;
     let all: Vec<Vec<(f64, f64, f64)>> = rows.iter().map(|row| bars(row, step.distance_m, widest, end)).collect();
     let highest = all.iter().flatten().map(|bar| bar.0).fold(0.0, f64::max);
@@ -70,13 +64,9 @@ mod tests {
 
     #[test]
     fn bars_tile_their_level_and_count_every_vertex_once() {
-        let row = |lower_m: f64, upper_m: f64| LevelCount {
-            level: 1,
-            lower_cm: 100.0 * lower_m,
-            upper_cm: 100.0 * upper_m,
-            vertices: 0,
-            parts: 0,
-            extent: None,
+        let row = |lower_m: f64, upper_m: f64| {
+            let [lower_cm, upper_cm] = [lower_m, upper_m].map(|m| 100.0 * m);
+            LevelCount { level: 1, lower_cm, upper_cm, ..LevelCount::default() }
         };
         let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
         // A narrow level has one bar of its own width.

@@ -17,16 +17,15 @@ use glam::DVec3;
 use rerun::sink::MemorySinkStorage;
 use rerun::{Arrows3D, RecordingStream, RecordingStreamBuilder};
 
-use super::blueprint::view::View;
+use super::blueprint::view::{View, on_the_body};
 use super::blueprint::{self, Node, TimePanel};
-use super::colour_map::{Range, Rgb};
+use super::colour_map::Rgb;
 use super::colours::{self, colour_parts};
-use super::error::RecordError;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::open::application;
-use super::paths;
 use super::step::{FORCE_QUANTILE, covering, part_arrows};
+use super::{Range, RecordError, paths};
 use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 
@@ -65,7 +64,7 @@ pub struct PinnedView<'a> {
     pub draped: &'a TriMesh,
 }
 
-/// Makes the pieces.
+/// Makes the pieces. What it is asked for fails with what Rerun refuses, and where lists do not fit the garment.
 pub struct LiveEncoder {
     stream: RecordingStream,
     storage: MemorySinkStorage,
@@ -79,9 +78,6 @@ pub struct LiveEncoder {
 
 impl LiveEncoder {
     /// An encoder for a session of this name, whose wearer looks along `front`; `id` tells it from other sessions.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn new(name: &str, id: &str, front: DVec3) -> Result<Self, RecordError> {
         let (name, id) = (name.to_owned(), id.to_owned());
         let builder = move || {
@@ -101,9 +97,6 @@ impl LiveEncoder {
     }
 
     /// Body, garment, what is pinned, and the layout: a viewer needs it before anything else, and all else after it again.
-    ///
-    /// # Errors
-    /// What Rerun refuses.
     pub fn base(&mut self, body: &TriMesh, garment: &TriMesh, pins: &[PinnedView<'_>]) -> Result<Vec<u8>, RecordError> {
         if self.garment != *garment {
             self.garment = garment.clone();
@@ -113,16 +106,14 @@ impl LiveEncoder {
         let views = 3 + pins.len();
         self.eye = Eye::on(garment, self.front, ROOM / views as f64).unwrap_or_default();
         let (stream, storage) = open((self.builder)())?;
-        let seen =
-            |name: String, body: &str, path: &str| (1.0, Node::from(View::spatial(name, &[body, path], &self.eye)));
-        let mut row = vec![
-            seen("PARTs".to_owned(), paths::BODY, PARTS),
-            seen("Two stages".to_owned(), paths::BODY, "/preview"),
-            seen("At rest".to_owned(), paths::BODY, "/rest"),
-        ];
+        let seen = |(name, path)| on_the_body(name, path, &self.eye);
+        let mut row = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")]
+            .map(seen)
+            .into_iter()
+            .collect::<Vec<_>>();
         for (i, pin) in pins.iter().enumerate() {
             let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
-            row.push(seen(format!("Pin: {}", pin.label), &body, &garment));
+            row.push((1.0, View::spatial(format!("Pin: {}", pin.label), &[&body, &garment], &self.eye).into()));
         }
         // The layout first: a slow viewer takes seconds to read the triangles, and would lay out by itself what it has.
         blueprint::send(&stream, &Node::Row("Live", row), TimePanel { timeline: paths::TABLE, follow: false })?;
@@ -139,9 +130,6 @@ impl LiveEncoder {
     }
 
     /// Which PART each vertex belongs to, the levels that made them, and the body's reaction on each, N (none: no arrows).
-    ///
-    /// # Errors
-    /// Arrays that do not fit the garment, and what Rerun refuses.
     pub fn parts(
         &mut self,
         part_of_vertex: &[u32],
@@ -169,9 +157,6 @@ impl LiveEncoder {
     }
 
     /// Where a garment is, m.
-    ///
-    /// # Errors
-    /// Positions that do not fit the garment, and what Rerun refuses.
     pub fn shape(&mut self, which: LiveShape, positions: &[DVec3]) -> Result<Vec<u8>, RecordError> {
         RecordError::unless_per_vertex(self.garment.vertex_count(), &[("positions", positions.len())])?;
         let moved = self.garment.with_positions(positions.to_vec());

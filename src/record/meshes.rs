@@ -16,15 +16,24 @@ pub(crate) fn singles(points: &[DVec3]) -> Vec<[f32; 3]> {
     points.iter().copied().map(single).collect()
 }
 
+/// Rerun's colour.
+pub(crate) fn colour([r, g, b]: Rgb) -> Color {
+    Color::from_rgb(r, g, b)
+}
+
 /// Rerun's colours.
 pub(crate) fn rerun_colours(colours: impl IntoIterator<Item = Rgb>) -> Vec<Color> {
-    colours.into_iter().map(|[r, g, b]| Color::from_rgb(r, g, b)).collect()
+    colours.into_iter().map(colour).collect()
+}
+
+/// A mesh with its triangles.
+pub(crate) fn whole(mesh: &TriMesh) -> Mesh3D {
+    shape(mesh).with_triangle_indices(mesh.triangles.iter().copied())
 }
 
 /// A mesh in one colour.
-pub(crate) fn plain(mesh: &TriMesh, colour: Rgb) -> Mesh3D {
-    let [r, g, b] = colour;
-    shape(mesh).with_triangle_indices(mesh.triangles.iter().copied()).with_albedo_factor(Rgba32::from_rgb(r, g, b))
+pub(crate) fn plain(mesh: &TriMesh, [r, g, b]: Rgb) -> Mesh3D {
+    whole(mesh).with_albedo_factor(Rgba32::from_rgb(r, g, b))
 }
 
 /// Positions and normals alone: what changes when a garment of known triangles moves.

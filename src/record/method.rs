@@ -1,14 +1,11 @@
 //! A reference method: what it made on its way, each in a view of its own, and the garment as it moves.
 
-use rerun::{Color, LineStrips3D, Mesh3D, Radius, TextDocument};
+use rerun::{LineStrips3D, Radius, TextDocument};
 
-use super::error::RecordError;
 use super::meshes::{self, rerun_colours, singles};
-use super::open::Open;
-use super::overlay::{Overlay, overlay};
-use super::panel::Panel;
+use super::overlay::overlay;
 use super::step::series;
-use super::{colours, paths};
+use super::{Open, Overlay, Panel, RecordError, colours, paths};
 use crate::methods::Exhibit;
 use glam::DVec3;
 
@@ -40,13 +37,7 @@ pub(super) fn moment(
     open.at_iteration(step);
     open.last_iteration = Some(step);
     series(open, paths::SPEED, "RMS speed, cm/s", 0, 100.0 * rms_speed)?;
-    match positions {
-        Some(x) if x.len() == open.garment.positions.len() => {
-            let moved = open.garment.with_positions(x.to_vec());
-            open.log(paths::DRAPE, &meshes::shape(&moved))
-        }
-        _ => Ok(()),
-    }
+    open.garment_at(positions)
 }
 
 pub(super) fn log(open: &mut Open, view: &MethodView<'_>) -> Result<(), RecordError> {
@@ -65,11 +56,7 @@ pub(super) fn log(open: &mut Open, view: &MethodView<'_>) -> Result<(), RecordEr
                 for (triangle, group) in mesh.triangles.iter().zip(&mesh.triangle_group) {
                     triangle.iter().for_each(|&v| shades[v as usize] = hues[*group as usize % hues.len()]);
                 }
-                let shape = Mesh3D::new(singles(&mesh.positions))
-                    .with_triangle_indices(mesh.triangles.iter().copied())
-                    .with_vertex_normals(singles(&mesh.vertex_normals()))
-                    .with_vertex_colors(rerun_colours(shades));
-                open.log(&path, &shape)?;
+                open.log(&path, &meshes::whole(mesh).with_vertex_colors(rerun_colours(shades)))?;
                 for (step, positions) in frames {
                     open.at_iteration(i64::try_from(*step).unwrap_or(i64::MAX));
                     open.log(&path, &meshes::shape(&mesh.with_positions(positions.clone())))?;
@@ -94,10 +81,7 @@ pub(super) fn log(open: &mut Open, view: &MethodView<'_>) -> Result<(), RecordEr
 /// Lines in the colours of what they belong to.
 fn drawn(lines: &[(usize, Vec<DVec3>)]) -> LineStrips3D {
     let hues = colours::palette();
-    let shades = lines.iter().map(|(of, _)| {
-        let [r, g, b] = hues[of % hues.len()];
-        Color::from_rgb(r, g, b)
-    });
+    let shades = lines.iter().map(|(of, _)| meshes::colour(hues[of % hues.len()]));
     LineStrips3D::new(lines.iter().map(|(_, line)| singles(line)).collect::<Vec<_>>())
         .with_colors(shades)
         .with_radii([Radius::new_ui_points(THICKNESS)])

@@ -1,7 +1,7 @@
 //! The recording: every stage of a drape as Rerun shows it. The only module that knows Rerun.
 //!
 //! Results come in as plain meshes and slices; [`paths`] lists what a recording holds. Triangles are logged once, later
-//! steps send only what changed. Without a sink nothing is made: see [`Recorder::disabled`].
+//! steps send only what changed. Without a sink nothing is made.
 
 mod blueprint;
 mod colour_map;
@@ -48,13 +48,13 @@ pub use error::RecordError;
 pub use folds::FoldView;
 pub use live::{LiveEncoder, LiveShape, PinnedView};
 pub use method::MethodView;
-pub use outfit::{OutfitView, Worn};
+pub use outfit::OutfitView;
 pub use overlay::Overlay;
 pub use page::{Bundled, bundled};
-pub(crate) use page::{name_of_run, takes_gzip};
+pub(crate) use page::{Server, answer, name_of_run, takes_gzip};
 pub use panel::Panel;
 pub use pattern::PatternView;
-pub use scatter::{Picture, ScatterPoint, When};
+pub use scatter::{Picture, ScatterPoint};
 pub use sinks::Sink;
 pub use step::StepView;
 pub use wrinkles::WrinkleView;
@@ -102,25 +102,27 @@ pub struct RecordSummary {
     pub log_ms: f64,
 }
 
+impl RecordSummary {
+    /// Where the file is, in words, where there is one.
+    #[must_use]
+    pub fn said(&self) -> Option<String> {
+        self.path.as_ref().map(|path| format!("recording: {}", path.display()))
+    }
+}
+
 /// A recording in the making. What logs to it fails with what Rerun refuses, and where a slice does not fit the garment.
 pub struct Recorder {
     open: Option<Box<Open>>,
 }
 
 impl Recorder {
-    /// A recorder that makes nothing and costs nothing.
-    #[must_use]
-    pub fn disabled() -> Self {
-        Self { open: None }
-    }
-
-    /// Opens every sink, or none.
+    /// Opens every sink, or none. Without a sink it makes nothing and costs nothing.
     ///
     /// # Errors
     /// An unwritable file, a port in use, a viewer that is not there.
     pub fn open(options: RecordOptions) -> Result<Self, RecordError> {
         if options.sinks.is_empty() {
-            return Ok(Self::disabled());
+            return Ok(Self { open: None });
         }
         Ok(Self { open: Some(Box::new(Open::new(options)?)) })
     }
@@ -193,13 +195,7 @@ impl Recorder {
             open.log(paths::RESIDUAL, &Scalars::single(residual_over_weight))?;
             // Plots have no logarithmic axis.
             step::series(open, paths::RESIDUAL_LOG10, "residual over weight, log10", 0, residual_over_weight.log10())?;
-            match positions {
-                Some(x) if x.len() == open.garment.positions.len() => {
-                    let moved = open.garment.with_positions(x.to_vec());
-                    open.log(paths::DRAPE, &meshes::shape(&moved))
-                }
-                _ => Ok(()),
-            }
+            open.garment_at(positions)
         })
     }
 
@@ -238,14 +234,14 @@ impl Recorder {
         self.timed(|open| compare::chosen(open, chosen))
     }
 
-    /// All points of a picture so far.
+    /// All points of a picture so far, as of this step of the timeline `table`.
     pub fn scatter(
         &mut self,
-        when: When,
+        index: i64,
         picture: Picture<'_>,
         points: &[ScatterPoint<'_>],
     ) -> Result<(), RecordError> {
-        self.timed(|open| scatter::scatter(open, when, picture, points))
+        self.timed(|open| scatter::scatter(open, index, picture, points))
     }
 
     /// Sends what is on its way, where someone watches.

@@ -4,16 +4,16 @@ use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
+use glam::DVec3;
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::layout::Layout;
-use super::colour_map::{Range, Rgb};
-use super::error::RecordError;
+use super::colour_map::Rgb;
 use super::eye::Eye;
 use super::meshes::{self, CellMesh};
 use super::sinks::{OpenSinks, Target};
 use super::web::WebViewer;
-use super::{RecordOptions, RecordSummary, blueprint, colours, paths};
+use super::{Range, RecordError, RecordOptions, RecordSummary, blueprint, colours, paths};
 use crate::mesh::TriMesh;
 
 /// Bytes of an application's name.
@@ -30,6 +30,7 @@ pub(crate) struct Open {
     body: TriMesh,
     pub(super) garment: TriMesh,
     pub(super) cells: CellMesh,
+    /// Where the views look from, at the garment alone.
     pub(super) eye: Eye,
     pub(super) distance: Vec<f64>,
     pub(super) vertex_shade: Vec<u8>,
@@ -90,11 +91,6 @@ impl Open {
         &self.options.layout
     }
 
-    /// Where the views look from, at the garment alone.
-    pub(super) fn eye(&self) -> &Eye {
-        &self.eye
-    }
-
     /// What the ends of a quantity's colour map stand for: as they were at its first step, or set before it, so that colours compare
     /// from step to step.
     pub(super) fn scale(&self, quantity: &str, first: impl FnOnce() -> Range) -> Range {
@@ -125,6 +121,14 @@ impl Open {
 
     pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordError> {
         self.log_as(path, false, what)
+    }
+
+    /// Logs where the garment is on its way to rest, where that is told.
+    pub(super) fn garment_at(&self, positions: Option<&[DVec3]>) -> Result<(), RecordError> {
+        match positions.filter(|x| x.len() == self.garment.positions.len()) {
+            Some(x) => self.log(paths::DRAPE, &meshes::shape(&self.garment.with_positions(x.to_vec()))),
+            None => Ok(()),
+        }
     }
 
     /// Logs a mesh once for all, or at the step where it may be replaced.

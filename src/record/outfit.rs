@@ -1,28 +1,13 @@
 //! Garments worn over each other, each in a branch of its own: its PARTs, their forces and its drape.
 
-use std::ops::Range;
-
 use glam::DVec3;
 use rerun::Mesh3D;
 
-use super::colour_map::{ColourMap, Range as Span, Rgb};
-use super::error::RecordError;
+use super::colour_map::{ColourMap, Rgb};
 use super::meshes::{self, CellMesh};
-use super::open::Open;
 use super::step::FORCE_QUANTILE;
-use super::{colours, paths};
-use crate::mesh::TriMesh;
-
-/// One garment of an outfit.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Worn {
-    /// What it is called.
-    pub name: String,
-    /// Its vertices among the recording's.
-    pub vertices: Range<usize>,
-    /// Its triangles among the recording's.
-    pub triangles: Range<usize>,
-}
+use super::{Open, Range, RecordError, colours, paths};
+use crate::scene::Layer;
 
 /// What the garments of an outfit do. Slices are per vertex of all of them.
 #[derive(Debug, Clone, Copy)]
@@ -36,25 +21,16 @@ pub struct OutfitView<'a> {
 }
 
 /// The branch of garment number `k`.
-pub(super) fn branch(k: usize, worn: &Worn) -> String {
+pub(super) fn branch(k: usize, worn: &Layer) -> String {
     format!("{}/{}-{}", paths::OUTFIT, k + 1, worn.name)
-}
-
-impl Worn {
-    fn cut_out(&self, triangles: &[[u32; 3]], x: &[DVec3]) -> TriMesh {
-        let first = self.vertices.start as u32;
-        let own = triangles[self.triangles.clone()].iter().map(|t| t.map(|v| v - first)).collect();
-        TriMesh::new(x[self.vertices.clone()].to_vec(), own)
-    }
 }
 
 pub(super) fn log(open: &Open, view: &OutfitView<'_>) -> Result<(), RecordError> {
     let n = open.garment.positions.len();
     RecordError::unless_per_vertex(n, &[("forces", view.force_n.len()), ("displaced positions", view.draped.len())])?;
-    let force = open.scale("force", || Span::to_quantile(view.force_n.iter().copied(), FORCE_QUANTILE));
-    let force = ColourMap::FORCE.colours(view.force_n, force).into_iter().collect::<Vec<Rgb>>();
-    let garments = &open.layout().outfit;
-    for (k, worn) in garments.iter().enumerate() {
+    let force = open.scale("force", || Range::to_quantile(view.force_n.iter().copied(), FORCE_QUANTILE));
+    let force = ColourMap::FORCE.colours(view.force_n, force);
+    for (k, worn) in open.layout().outfit.iter().enumerate() {
         let branch = branch(k, worn);
         let cut_out = |x: &[DVec3]| worn.cut_out(&open.garment.triangles, x);
         let placed = CellMesh::new(&cut_out(&open.garment.positions));

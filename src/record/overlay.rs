@@ -1,9 +1,8 @@
 //! Values on the draped garment, in colours that stand for the same from step to step.
 
-use super::colour_map::{ColourMap, Range};
-use super::error::RecordError;
+use super::colour_map::ColourMap;
 use super::legend::{Cell, Legend};
-use super::{Open, meshes};
+use super::{Open, Range, RecordError, meshes};
 use crate::mesh::TriMesh;
 
 /// Values above this quantile share the last colour.

@@ -32,7 +32,7 @@
 //! | `/legend/compare/<slot>` | Points2D | what each of them costs | `table` |
 //! | `/legend/stages/table` | Points2D | the table's name | `table` |
 //! | `/legend/<tab>/<name>/bar`, `.../ticks` | LineStrips2D, Points2D | colour bars of a tab, in one drawing | `table` |
-//! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table`, `iteration` |
+//! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table` |
 //! | `/growth/points` and so on | the same | vertices against time, a point per way to drape and garment | `table` |
 
 #![allow(missing_docs, reason = "the table above says what lies at each path")]

@@ -1,15 +1,12 @@
 //! The flat pattern beside the drape: the same colours on the panels as they were cut.
 
 use glam::DVec3;
-use rerun::Mesh3D;
 
 use super::blueprint::layout::Tab;
 use super::colour_map::ColourMap;
-use super::error::RecordError;
-use super::meshes::{self, CellMesh, singles};
-use super::open::Open;
-use super::overlay::{Overlay, scale};
-use super::{colours, paths};
+use super::meshes::{self, CellMesh};
+use super::overlay::scale;
+use super::{Open, Overlay, RecordError, colours, paths};
 use crate::mesh::TriMesh;
 
 /// Share of the height in a view that the panels take.
@@ -42,9 +39,7 @@ pub(super) fn log(open: &Open, view: &PatternView<'_>) -> Result<(), RecordError
     let part = |v: u32| open.vertex_colour.get(of(v)).copied().unwrap_or(colours::CLOTH);
     let shown = cells.shape().with_vertex_colors(meshes::rerun_colours(cells.of_vertices(part)));
     open.log(&format!("{}/parts/panels", paths::PATTERN), &shown)?;
-    let shape = Mesh3D::new(singles(&flat.positions))
-        .with_triangle_indices(flat.triangles.iter().copied())
-        .with_vertex_normals(singles(&flat.vertex_normals()));
+    let shape = meshes::whole(&flat);
     for overlay in view.overlays {
         let values: Vec<f64> = view.garment_vertex.iter().map(|&v| overlay.values[v as usize]).collect();
         let map = ColourMap::ALARM;

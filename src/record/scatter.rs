@@ -4,13 +4,9 @@
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::colours;
-use super::error::RecordError;
 use super::labels::{Labels, Rect};
 use super::legend::{number, texts};
-use super::meshes;
-use super::open::Open;
-use super::paths;
+use super::{Open, RecordError, colours, meshes, paths};
 
 /// A picture: where it lies and what its axes are called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,15 +46,6 @@ pub struct ScatterPoint<'a> {
     pub group: usize,
     /// Whether its name is written beside it, where there is room.
     pub named: bool,
-}
-
-/// The moment a picture belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// A step of the timeline `table`.
-    Table(i64),
-    /// A step of the timeline `iteration`: a search.
-    Iteration(i64),
 }
 
 /// Width and height of the picture, in its own units: about two pixels of the view.
@@ -115,15 +102,12 @@ fn round(value: f64, up: bool) -> f64 {
 /// Points that are not positive and finite cannot be placed and are left out.
 pub(super) fn scatter(
     open: &Open,
-    when: When,
+    index: i64,
     picture: Picture<'_>,
     points: &[ScatterPoint<'_>],
 ) -> Result<(), RecordError> {
     let path = picture.path;
-    match when {
-        When::Table(index) => open.at(index, 6),
-        When::Iteration(iteration) => open.at_iteration(iteration),
-    }
+    open.at(index, 6);
     let placed: Vec<&ScatterPoint<'_>> =
         points.iter().filter(|p| p.x.is_finite() && p.y.is_finite() && p.x > 0.0 && p.y > 0.0).collect();
     let along = Axis::around(placed.iter().map(|p| p.x), PICTURE[0]);
@@ -159,23 +143,20 @@ fn axes(open: &Open, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<()
     let mut shades = Vec::new();
     let mut places = vec![plane([0.5 * width, -13.0]), plane([0.0, height + 16.0])];
     let mut labels = vec![picture.x.to_owned(), picture.y.to_owned()];
-    let mut line = |from: [f64; 2], to: [f64; 2], major: bool| {
-        lines.push(vec![plane(from), plane(to)]);
-        shades.push(if major { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
-    };
-    for (multiple, value) in along.ticks() {
+    // The line of each tick, and where its number stands.
+    let upright = along.ticks().map(|(multiple, value)| {
         let x = along.place(value);
-        line([x, 0.0], [x, height], multiple == 1);
-        if matches!(multiple, 1 | 2 | 5) {
-            places.push(plane([x, -1.0]));
-            labels.push(number(value));
-        }
-    }
-    for (multiple, value) in up.ticks() {
+        (multiple, value, [[x, 0.0], [x, height]], [x, -1.0])
+    });
+    let level = up.ticks().map(|(multiple, value)| {
         let y = up.place(value);
-        line([0.0, y], [width, y], multiple == 1);
+        (multiple, value, [[0.0, y], [width, y]], [-16.0, y + 6.0])
+    });
+    for (multiple, value, line, place) in upright.chain(level) {
+        lines.push(line.map(plane).to_vec());
+        shades.push(if multiple == 1 { Color::from_rgb(110, 117, 128) } else { Color::from_rgb(58, 62, 69) });
         if matches!(multiple, 1 | 2 | 5) {
-            places.push(plane([-16.0, y + 6.0]));
+            places.push(plane(place));
             labels.push(number(value));
         }
     }

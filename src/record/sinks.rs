@@ -14,12 +14,11 @@ use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink;
 use rerun::{MemoryLimit, ServerOptions};
 
-use super::error::RecordError;
-use super::native;
 use super::panel::RERUN_VERSION;
 use super::remote::Remote;
 use super::web::WebViewer;
 use super::writer::RrdWriter;
+use super::{RecordError, native};
 use crate::whole_file::{WholeFile, folder_of};
 
 /// How long a viewer has to answer.

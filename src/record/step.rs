@@ -6,15 +6,13 @@ use glam::DVec3;
 use rerun::components::{Scalar, Text};
 use rerun::{AnyValues, Arrows3D, Color, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints, TextDocument};
 
-use super::colour_map::{ColourMap, Range};
+use super::colour_map::ColourMap;
 use super::colours::{self, colour_parts};
-use super::error::RecordError;
 use super::eye::Eye;
 use super::legend::{Legend, caption, titled};
 use super::meshes::{self, single};
-use super::overlay::{self, Overlay, QUANTILE};
-use super::panel::Panel;
-use super::{Open, dots, levels, paths};
+use super::overlay::{self, QUANTILE};
+use super::{Open, Overlay, Panel, Range, RecordError, dots, levels, paths};
 use crate::parts::UNASSIGNED;
 
 /// Share of the garment's height that the longest arrow takes.
@@ -73,7 +71,6 @@ impl StepView<'_> {
     }
 }
 
-/// Logs the whole step.
 pub(crate) fn log(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let part_of_vertex = covering(step.part_of_vertex, step.part_force_n.len());
     // Nothing pulls at what is in no PART.
@@ -124,8 +121,7 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
     let (factor, unit) = if scale.high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
     let map = ColourMap::FORCE;
     let shades = map.colours(&force_n, scale);
-    let mesh = open.cells.colours(|v| shades[v as usize]);
-    open.log(paths::FORCE, &mesh)?;
+    open.log(paths::FORCE, &open.cells.colours(|v| shades[v as usize]))?;
     let open_end = force_n.iter().any(|&f| f > scale.high);
     let range = Range { low: factor * scale.low, high: factor * scale.high };
     // Where nobody sees the forces the bar of the error has their row.
@@ -133,11 +129,8 @@ fn force(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
         let legend = Legend { title: "|F|", unit, map, range, open_end };
         legend.log(open, &format!("{}/force", paths::STAGES_LEGEND), [0, 2])?;
     }
-    arrows(open, step, scale.high)
-}
-
-fn arrows(open: &Open, step: &StepView<'_>, full: f64) -> Result<(), RecordError> {
-    let arrows = part_arrows(&open.eye, &open.garment.positions, step.part_of_vertex, step.part_force_n, full);
+    let placed = &open.garment.positions;
+    let arrows = part_arrows(&open.eye, placed, step.part_of_vertex, step.part_force_n, scale.high);
     open.log(paths::FORCE_ARROWS, &arrows.with_labels(dots::told(step)).with_show_labels(false))
 }
 
@@ -190,9 +183,9 @@ fn drape(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
 }
 
 fn numbers(open: &mut Open, step: &StepView<'_>) -> Result<(), RecordError> {
-    let parts = ("part_count", "PARTs", step.part_force_n.len() as f64);
-    series(open, "/numbers/part_count", parts.1, 0, parts.2)?;
-    let mut row = vec![(parts.0.to_owned(), parts.2)];
+    let count = step.part_force_n.len() as f64;
+    series(open, "/numbers/part_count", "PARTs", 0, count)?;
+    let mut row = vec![("part_count".to_owned(), count)];
     for (i, (stage, ms)) in step.panel.timings_ms.iter().enumerate() {
         series(open, &format!("{}/{stage}", paths::STAGE_MS), stage, i, *ms)?;
         row.push((format!("{stage}_ms"), *ms));
@@ -230,8 +223,7 @@ fn name_of(leaf: &str) -> String {
 /// A scalar, drawn as a line with a dot at each step: one step alone is then seen too.
 pub(super) fn series(open: &Open, path: &str, name: &str, place: usize, value: f64) -> Result<(), RecordError> {
     if open.first_use(path) {
-        let [r, g, b] = colours::palette()[place % colours::HUES];
-        let colour = Color::from_rgb(r, g, b);
+        let colour = meshes::colour(colours::palette()[place % colours::HUES]);
         open.log_fixed(path, &SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([2.0]))?;
         open.log_fixed(path, &SeriesPoints::new().with_names([name]).with_colors([colour]).with_marker_sizes([4.0]))?;
     }

@@ -11,12 +11,12 @@ use rerun::log::LogMsg;
 use rerun::sink::LogSink as _;
 
 use super::error::RecordError;
-use super::page::Page;
+use super::page::{self, Server};
 use super::sinks::{WHOLE_HISTORY, listen_for_pages, serve};
 
 /// A page that shows a recording; it is served for as long as this lives.
 pub struct WebViewer {
-    _page: Page,
+    _page: Server,
     url: String,
 }
 
@@ -25,7 +25,7 @@ impl WebViewer {
     pub(crate) fn start(listener: TcpListener, grpc_port: u16) -> Result<Self, RecordError> {
         let port = listener.local_addr().map_or(0, |address| address.port());
         let failed = |reason: String| RecordError::Server { what: "the web viewer", port, reason };
-        let page = Page::serve(listener, &format!("rerun+http://127.0.0.1:{grpc_port}/proxy")).map_err(failed)?;
+        let page = page::serve(listener, &format!("rerun+http://127.0.0.1:{grpc_port}/proxy")).map_err(failed)?;
         Ok(Self { _page: page, url: format!("http://127.0.0.1:{port}/") })
     }
 

@@ -6,13 +6,11 @@
 use glam::DVec3;
 use rerun::{LineStrips3D, Radius};
 
-use super::colour_map::{ColourMap, Range};
-use super::error::RecordError;
+use super::colour_map::ColourMap;
 use super::legend::Legend;
 use super::meshes::{self, single};
-use super::open::Open;
-use super::overlay::{Overlay, QUANTILE, overlay};
-use super::{colours, paths};
+use super::overlay::{QUANTILE, overlay};
+use super::{Open, Overlay, Range, RecordError, colours, paths};
 use crate::mesh::TriMesh;
 
 /// The seams lie this far above the cloth, m: in it they would be half hidden.

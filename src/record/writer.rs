@@ -28,7 +28,6 @@ enum State<W: Write> {
 }
 
 impl<W: Write> RrdWriter<W> {
-    /// Begins a recording.
     pub(super) fn new(to: W) -> Result<Self, String> {
         let version = rerun::build_info().version;
         let encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, to);

@@ -13,6 +13,8 @@ mod names;
 
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::{Scene, SceneError, SceneSpec};
 use crate::fabric::Fabric;
 use crate::files::{listed, names_a_file, stem};
@@ -21,16 +23,26 @@ use names::{BESIDE, files_named_in, fits};
 pub use names::{CutError, PanelFabrics};
 
 /// A share of a garment that is cut from one fabric.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Swatch {
     /// The garment.
     pub garment: String,
     /// The fabric; none is that of the settings.
     pub fabric: Option<String>,
     /// Its panels; none where it is all of the garment.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub panels: Vec<String>,
     /// The file that says so; none where the command line does.
+    #[serde(skip)]
     pub by: Option<String>,
+}
+
+impl Swatch {
+    /// The same by the name of its fabric, `of_settings` being that of what names none itself.
+    #[must_use]
+    pub fn cut_from(&self, of_settings: &Fabric) -> Self {
+        Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
+    }
 }
 
 /// The fabrics of a garment: those that its rest shape numbers, none being that of the settings.

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use super::{Scene, SceneError};
+use crate::files::first_of;
 
 /// Connected parts that are named in one message; of more their number is told.
 const NAMED: usize = 5;
@@ -138,14 +139,13 @@ impl Scene {
                 None => part.to_string(),
             }
         };
-        let numbers: Vec<String> = parts.iter().take(NAMED).map(numbered).collect();
+        let numbers: Vec<String> = parts.iter().map(numbered).collect();
         let whole = if self.layers.len() > 1 { "outfit" } else { "garment" };
-        match parts.len().saturating_sub(NAMED) {
-            _ if all == 1 => "the garment".to_owned(),
-            0 if parts.len() == 1 => format!("connected part {} of the {whole}'s {all}", numbers[0]),
-            0 => format!("connected parts {} of the {whole}'s {all}", numbers.join(", ")),
-            more => format!("connected parts {} and {more} more of the {whole}'s {all}", numbers.join(", ")),
+        let s = if parts.len() == 1 { "" } else { "s" };
+        if all == 1 {
+            return "the garment".to_owned();
         }
+        format!("connected part{s} {} of the {whole}'s {all}", first_of(&numbers, NAMED))
     }
 
     /// What to do about connected parts that nothing holds, as the user would write it.
@@ -162,16 +162,10 @@ impl Scene {
             .filter(|(corners, _)| parts.contains(&(part_of[corners[0] as usize] as usize + 1)))
             .map(|(_, group)| *group)
             .collect();
-        let names_of: Vec<&str> = groups
-            .iter()
-            .take(NAMED)
-            .filter_map(|&g| self.garment.groups.get(g as usize))
-            .map(String::as_str)
-            .collect();
-        let or_group = match (names_of.as_slice(), groups.len().saturating_sub(NAMED)) {
-            ([], _) => String::new(),
-            (some, 0) => format!(", or one of its groups: {}", some.join(", ")),
-            (some, more) => format!(", or one of its groups: {} and {more} more", some.join(", ")),
+        let groups: Vec<String> = groups.iter().filter_map(|&g| self.garment.groups.get(g as usize)).cloned().collect();
+        let or_group = match &groups[..] {
+            [] => String::new(),
+            some => format!(", or one of its groups: {}", first_of(some, NAMED)),
         };
         format!("hold its edge (--hold {names}{or_group})")
     }

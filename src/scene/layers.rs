@@ -63,6 +63,15 @@ pub struct Layer {
     pub triangles: Range<usize>,
 }
 
+impl Layer {
+    /// It alone, of these triangles of all and with their vertices at `x` (m).
+    pub(crate) fn cut_out(&self, triangles: &[[u32; 3]], x: &[DVec3]) -> TriMesh {
+        let first = self.vertices.start as u32;
+        let own = triangles[self.triangles.clone()].iter().map(|t| t.map(|v| v - first)).collect();
+        TriMesh::new(x[self.vertices.clone()].to_vec(), own)
+    }
+}
+
 /// What the distances of stage one count to, where garments are worn over each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -154,9 +163,7 @@ impl Scene {
     }
 
     fn cut_out(&self, layer: &Layer, x: &[DVec3]) -> TriMesh {
-        let first = layer.vertices.start as u32;
-        let triangles = self.garment.triangles[layer.triangles.clone()].iter().map(|t| t.map(|v| v - first));
-        TriMesh::new(x[layer.vertices.clone()].to_vec(), triangles.collect())
+        layer.cut_out(&self.garment.triangles, x)
     }
 }
 

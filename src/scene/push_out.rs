@@ -68,38 +68,26 @@ impl PushOutReport {
 
 impl fmt::Display for PushOutReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.off_ends_m > 0.0 {
-            write!(
-                f,
-                "the body stuck through the garment (a foot, a hand?); taken off over its end, by up to {:.0} mm; ",
-                1e3 * self.off_ends_m
-            )?;
+        let Self { found_inside, too_deep, moved, left_inside, turned_over, .. } = self;
+        let [deepest, farthest, ends] = [self.deepest_m, self.farthest_m, self.off_ends_m].map(|m| 1e3 * m);
+        if ends > 0.0 {
+            f.write_str("the body stuck through the garment (a foot, a hand?); taken off over its end, ")?;
+            write!(f, "by up to {ends:.0} mm; ")?;
         }
-        if self.found_inside == 0 {
+        if *found_inside == 0 {
             return f.write_str("no vertex of the garment starts inside the body");
         }
-        write!(
-            f,
-            "{} vertices of the garment started up to {:.1} mm inside the body; pushed out and smoothed, {} moved by up \
-             to {:.1} mm",
-            self.found_inside,
-            1e3 * self.deepest_m,
-            self.moved,
-            1e3 * self.farthest_m
-        )?;
-        if self.too_deep > 0 {
-            write!(
-                f,
-                "; {} were deeper than {:.0} mm and may be on the wrong side now: place the garment better",
-                self.too_deep,
-                1e3 * DEEPEST
-            )?;
+        write!(f, "{found_inside} vertices of the garment started up to {deepest:.1} mm inside the body; ")?;
+        write!(f, "pushed out and smoothed, {moved} moved by up to {farthest:.1} mm")?;
+        if *too_deep > 0 {
+            write!(f, "; {too_deep} were deeper than {:.0} mm and may be on the wrong side now: ", 1e3 * DEEPEST)?;
+            f.write_str("place the garment better")?;
         }
-        if self.left_inside > 0 {
-            write!(f, "; {} are still inside", self.left_inside)?;
+        if *left_inside > 0 {
+            write!(f, "; {left_inside} are still inside")?;
         }
-        if self.turned_over > 0 {
-            write!(f, "; {} triangles were turned over", self.turned_over)?;
+        if *turned_over > 0 {
+            write!(f, "; {turned_over} triangles were turned over")?;
         }
         Ok(())
     }

@@ -27,7 +27,7 @@ pub(super) struct Desk {
     pub(super) accepted: Instant,
     /// The state that failed, after which there is nothing to go back to.
     pub(super) failed: Option<u64>,
-    history: History,
+    pub(super) history: History,
     good_scene: Option<SceneSpec>,
     good_job: Option<Arc<Job>>,
     /// Body and garment while their files are read again.
@@ -40,45 +40,18 @@ pub(super) struct Desk {
 impl Desk {
     pub(super) fn new(job: Job, warm: bool) -> Self {
         let job = Arc::new(job);
-        let view = Snapshot {
-            serial: 1,
-            state: 1,
-            job: Arc::clone(&job),
-            idle: false,
-            ground: None,
-            sectioned: None,
-            preview: None,
-            rest: None,
-            finished: None,
-            refused: None,
-            pins: Arc::default(),
-            trail: Arc::default(),
-            undo: 0,
-            redo: 0,
-            superseded: 0,
-        };
-        let history = History::new(job);
-        let accepted = Instant::now();
         Self {
-            view,
+            view: Snapshot { serial: 1, state: 1, job: Arc::clone(&job), ..Snapshot::default() },
             warm,
-            accepted,
+            accepted: Instant::now(),
             failed: None,
-            history,
+            history: History::new(job),
             good_scene: None,
             good_job: None,
             before: None,
             pins_made: 0,
             rests: Vec::new(),
         }
-    }
-
-    pub(super) fn job(&self) -> &Job {
-        &self.view.job
-    }
-
-    pub(super) fn steps(&self) -> (usize, usize) {
-        self.history.depth()
     }
 
     /// Takes the next job, unless it is the one that stands.

@@ -17,6 +17,7 @@ use crate::shapes::ShapeError;
 
 /// Why an edit was refused: the session stays as it was.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum EditError {
     /// The range table.
     #[error(transparent)]
@@ -35,14 +36,7 @@ pub enum EditError {
     Drape(#[from] DrapeError),
     /// Any other value.
     #[error("{what}: found {found}, expected {expected}")]
-    Value {
-        /// Which one.
-        what: &'static str,
-        /// What it is.
-        found: String,
-        /// What it should be.
-        expected: String,
-    },
+    Value { what: &'static str, found: String, expected: String },
 }
 
 impl EditError {

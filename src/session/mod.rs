@@ -42,7 +42,7 @@ use crate::job::Job;
 /// Called with the serial number of what became known.
 type Listener = Arc<dyn Fn(u64) + Send + Sync>;
 
-/// A handle to the session; clones are the same session.
+/// A handle to the session; clones are the same session. What cannot be done fails with [`EditError`], and leaves the session as it was.
 #[derive(Clone)]
 pub struct Session(Arc<Shared>);
 
@@ -76,55 +76,37 @@ impl Session {
 
     /// Hands in an edit and returns the number of the state it makes; one that changes nothing makes none. Edits of one
     /// `gesture`, a drag, are one step for [`undo`](Self::undo).
-    ///
-    /// # Errors
-    /// [`EditError`]: the session stays as it was.
     pub fn submit(&self, edit: &Edit, gesture: Option<u64>) -> Result<u64, EditError> {
         self.change(|desk| {
-            let job = edit.applied(desk.job())?;
+            let job = edit.applied(&desk.view.job)?;
             desk.check_fabric(edit, &job)?;
             desk.take(job, gesture)
         })
     }
 
     /// Hands in a whole job, as [`submit`](Self::submit).
-    ///
-    /// # Errors
-    /// As there.
     pub fn submit_job(&self, job: Job) -> Result<u64, EditError> {
         check(&job)?;
         self.change(|desk| desk.take(job, None))
     }
 
     /// Hands in a whole job whose files hold something else than before: body and garment are read again.
-    ///
-    /// # Errors
-    /// As [`submit`](Self::submit).
     pub fn reload(&self, job: Job) -> Result<u64, EditError> {
         check(&job)?;
         self.change(|desk| desk.take_anew(job))
     }
 
-    /// Takes the last step back.
-    ///
-    /// # Errors
-    /// Where there is none.
+    /// Takes the last step back, where there is one.
     pub fn undo(&self) -> Result<u64, EditError> {
         self.change(|desk| desk.go(-1))
     }
 
-    /// Takes a step on that was taken back.
-    ///
-    /// # Errors
-    /// Where there is none.
+    /// Takes a step on that was taken back, where there is one.
     pub fn redo(&self) -> Result<u64, EditError> {
         self.change(|desk| desk.go(1))
     }
 
-    /// Keeps the newest state beside those after it.
-    ///
-    /// # Errors
-    /// Where there is no drape of it yet, or enough is pinned already.
+    /// Keeps the newest state beside those after it, where there is a drape of it already and not enough is pinned.
     pub fn pin(&self, label: Option<String>) -> Result<u64, EditError> {
         self.change(|desk| desk.pin(label))
     }
@@ -192,7 +174,7 @@ impl Session {
         let mut desk = self.desk();
         let done = change(&mut desk)?;
         desk.view.serial += 1;
-        (desk.view.undo, desk.view.redo) = desk.steps();
+        (desk.view.undo, desk.view.redo) = desk.history.depth();
         self.0.newest.store(desk.view.state, Ordering::SeqCst);
         let serial = desk.view.serial;
         drop(desk);

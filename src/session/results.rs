@@ -1,4 +1,13 @@
 //! What a session has found so far, piece by piece; every piece says which state it belongs to.
+//!
+//! | field | of every piece that has it |
+//! |---|---|
+//! | `state` | the state it belongs to |
+//! | `ground` | body and garment, what was cut or draped |
+//! | `positions` | the garment, m |
+//! | `ms`, `after_ms` | milliseconds of its steps, and from the edit to here |
+
+#![allow(missing_docs, reason = "the table above says what the fields are that have no text of their own")]
 
 use std::sync::Arc;
 
@@ -38,9 +47,7 @@ impl Ground {
 /// Stage one of a state.
 #[derive(Debug, Clone)]
 pub struct Sectioned {
-    /// The state.
     pub state: u64,
-    /// What was cut.
     pub ground: Arc<Ground>,
     /// The table, with the rows its rule made.
     pub table: Arc<RangeTable>,
@@ -50,7 +57,6 @@ pub struct Sectioned {
     pub force_n: Arc<Vec<DVec3>>,
     /// Milliseconds of the cut.
     pub segment_ms: f64,
-    /// Milliseconds from the edit to here.
     pub after_ms: f64,
     pub(crate) min_part: usize,
 }
@@ -58,9 +64,7 @@ pub struct Sectioned {
 /// Stage two of a state.
 #[derive(Debug, Clone)]
 pub struct Preview {
-    /// The state.
     pub state: u64,
-    /// What was draped.
     pub ground: Arc<Ground>,
     /// Whether it went on from the preview before, in which case the two stages from the undraped garment are still to come.
     pub warm: bool,
@@ -70,11 +74,8 @@ pub struct Preview {
     pub parts: Arc<Parts>,
     /// What each did; empty before the steps are done.
     pub outcomes: Arc<Vec<PartOutcome>>,
-    /// The garment, m.
     pub positions: Arc<Vec<DVec3>>,
-    /// Milliseconds of its steps.
     pub ms: f64,
-    /// Milliseconds from the edit to here.
     pub after_ms: f64,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -83,9 +84,7 @@ pub struct Preview {
 /// The garment at full resolution, on its way to rest or there.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// The state.
     pub state: u64,
-    /// What was draped.
     pub ground: Arc<Ground>,
     /// Whether no step is left to take: where its forces balance, it was looked at that this lasts.
     pub done: bool,
@@ -96,15 +95,12 @@ pub struct AtRest {
     pub kept: bool,
     /// Whether it began at the drape before.
     pub warm: bool,
-    /// The garment, m.
     pub positions: Arc<Vec<DVec3>>,
     /// ‖∇E‖ over the weight.
     pub residual_over_weight: f64,
     /// Steps at full resolution.
     pub steps: usize,
-    /// Milliseconds of these.
     pub ms: f64,
-    /// Milliseconds from the edit to here.
     pub after_ms: f64,
     /// What came of letting go what was held until it rested.
     pub let_go: Option<LetGo>,
@@ -118,9 +114,7 @@ pub struct AtRest {
 /// A state with nothing left to compute.
 #[derive(Debug)]
 pub struct Finished {
-    /// The state.
     pub state: u64,
-    /// What was draped.
     pub ground: Arc<Ground>,
     /// All of it.
     pub drape: Drape,
@@ -150,13 +144,11 @@ pub struct Pin {
     pub id: u64,
     /// What it is called.
     pub label: String,
-    /// The state it was.
     pub state: u64,
     /// Its job.
     pub job: Arc<Job>,
     /// Its drape: at rest where it had come to rest, else as previewed.
     pub positions: Arc<Vec<DVec3>>,
-    /// What was draped.
     pub ground: Arc<Ground>,
     /// Its numbers.
     pub numbers: TrailPoint,
@@ -165,7 +157,6 @@ pub struct Pin {
 /// The numbers of a state, for lines over the edits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct TrailPoint {
-    /// The state.
     pub state: u64,
     /// Its PARTs.
     pub parts: usize,
@@ -182,7 +173,7 @@ pub struct TrailPoint {
 }
 
 /// All that is known at one moment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Snapshot {
     /// Grows with everything that becomes known.
     pub serial: u64,

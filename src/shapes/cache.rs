@@ -17,7 +17,6 @@ use super::{ShapeError, body};
 use crate::files::user_cache;
 use crate::mesh::{RestShape, TriMesh};
 use crate::sealed::{self, Kind};
-use crate::whole_file::WholeFile;
 
 /// First bytes of an entry, and part of every name; the number goes up with the format and with every change of what the
 /// mesher makes, so that an older mesh is never taken for a newer one.
@@ -26,7 +25,7 @@ const KIND: &Kind = b"PWMESH01";
 const MOST: usize = 64;
 
 /// Positions, triangles, groups and their triangles; rest corners and held vertices, of a garment.
-type Stored = (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<String>, Vec<u32>, Vec<[[f64; 2]; 3]>, Vec<u32>);
+type Stored = (Vec<DVec3>, Vec<[u32; 3]>, Vec<String>, Vec<u32>, Vec<[DVec2; 3]>, Vec<u32>);
 
 /// A folder of made meshes, or none: then all are made anew.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -88,11 +87,8 @@ impl MeshCache {
 
 fn keep(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::Result<()> {
     let PlacedGarment { mesh, rest, held, .. } = made;
-    let positions: Vec<[f64; 3]> = mesh.positions.iter().map(DVec3::to_array).collect();
-    let corners: Vec<[[f64; 2]; 3]> = rest.corners.iter().map(|t| t.map(|corner| corner.to_array())).collect();
-    std::fs::create_dir_all(folder)?;
-    let stored = (positions, &mesh.triangles, &mesh.groups, &mesh.triangle_group, corners, held);
-    WholeFile::write(path, sealed::seal(KIND, &(of, stored))?)?;
+    let stored = (&mesh.positions, &mesh.triangles, &mesh.groups, &mesh.triangle_group, &rest.corners, held);
+    sealed::write(path, KIND, &(of, stored))?;
     let mut kept: Vec<(SystemTime, PathBuf)> = std::fs::read_dir(folder)?
         .filter_map(|entry| entry.ok().filter(|e| e.path().extension().is_some_and(|ending| ending == "mesh")))
         .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
@@ -102,8 +98,6 @@ fn keep(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::
 }
 
 fn unpack((positions, triangles, groups, triangle_group, corners, held): Stored) -> PlacedGarment {
-    let positions = positions.into_iter().map(DVec3::from_array).collect();
-    let corners = corners.into_iter().map(|t| t.map(DVec2::from_array)).collect();
     let mesh = TriMesh { positions, triangles, groups, triangle_group };
     PlacedGarment { name: String::new(), mesh, rest: RestShape::new(corners), held }
 }
@@ -132,7 +126,7 @@ mod tests {
         // Whether an entry is read at all shows by one that holds another mesh under the right text.
         let whole = std::fs::read(&entry).unwrap();
         let (of, mut stored) = sealed::open::<(String, Stored)>(KIND, &whole).unwrap();
-        stored.0[0][0] = 9.0;
+        stored.0[0].x = 9.0;
         let other = sealed::seal(KIND, &(&of, &stored)).unwrap();
         std::fs::write(&entry, &other).unwrap();
         assert_eq!(skirt(&cache).mesh.positions[0].x, 9.0);

@@ -6,12 +6,11 @@
 use toml::Value;
 
 use super::bodies::body;
-use super::error::PlanError;
 use super::file::{At, Grid, Single, Source, number};
 use super::garments::garments;
 use super::inputs::Inputs;
-use super::point::Point;
 use super::tables::tables;
+use super::{PlanError, Point};
 use crate::drape::{Model, Refine};
 use crate::fabric::Fabric;
 use crate::files::names_a_file;

@@ -11,9 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 
-use super::point::Point;
-use super::row::Row;
-use super::timing::Timing;
+use super::{Point, Row, Timing};
 use crate::accuracy::reference::ReferenceCache;
 use crate::assess::AssessError;
 use crate::drape::{Drape, StageTimes};

@@ -23,16 +23,17 @@ fn chosen(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<(Input,
     let expected = "\"form\", an OBJ file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
                     optional name = \"...\" and of = (one of these)";
     let place = source.place(value);
+    let wrong = || source.wrong(value, "body", expected);
     let table = match value.get_ref() {
         Value::String(label) => return named_body(source, value, label, expected, inputs),
         Value::Table(table) => table,
-        _ => return Err(source.wrong(value, "body", expected)),
+        _ => return Err(wrong()),
     };
-    let text = |key| table.get(key).map(|v: &Value| v.as_str().ok_or_else(|| source.wrong(value, "body", expected)));
+    let text = |key| table.get(key).map(|v: &Value| v.as_str().ok_or_else(wrong));
     let (name, of) = (text("name").transpose()?, text("of").transpose()?.unwrap_or(DRESS_FORM));
     let (mut input, mut measurements) = named_body(source, value, of, expected, inputs)?;
     for (measure, entry) in table.iter().filter(|(key, _)| *key != "name" && *key != "of") {
-        let cm = number(entry).ok_or_else(|| source.wrong(value, "body", expected))?;
+        let cm = number(entry).ok_or_else(wrong)?;
         measurements = measurements.with(measure, cm).map_err(PlanError::input(&place, "body"))?;
         input.label = format!("{} {measure}={cm}", input.label);
     }

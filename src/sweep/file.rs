@@ -65,7 +65,6 @@ const KEYS: [[&str; 2]; 12] = [
     ["options", "options"],
 ];
 
-/// The file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SweepFile {
@@ -132,7 +131,6 @@ impl Source<'_> {
         PlanError::Value { place: self.place(value), key, found, expected: expected.into() }
     }
 
-    /// A string.
     pub(super) fn text(self, value: &At, key: &'static str, expected: &str) -> Result<String, PlanError> {
         match value.get_ref() {
             Value::String(text) if !text.is_empty() => Ok(text.clone()),

@@ -49,15 +49,11 @@ impl Inputs {
             return Ok(Input::built_in(label));
         }
         let path = self.folder.join(label);
-        let digest = match self.digests.get(&path) {
-            Some(digest) => digest.clone(),
-            None => {
-                let bytes = fs::read(&path).map_err(|e| unreadable(&path, place, e))?;
-                let digest = blake3::hash(&bytes).to_hex()[..32].to_owned();
-                self.digests.insert(path.clone(), digest.clone());
-                digest
-            }
-        };
+        if !self.digests.contains_key(&path) {
+            let bytes = fs::read(&path).map_err(|e| unreadable(&path, place, e))?;
+            self.digests.insert(path.clone(), blake3::hash(&bytes).to_hex()[..32].to_owned());
+        }
+        let digest = &self.digests[&path];
         Ok(Input { label: label.to_owned(), name: path.display().to_string(), key: format!("blake3 {digest}") })
     }
 

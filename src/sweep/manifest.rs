@@ -7,10 +7,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::disk;
-use super::error::{PlanError, StoreError};
-use super::plan::Plan;
-use super::point::{VERSION, content_id};
+use super::point::content_id;
+use super::{Plan, PlanError, StoreError, VERSION, disk};
 
 /// Name of the manifest in a sweep's folder.
 pub(super) const MANIFEST: &str = "plan.json";

@@ -2,10 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::MergeError;
-use super::manifest::Manifest;
-use super::row::Row;
-use super::store::{self, Existing, Store};
+use super::{Existing, Manifest, MergeError, Row, Store, store};
 
 /// How many missing points an error lists.
 const LISTED: usize = 10;

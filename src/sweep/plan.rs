@@ -11,10 +11,9 @@ use std::fs;
 use std::path::Path;
 
 use super::axes::Axes;
-use super::error::PlanError;
 use super::file::{At, Grid, Source};
 use super::inputs::{Inputs, unreadable};
-use super::point::Point;
+use super::{PlanError, Point};
 use crate::job::Job;
 
 /// Timed passes, and passes before them, that a point can be asked for: a median of more says nothing more, and takes for ever.

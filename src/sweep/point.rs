@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::inputs::Input;
+use crate::drape::Settings;
 use crate::job::Job;
 use crate::scene::SceneSpec;
 
@@ -75,17 +76,13 @@ impl Point {
     #[must_use]
     pub fn label(&self) -> String {
         let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
+        let Settings { model, table, min_part, refine, fabric, .. } = settings;
+        let (fabric, table, extent) = (&fabric.name, table.name(), self.extent_text());
+        let (model, motion) = (model.name(), model.motion().name());
         let options = self.options.iter().map(|(key, value)| format!(", {key} {value}")).collect::<String>();
         format!(
-            "body {body}, garment {garment}, fabric {}, {}, table {}, extent {}, motion {}, \
-             min-part {}, refine {}, seed {seed}{options}",
-            settings.fabric.name,
-            settings.model.name(),
-            settings.table.name(),
-            self.extent_text(),
-            settings.model.motion().name(),
-            settings.min_part,
-            settings.refine,
+            "body {body}, garment {garment}, fabric {fabric}, {model}, table {table}, extent {extent}, motion {motion}, \
+             min-part {min_part}, refine {refine}, seed {seed}{options}"
         )
     }
 

@@ -7,14 +7,12 @@
 //!
 //! Columns that are timings, and nothing else, start with `time_`; comparisons drop them.
 
-use std::collections::BTreeMap;
-
-use serde::de::{DeserializeOwned, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use indexmap::IndexMap;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::point::Point;
-use super::timing::Timing;
+use super::{Point, Timing};
 use crate::figures::Figures;
 
 /// Whether a point has a result.
@@ -122,7 +120,7 @@ impl Row {
 #[must_use]
 pub fn columns() -> Vec<String> {
     let full = Row { figures: Some(Figures::default()), timing: Some(Timing::default()), ..Row::default() };
-    ordered(&full).into_iter().map(|(name, _)| name).collect()
+    cells(&full).into_keys().collect()
 }
 
 /// Rows as CSV, the titles first.
@@ -157,35 +155,9 @@ pub(super) fn json_line(row: &Row) -> Vec<u8> {
     line
 }
 
-fn cells(row: &Row) -> BTreeMap<String, Value> {
-    ordered(row).into_iter().collect()
-}
-
-/// Keys and values of a row in the order of its fields, which a JSON object read back would lose.
-fn ordered(row: &Row) -> Vec<(String, Value)> {
-    struct Pairs(Vec<(String, Value)>);
-    struct Keys;
-    impl<'de> Visitor<'de> for Keys {
-        type Value = Pairs;
-
-        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            f.write_str("an object")
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs, A::Error> {
-            let mut pairs = Vec::new();
-            while let Some(pair) = map.next_entry()? {
-                pairs.push(pair);
-            }
-            Ok(Pairs(pairs))
-        }
-    }
-    impl<'de> Deserialize<'de> for Pairs {
-        fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-            from.deserialize_map(Keys)
-        }
-    }
-    serde_json::from_slice(&json_line(row)).map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs)
+/// Keys and values of a row, in the order of its fields.
+fn cells(row: &Row) -> IndexMap<String, Value> {
+    serde_json::from_slice(&json_line(row)).unwrap_or_default()
 }
 
 /// The first figure that is no number, and what it is. JSON has nothing for it; a CSV says so.

@@ -5,12 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-use super::error::StoreError;
-use super::manifest::{Manifest, Shard};
-use super::plan::Plan;
-use super::point::Point;
-use super::row::{Row, Status};
-use super::store::{Existing, Store};
+use super::{Existing, Manifest, Plan, Point, Row, Shard, Status, Store, StoreError};
 
 /// How far a sweep is.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +48,15 @@ pub struct Outcome {
     pub stopped: bool,
     /// All rows so far, in the plan's order.
     pub rows: Vec<Row>,
+}
+
+impl Outcome {
+    /// Of a sweep all of whose rows were there.
+    #[must_use]
+    pub fn found(rows: Vec<Row>) -> Self {
+        let total = rows.len();
+        Self { total, skipped: total, failed: count_failed(&rows), stopped: false, rows }
+    }
 }
 
 /// Opens the folder, runs what is missing, and puts the files in order: the whole of `partwise sweep`.

@@ -50,24 +50,22 @@ pub(super) fn tables(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<
 }
 
 fn rules(source: Source<'_>, entry: &At, inputs: &Inputs) -> Result<Vec<TableRule>, PlanError> {
+    let unread = |expected: &str, e: &toml::de::Error| {
+        source.wrong(entry, "table", format!("{expected}; {}", e.message().replace('\n', ", ")))
+    };
     let table = match entry.get_ref() {
         Value::String(name) => return Ok(vec![TableRule::from(base(source, entry, name, inputs)?).named(name)]),
         Value::Table(table) if table.contains_key("rows") => {
             let mut table = table.clone();
             let rows = table.remove("rows").unwrap_or(Value::Array(Vec::new()));
             table.insert("levels".to_owned(), rows);
-            let read = table.try_into::<RangeTable>();
-            let wrong = |e: toml::de::Error| {
-                source.wrong(entry, "table", format!("{ROWS}; {}", e.message().replace('\n', ", ")))
-            };
-            return Ok(vec![TableRule::from(read.map_err(wrong)?)]);
+            let read: RangeTable = table.try_into().map_err(|e| unread(ROWS, &e))?;
+            return Ok(vec![TableRule::from(read)]);
         }
         Value::Table(table) => table.clone(),
         _ => return Err(source.wrong(entry, "table", EXPECTED)),
     };
-    let family: Family = table.try_into().map_err(|e: toml::de::Error| {
-        source.wrong(entry, "table", format!("{EXPECTED}; {}", e.message().replace('\n', ", ")))
-    })?;
+    let family: Family = table.try_into().map_err(|e| unread(EXPECTED, &e))?;
     let kinds =
         [family.scale.is_some() || family.levels.is_some(), family.quantile.is_some(), family.geometric.is_some()];
     let ends = family.first_cm.is_some() || family.last_cm.is_some();

@@ -39,30 +39,25 @@ impl Timing {
     /// Of the repeats, warm-up passes left out.
     #[must_use]
     pub fn of(passes: &[StageTimes]) -> Self {
-        let stage = |pick: fn(StageTimes) -> Duration| {
-            let ms: Vec<f64> = passes.iter().map(|t| 1e3 * pick(*t).as_secs_f64()).collect();
-            let spread = || interpolated(&ms, 0.75) - interpolated(&ms, 0.25);
-            (interpolated(&ms, 0.5), (ms.len() > 1).then(spread))
+        type Stage = fn(StageTimes) -> Duration;
+        let at = |of: Stage, share: f64| {
+            interpolated(&passes.iter().map(|t| 1e3 * of(*t).as_secs_f64()).collect::<Vec<_>>(), share)
         };
-        let (time_distance_ms, time_distance_spread_ms) = stage(|t| t.distance);
-        let (time_segment_ms, time_segment_spread_ms) = stage(|t| t.segment);
-        let (time_mechanics_ms, time_mechanics_spread_ms) = stage(|t| t.mechanics);
-        let (time_refine_ms, time_refine_spread_ms) = stage(|t| t.refine);
-        let (time_other_ms, time_other_spread_ms) = stage(StageTimes::other);
-        let (time_total_ms, time_total_spread_ms) = stage(|t| t.total);
+        let median = |of: Stage| at(of, 0.5);
+        let spread = |of: Stage| (passes.len() > 1).then(|| at(of, 0.75) - at(of, 0.25));
         Self {
-            time_distance_ms,
-            time_distance_spread_ms,
-            time_segment_ms,
-            time_segment_spread_ms,
-            time_mechanics_ms,
-            time_mechanics_spread_ms,
-            time_refine_ms,
-            time_refine_spread_ms,
-            time_other_ms,
-            time_other_spread_ms,
-            time_total_ms,
-            time_total_spread_ms,
+            time_distance_ms: median(|t| t.distance),
+            time_distance_spread_ms: spread(|t| t.distance),
+            time_segment_ms: median(|t| t.segment),
+            time_segment_spread_ms: spread(|t| t.segment),
+            time_mechanics_ms: median(|t| t.mechanics),
+            time_mechanics_spread_ms: spread(|t| t.mechanics),
+            time_refine_ms: median(|t| t.refine),
+            time_refine_spread_ms: spread(|t| t.refine),
+            time_other_ms: median(StageTimes::other),
+            time_other_spread_ms: spread(StageTimes::other),
+            time_total_ms: median(|t| t.total),
+            time_total_spread_ms: spread(|t| t.total),
         }
     }
 

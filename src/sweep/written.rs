@@ -7,10 +7,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use serde::Serialize;
 use toml::{Table, Value};
 
-use super::error::PlanError;
-use super::plan::Plan;
+use super::{Plan, PlanError};
 use crate::drape::{Model, Refine};
 use crate::fabric::Fabric;
 use crate::files::names_a_file;
@@ -103,11 +103,8 @@ fn path(name: &str) -> Result<String, String> {
 
 fn body(scene: &SceneSpec) -> Result<Value, String> {
     let of = path(&scene.body)?;
-    let [given, usual] = [&scene.measurements, &SceneSpec::default().measurements].map(Table::try_from);
-    let (given, usual) = (given.map_err(|e| e.to_string())?, usual.map_err(|e| e.to_string())?);
-    let mut table: Table = (given.into_iter().filter(|(key, value)| usual.get(key) != Some(value)))
-        .map(|(key, value)| (key.trim_end_matches("_cm").to_owned(), value))
-        .collect();
+    let measured = unusual(&scene.measurements)?;
+    let mut table: Table = measured.map(|(key, value)| (key.trim_end_matches("_cm").to_owned(), value)).collect();
     if table.is_empty() {
         return Ok(Value::String(of));
     }
@@ -151,10 +148,14 @@ fn rows(rule: &TableRule, name: &str) -> Result<Value, String> {
 
 /// What of the scene has no key of its own and is not as it comes.
 fn options(scene: &SceneSpec) -> Result<Table, String> {
-    let [given, usual] = [scene, &SceneSpec::default()].map(Table::try_from);
-    let (given, usual) = (given.map_err(|e| e.to_string())?, usual.map_err(|e| e.to_string())?);
-    let own = |key: &str| matches!(key, "body" | "garment" | "measurements");
-    Ok(given.into_iter().filter(|(key, value)| !own(key) && usual.get(key) != Some(value)).collect())
+    Ok(unusual(scene)?.filter(|(key, _)| !matches!(key.as_str(), "body" | "garment" | "measurements")).collect())
+}
+
+/// The fields that are not as they come.
+fn unusual<T: Serialize + Default>(given: &T) -> Result<impl Iterator<Item = (String, Value)>, String> {
+    let given = Table::try_from(given).map_err(|e| e.to_string())?;
+    let usual = Table::try_from(T::default()).map_err(|e| e.to_string())?;
+    Ok(given.into_iter().filter(move |(key, value)| usual.get(key) != Some(value)))
 }
 
 fn text(name: &str, base: &BTreeMap<&str, Value>, points: &[(&str, BTreeMap<&str, Value>)]) -> String {

@@ -13,8 +13,8 @@ pub(super) struct Candidates {
     sorted: Vec<f64>,
     /// Ranks in `sorted`, ascending, distinct, each from 1 to its length − 1.
     ranks: Vec<usize>,
-    /// Whether these are all ranks there are.
-    every: bool,
+    /// Whether these are all ranks there are: no other bound makes a difference then.
+    pub(super) every: bool,
     /// How far apart candidates are, in ranks.
     spacing: usize,
 }
@@ -75,11 +75,6 @@ impl Candidates {
         let shift = (round as f64 * 0.618_033_988_749_895).fract();
         ranks.extend((0..others).map(|i| ((i as f64 + shift) * self.sorted.len() as f64 / others as f64) as usize));
         Self::of(self.sorted.clone(), ranks, self.spacing)
-    }
-
-    /// Whether there is no other bound that makes a difference.
-    pub(super) fn complete(&self) -> bool {
-        self.every
     }
 
     /// Number of smallest levels, between neighbouring candidates.

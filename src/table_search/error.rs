@@ -4,49 +4,28 @@ use glam::DVec3;
 
 use super::Sample;
 
-/// A search that cannot be run.
+/// A search that cannot be run. Garments are numbered from 1, vertices from 0; limits are garment by garment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
 pub enum SearchError {
     /// Nothing to search on.
     #[error("no garment to tune on, expected at least one")]
     NoGarment,
     /// A list that is not one entry per vertex.
     #[error("garment {garment}: {what} has {found} entries, expected {expected}, one per vertex")]
-    Length {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Which list.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The number of vertices.
-        expected: usize,
-    },
+    Length { garment: usize, what: &'static str, found: usize, expected: usize },
     /// A weight that is no positive number.
     #[error("garment {garment} has the weight {found}, expected a positive, finite number")]
-    Weight {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Its weight.
-        found: f64,
-    },
+    Weight { garment: usize, found: f64 },
     /// A distance or displacement that is no number.
     #[error("garment {garment}: vertex {vertex} has no finite distance and displacement")]
-    NotFinite {
-        /// Garment number, from 1.
-        garment: usize,
-        /// Vertex, from 0.
-        vertex: usize,
-    },
+    NotFinite { garment: usize, vertex: usize },
     /// Even the coarsest table has more PARTs.
     #[error(
         "no table tried is within {} PARTs, not even one single level; allow more PARTs or larger extents",
         max_parts.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ")
     )]
-    TooFewParts {
-        /// The limits given, garment by garment.
-        max_parts: Vec<usize>,
-    },
+    TooFewParts { max_parts: Vec<usize> },
 }
 
 /// Refuses samples that do not fit together.

@@ -13,7 +13,6 @@ use crate::parts::{Ruler, spread_seeds};
 /// What a level costs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Cost {
-    /// PARTs.
     pub(super) parts: u32,
     /// What the PARTs' motions leave, squared, over its vertices, m².
     pub(super) error: f64,

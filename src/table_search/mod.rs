@@ -118,7 +118,7 @@ pub fn search(
     let mut ladder = Ladder::new(&options.widths_cm, &options.shapes);
     let mut candidates = Candidates::quantiles(samples, options);
     let mut charges = Charges::even(samples.len());
-    let exact = candidates.complete();
+    let exact = candidates.every;
     let round_count = if exact { 1 } else { options.rounds.max(1) };
     let mut rounds: Vec<Front> = Vec::new();
     for round in 1..=round_count {

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use partwise::record::{
     Chosen, Colours, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
-    StepView, Tab, When, WrinkleView, paths,
+    StepView, Tab, WrinkleView, paths,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
@@ -158,7 +158,7 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
             }
             points.push(ScatterPoint { label: name, x: ms, y: rms, group: 0, named: true });
         }
-        recorder.scatter(When::Table(0), Picture::of_error("time, ms"), &points).unwrap();
+        recorder.scatter(0, Picture::of_error("time, ms"), &points).unwrap();
         recorder.finish().unwrap()
     };
     let one = record("sweep-one.rrd", 1);

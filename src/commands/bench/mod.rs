@@ -2,21 +2,18 @@
 
 mod recorded;
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use comfy_table::{CellAlignment, presets};
 use partwise::SceneSpec;
 use partwise::contest::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
 use partwise::fabric::{DEFAULT_FABRIC, Fabric};
 use partwise::shapes::{GarmentRequest, MeshCache};
 use serde_json::json;
 
-use crate::commands::failure::UserError;
 use crate::commands::sweep::report::Format;
-use crate::commands::work::{use_threads, write_csv};
-use crate::commands::{console, interrupt};
+use crate::commands::work::{make_folder, unwritable, use_threads, write_csv};
+use crate::commands::{UserError, console, interrupt};
 
 const LONG_ABOUT: &str = "\
 Drapes the paper's garments in every way there is: its reference methods [19], [20] and [21], its own equations (`paper`), the coupled \
@@ -109,8 +106,7 @@ impl TableFourArgs {
             Journal::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
         };
         if let Some(folder) = &self.recordings {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| UserError::new(format!("{}: cannot be made: {e}", folder.display())))?;
+            make_folder(folder)?;
         }
         interrupt::keep();
         let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
@@ -127,7 +123,7 @@ impl TableFourArgs {
                     begun = (begun + 1).min((runs * ENTRANTS.len()) as u64);
                     bar.set_message(format!("{name}@{vertices}: {what}, round {} of {of}", (round + 1).min(of)));
                 }
-                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                interrupt::go_on()
             };
             let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
             let loaded = spec.load_with(&MeshCache::in_user_cache())?;
@@ -136,7 +132,8 @@ impl TableFourArgs {
                     journal.rows.push(contested.row.clone());
                     // Kept before it is recorded: a disk that is full then costs a picture and no row.
                     if !self.quick {
-                        self.keep(&journal)?;
+                        let file = &self.rows_file;
+                        journal.write(file).map_err(unwritable(file, "file with --rows-file"))?;
                     }
                     if let Some(folder) = &self.recordings {
                         let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
@@ -193,13 +190,6 @@ impl TableFourArgs {
         Ok(asked)
     }
 
-    fn keep(&self, journal: &Journal) -> anyhow::Result<()> {
-        journal.write(&self.rows_file).map_err(|e| {
-            let file = self.rows_file.display();
-            UserError::new(format!("{file}: cannot be written: {e}; choose another file with --rows-file"))
-        })
-    }
-
     fn report(&self, journal: &Journal, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {
         let find =
             |(name, n): &(String, usize)| journal.rows.iter().find(|row| row.garment == *name && row.asked == *n);
@@ -234,19 +224,13 @@ impl TableFourArgs {
 fn text(journal: &Journal, rows: &[ContestRow]) -> String {
     let mut out = journal.conditions.said();
     for cells in contest::tables(rows).into_iter().chain(contest::exponents(rows)) {
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&cells.header);
-        for row in &cells.rows {
-            table.add_row(row);
-        }
-        table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+        let mut table = console::table(console::RULED, &cells.header, 1..);
+        table.add_rows(&cells.rows);
         out += &format!("\n\n{}\n{table}", cells.title);
     }
-    for row in rows {
-        for entry in &row.entries {
-            if let Some(error) = &entry.error {
-                out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
-            }
+    for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {
+        if let Some(error) = &entry.error {
+            out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
         }
     }
     out

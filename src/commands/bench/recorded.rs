@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 
 use partwise::accuracy::vertex_errors;
 use partwise::contest::{ContestRow, Contested, ENTRANTS, Entrant, Entry};
-use partwise::record::{
-    Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink, When,
-};
+use partwise::record::{Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
 use partwise::scene::Scene;
 
 /// Share of the distances that the colours tell apart; what is beyond takes the last.
@@ -57,9 +55,9 @@ pub(super) fn record(
         ran.map(point).collect::<Vec<_>>()
     };
     let errors = points(row, |row, i| [row.entries[i].median_ms, row.entries[i].canonical_rms_mm], true);
-    recorder.scatter(When::Table(0), Picture::of_error("time, ms"), &errors)?;
+    recorder.scatter(0, Picture::of_error("time, ms"), &errors)?;
     let growth = |of: &ContestRow| points(of, |row, i| [row.vertices as f64, row.entries[i].median_ms], false);
-    recorder.scatter(When::Table(0), Picture::of_growth(), &rows.iter().flat_map(growth).collect::<Vec<_>>())?;
+    recorder.scatter(0, Picture::of_growth(), &rows.iter().flat_map(growth).collect::<Vec<_>>())?;
     recorder.finish()?;
     Ok(path)
 }

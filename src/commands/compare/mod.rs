@@ -98,7 +98,7 @@ impl CompareArgs {
         // What cannot be loaded is said before anything is draped, and is the user's to mend.
         for point in &plan.points {
             let loaded = bench.bench.scene(point).map_err(|error| UserError::new(error.to_string()))?;
-            self.dials.cloth().check_used(&loaded)?;
+            self.dials.cloth.check_used(&loaded)?;
         }
         let bar = console::progress(Some(plan.points.len() as u64), "compare");
         let mut rows: Vec<Row> = Vec::new();
@@ -109,9 +109,7 @@ impl CompareArgs {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        for warning in bench.bench.warnings() {
-            console::warning(&warning);
-        }
+        console::warnings(&bench.bench.warnings());
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
             write_csv(path, &table::csv(&compared)?)?;
@@ -136,7 +134,7 @@ impl CompareArgs {
 
     /// The comparison as a plan: every table on every garment.
     fn plan(&self) -> anyhow::Result<Plan> {
-        self.dials.cloth().only("compare")?;
+        self.dials.cloth.only("compare")?;
         let settings = Settings { refine: self.refine, ..self.dials.over(Job::preview().settings)? };
         let table = |name: &String| Ok(TableRule::from(RangeTable::by_name(name)?).named(name));
         let tables: Vec<TableRule> = self.tables.iter().map(table).collect::<anyhow::Result<_>>()?;
@@ -152,9 +150,7 @@ impl CompareArgs {
             }));
         }
         let plan = Plan::of_jobs("compare", jobs)?;
-        for note in &plan.notes {
-            console::note(note);
-        }
+        console::notes(&plan.notes);
         Ok(plan)
     }
 }

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::presets;
 use partwise::figures::LevelCount;
 use partwise::range_table::Extent;
 use partwise::sweep::{Row, Status, cell};
@@ -11,7 +10,7 @@ use serde_json::{Map, Value};
 
 use super::changes::Changes;
 use crate::commands::console;
-use crate::commands::sweep::report::{explained, right, rows_table};
+use crate::commands::sweep::report::{explained, rows_table};
 
 /// One table on one garment.
 #[derive(Debug, Clone, Serialize)]
@@ -43,18 +42,15 @@ pub(super) fn text(all: &[Compared]) -> String {
             "\n{}: PARTs by levels alone, and what became of the first table's",
             of_garment[0].row.garment
         );
-        let mut table = console::table();
-        table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["table", "PARTs", "kept", "split", "merged"]);
+        let mut table = console::table(console::OPEN, ["table", "PARTs", "kept", "split", "merged"], 1..);
         for c in of_garment {
             let Changes { kept, split, merged } = c.changes;
             let counts = [c.parts_by_levels(), kept, split, merged].map(|n| n.to_string());
             table.add_row(std::iter::once(c.row.table.clone()).chain(counts));
         }
-        right(&mut table, 1..5);
         let _ = writeln!(out, "{table}");
-        let mut table = console::table();
         let pairs = of_garment.iter().flat_map(|c| [c.row.table.clone(), "PARTs".to_owned()]);
-        table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(std::iter::once("level".to_owned()).chain(pairs));
+        let mut table = console::table(console::OPEN, std::iter::once("level".to_owned()).chain(pairs), 0..);
         let most = of_garment.iter().map(|c| c.per_level.len()).max().unwrap_or(0);
         for level in 0..most {
             if of_garment.iter().all(|c| c.per_level.get(level).is_none_or(|l| l.vertices == 0)) {
@@ -66,7 +62,6 @@ pub(super) fn text(all: &[Compared]) -> String {
             });
             table.add_row(std::iter::once((level + 1).to_string()).chain(cells));
         }
-        right(&mut table, 0..1 + 2 * of_garment.len());
         let _ = writeln!(out, "{table}");
     }
     out
@@ -79,42 +74,25 @@ fn range(level: &LevelCount) -> String {
     format!("{}–{upper} cm{own}", short(level.lower_cm))
 }
 
-/// Columns of the CSV: of the row, and of the level.
-const COLUMNS: [&str; 19] = [
-    "garment",
-    "table",
-    "level",
-    "lower_cm",
-    "upper_cm",
-    "extent_cm",
-    "vertices",
-    "parts",
-    "level_part_count",
-    "kept",
-    "split",
-    "merged",
-    "part_count",
-    "time_total_ms",
-    "rms_mm",
-    "canonical_rms_mm",
-    "representable_rms_mm",
-    "representable_affine_rms_mm",
-    "error",
-];
+/// The header of the CSV: columns of the row, and of the level.
+const HEADER: &str = "garment,table,level,lower_cm,upper_cm,extent_cm,vertices,parts,level_part_count,kept,split,merged,\
+    part_count,time_total_ms,rms_mm,canonical_rms_mm,representable_rms_mm,representable_affine_rms_mm,error";
 
 /// As CSV: a line for each level, the totals of its table repeated; a failed table has one line without a level.
 pub(super) fn csv(all: &[Compared]) -> anyhow::Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS)?;
+    writer.write_record(HEADER.split(','))?;
     for c in all {
         let mut cells: Map<String, Value> = serde_json::from_value(serde_json::to_value(c)?)?;
-        let levels: &[LevelCount] = if c.row.status == Status::Error { &[] } else { &c.per_level };
-        for level in levels {
-            cells.extend(serde_json::from_value::<Map<String, Value>>(serde_json::to_value(level)?)?);
-            writer.write_record(COLUMNS.map(|name| cell(cells.get(name))))?;
+        let mut write =
+            |cells: &Map<String, Value>| writer.write_record(HEADER.split(',').map(|name| cell(cells.get(name))));
+        if c.row.status == Status::Error || c.per_level.is_empty() {
+            write(&cells)?;
+            continue;
         }
-        if levels.is_empty() {
-            writer.write_record(COLUMNS.map(|name| cell(cells.get(name))))?;
+        for level in &c.per_level {
+            cells.extend(serde_json::from_value::<Map<String, Value>>(serde_json::to_value(level)?)?);
+            write(&cells)?;
         }
     }
     Ok(String::from_utf8(writer.into_inner()?)?)

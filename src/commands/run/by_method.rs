@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -17,10 +16,9 @@ use partwise::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Record
 use partwise::scene::Loaded;
 use serde::Serialize;
 
-use super::{Format, RunArgs};
-use crate::commands::failure::UserError;
-use crate::commands::summary::{command_line, fabric_facts};
-use crate::commands::{certified, console, interrupt};
+use super::{Format, RunArgs, show};
+use crate::commands::summary::{command_line, ended, fabric_facts};
+use crate::commands::{UserError, certified, console, interrupt};
 
 /// Our own: PARTs and what follows.
 pub(super) const TWO_STAGE: &str = "two-stage";
@@ -88,7 +86,7 @@ impl RunArgs {
     pub(super) fn run_by_method(&self) -> anyhow::Result<()> {
         self.refuse_beside_a_method()?;
         let began = Instant::now();
-        let (spec, fabric) = (self.stages.cloth().give(self.input.spec()?)?, self.stages.cloth().first()?);
+        let (spec, fabric) = (self.stages.dials.cloth.give(self.input.spec()?)?, self.stages.dials.cloth.first()?);
         if !spec.over.is_empty() {
             return Err(UserError::new(format!(
                 "--method {}: found {} garments over each other, expected one: it keeps no cloth off cloth",
@@ -98,7 +96,7 @@ impl RunArgs {
         }
         self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
         let loaded = self.input.load(&spec)?;
-        self.stages.cloth().check_used(&loaded)?;
+        self.stages.dials.cloth.check_used(&loaded)?;
         let load = began.elapsed();
         let sewn = loaded.tailored.as_ref().map(|tailored| &tailored.put_on.garment);
         let method = methods::by_name(self.method, !self.sinks.sinks("").is_empty(), sewn);
@@ -117,37 +115,39 @@ impl RunArgs {
             kept.push((moment.step, moment.rms_speed_m_per_s, mesh));
             let speed = 100.0 * moment.rms_speed_m_per_s;
             bar.set_message(format!("{}: {}, {:.2} s, {speed:.1} cm/s", self.method, moment.stage, moment.time_s));
-            if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            interrupt::go_on()
         });
         bar.finish_and_clear();
         let drape = drape.map_err(|e| UserError::new(e.to_string()))?;
         let measured = Instant::now();
         let (figures, fit) = MethodFigures::of(&dressing, &drape);
         let certificate = self.certify.then(|| certify(&scene, fabric, &drape.positions)).transpose()?;
-        let mut timings = vec![("load", load)];
-        timings.extend(drape.times.iter().copied());
-        timings.extend([("method", drape.total), ("measure", measured.elapsed())]);
+        let ms = |time: Duration| 1e3 * time.as_secs_f64();
+        let mut timings = vec![("load", ms(load))];
+        timings.extend(drape.times.iter().map(|(name, time)| (*name, ms(*time))));
+        timings.extend([("method", ms(drape.total)), ("measure", ms(measured.elapsed()))]);
         let mut warnings = [loaded.warnings(), figures.warnings(&dressing)].concat();
         if scene.let_go && !scene.held.is_empty() {
             warnings.push(format!("{} does not let go: what is held stays held", self.method));
         }
-        let made = Made { drape: &drape, figures: &figures, fit: &fit, fabric, kept: &kept };
-        let (recorder, spent) = self.record_method(&loaded, &made, &timings, &warnings)?;
-        timings.push(("record", spent));
+        let recorded = Instant::now();
+        let (loaded, drape, figures) = (&loaded, &drape, &figures);
+        let made =
+            Made { loaded, drape, figures, fit: &fit, fabric, kept: &kept, timings_ms: &timings, warnings: &warnings };
+        let recorder = self.record_method(&made)?;
+        timings.push(("record", ms(recorded.elapsed())));
         let mut outputs = Vec::new();
         if let Some(path) = &self.export {
             loaded.write(path, &drape.positions)?;
             outputs.push(format!("displaced garment: {}", path.display()));
         }
-        let url = recorder.web_url().map(str::to_owned);
-        let mut recorder = Some(recorder);
-        if url.is_none() {
-            let path = recorder.take().map(Recorder::finish).transpose()?.and_then(|summary| summary.path);
-            outputs.extend(path.map(|path| format!("recording: {}", path.display())));
+        let mut served = Some(recorder);
+        if let Some(recorder) = served.take_if(|recorder| recorder.web_url().is_none()) {
+            outputs.extend(recorder.finish()?.said());
         }
-        timings.push(("total", began.elapsed()));
-        loaded.notes().iter().chain(&drape.notes).for_each(|note| console::note(note));
-        warnings.iter().for_each(|warning| console::warning(warning));
+        timings.push(("total", ms(began.elapsed())));
+        console::notes(&[loaded.notes(), drape.notes.clone()].concat());
+        console::warnings(&warnings);
         let report = Report {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
@@ -155,9 +155,9 @@ impl RunArgs {
             garment: &loaded.garment_name,
             method: self.method,
             fabric: &fabric.name,
-            figures: &figures,
+            figures,
             counts: drape.counts.iter().copied().collect(),
-            timings_ms: timings.iter().map(|(name, time)| (*name, 1e3 * time.as_secs_f64())).collect(),
+            timings_ms: timings.iter().copied().collect(),
             notes: &drape.notes,
             warnings,
             certificate: certificate.as_ref(),
@@ -166,30 +166,16 @@ impl RunArgs {
         match self.format {
             Format::Json => console::result(&partwise::said::json(&report)?),
             Format::Text => {
-                console::result(&report.text(&drape, &timings));
-                if let Some(certificate) = &certificate {
-                    console::result(&certified::text(certificate));
-                }
+                console::result(&report.text(drape, &timings));
+                certified::print(certificate.as_ref());
             }
         }
-        if let (Some(recorder), Some(url)) = (recorder, url) {
-            console::note(&format!("look at it: {url}"));
-            interrupt::wait();
-            if let Some(path) = recorder.finish()?.path {
-                console::note(&format!("recording: {}", path.display()));
-            }
-        }
+        served.map_or(Ok(()), show)?;
         certified::verified(certificate.as_ref())
     }
 
-    fn record_method(
-        &self,
-        loaded: &Loaded,
-        made: &Made<'_>,
-        timings: &[(&'static str, Duration)],
-        warnings: &[String],
-    ) -> anyhow::Result<(Recorder, Duration)> {
-        let began = Instant::now();
+    fn record_method(&self, made: &Made<'_>) -> anyhow::Result<Recorder> {
+        let loaded = made.loaded;
         let overlays = [
             Overlay { name: "strain", unit: "%", values: &made.fit.strain_percent },
             Overlay { name: "pressure", unit: "kPa", values: &made.fit.pressure_kpa },
@@ -224,8 +210,8 @@ impl RunArgs {
             title: format!("{} on {}, by {}", loaded.garment_name, loaded.body_name, self.method),
             facts: facts.into_iter().chain(counts).chain(found).chain(notes).collect(),
             fabric: fabric_facts(made.fabric),
-            timings_ms: timings.iter().map(|(name, time)| ((*name).to_owned(), 1e3 * time.as_secs_f64())).collect(),
-            warnings: warnings.to_vec(),
+            timings_ms: made.timings_ms.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
+            warnings: made.warnings.to_vec(),
             command_line: command_line(),
             ..Panel::default()
         };
@@ -236,22 +222,25 @@ impl RunArgs {
             panel: &panel,
             overlays: &overlays,
         })?;
-        Ok((recorder, began.elapsed()))
+        Ok(recorder)
     }
 }
 
 /// What there is to record.
 struct Made<'a> {
+    loaded: &'a Loaded,
     drape: &'a MethodDrape,
     figures: &'a MethodFigures,
     fit: &'a Fit,
     fabric: &'a Fabric,
     kept: &'a [Kept],
+    timings_ms: &'a [(&'static str, f64)],
+    warnings: &'a [String],
 }
 
 impl Report<'_> {
     /// For the terminal.
-    fn text(&self, drape: &MethodDrape, timings: &[(&'static str, Duration)]) -> String {
+    fn text(&self, drape: &MethodDrape, timings_ms: &[(&'static str, f64)]) -> String {
         let MethodFigures { vertices, triangles, .. } = self.figures;
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
         let _ = writeln!(out, "{:<20}{} in {}", "method", self.method, self.fabric);
@@ -260,12 +249,6 @@ impl Report<'_> {
         }
         let counts: Vec<String> = drape.counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
         let _ = writeln!(out, "{:<20}{}", "counted", counts.join(", "));
-        let times: Vec<String> =
-            timings.iter().map(|(name, time)| format!("{name} {:.1}", 1e3 * time.as_secs_f64())).collect();
-        let _ = writeln!(out, "milliseconds: {}", times.join(", "));
-        for output in &self.outputs {
-            let _ = writeln!(out, "{output}");
-        }
-        out
+        out + &ended(timings_ms.iter().copied(), &self.outputs)
     }
 }

@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use partwise::mesh::glb::write_glb;
 use partwise::record::painted::{by_parts, by_values};
 
-use super::super::failure::UserError;
 use super::super::solved::Solved;
+use crate::commands::UserError;
 
 /// What the vertices of a displaced garment are coloured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -12,10 +12,9 @@ use partwise::record::Recorder;
 use partwise::session::{Finished, Session, Snapshot, Workshop};
 
 use super::{RunArgs, Solved};
-use crate::commands::failure::UserError;
 use crate::commands::watch::FileWatch;
 use crate::commands::work::cache;
-use crate::commands::{console, interrupt};
+use crate::commands::{UserError, console, interrupt};
 
 /// How often files and Ctrl-C are looked at.
 const GLANCE: Duration = Duration::from_millis(40);
@@ -38,7 +37,7 @@ impl RunArgs {
     pub(super) fn keep_watching(&self) -> anyhow::Result<()> {
         let job = self.job()?;
         let of_meshes: Vec<PathBuf> =
-            job.scene.files().into_iter().chain(self.input.measurements().map(Path::to_path_buf)).collect();
+            job.scene.files().into_iter().chain(self.input.measurements.file().map(Path::to_path_buf)).collect();
         let files: Vec<PathBuf> =
             of_meshes.iter().cloned().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
         if files.is_empty() {
@@ -50,7 +49,7 @@ impl RunArgs {
         let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
         let mut watch = FileWatch::new(files);
         // What cannot be from the start is an error, as without --watch.
-        self.stages.cloth().check_used(&self.input.load(&job.scene)?)?;
+        self.stages.dials.cloth.check_used(&self.input.load(&job.scene)?)?;
         let session = Session::new(job, true);
         let mut workshop = Workshop::new(self.input.meshes());
         let working = session.clone();
@@ -77,8 +76,8 @@ impl RunArgs {
             outcome = outcome.and(Err(anyhow::anyhow!("the session broke off; this is a mistake of the program")));
         }
         outcome?;
-        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.path) {
-            Some(path) => console::note(&format!("recording: {}", path.display())),
+        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.said()) {
+            Some(said) => console::note(&said),
             None if told.recorded == 0 => console::note("interrupted before the first drape: nothing is recorded"),
             None => {}
         }
@@ -114,21 +113,20 @@ impl RunArgs {
         let mut solved = Solved::of_session(&now.job, finished, measured)?;
         solved.summary.since_last = told.last.as_ref().map(|last| since(last, finished));
         told.last = Some(Arc::clone(finished));
-        if told.recorder.is_none() {
-            told.recorder = Some(Recorder::open(solved.record_options(&self.sinks, false, true))?);
+        let recorder = match &mut told.recorder {
+            Some(recorder) => recorder,
+            none => none.insert(Recorder::open(solved.record_options(&self.sinks, false, true))?),
+        };
+        solved.record(recorder, told.index, false)?;
+        if told.index == 0 {
+            self.export(&mut solved)?;
         }
-        if let Some(recorder) = &mut told.recorder {
-            solved.record(recorder, told.index, false)?;
-            if told.index == 0 {
-                self.export(&mut solved)?;
+        self.print(&solved)?;
+        if told.index == 0 {
+            if let Some(url) = recorder.web_url() {
+                console::note(&format!("look at it: {url}"));
             }
-            self.print(&solved)?;
-            if told.index == 0 {
-                if let Some(url) = recorder.web_url() {
-                    console::note(&format!("look at it: {url}"));
-                }
-                console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
-            }
+            console::note(&format!("watching {}; Ctrl-C ends", names.join(", ")));
         }
         told.index += 1;
         Ok(())

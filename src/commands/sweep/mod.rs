@@ -16,7 +16,7 @@ use clap::Args;
 use partwise::Job;
 use partwise::job::Against;
 use partwise::record::{RecordSummary, Tab};
-use partwise::sweep::{Existing, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
+use partwise::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
 
 use self::points::KeepingBench;
 use self::report::{Format, Report};
@@ -132,27 +132,21 @@ impl SweepArgs {
         let outcome = outcome?;
         self.mend(&plan, &outcome.rows, &store, &bench);
         let seconds = started.elapsed().as_secs_f64();
-        for warning in bench.bench.warnings() {
-            console::warning(&warning);
-        }
+        console::warnings(&bench.bench.warnings());
         let recordings = record_all(&outcome.rows, &store, &plan.name, &folder, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &plan.name,
-            folder: folder.display().to_string(),
-            total: outcome.total,
-            skipped: outcome.skipped,
+            folder: &folder,
+            outcome: &outcome,
             seconds,
             keeping_ms: bench.keeping_ms(),
-            rows: &outcome.rows,
             recordings: &recordings,
         };
         console::result(&report.text(self.format)?);
         if outcome.failed > 0 && !interrupt::requested() {
+            let (Outcome { failed, total, .. }, folder) = (outcome, folder.display());
             anyhow::bail!(
-                "{} of {} points failed: the column `error` of {}/rows.csv says why; --resume tries them again",
-                outcome.failed,
-                outcome.total,
-                folder.display()
+                "{failed} of {total} points failed: the column `error` of {folder}/rows.csv says why; --resume tries them again"
             );
         }
         Ok(())
@@ -160,9 +154,7 @@ impl SweepArgs {
 
     fn plan(&self) -> anyhow::Result<Plan> {
         let plan = Plan::read(&self.file, &Job { accuracy: self.accuracy, ..Job::preview() })?;
-        for note in &plan.notes {
-            console::note(note);
-        }
+        console::notes(&plan.notes);
         Ok(plan)
     }
 

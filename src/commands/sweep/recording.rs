@@ -10,7 +10,7 @@ use partwise::figures::Figures;
 use partwise::quantile::nearest_rank;
 use partwise::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
-    Sink, StepView, Tab, When,
+    Sink, StepView, Tab,
 };
 use partwise::sweep::{Row, Status, Timing};
 
@@ -113,7 +113,7 @@ pub(crate) fn record(
     }
     if judged {
         let cost = if chosen.len() > 1 { "time, ms (green: side by side)" } else { "time, ms" };
-        recorder.scatter(When::Table(0), Picture::of_error(cost), &scatter(rows, &label, &chosen))?;
+        recorder.scatter(0, Picture::of_error(cost), &scatter(rows, &label, &chosen))?;
     }
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {

@@ -1,9 +1,11 @@
 //! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
 
+use std::path::Path;
+
 use clap::ValueEnum;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use partwise::record::RecordSummary;
-use partwise::sweep::{Row, Status, csv_text};
+use partwise::sweep::{Outcome, Row, Status, csv_text};
 use serde_json::json;
 
 use super::chosen::{labels, total_ms};
@@ -22,21 +24,13 @@ pub(crate) enum Format {
 
 /// What became of a sweep.
 pub(crate) struct Report<'a> {
-    /// Its name.
     pub(crate) name: &'a str,
-    /// Where it is.
-    pub(crate) folder: String,
-    /// Points of the sweep or shard.
-    pub(crate) total: usize,
-    /// Rows found at the start.
-    pub(crate) skipped: usize,
+    pub(crate) folder: &'a Path,
+    pub(crate) outcome: &'a Outcome,
     /// Wall time of the points, s.
     pub(crate) seconds: f64,
     /// Time spent on keeping points for the recording, ms.
     pub(crate) keeping_ms: f64,
-    /// The rows.
-    pub(crate) rows: &'a [Row],
-    /// The recordings.
     pub(crate) recordings: &'a [RecordSummary],
 }
 
@@ -46,12 +40,8 @@ impl Report<'_> {
         match format {
             Format::Text => Ok(self.table()),
             Format::Json => Ok(partwise::said::json(&self.json())?),
-            Format::Csv => Ok(String::from_utf8(csv_text(self.rows))?),
+            Format::Csv => Ok(String::from_utf8(csv_text(&self.outcome.rows))?),
         }
-    }
-
-    fn failed(&self) -> usize {
-        self.rows.iter().filter(|row| row.status == Status::Error).count()
     }
 
     /// Time to keep points and to write the recordings, ms.
@@ -69,27 +59,23 @@ impl Report<'_> {
             .collect();
         json!({
             "sweep": self.name,
-            "folder": self.folder,
-            "points": self.total,
-            "skipped": self.skipped,
-            "failed": self.failed(),
+            "folder": self.folder.display().to_string(),
+            "points": self.outcome.total,
+            "skipped": self.outcome.skipped,
+            "failed": self.outcome.failed,
             "seconds": self.seconds,
             "logging_ms": self.logging_ms(),
             "recordings": recordings,
-            "rows": self.rows,
+            "rows": self.outcome.rows,
         })
     }
 
     fn table(&self) -> String {
-        let mut out = format!("{}\n{}", rows_table(self.rows), explained(self.rows));
+        let Outcome { total, skipped, failed, rows, .. } = self.outcome;
+        let mut out = format!("{}\n{}", rows_table(rows), explained(rows));
+        let (done, seconds, folder) = (rows.len(), self.seconds, self.folder.display());
         out.push_str(&format!(
-            "{} of {} points done, {} failed; {} found there, the others took {:.1} s\nrows: {}/rows.csv\n",
-            self.rows.len(),
-            self.total,
-            self.failed(),
-            self.skipped,
-            self.seconds,
-            self.folder
+            "{done} of {total} points done, {failed} failed; {skipped} found there, the others took {seconds:.1} s\nrows: {folder}/rows.csv\n"
         ));
         for recording in self.recordings {
             out.push_str(&line(recording));
@@ -103,14 +89,10 @@ impl Report<'_> {
 
 /// A recording, its size and its cost in a line.
 pub(crate) fn line(recording: &RecordSummary) -> String {
-    let Some(path) = &recording.path else { return String::new() };
-    format!(
-        "recording: {} ({:.1} MB, {:.2} of the bytes that changed, {:.1} s)\n",
-        path.display(),
-        recording.bytes as f64 / 1e6,
-        recording.bytes as f64 / recording.raw_bytes.max(1) as f64,
-        recording.log_ms / 1e3
-    )
+    let Some(said) = recording.said() else { return String::new() };
+    let [bytes, raw] = [recording.bytes, recording.raw_bytes.max(1)].map(|bytes| bytes as f64);
+    let (mb, share, seconds) = (bytes / 1e6, bytes / raw, recording.log_ms / 1e3);
+    format!("{said} ({mb:.1} MB, {share:.2} of the bytes that changed, {seconds:.1} s)\n")
 }
 
 /// What the columns of [`rows_table`] are, where an error was measured.
@@ -125,9 +107,8 @@ pub(crate) fn explained(rows: &[Row]) -> &'static str {
 
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_BORDERS_ONLY);
-    table.set_header(["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"]);
+    let header = ["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"];
+    let mut table = console::table(console::OPEN, header, [0].into_iter().chain(3..));
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
     for (row, label) in rows.iter().zip(labels(&refs)) {
@@ -149,15 +130,5 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             mm(figures.representable_rms_mm),
         ]);
     }
-    right(&mut table, [0].into_iter().chain(3..9));
     table
-}
-
-/// Sets columns of numbers to the right.
-pub(crate) fn right(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
-    for column in columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
 }

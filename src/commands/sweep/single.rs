@@ -4,12 +4,12 @@ use glam::{DVec3, Vec3};
 use partwise::mesh::TriMesh;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-fn rounded(points: &[DVec3]) -> Vec<[f32; 3]> {
-    points.iter().map(|p| p.as_vec3().to_array()).collect()
+fn rounded(points: &[DVec3]) -> Vec<Vec3> {
+    points.iter().map(DVec3::as_vec3).collect()
 }
 
-fn widened(points: Vec<[f32; 3]>) -> Vec<DVec3> {
-    points.into_iter().map(|p| Vec3::from_array(p).as_dvec3()).collect()
+fn widened(points: Vec<Vec3>) -> Vec<DVec3> {
+    points.iter().map(Vec3::as_dvec3).collect()
 }
 
 pub(super) mod points {

@@ -20,9 +20,8 @@ use partwise::figures::LevelCount;
 use partwise::mesh::TriMesh;
 use partwise::parts::UNASSIGNED;
 use partwise::scene::Scene;
-use partwise::sealed::{self, Kind};
+use partwise::sealed::{self, Kind, write};
 use partwise::sweep::is_id;
-use partwise::whole_file::WholeFile;
 use serde::{Deserialize, Serialize};
 
 use super::single;
@@ -115,7 +114,7 @@ pub(crate) enum PointStore {
     /// In a sweep's folder; who writes a scene, which several jobs may want at once, takes the lock.
     Folder(PathBuf, Mutex<()>),
     /// In memory, for a handful of points.
-    Memory(Mutex<(BTreeMap<String, KeptScene>, BTreeMap<String, KeptPoint>)>),
+    Memory(Mutex<Kept>),
 }
 
 type Kept = (BTreeMap<String, KeptScene>, BTreeMap<String, KeptPoint>);
@@ -133,7 +132,6 @@ fn scene_path(folder: &Path, id: &str) -> PathBuf {
 }
 
 impl PointStore {
-    /// A store in memory.
     pub(crate) fn in_memory() -> Self {
         Self::Memory(Mutex::default())
     }
@@ -208,13 +206,6 @@ impl PointStore {
         let Some(scene) = from.scene(&point.scene) else { return Ok(false) };
         self.put_both(id, point, || Ok(scene)).map(|()| true)
     }
-}
-
-fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> io::Result<()> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
-    }
-    WholeFile::write(path, sealed::seal(kind, value)?)
 }
 
 #[cfg(test)]

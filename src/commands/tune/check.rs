@@ -25,7 +25,6 @@ const BOUNDS: usize = 3;
 /// A table taken from a front.
 #[derive(Debug, Clone)]
 pub(crate) struct Taken {
-    /// The table.
     pub(crate) table: RangeTable,
     /// What it holds, garment by garment, in the order of the garments it was tuned on.
     pub(crate) holds: Vec<Holds>,
@@ -60,7 +59,7 @@ pub(crate) fn check(
             if i > 0 && interrupt::requested() {
                 return Ok(f64::INFINITY);
             }
-            let errors = relative(garments, |w| Ok(w.model_mm(table)? / w.table_3_worth.model_mm));
+            let errors = relative(garments.iter().map(|w| Ok(w.model_mm(table)? / w.table_3_worth.model_mm)));
             tried.fetch_add(1, Ordering::Relaxed);
             bar.inc(1);
             errors
@@ -98,12 +97,8 @@ fn near(
             if interrupt::requested() || parts.iter().zip(limits).any(|(parts, limit)| parts.len() > *limit) {
                 return Ok(None);
             }
-            let mut parts = parts.iter();
-            let ratio = |w: &Garment| match parts.next() {
-                Some(parts) => Ok(w.affine_mm(parts)? / w.table_3_worth.affine_mm),
-                None => Ok(f64::INFINITY),
-            };
-            Ok(Some((relative(garments, ratio)?, table)))
+            let ratio = |(w, parts): (&&Garment, _)| Ok(w.affine_mm(parts)? / w.table_3_worth.affine_mm);
+            Ok(Some((relative(garments.iter().zip(&parts).map(ratio))?, table)))
         });
         bounded.extend(bounds.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten());
         // Where garments have limits of their own, most of a front is beyond one of them.
@@ -117,10 +112,8 @@ fn near(
 }
 
 /// Root of the mean square over garments of errors relative to Table 3's.
-fn relative(garments: &[&Garment], mut ratio: impl FnMut(&Garment) -> anyhow::Result<f64>) -> anyhow::Result<f64> {
-    let mut sum = 0.0;
-    for garment in garments {
-        sum += ratio(garment)?.powi(2);
-    }
-    Ok((sum / garments.len() as f64).sqrt())
+fn relative(ratios: impl ExactSizeIterator<Item = anyhow::Result<f64>>) -> anyhow::Result<f64> {
+    let garments = ratios.len() as f64;
+    let squares: f64 = ratios.map(|ratio| Ok(ratio?.powi(2))).sum::<anyhow::Result<f64>>()?;
+    Ok((squares / garments).sqrt())
 }

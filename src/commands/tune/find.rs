@@ -1,7 +1,5 @@
 //! The search itself: levels alone, then levels and extents; what was best after each iteration.
 
-use std::ops::ControlFlow;
-
 use partwise::table_search::{Front, Progress, Search, SearchError, SearchOptions, search};
 
 use super::garment::Garment;
@@ -10,7 +8,6 @@ use crate::commands::{console, interrupt};
 /// One iteration: a round of one search.
 #[derive(Debug, Clone)]
 pub(crate) struct Iteration {
-    /// What was searched.
     pub(crate) what: &'static str,
     /// Its round, from 1.
     pub(crate) round: usize,
@@ -79,7 +76,7 @@ pub(crate) fn find(
         let progress = |p: Progress| {
             bar.set_length((p.total * p.rounds) as u64);
             bar.set_position((p.total * (p.round - 1) + p.done) as u64);
-            if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            interrupt::go_on()
         };
         let searched = search(&samples, &options, &progress);
         bar.finish_and_clear();

@@ -1,7 +1,5 @@
 //! A garment to tune a table on, or to try one on: its distances, its reference drape, and what a table can hold of it.
 
-use std::ops::ControlFlow;
-
 use glam::DVec3;
 use partwise::accuracy::{self, representable};
 use partwise::assess::{AssessError, AssessOptions, assess, canonical};
@@ -14,15 +12,12 @@ use partwise::range_table::RangeTable;
 use partwise::table_search::Sample;
 use partwise::{Scene, SceneSpec};
 
-use crate::commands::fabrics::FabricArgs;
-use crate::commands::failure::UserError;
 use crate::commands::work::refining;
-use crate::commands::{console, interrupt};
+use crate::commands::{FabricArgs, UserError, console};
 
 /// PARTs of a table on a garment, and the error that guides the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Holds {
-    /// PARTs.
     pub(crate) parts: usize,
     /// What a motion of each PART's own leaves, mm.
     pub(crate) rms_mm: f64,
@@ -79,10 +74,7 @@ impl Garment {
         let (loaded, fabric) = (SceneSpec::new(body, name).load()?, cloth.first()?);
         cloth.check_used(&loaded)?;
         let found = refining(&format!("{name}: reference drape"), |observer| {
-            canonical(&loaded.scene, &fabric, options, &mut |step| {
-                let _ = observer(step);
-                if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
+            canonical(&loaded.scene, &fabric, options, observer)
         });
         let (reference, warnings) = match found {
             Ok(found) => found,

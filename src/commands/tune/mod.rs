@@ -21,14 +21,14 @@ use partwise::table_search::Front;
 use partwise::whole_file::WholeFile;
 
 use self::check::{Taken, check};
-use self::find::{Found, SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
+use self::find::{SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
 use self::garment::Garment;
 use self::report::Verdict;
 use super::fabrics::FabricArgs;
 use super::failure::UserError;
 use super::sinks::SinkArgs;
 use super::sweep::report::{Format, line};
-use super::work::{cache, use_threads};
+use super::work::{cache, unwritable, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -119,7 +119,6 @@ struct Results {
 }
 
 impl TuneArgs {
-    /// Runs the command.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::keep();
@@ -149,9 +148,9 @@ impl TuneArgs {
             }
             self.tune(set, &held_out, (&ladder.0, &ladder.1), &mut results)?;
         }
-        let front = report::csv(&results.fronts)?;
+        let front = report::csv(results.fronts.iter().flat_map(report::lines))?;
         self.write(&self.out.join("front.csv"), &front)?;
-        self.write(&self.out.join("verdicts.csv"), &report::verdicts_csv(&results.verdicts)?)?;
+        self.write(&self.out.join("verdicts.csv"), &report::csv(&results.verdicts)?)?;
         // JSON is Unicode; names of files need not be.
         let name = |path: &PathBuf| path.display().to_string();
         match self.format {
@@ -218,21 +217,10 @@ impl TuneArgs {
             }
             taken.push((kind, best));
         }
-        self.record(set, &found, &taken, results)
-    }
-
-    fn record(
-        &self,
-        set: &[&Garment],
-        found: &Found,
-        taken: &[(&'static str, Taken)],
-        results: &mut Results,
-    ) -> anyhow::Result<()> {
-        let taken: Vec<(&'static str, &Taken)> = taken.iter().map(|(kind, t)| (*kind, t)).collect();
         for garment in set {
             let sinks = self.sinks.sinks_in(&self.out, &stem(&garment.name));
             if !sinks.is_empty() {
-                results.recordings.push(recording::record(garment, set, found, &taken, sinks)?);
+                results.recordings.push(recording::record(garment, set, &found, &taken, sinks)?);
             }
         }
         Ok(())
@@ -260,8 +248,6 @@ impl TuneArgs {
 
     fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
         let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
-        written.map_err(|e| {
-            UserError::new(format!("{}: cannot be written: {e}; choose another folder with --out", path.display()))
-        })
+        written.map_err(unwritable(path, "folder with --out"))
     }
 }

@@ -9,12 +9,12 @@ use partwise::parts::Parts;
 use partwise::range_table::RangeTable;
 use partwise::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
-    StepView, When,
+    StepView,
 };
 use partwise::table_search::Front;
 
 use super::check::Taken;
-use super::find::{Found, Iteration};
+use super::find::Found;
 use super::garment::Garment;
 use crate::commands::summary::command_line;
 
@@ -30,7 +30,7 @@ pub(super) fn record(
     garment: &Garment,
     all: &[&Garment],
     found: &Found,
-    taken: &[(&'static str, &Taken)],
+    taken: &[(&'static str, Taken)],
     sinks: Vec<Sink>,
 ) -> anyhow::Result<RecordSummary> {
     let titles =
@@ -48,7 +48,8 @@ pub(super) fn record(
     slot(&mut recorder, garment, (0, garment.table_3_worth.model_mm), &start)?;
     for (index, iteration) in (1..).zip(&found.iterations) {
         let Some(best) = &iteration.front.best else { continue };
-        let shown = Shown { index, title: title(iteration), table: &best.table("best so far", "")? };
+        let title = format!("best after {}, round {}", iteration.what, iteration.round);
+        let shown = Shown { index, title, table: &best.table("best so far", "")? };
         step(&mut recorder, garment, &shown)?;
         scatter(&mut recorder, index, all, &iteration.front)?;
     }
@@ -58,10 +59,6 @@ pub(super) fn record(
         slot(&mut recorder, garment, (place, worth.map_or(f64::NAN, |(_, worth)| worth.model_mm)), &shown)?;
     }
     Ok(recorder.finish()?)
-}
-
-fn title(iteration: &Iteration) -> String {
-    format!("best after {}, round {}", iteration.what, iteration.round)
 }
 
 /// The garment with its PARTs moved as near to the reference as they can.
@@ -134,5 +131,5 @@ fn scatter(recorder: &mut Recorder, index: i64, all: &[&Garment], front: &Front)
         group: 0,
         named: false,
     }));
-    Ok(recorder.scatter(When::Table(index), Picture::of_error("PARTs"), &points)?)
+    Ok(recorder.scatter(index, Picture::of_error("PARTs"), &points)?)
 }

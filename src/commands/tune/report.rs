@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use partwise::range_table::{Extent, RangeTable};
 use partwise::table_search::Front;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::commands::console;
 use crate::commands::summary::command_line;
 
 /// A tuned table beside Table 3 on one garment.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Verdict {
     /// What the table was tuned on.
     pub(super) tuned_on: String,
@@ -81,40 +81,28 @@ impl Verdict {
 
 /// The verdicts for the terminal.
 pub(super) fn verdicts(all: &[Verdict]) -> Table {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header([
-        "tuned on",
-        "what",
-        "garment",
-        "levels",
-        "cut",
-        "PARTs",
-        "Table 3",
-        "translations mm",
-        "affine mm",
-        "model mm",
-        "to its own rest mm",
-    ]);
-    for v in all {
-        table.add_row([
-            v.tuned_on.clone(),
-            if v.extent_factor == 1.0 { v.kind.to_owned() } else { format!("{} × {:.2}", v.kind, v.extent_factor) },
-            format!("{}{}", v.garment, if v.held_out { " (held out)" } else { "" }),
-            v.levels.to_string(),
-            v.cut_levels.to_string(),
-            v.parts.to_string(),
-            v.table_3_parts.to_string(),
-            format!("{:.1} ({:.2})", v.translation_mm, v.translation_ratio),
-            format!("{:.1} ({:.2})", v.affine_mm, v.affine_ratio),
-            format!("{:.1} ({:.2})", v.model_mm, v.model_ratio),
-            v.own_mm.zip(v.own_ratio).map_or_else(String::new, |(mm, ratio)| format!("{mm:.1} ({ratio:.2})")),
-        ]);
-    }
-    for column in 3..11 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+    let what = |v: &Verdict| match v.extent_factor {
+        1.0 => v.kind.to_owned(),
+        factor => format!("{} × {factor:.2}", v.kind),
+    };
+    let error = |(mm, ratio): (f64, f64)| format!("{mm:.1} ({ratio:.2})");
+    let columns = |v: &Verdict| {
+        [
+            ("tuned on", v.tuned_on.clone()),
+            ("what", what(v)),
+            ("garment", format!("{}{}", v.garment, if v.held_out { " (held out)" } else { "" })),
+            ("levels", v.levels.to_string()),
+            ("cut", v.cut_levels.to_string()),
+            ("PARTs", v.parts.to_string()),
+            ("Table 3", v.table_3_parts.to_string()),
+            ("translations mm", error((v.translation_mm, v.translation_ratio))),
+            ("affine mm", error((v.affine_mm, v.affine_ratio))),
+            ("model mm", error((v.model_mm, v.model_ratio))),
+            ("to its own rest mm", v.own_mm.zip(v.own_ratio).map_or_else(String::new, error)),
+        ]
+    };
+    let mut table = console::table(console::OPEN, columns(&Verdict::default()).map(|(name, _)| name), 3..);
+    table.add_rows(all.iter().map(|v| columns(v).map(|(_, cell)| cell)));
     table
 }
 
@@ -132,8 +120,7 @@ const SHOWN: usize = 12;
 
 /// A front for the terminal, thinned.
 pub(super) fn front(title: &str, front: &Front, garments: &[&Garment], exact: bool) -> String {
-    let mut table = console::table();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header(["PARTs", "error mm", "levels", "extents cm"]);
+    let mut table = console::table(console::OPEN, ["PARTs", "error mm", "levels", "extents cm"], 0..);
     let last = front.points.len().saturating_sub(1);
     let mut shown: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();
     shown.dedup();
@@ -144,9 +131,6 @@ pub(super) fn front(title: &str, front: &Front, garments: &[&Garment], exact: bo
             (point.inner_bounds_cm.len() + 1).to_string(),
             between(&point.extents),
         ]);
-    }
-    for column in table.column_iter_mut() {
-        column.set_cell_alignment(CellAlignment::Right);
     }
     let beats = if exact { "can beat, every bound tried" } else { "found beats" };
     let mut out = format!("{title}: {} tables that no other {beats}\n{table}\n", front.points.len());
@@ -176,8 +160,9 @@ pub(super) fn table_3(garments: &[&Garment]) -> (usize, f64) {
     (parts, mean.sqrt())
 }
 
+/// A table of a front.
 #[derive(Serialize)]
-struct Line<'a> {
+pub(super) struct Line<'a> {
     tuned_on: &'a str,
     kind: &'a str,
     parts: usize,
@@ -187,36 +172,24 @@ struct Line<'a> {
     extents_cm: String,
 }
 
-fn words(numbers: &[f64]) -> String {
-    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
-}
-
-/// Verdicts as CSV.
-pub(super) fn verdicts_csv(all: &[Verdict]) -> anyhow::Result<String> {
+/// Lines as CSV, verdicts say, with their fields for a header.
+pub(super) fn csv(lines: impl IntoIterator<Item = impl Serialize>) -> anyhow::Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for verdict in all {
-        writer.serialize(verdict)?;
-    }
+    lines.into_iter().try_for_each(|line| writer.serialize(line))?;
     Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
-/// Fronts as CSV.
-pub(super) fn csv(fronts: &[(String, &'static str, Front)]) -> anyhow::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for (tuned_on, kind, front) in fronts {
-        for point in &front.points {
-            writer.serialize(Line {
-                tuned_on,
-                kind,
-                parts: point.parts,
-                rms_mm: 1e3 * point.rms_m,
-                levels: point.inner_bounds_cm.len() + 1,
-                inner_bounds_cm: words(&point.inner_bounds_cm),
-                extents_cm: point.extents.iter().map(Extent::in_a_column).collect::<Vec<_>>().join(" "),
-            })?;
-        }
-    }
-    Ok(String::from_utf8(writer.into_inner()?)?)
+/// The lines of a front, by what was tuned on and how.
+pub(super) fn lines<'a>((tuned_on, kind, front): &'a (String, &'static str, Front)) -> impl Iterator<Item = Line<'a>> {
+    front.points.iter().map(move |point| Line {
+        tuned_on,
+        kind,
+        parts: point.parts,
+        rms_mm: 1e3 * point.rms_m,
+        levels: point.inner_bounds_cm.len() + 1,
+        inner_bounds_cm: point.inner_bounds_cm.iter().map(f64::to_string).collect::<Vec<_>>().join(" "),
+        extents_cm: point.extents.iter().map(Extent::in_a_column).collect::<Vec<_>>().join(" "),
+    })
 }
 
 /// The table with its provenance: who made it how, from what, and how good it is there.

@@ -7,7 +7,7 @@ use super::super::scatter::VISIBLE;
 use super::Node;
 use super::layout::{ASPECT, BARS_HEIGHT, Layout, Tab};
 use super::rows::{grid, in_rows, view_of};
-use super::view::View;
+use super::view::{View, on_the_body};
 
 /// Time over error, and over vertices.
 pub(super) fn numbers() -> Node {
@@ -25,10 +25,8 @@ impl Layout {
         let (rows, _) = self.compare_grid(eye);
         let cells = self.captions(eye);
         let eye = &self.eye(Tab::SideBySide, eye);
-        let view = |(slot, title): (usize, &String)| {
-            let path = format!("{}/{slot}", paths::COMPARE);
-            (1.0, View::spatial(title.clone(), &[paths::BODY, &path], eye).into())
-        };
+        let view =
+            |(slot, title): (usize, &String)| on_the_body(title.clone(), &format!("{}/{slot}", paths::COMPARE), eye);
         let views = in_rows("Side by side", self.compare.iter().enumerate().map(view).collect(), rows);
         let name = if self.contest { "Colours: distance to the canonical drape" } else { "What they cost" };
         let below = View::plane(name, &[paths::COMPARE_CAPTIONS], visible(cells)).into();

@@ -3,13 +3,14 @@
 
 use super::super::eye::Eye;
 use super::super::legend::visible;
-use super::super::outfit::{self, Worn};
+use super::super::outfit;
 use super::super::scatter::VISIBLE;
 use super::super::{paths, pattern};
 use super::rows::{grid, in_rows};
-use super::view::View;
+use super::view::{View, on_the_body};
 use super::{Node, TimePanel};
 use super::{closer, contest};
+use crate::scene::Layer;
 
 /// Width over height of a tab in a window of 16:10, below the bars of the viewer.
 pub(crate) const ASPECT: f64 = 1.8;
@@ -38,7 +39,7 @@ pub struct Layout {
     /// The flat panels of a sewing pattern will come.
     pub pattern: bool,
     /// The garments of an outfit, inner to outer, where there are several.
-    pub outfit: Vec<Worn>,
+    pub outfit: Vec<Layer>,
     /// Both measures of wrinkles will come.
     pub wrinkles: bool,
     /// Titles of the chosen tables shown side by side, at most six.
@@ -90,30 +91,22 @@ impl Layout {
             return Node::Tabs(0, vec![self.side_by_side(eye), contest::numbers()]);
         }
         let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
-        let mut tabs = vec![(Tab::Stages, first)];
-        if !self.compare.is_empty() {
-            tabs.push((Tab::SideBySide, self.side_by_side(eye)));
+        let further: [(Tab, bool, &dyn Fn() -> Node); 7] = [
+            (Tab::SideBySide, !self.compare.is_empty(), &|| self.side_by_side(eye)),
+            (Tab::Numbers, self.several_tables || self.scatter, &|| self.numbers()),
+            (Tab::Fit, !self.fit.is_empty(), &|| self.fit(eye)),
+            (Tab::Pattern, self.pattern, &|| self.panels(eye)),
+            (Tab::Outfit, !self.outfit.is_empty(), &|| self.wardrobe(eye)),
+            (Tab::Wrinkles, self.wrinkles, &|| closer::wrinkles(&self.eye(Tab::Wrinkles, eye))),
+            (Tab::Solver, self.iterations && self.method.is_none(), &|| closer::solver(&self.eye(Tab::Solver, eye))),
+        ];
+        let there = further.into_iter().filter(|(_, there, _)| *there);
+        let (mut tabs, mut nodes) = (vec![Tab::Stages], vec![first]);
+        for (tab, _, node) in there {
+            tabs.push(tab);
+            nodes.push(node());
         }
-        if self.several_tables || self.scatter {
-            tabs.push((Tab::Numbers, self.numbers()));
-        }
-        if !self.fit.is_empty() {
-            tabs.push((Tab::Fit, self.fit(eye)));
-        }
-        if self.pattern {
-            tabs.push((Tab::Pattern, self.panels(eye)));
-        }
-        if !self.outfit.is_empty() {
-            tabs.push((Tab::Outfit, self.wardrobe(eye)));
-        }
-        if self.wrinkles {
-            tabs.push((Tab::Wrinkles, closer::wrinkles(&self.eye(Tab::Wrinkles, eye))));
-        }
-        if self.iterations && self.method.is_none() {
-            tabs.push((Tab::Solver, closer::solver(&self.eye(Tab::Solver, eye))));
-        }
-        let open = tabs.iter().position(|(tab, _)| *tab == self.opens_on).unwrap_or(0);
-        let mut nodes: Vec<Node> = tabs.into_iter().map(|(_, node)| node).collect();
+        let open = tabs.iter().position(|tab| *tab == self.opens_on).unwrap_or(0);
         match nodes.pop() {
             Some(only) if nodes.is_empty() => only,
             last => Node::Tabs(open, nodes.into_iter().chain(last).collect()),
@@ -147,7 +140,7 @@ impl Layout {
     fn stages(&self, eye: &Eye) -> Node {
         let (rows, _) = self.stage_grid(eye);
         let eye = &self.eye(Tab::Stages, eye);
-        let seen = |name: &str, path: &str| (1.0, View::spatial(name, &[paths::BODY, path], eye).into());
+        let seen = |name: &str, path: &str| on_the_body(name, path, eye);
         let mut views = vec![seen("Distance", "/distance"), seen("PARTs", "/parts")];
         if !self.held {
             views.push(seen("Force per PART", "/force"));
@@ -211,14 +204,11 @@ impl Layout {
         let all = self.eye(Tab::Outfit, eye);
         let rows = self.outfit.len() as f64;
         let one = eye.through(ASPECT / 6.0 * rows);
-        let row = |(k, worn): (usize, &Worn)| {
+        let row = |(k, worn): (usize, &Layer)| {
             let branch = outfit::branch(k, worn);
             // The drape bears the garment's name: all three would be cut with it.
             let stages = [("PARTs", "parts"), ("Force per PART", "force"), (worn.name.as_str(), "drape")];
-            let view = |(title, leaf): (&str, &str)| {
-                let path = format!("{branch}/{leaf}");
-                (1.0, View::spatial(title, &[paths::BODY, &path], &one).into())
-            };
+            let view = |(title, leaf): (&str, &str)| on_the_body(title, &format!("{branch}/{leaf}"), &one);
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };
         let garments = Node::Column("Garments", self.outfit.iter().enumerate().map(row).collect());
@@ -230,12 +220,8 @@ impl Layout {
 
     fn fit(&self, eye: &Eye) -> Node {
         let eye = &self.eye(Tab::Fit, eye);
-        let mut views: Vec<(f32, Node)> = Vec::new();
-        for name in &self.fit {
-            let path = format!("{}/{name}", paths::FIT);
-            views.push((1.0, View::spatial(capital(name), &[paths::BODY, &path], eye).into()));
-        }
-        over("Fit", views, "Colours", paths::FIT_LEGEND, self.fit.len())
+        let view = |name: &String| on_the_body(capital(name), &format!("{}/{name}", paths::FIT), eye);
+        over("Fit", self.fit.iter().map(view).collect(), "Colours", paths::FIT_LEGEND, self.fit.len())
     }
 }
 

@@ -7,8 +7,6 @@
 mod closer;
 mod contest;
 pub(crate) mod layout;
-mod method;
-mod panels;
 mod rows;
 pub(crate) mod view;
 
@@ -20,6 +18,7 @@ use rerun::external::re_sdk_types::blueprint::components::{
     ColumnShare, ContainerKind, PanelState, PlayState, RootContainer, RowShare,
 };
 use rerun::{RecordingStream, RecordingStreamBuilder};
+use uuid::Uuid;
 
 use super::RecordError;
 use view::View;
@@ -54,13 +53,9 @@ pub(crate) struct TimePanel {
 struct Ids(u128);
 
 impl Ids {
-    /// The next id, in bytes and as a path writes it.
-    fn next(&mut self) -> ([u8; 16], String) {
+    fn next(&mut self) -> Uuid {
         self.0 += 1;
-        let bytes = self.0.to_be_bytes();
-        let hex: Vec<String> = bytes.iter().map(|b| format!("{b:02x}")).collect();
-        let text = [&hex[0..4], &hex[4..6], &hex[6..8], &hex[8..10], &hex[10..16]].map(<[String]>::concat).join("-");
-        (bytes, text)
+        Uuid::from_u128(self.0)
     }
 }
 
@@ -69,8 +64,8 @@ pub(crate) fn send(recording: &RecordingStream, root: &Node, time: TimePanel) ->
     let Some(info) = recording.store_info() else { return Ok(()) };
     let (stream, storage) = RecordingStreamBuilder::new(info.application_id().clone()).blueprint().memory()?;
     stream.set_time_sequence("blueprint", 0);
-    let (root_bytes, _) = log_node(&stream, root, &mut Ids(0x7061_7274_7769_7365_u128 << 64))?;
-    let root_id = rerun::external::re_sdk_types::datatypes::Uuid { bytes: root_bytes };
+    let (root, _) = log_node(&stream, root, &mut Ids(0x7061_7274_7769_7365_u128 << 64))?;
+    let root_id = rerun::external::re_sdk_types::datatypes::Uuid { bytes: root.into_bytes() };
     let viewport = ViewportBlueprint::new()
         .with_root_container(RootContainer::from(root_id))
         .with_auto_layout(false)
@@ -100,13 +95,13 @@ pub(crate) fn send(recording: &RecordingStream, root: &Node, time: TimePanel) ->
 
 /// Logs a node and all below it; returns its id and its path. A lone view is wrapped in tabs: a viewport's root must be a
 /// container.
-fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<([u8; 16], String), RecordError> {
+fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<(Uuid, String), RecordError> {
     let (name, kind, children): (&str, ContainerKind, Vec<(f32, &Node)>) = match node {
         Node::View(view) => {
-            let (bytes, id) = ids.next();
+            let id = ids.next();
             let path = format!("view/{id}");
             view.log(stream, &path)?;
-            return Ok((bytes, path));
+            return Ok((id, path));
         }
         Node::Row(name, nodes) => (name, ContainerKind::Horizontal, nodes.iter().map(|(s, n)| (*s, n)).collect()),
         Node::Column(name, nodes) => (name, ContainerKind::Vertical, nodes.iter().map(|(s, n)| (*s, n)).collect()),
@@ -116,7 +111,7 @@ fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<([u8
     for (_, child) in &children {
         paths.push(log_node(stream, child, ids)?.1);
     }
-    let (bytes, id) = ids.next();
+    let id = ids.next();
     let shares = children.iter().map(|(share, _)| *share);
     let mut container = ContainerBlueprint::new(kind).with_contents(paths.iter().map(String::as_str));
     if !name.is_empty() {
@@ -133,5 +128,5 @@ fn log_node(stream: &RecordingStream, node: &Node, ids: &mut Ids) -> Result<([u8
     };
     let path = format!("container/{id}");
     stream.log(path.as_str(), &container)?;
-    Ok((bytes, path))
+    Ok((id, path))
 }

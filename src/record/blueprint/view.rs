@@ -5,18 +5,23 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
     ViewBlueprint, ViewContents, VisualBounds2D,
 };
 use rerun::external::re_sdk_types::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind};
-use rerun::external::re_sdk_types::components::Color;
 use rerun::external::re_sdk_types::datatypes::{Range2D, TimeRange, TimeRangeBoundary};
 use rerun::{AsComponents, RecordingStream, SerializedComponentBatch};
 
 use super::super::RecordError;
 use super::super::eye::Eye;
-use super::super::meshes::single;
+use super::super::meshes::{colour, single};
+use super::super::paths;
+use super::Node;
+
+/// A view of what lies at `path` on the body, one share wide.
+pub(crate) fn on_the_body(name: impl Into<String>, path: &str, eye: &Eye) -> (f32, Node) {
+    (1.0, View::spatial(name, &[paths::BODY, path], eye).into())
+}
 
 /// Behind the garments: a calm dark grey, a shade lighter than the viewer's own panels.
 const BACKDROP: [u8; 3] = [31, 34, 39];
 
-/// One view.
 pub(crate) struct View {
     class: &'static str,
     name: String,
@@ -43,8 +48,7 @@ impl View {
             .with_position(single(eye.position))
             .with_look_target(single(eye.target))
             .with_eye_up([0.0, 0.0, 1.0]);
-        let [r, g, b] = BACKDROP;
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(r, g, b));
+        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(colour(BACKDROP));
         Self::new("3D", name, contents)
             .with("EyeControls3D", &controls)
             .with("Background", &backdrop)
@@ -54,12 +58,11 @@ impl View {
 
     /// A drawing in the plane, of which `[x, y]` is seen. Black, so that its texts read in the light theme too.
     pub(crate) fn plane(name: impl Into<String>, contents: &[&str], [x, y]: [[f64; 2]; 2]) -> Self {
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(0, 0, 0));
+        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(colour([0; 3]));
         let seen = VisualBounds2D::new(Range2D { x_range: x.into(), y_range: y.into() });
         Self::new("2D", name, contents).with("Background", &backdrop).with("VisualBounds2D", &seen)
     }
 
-    /// A text.
     pub(crate) fn text(name: impl Into<String>, path: &str) -> Self {
         let mut view = Self::new("TextDocument", name, &[path]);
         path.clone_into(&mut view.origin);
@@ -79,7 +82,6 @@ impl View {
         self.with("TimeAxis", &TimeAxis::new().with_view_range(TimeRange { start, end }))
     }
 
-    /// Bars.
     pub(crate) fn bars(name: impl Into<String>, contents: &[&str]) -> Self {
         Self::new("BarChart", name, contents).with("PlotLegend", &PlotLegend::new().with_visible(false))
     }

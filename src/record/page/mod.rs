@@ -3,32 +3,27 @@
 //! The viewer is Rerun's, as its crate bundles it; the page around it is ours, as Rerun's own asks for fonts, news and
 //! statistics elsewhere. The Content-Security-Policy forbids the browser every other host.
 
-use std::convert::Infallible;
+mod server;
+
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::Write as _;
 use std::net;
 use std::sync::OnceLock;
-use std::thread::JoinHandle;
-use std::time::Duration;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use http_body_util::Full;
 use hyper::body::Bytes;
 use hyper::header::{self, HeaderValue};
-use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
-use hyper_util::rt::{TokioIo, TokioTimer};
 use re_web_viewer_server::WebViewerData;
-use tokio::net::TcpListener;
-use tokio::sync::oneshot;
+
+pub(crate) use server::{Server, answer};
 
 const INDEX: &str = include_str!("index.html");
 const START: &str = include_str!("start.js");
 /// What every page round the viewer needs.
 const PROGRAM: &str = include_str!("program.js");
-/// How long a browser has to ask once it has connected.
-const PATIENCE: Duration = Duration::from_secs(30);
 
 /// What a browser may do on the page. WebAssembly is compiled code, which needs leave of its own; the data comes from
 /// another port of this machine; the viewer sets styles and draws pictures it made.
@@ -37,58 +32,10 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
     img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'none'";
 
-/// A page, served for as long as this lives.
-pub(super) struct Page {
-    stop: Option<oneshot::Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Page {
-    /// Serves the page to whom `listener` hears; it opens the recording at `recording` (`rerun+http://...`).
-    pub(super) fn serve(listener: net::TcpListener, recording: &str) -> Result<Self, String> {
-        let files = Files::new(recording)?;
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| e.to_string())?;
-        listener.set_nonblocking(true).map_err(|e| e.to_string())?;
-        let listener = runtime.block_on(async { TcpListener::from_std(listener) }).map_err(|e| e.to_string())?;
-        let (stop, stopped) = oneshot::channel();
-        let serve = move || {
-            runtime.block_on(async {
-                tokio::select! {
-                    () = accept(listener, files) => {}
-                    _ = stopped => {}
-                }
-            });
-        };
-        let thread = std::thread::Builder::new().name("page".to_owned()).spawn(serve).map_err(|e| e.to_string())?;
-        Ok(Self { stop: Some(stop), thread: Some(thread) })
-    }
-}
-
-impl Drop for Page {
-    fn drop(&mut self) {
-        // The thread ends at once; if it has ended before, there is nobody to tell.
-        let _ = self.stop.take().map(|stop| stop.send(()));
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
-}
-
-async fn accept(listener: TcpListener, files: Files) {
-    loop {
-        let Ok((stream, _)) = listener.accept().await else {
-            // Out of file handles: those open are closed in a while.
-            tokio::time::sleep(Duration::from_millis(100)).await;
-            continue;
-        };
-        let files = files.clone();
-        let answer = service_fn(move |request: Request<hyper::body::Incoming>| {
-            let response = files.answer(&request);
-            async { Ok::<_, Infallible>(response) }
-        });
-        let mut http = hyper::server::conn::http1::Builder::new();
-        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
-        // A browser that breaks off is no concern of ours.
-        tokio::spawn(async move { http.serve_connection(TokioIo::new(stream), answer).await.ok() });
-    }
+/// Serves the page to whom `listener` hears; it opens the recording at `recording` (`rerun+http://...`).
+pub(super) fn serve(listener: net::TcpListener, recording: &str) -> Result<Server, String> {
+    let files = Files::new(recording)?;
+    Server::start("page", listener, move |request| std::future::ready(files.answer(&request)))
 }
 
 /// What there is to be had.
@@ -130,14 +77,8 @@ impl Files {
     }
 
     fn program<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
-        let Bundled { bytes, packed, whole, .. } = program(self.viewer, takes_gzip(request.headers()));
-        let mut response = response(StatusCode::OK, "application/wasm", bytes);
-        if packed {
-            response.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-        }
-        // The page shows how much has come, and sees unpacked bytes only.
-        response.headers_mut().insert("rerun-final-length", whole.into());
-        response
+        let program = program(self.viewer, takes_gzip(request.headers()));
+        program.measured(response(StatusCode::OK, program.kind, program.bytes.clone()))
     }
 }
 
@@ -158,6 +99,18 @@ pub struct Bundled {
     pub packed: bool,
     /// How many there are unpacked.
     pub whole: usize,
+}
+
+impl Bundled {
+    /// An answer with these bytes, which says how they are packed and how many there are.
+    pub(crate) fn measured<B>(&self, mut answer: Response<B>) -> Response<B> {
+        if self.packed {
+            answer.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+        }
+        // The page shows how much has come, and sees unpacked bytes only.
+        answer.headers_mut().insert("rerun-final-length", self.whole.into());
+        answer
+    }
 }
 
 /// The viewer's file at this path (`/program.js`, `/re_viewer.js`, `/re_viewer_bg.wasm`, `/favicon.ico`); none elsewhere, or where this
@@ -213,17 +166,5 @@ fn packed(wasm: &[u8]) {
 }
 
 fn response(status: StatusCode, kind: &'static str, bytes: Bytes) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(bytes));
-    *response.status_mut() = status;
-    for (name, value) in [
-        (header::CONTENT_TYPE, kind),
-        (header::CONTENT_SECURITY_POLICY, POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-        // The next run may be of another version on the same port.
-        (header::CACHE_CONTROL, "no-cache"),
-    ] {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
-    }
-    response
+    answer(status, kind, POLICY, Full::new(bytes))
 }

@@ -11,14 +11,16 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::desk::Desk;
-use super::results::{AtRest, Sectioned};
+use super::desk::{Desk, ms_since};
+use super::results::{AtRest, Ground, Preview, Sectioned};
 use super::{EditError, Session};
-use crate::drape::{Levels, Model, Refine, StageTwo, approach};
+use crate::drape::{Levels, Model, Refine, Settings, StageTwo, approach};
 use crate::fabric::Fabric;
 use crate::job::Job;
 use crate::mechanics::refine::Step;
+use crate::parts::Parts;
 use crate::said::said;
+use crate::scene::Scene;
 use crate::shapes::MeshCache;
 
 /// What is kept between pieces.
@@ -59,6 +61,54 @@ struct Target {
     accepted: Instant,
     sectioned: Option<Arc<Sectioned>>,
     rest: Option<Arc<AtRest>>,
+}
+
+/// A piece of work on a state whose PARTs are known.
+#[derive(Clone, Copy)]
+struct Piece<'a> {
+    session: &'a Session,
+    target: &'a Target,
+    sectioned: &'a Sectioned,
+}
+
+impl<'a> Piece<'a> {
+    fn settings(self) -> &'a Settings {
+        &self.target.job.settings
+    }
+
+    fn ground(self) -> &'a Arc<Ground> {
+        &self.sectioned.ground
+    }
+
+    fn scene(self) -> &'a Scene {
+        &self.ground().loaded.scene
+    }
+
+    /// Whether a step is the last one.
+    fn ask(self) -> ControlFlow<()> {
+        if self.session.overtaken(self.target.state) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Makes something known of the state, if it is still the newest.
+    fn publish(self, add: impl FnOnce(&mut Desk)) {
+        self.session.publish(self.target.state, add);
+    }
+
+    /// These PARTs at `positions` (m) after so many milliseconds of steps: cold, not done, and nothing told of it yet.
+    fn preview(self, parts: Arc<Parts>, positions: Vec<DVec3>, ms: f64) -> Preview {
+        Preview {
+            state: self.target.state,
+            ground: Arc::clone(self.ground()),
+            warm: false,
+            done: false,
+            parts,
+            outcomes: Arc::default(),
+            positions: Arc::new(positions),
+            ms,
+            after_ms: ms_since(self.target.accepted),
+            warnings: Vec::new(),
+        }
+    }
 }
 
 impl Workshop {
@@ -109,9 +159,10 @@ impl Workshop {
 
     fn piece(&mut self, session: &Session, target: &Target) -> Result<(), EditError> {
         let Some(sectioned) = &target.sectioned else { return self.load(session, target) };
-        let settings = &target.job.settings;
-        if sectioned.ground.loaded.scene.layers.len() > 1 {
-            return self.outfit(session, target, sectioned);
+        let piece = Piece { session, target, sectioned };
+        let settings = piece.settings();
+        if piece.scene().layers.len() > 1 {
+            return self.outfit(piece);
         }
         let generation = sectioned.ground.generation;
         let needs_cloth = matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0);
@@ -128,41 +179,26 @@ impl Workshop {
         };
         let (before, at_rest) = (of_this(&self.preview), of_this(&self.rest));
         let at_rest = at_rest.filter(|_| settings.refine == Refine::Converged);
-        match (&levels, &settings.model) {
-            (Some(levels), Model::Coupled(options)) if !self.done.warmed => {
-                self.done.warmed = true;
-                match before {
-                    Some(start) => {
-                        let rest_follows = at_rest.is_some() && target.rest.is_none();
-                        return self.go_on(session, target, sectioned, levels, options, (&start, rest_follows));
-                    }
-                    None => return Ok(()),
-                }
-            }
-            _ => {}
+        if let (Some(levels), Model::Coupled(options), false) = (&levels, &settings.model, self.done.warmed) {
+            self.done.warmed = true;
+            let Some(start) = before else { return Ok(()) };
+            let rest_follows = at_rest.is_some() && target.rest.is_none();
+            return self.go_on(piece, levels, options, (&start, rest_follows));
         }
-        if let (Some(levels), None, None) = (&levels, &target.rest, self.done.rested)
-            && let Some(start) = at_rest
-        {
-            return self.settle(session, target, sectioned, levels, start.to_vec(), true);
+        let to_rest = levels.as_ref().filter(|_| target.rest.is_none() && self.done.rested.is_none());
+        if let (Some(levels), Some(start)) = (to_rest, at_rest) {
+            return self.settle(piece, levels, start.to_vec(), true);
         }
-        let Some((stage, _)) = &self.done.two_stages else {
-            return self.two_stages(session, target, sectioned, levels.as_deref());
-        };
-        if let (Some(levels), None, None) = (&levels, &target.rest, self.done.rested) {
-            let asked = || ask(session, target.state);
-            let scene = &sectioned.ground.loaded.scene;
+        let Some((stage, _)) = &self.done.two_stages else { return self.two_stages(piece, levels.as_deref()) };
+        if let Some(levels) = to_rest {
+            let asked = || piece.ask();
             let surface = &sectioned.ground.distances.surface;
             let told = &mut |_: &Step<'_>| asked();
-            let start = approach(scene, settings, levels, surface, &stage.parts, &stage.positions, (&asked, told));
-            return self.settle(session, target, sectioned, levels, start, false);
+            let (parts, positions) = (&stage.parts, &stage.positions);
+            let start = approach(piece.scene(), settings, levels, surface, parts, positions, (&asked, told));
+            return self.settle(piece, levels, start, false);
         }
-        self.finish(session, target, sectioned, levels.as_deref());
+        self.finish(piece, levels.as_deref());
         Ok(())
     }
-}
-
-/// Whether a step is the last one.
-fn ask(session: &Session, state: u64) -> ControlFlow<()> {
-    if session.overtaken(state) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

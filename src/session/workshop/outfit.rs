@@ -4,46 +4,32 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::rest::{Way, reactions};
-use super::{Target, Workshop, ask};
+use super::{Piece, Workshop};
 use crate::drape::{Drape, DrapeError, drape};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::Stop;
-use crate::session::desk::ms_since;
-use crate::session::results::{AtRest, Preview, Sectioned};
-use crate::session::{EditError, Session};
+use crate::session::EditError;
+use crate::session::results::{AtRest, Preview};
 
 impl Workshop {
     /// Drapes all of them, shown step by step at full resolution.
-    pub(super) fn outfit(
-        &mut self,
-        session: &Session,
-        target: &Target,
-        sectioned: &Sectioned,
-    ) -> Result<(), EditError> {
-        let began = Instant::now();
-        let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
-        let way = Way { target, sectioned, warm: false, began };
+    pub(super) fn outfit(&mut self, piece: Piece<'_>) -> Result<(), EditError> {
+        let (scene, settings) = (piece.scene(), piece.settings());
+        let way = Way { piece, warm: false, began: Instant::now() };
         let all = drape(scene, settings, &mut |step| {
             let step = Arc::new(way.at(step.positions, step.residual_over_weight, step.iteration));
-            session.publish(target.state, |desk| desk.view.rest = Some(step));
-            ask(session, target.state)
+            piece.publish(|desk| desk.view.rest = Some(step));
+            piece.ask()
         })?;
         let interrupted = |drape: &Drape| drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted);
-        if interrupted(&all) && session.overtaken(target.state) {
+        if interrupted(&all) && piece.ask().is_break() {
             return Ok(());
         }
         let stages = all.times.total - all.times.refine;
         let preview = Preview {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
-            warm: false,
             done: true,
-            parts: Arc::new(all.parts.clone()),
             outcomes: Arc::new(all.outcomes.clone()),
-            positions: Arc::new(all.preview.clone()),
-            ms: 1e3 * stages.as_secs_f64(),
-            after_ms: ms_since(target.accepted),
-            warnings: Vec::new(),
+            ..piece.preview(Arc::new(all.parts.clone()), all.preview.clone(), 1e3 * stages.as_secs_f64())
         };
         let rest = all.state.as_ref().map(|state| -> Result<AtRest, EditError> {
             let cloth =
@@ -58,7 +44,7 @@ impl Workshop {
             })
         });
         let rest = rest.transpose()?.map(Arc::new);
-        session.publish(target.state, |desk| {
+        piece.publish(|desk| {
             desk.add_to_trail(|point| point.two_stages_ms = Some(preview.ms));
             desk.view.preview = Some(Arc::new(preview));
             if let Some(rest) = rest {
@@ -66,7 +52,7 @@ impl Workshop {
                 desk.found_rest(rest);
             }
         });
-        self.show(session, target, sectioned, all);
+        self.show(piece, all);
         Ok(())
     }
 }

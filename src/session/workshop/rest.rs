@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::{Target, Workshop, ask};
+use super::{Piece, Workshop};
 use crate::accuracy::{self, representable::representable};
 use crate::drape::{
     ClothState, Drape, Levels, Made, Refine, Released, Settings, StageTimes, StartsFrom, folds_of, let_go, refine_from,
@@ -16,14 +16,13 @@ use crate::mechanics::coupled::Motion;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::refine::{Step, Stop};
 use crate::scene::Scene;
+use crate::session::EditError;
 use crate::session::desk::ms_since;
-use crate::session::results::{AtRest, Finished, Sectioned};
-use crate::session::{EditError, Session};
+use crate::session::results::{AtRest, Finished};
 
 /// A drape on its way to rest.
 pub(super) struct Way<'a> {
-    pub(super) target: &'a Target,
-    pub(super) sectioned: &'a Sectioned,
+    pub(super) piece: Piece<'a>,
     pub(super) warm: bool,
     pub(super) began: Instant,
 }
@@ -31,11 +30,11 @@ pub(super) struct Way<'a> {
 impl Way<'_> {
     /// How far it has come: nothing yet of what is told of a drape at rest.
     pub(super) fn at(&self, positions: &[DVec3], residual_over_weight: f64, steps: usize) -> AtRest {
-        let Self { target, sectioned, warm, began } = *self;
-        let settings = &target.job.settings;
+        let Self { piece, warm, began } = *self;
+        let settings = piece.settings();
         AtRest {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
+            state: piece.target.state,
+            ground: Arc::clone(piece.ground()),
             done: false,
             balanced: false,
             kept: false,
@@ -44,7 +43,7 @@ impl Way<'_> {
             residual_over_weight,
             steps,
             ms: ms_since(began),
-            after_ms: ms_since(target.accepted),
+            after_ms: ms_since(piece.target.accepted),
             reaction_n: Arc::default(),
             told: None,
             let_go: None,
@@ -58,16 +57,15 @@ impl Workshop {
     /// Steps at full resolution from `start`, shown step by step.
     pub(super) fn settle(
         &mut self,
-        session: &Session,
-        target: &Target,
-        sectioned: &Sectioned,
+        piece: Piece<'_>,
         levels: &Levels,
         start: Vec<DVec3>,
         warm: bool,
     ) -> Result<(), EditError> {
         let began = Instant::now();
-        let (scene, settings) = (&sectioned.ground.loaded.scene, &target.job.settings);
-        let way = Way { target, sectioned, warm, began };
+        let (scene, settings) = (piece.scene(), piece.settings());
+        let distances = Some(&piece.ground().distances);
+        let way = Way { piece, warm, began };
         let from = if warm { StartsFrom::Rest } else { StartsFrom::Parts };
         let mut balanced = false;
         let mut show = |step: &Step<'_>| {
@@ -76,23 +74,22 @@ impl Workshop {
             if step.iteration > 0 || balanced {
                 let at = way.at(step.positions, step.residual_over_weight, step.iteration);
                 let step = Arc::new(AtRest { balanced, ..at });
-                session.publish(target.state, |desk| desk.view.rest = Some(step));
+                piece.publish(|desk| desk.view.rest = Some(step));
             }
-            ask(session, target.state)
+            piece.ask()
         };
-        let refined =
-            refine_from(scene, settings, &levels.cloth, Some(&sectioned.ground.distances), (start, from), &mut show)?;
+        let refined = refine_from(scene, settings, &levels.cloth, distances, (start, from), &mut show)?;
         // What is held is held where it was placed: the next drape goes on from before it is let go.
         let held = Arc::new(refined.positions.clone());
-        self.rest = Some((sectioned.ground.generation, Arc::clone(&held)));
+        self.rest = Some((piece.ground().generation, Arc::clone(&held)));
         let Released { cloth, refined, let_go } = let_go(scene, settings, refined, &mut show)?;
-        if refined.stop == Stop::Interrupted && session.overtaken(target.state) {
+        if refined.stop == Stop::Interrupted && piece.ask().is_break() {
             // A drape that falls off is interrupted too, and shown.
             return Ok(());
         }
         let took = began.elapsed();
         let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
-        let (positions, state) = settled(scene, settings, cloth, Some(&sectioned.ground.distances), refined);
+        let (positions, state) = settled(scene, settings, cloth, distances, refined);
         let rest = Arc::new(AtRest {
             done: true,
             balanced: state.stop == Stop::Converged,
@@ -104,7 +101,7 @@ impl Workshop {
             ..way.at(&positions, state.residual_over_weight, state.steps)
         });
         self.done.rested = Some(took);
-        session.publish(target.state, |desk| {
+        piece.publish(|desk| {
             desk.add_to_trail(|point| point.rest_ms = Some(rest.ms));
             desk.found_rest(rest);
         });
@@ -112,17 +109,9 @@ impl Workshop {
     }
 
     /// The whole drape of the state, and its figures.
-    pub(super) fn finish(
-        &mut self,
-        session: &Session,
-        target: &Target,
-        sectioned: &Arc<Sectioned>,
-        levels: Option<&Levels>,
-    ) {
+    pub(super) fn finish(&mut self, piece: Piece<'_>, levels: Option<&Levels>) {
         let Some((stage, took)) = self.done.two_stages.take() else { return };
-        let settings = &target.job.settings;
-        let ground = &sectioned.ground;
-        let scene = &ground.loaded.scene;
+        let (ground, sectioned, rest) = (piece.ground(), piece.sectioned, piece.target.rest.as_ref());
         let ms = |ms: f64| Duration::from_secs_f64(1e-3 * ms);
         let sewing = self.cloth.as_ref().map_or(Duration::ZERO, |sewn| sewn.took);
         let mut times = StageTimes {
@@ -133,7 +122,7 @@ impl Workshop {
             total: Duration::ZERO,
         };
         times.total = times.distance + times.segment + times.mechanics + times.refine;
-        let state = target.rest.as_ref().and_then(|rest| {
+        let state = rest.and_then(|rest| {
             let told: &ClothState = rest.told.as_deref()?;
             Some((rest.positions.to_vec(), ClothState { steps: rest.steps, ..told.clone() }))
         });
@@ -141,27 +130,26 @@ impl Workshop {
             ground: ground.distances.clone(),
             table: (*sectioned.table).clone(),
             level_part_count: sectioned.parts.len(),
-            folds: folds_of(settings, levels, &stage),
+            folds: folds_of(piece.settings(), levels, &stage),
             stage,
             state,
-            let_go: target.rest.as_ref().and_then(|rest| rest.let_go),
+            let_go: rest.and_then(|rest| rest.let_go),
         };
-        self.show(session, target, sectioned, made.judged(scene, settings, times));
+        self.show(piece, made.judged(piece.scene(), piece.settings(), times));
     }
 
     /// A whole drape of the state, with its figures.
-    pub(super) fn show(&mut self, session: &Session, target: &Target, sectioned: &Sectioned, drape: Drape) {
-        let (settings, ground) = (&target.job.settings, &sectioned.ground);
-        let scene = &ground.loaded.scene;
+    pub(super) fn show(&mut self, piece: Piece<'_>, drape: Drape) {
+        let (settings, scene) = (piece.settings(), piece.scene());
         let figures = Figures::of(scene, &drape);
         let rested = drape.state.is_some() && settings.refine != Refine::Steps(0);
         let preview_error_mm = rested.then(|| accuracy::rms_mm(&drape.preview, &drape.positions));
         let bound_mm = rested.then(|| bound(settings, scene, &drape));
         let bound_mm = bound_mm.filter(|mm| mm.is_finite());
-        let (state, ground) = (target.state, Arc::clone(ground));
+        let (state, ground) = (piece.target.state, Arc::clone(piece.ground()));
         let finished = Finished { state, ground, drape, figures, preview_error_mm, bound_mm };
         self.done.finished = true;
-        session.publish(state, |desk| {
+        piece.publish(|desk| {
             desk.add_to_trail(|point| {
                 (point.preview_error_mm, point.bound_mm) = (preview_error_mm, bound_mm);
             });

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::{Sewn, Target, Workshop, ask};
+use super::{Piece, Sewn, Target, Workshop};
 use crate::drape::{Distances, DrapeError, ENOUGH, Levels, stage_two, told};
 use crate::fabric::Fabric;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Onlooker};
@@ -56,39 +56,29 @@ impl Workshop {
     /// Stage two from the preview before, shown step by step.
     pub(super) fn go_on(
         &mut self,
-        session: &Session,
-        target: &Target,
-        sectioned: &Sectioned,
+        piece: Piece<'_>,
         levels: &Levels,
         options: &CoupledOptions,
         (start, rest_follows): (&[DVec3], bool),
     ) -> Result<(), EditError> {
         let began = Instant::now();
-        let scene = &sectioned.ground.loaded.scene;
+        let (scene, generation, whole) = (piece.scene(), piece.ground().generation, &piece.sectioned.parts);
         let parts = match options.extents_m.last() {
-            None => Arc::clone(&sectioned.parts),
-            Some(&finest) => Arc::new(sectioned.parts.cut_to_extent(&scene.garment, &scene.topology, finest)),
+            None => Arc::clone(whole),
+            Some(&finest) => Arc::new(whole.cut_to_extent(&scene.garment, &scene.topology, finest)),
         };
         let preview = |positions: &[DVec3]| Preview {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
             warm: true,
-            done: false,
-            parts: Arc::clone(&parts),
-            outcomes: Arc::default(),
-            positions: Arc::new(positions.to_vec()),
-            ms: ms_since(began),
-            after_ms: ms_since(target.accepted),
-            warnings: Vec::new(),
+            ..piece.preview(Arc::clone(&parts), positions.to_vec(), ms_since(began))
         };
         let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
         let mut reached = start.to_vec();
-        if let Some(glance) = glance(scene, levels, &parts, start, options, &mut |_| ask(session, target.state)) {
+        if let Some(glance) = glance(scene, levels, &parts, start, options, &mut |_| piece.ask()) {
             reached = glance;
             let shown = Arc::new(preview(&reached));
-            session.publish(target.state, |desk| desk.view.preview = Some(shown));
+            piece.publish(|desk| desk.view.preview = Some(shown));
             if rest_follows {
-                self.preview = Some((sectioned.ground.generation, Arc::new(reached)));
+                self.preview = Some((generation, Arc::new(reached)));
                 return Ok(());
             }
         }
@@ -99,10 +89,9 @@ impl Workshop {
             reached.clear();
             reached.extend_from_slice(x);
             let step = Arc::new(preview(x));
-            session.publish(target.state, |desk| desk.view.preview = Some(step));
-            ask(session, target.state)
+            piece.publish(|desk| desk.view.preview = Some(step));
+            piece.ask()
         });
-        let generation = sectioned.ground.generation;
         let mut solved = match solved {
             Ok(solved) => solved,
             Err(CoupledError::Interrupted) => {
@@ -120,44 +109,30 @@ impl Workshop {
         let outcomes = Arc::new(solved.parts.iter().map(told).collect());
         let shown = Arc::new(Preview { done: true, outcomes, ..preview(&solved.positions) });
         self.preview = Some((generation, Arc::clone(&shown.positions)));
-        session.publish(target.state, |desk| desk.view.preview = Some(shown));
+        piece.publish(|desk| desk.view.preview = Some(shown));
         Ok(())
     }
 
     /// Both stages from the undraped garment, as `run` does it.
-    pub(super) fn two_stages(
-        &mut self,
-        session: &Session,
-        target: &Target,
-        sectioned: &Sectioned,
-        levels: Option<&Levels>,
-    ) -> Result<(), EditError> {
+    pub(super) fn two_stages(&mut self, piece: Piece<'_>, levels: Option<&Levels>) -> Result<(), EditError> {
         let began = Instant::now();
-        let Ground { loaded, distances, .. } = &*sectioned.ground;
-        let parts = (*sectioned.parts).clone();
-        let asked = || ask(session, target.state);
-        let stage = stage_two(&loaded.scene, &target.job.settings, &distances.surface, parts, levels, &asked);
-        let stage = match stage {
+        let surface = &piece.ground().distances.surface;
+        let parts = (*piece.sectioned.parts).clone();
+        let stage = match stage_two(piece.scene(), piece.settings(), surface, parts, levels, &|| piece.ask()) {
             Ok(stage) => stage,
             Err(DrapeError::Coupled(CoupledError::Interrupted)) => return Ok(()),
             Err(error) => return Err(error.into()),
         };
         let took = began.elapsed();
         let preview = Arc::new(Preview {
-            state: target.state,
-            ground: Arc::clone(&sectioned.ground),
-            warm: false,
             done: true,
-            parts: Arc::new(stage.parts.clone()),
             outcomes: Arc::new(stage.outcomes.clone()),
-            positions: Arc::new(stage.positions.clone()),
-            ms: took.as_secs_f64() * 1e3,
-            after_ms: ms_since(target.accepted),
             warnings: stage.warnings.clone(),
+            ..piece.preview(Arc::new(stage.parts.clone()), stage.positions.clone(), took.as_secs_f64() * 1e3)
         });
-        self.preview = Some((sectioned.ground.generation, Arc::clone(&preview.positions)));
+        self.preview = Some((piece.ground().generation, Arc::clone(&preview.positions)));
         self.done.two_stages = Some((stage, took));
-        session.publish(target.state, |desk| {
+        piece.publish(|desk| {
             desk.add_to_trail(|point| point.two_stages_ms = Some(preview.ms));
             desk.view.preview = Some(preview);
         });
