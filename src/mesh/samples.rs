@@ -1,0 +1,27 @@
+//! Meshes that tests are made with.
+
+use glam::DVec3;
+
+use super::TriMesh;
+
+/// A closed box, wound outward; its top are triangles 2 and 3.
+pub(crate) fn cuboid(low: DVec3, high: DVec3) -> TriMesh {
+    let corner = |i: usize| {
+        let of = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
+        DVec3::new(of(0, low.x, high.x), of(1, low.y, high.y), of(2, low.z, high.z))
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh::new((0..8).map(corner).collect(), triangles)
+}
+
+/// So many squares side by side in so many rows, two triangles each; the vertices, row by row, are where `at` has the corners.
+pub(crate) fn sheet(columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let corners = (0..=rows).flat_map(|j| (0..=columns).map(move |i| (f64::from(i), f64::from(j))));
+    let square = |i: u32, j: u32| {
+        let [a, b] = [j, j + 1].map(|row| row * (columns + 1) + i);
+        [[a, a + 1, b + 1], [a, b + 1, b]]
+    };
+    let triangles = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| square(i, j))).collect();
+    TriMesh::new(corners.map(|(i, j)| at(i, j)).collect(), triangles)
+}
