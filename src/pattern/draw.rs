@@ -7,7 +7,9 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use super::{Curve, EdgeAt, SewingPattern, laid_out};
+use super::layout::{box_about, laid_out};
+use super::panel_mesh::is_within;
+use super::{Curve, EdgeAt, SewingPattern};
 
 /// Margin about the panels, mm.
 const MARGIN: f64 = 30.0;
@@ -21,9 +23,8 @@ const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9
 pub(super) fn svg(pattern: &SewingPattern) -> String {
     let offsets = laid_out(pattern);
     let points = || {
-        let of_panel = |(panel, offset): (&super::PatternPanel, &DVec2)| {
-            panel.edges.iter().flat_map(|e| e.curve.divided(16)).map(|p| p + offset).collect::<Vec<_>>()
-        };
+        let of_panel =
+            |(panel, offset): (&super::PatternPanel, &DVec2)| panel.points().map(|p| p + offset).collect::<Vec<_>>();
         pattern.panels.iter().zip(&offsets).flat_map(of_panel)
     };
     let high = points().fold(DVec2::ZERO, DVec2::max) * 1e3;
@@ -43,7 +44,7 @@ pub(super) fn svg(pattern: &SewingPattern) -> String {
         let _ = write!(path, "M{:.3} {:.3}", start.x, start.y);
         panel.edges.iter().for_each(|e| path += &command(&e.curve, offset, &onto));
         let _ = writeln!(out, "<path d=\"{path}Z\" fill=\"#f4f1ea\" stroke=\"#333\" stroke-width=\"1\"/>");
-        let outline: Vec<DVec2> = panel.edges.iter().flat_map(|e| e.curve.divided(16)).collect();
+        let outline: Vec<DVec2> = panel.points().collect();
         let middle = onto(middle(&outline) + offset);
         // The grain, along y: above the name, beside it where a panel is low.
         let size = size(&outline);
@@ -87,7 +88,7 @@ pub(super) fn svg(pattern: &SewingPattern) -> String {
                 "<path d=\"M{:.3} {:.3}{drawn}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.5\"/>",
                 start.x, start.y
             );
-            let outline: Vec<DVec2> = panel.edges.iter().flat_map(|e| e.curve.divided(16)).collect();
+            let outline: Vec<DVec2> = panel.points().collect();
             let mut name = (number + 1).to_string();
             if longer && gathering > SewingPattern::GATHERED {
                 let _ = write!(name, " +{:.0} %", 100.0 * gathering);
@@ -142,20 +143,17 @@ fn inward(outline: &[DVec2], curve: &Curve, by: f64) -> DVec2 {
 
 /// Width and height of a panel, mm.
 fn size(outline: &[DVec2]) -> DVec2 {
-    let (low, high) = outline.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+    let [low, high] = box_about(outline.iter().copied());
     1e3 * (high - low)
 }
 
 /// A point of the panel to write at: the middle of its box, or of its vertices where that lies outside.
 fn middle(outline: &[DVec2]) -> DVec2 {
-    let (low, high) = outline.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+    let [low, high] = box_about(outline.iter().copied());
     let p = 0.5 * (low + high);
     let n = outline.len();
-    let crossings = (0..n).filter(|&i| {
-        let (a, b) = (outline[i], outline[(i + 1) % n]);
-        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-    });
-    if crossings.count() % 2 == 1 { p } else { outline.iter().sum::<DVec2>() / n as f64 }
+    let sides: Vec<[DVec2; 2]> = (0..n).map(|i| [outline[i], outline[(i + 1) % n]]).collect();
+    if is_within(p, &sides) { p } else { outline.iter().sum::<DVec2>() / n as f64 }
 }
 
 fn escaped(text: &str) -> String {

@@ -67,6 +67,11 @@ impl PatternPanel {
         self.rotation * flat.extend(0.0) + self.translation
     }
 
+    /// Its loop by points, m, sixteen parts an edge.
+    fn points(&self) -> impl Iterator<Item = DVec2> + '_ {
+        self.edges.iter().flat_map(|edge| edge.curve.divided(16))
+    }
+
     /// Area inside its loop, m²; negative where the loop runs clockwise.
     #[must_use]
     pub fn signed_area(&self) -> f64 {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::outline::{Outline, divisions, outlines};
 use super::panel_mesh::{self, Meshed};
 use super::{EdgeAt, PatternError, SewingPattern, laid_out};
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{RestShape, Topology, TriMesh, each_once};
 
 /// Edge lengths a garment is made with, m.
 const EDGES: [f64; 2] = [2e-3, 0.2];
@@ -147,10 +147,7 @@ fn join(pattern: &SewingPattern, outlines: &[Outline], meshed: Vec<Meshed>) -> S
             }
         }
     }
-    for vertices in labelled.values_mut() {
-        vertices.sort_unstable();
-        vertices.dedup();
-    }
+    labelled.values_mut().for_each(|vertices| *vertices = each_once(vertices.drain(..)));
     SewnGarment { mesh, rest: RestShape::new(corners), flat, panels, seams, labelled, notes }
 }
 
