@@ -7,6 +7,7 @@
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
 use crate::mechanics::energy::pattern::Pattern;
 use crate::mechanics::energy::{Cloth, bending::Bending};
+use crate::mesh::Lists;
 
 use super::motions::Motions;
 use super::weights::Weights;
@@ -18,12 +19,9 @@ const ENOUGH: f64 = 12.0;
 /// The PARTs of elements of one kind.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Elements {
-    starts: Vec<u32>,
-    parts: Vec<u32>,
-    weight_starts: Vec<u32>,
-    weights: Vec<f64>,
-    pair_starts: Vec<u32>,
-    pairs: Vec<Pair>,
+    parts: Lists<u32>,
+    weights: Lists<f64>,
+    pairs: Lists<Pair>,
     /// The elements that are sampled, and how many each stands for.
     pub(super) sampled: Vec<(u32, f64)>,
 }
@@ -49,23 +47,15 @@ pub(super) struct Place {
 impl Elements {
     /// From the vertices of each element.
     fn new<'a>(weights: &Weights, parts: usize, all: impl Iterator<Item = &'a [u32]>) -> Self {
-        let mut e = Self { starts: vec![0], weight_starts: vec![0], ..Self::default() };
+        let (mut e, mut own) = (Self::default(), Vec::new());
+        let of = |v: u32| weights.of(v as usize);
+        let weight = |p: u32, v: u32| of(v).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
         for vertices in all {
-            let first = e.parts.len();
-            for &v in vertices {
-                for &(p, _) in weights.of(v as usize) {
-                    if !e.parts[first..].contains(&p) {
-                        e.parts.push(p);
-                    }
-                }
-            }
-            e.parts[first..].sort_unstable();
-            for &p in &e.parts[first..] {
-                let of = |&v: &u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
-                e.weights.extend(vertices.iter().map(of));
-            }
-            e.starts.push(e.parts.len() as u32);
-            e.weight_starts.push(e.weights.len() as u32);
+            own.extend(vertices.iter().flat_map(|&v| of(v)).map(|&(p, _)| p));
+            own.sort_unstable();
+            own.dedup();
+            e.weights.push(own.iter().flat_map(|&p| vertices.iter().map(move |&v| weight(p, v))));
+            e.parts.push(own.drain(..));
         }
         e.sample(parts);
         e
@@ -90,40 +80,36 @@ impl Elements {
     }
 
     fn len(&self) -> usize {
-        self.starts.len() - 1
+        self.parts.len()
     }
 
     /// PARTs of an element, ascending.
     pub(super) fn parts(&self, i: usize) -> &[u32] {
-        &self.parts[self.starts[i] as usize..self.starts[i + 1] as usize]
+        self.parts.of(i)
     }
 
     /// Their weights at its vertices, PART after PART.
     pub(super) fn weights(&self, i: usize) -> &[f64] {
-        &self.weights[self.weight_starts[i] as usize..self.weight_starts[i + 1] as usize]
+        self.weights.of(i)
     }
 
     /// The pairs of its PARTs.
     pub(super) fn pairs(&self, i: usize) -> &[Pair] {
-        &self.pairs[self.pair_starts[i] as usize..self.pair_starts[i + 1] as usize]
+        self.pairs.of(i)
     }
 
     fn lay_out(&mut self, motions: &Motions, columns: &[Vec<(u32, u32)>]) {
-        self.pair_starts.push(0);
         for i in 0..self.len() {
-            let list = self.parts(i).to_vec();
-            for (k, &p) in list.iter().enumerate() {
-                for (l, &q) in list[..=k].iter().enumerate() {
-                    let (row, column) =
-                        if motions.first[p as usize] >= motions.first[q as usize] { (k, l) } else { (l, k) };
-                    let later = motions.first[list[row] as usize];
-                    let of = &columns[list[column] as usize];
-                    // PARTs that do not move have no pair: they add to one that nobody reads.
-                    let number = of.binary_search_by_key(&later, |e| e.0).map_or(0, |at| of[at].1);
-                    self.pairs.push(Pair { row: row as u8, column: column as u8, number });
-                }
-            }
-            self.pair_starts.push(self.pairs.len() as u32);
+            let list = self.parts.of(i);
+            let pair = |k: usize, l: usize| {
+                let [p, q] = [k, l].map(|place| motions.first[list[place] as usize]);
+                let (row, column) = if p >= q { (k, l) } else { (l, k) };
+                let of = &columns[list[column] as usize];
+                // PARTs that do not move have no pair: they add to one that nobody reads.
+                let number = of.binary_search_by_key(&p.max(q), |e| e.0).map_or(0, |at| of[at].1);
+                Pair { row: row as u8, column: column as u8, number }
+            };
+            self.pairs.push((0..list.len()).flat_map(|k| (0..=k).map(move |l| pair(k, l))));
         }
     }
 }

@@ -52,8 +52,9 @@ impl Touch {
 const PLANE: f64 = 2e-3;
 
 /// What there is to touch, and by which distance.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) enum Met<'b> {
+    #[default]
     Nothing,
     /// The exact distance's tangent plane where it was last asked.
     Planes(&'b Body, Vec<DVec3>),
@@ -61,7 +62,7 @@ pub(super) enum Met<'b> {
 }
 
 /// What the cloth meets at its current positions, with the memory that makes asking again cheap.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Contacts<'b> {
     pub(super) met: Met<'b>,
     /// h of each vertex, m.
@@ -88,21 +89,7 @@ impl<'b> Contacts<'b> {
     /// Nothing to touch.
     #[must_use]
     pub fn none() -> Self {
-        Self {
-            met: Met::Nothing,
-            offsets: Vec::new(),
-            areas: Vec::new(),
-            held: Vec::new(),
-            asked_at: Vec::new(),
-            answer: Vec::new(),
-            leave: Vec::new(),
-            near: Vec::new(),
-            stiffness: 0.0,
-            touches: Vec::new(),
-            friction: Friction::none(),
-            proximity: None,
-            cover: Cover::default(),
-        }
+        Self::default()
     }
 
     /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at their `offsets` (m) with
@@ -125,12 +112,9 @@ impl<'b> Contacts<'b> {
             answer: vec![f64::NEG_INFINITY; n],
             // Who is held is never asked.
             leave: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
-            near: Vec::new(),
             stiffness,
-            touches: Vec::new(),
             friction,
-            proximity: None,
-            cover: Cover::default(),
+            ..Self::none()
         }
     }
 
@@ -140,9 +124,8 @@ impl<'b> Contacts<'b> {
     pub fn by_planes(self) -> Self {
         let n = self.areas.len();
         let met = match self.met {
-            Met::Nothing => Met::Nothing,
-            Met::Planes(body, normals) => Met::Planes(body, normals),
             Met::Rounded(field) => Met::Planes(field.body(), vec![DVec3::ZERO; n]),
+            others => others,
         };
         Self { met, ..self }
     }
@@ -176,13 +159,18 @@ impl<'b> Contacts<'b> {
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
             self.keep(v, x[v], distance);
-            let depth = self.offsets[v] - distance;
-            if depth > 0.0 {
-                let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex, depth, normal, stiffness });
-            }
+            self.touch(vertex, distance, normal);
         }
         self.near = near;
+    }
+
+    /// A vertex touches where its distance is less than its offset.
+    fn touch(&mut self, vertex: u32, distance: f64, normal: DVec3) {
+        let v = vertex as usize;
+        let depth = self.offsets[v] - distance;
+        if depth > 0.0 {
+            self.touches.push(Touch { vertex, depth, normal, stiffness: self.stiffness * self.areas[v] });
+        }
     }
 
     /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
@@ -221,14 +209,11 @@ impl<'b> Contacts<'b> {
                 normals[v] = found.normal;
             }
         }
-        let Met::Planes(_, normals) = &self.met else { return };
         for &vertex in &near {
             let v = vertex as usize;
-            let depth = self.offsets[v] - (self.answer[v] + normals[v].dot(x[v] - self.asked_at[v]));
-            if depth > 0.0 {
-                let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex, depth, normal: normals[v], stiffness });
-            }
+            let Met::Planes(_, normals) = &self.met else { return };
+            let (normal, moved) = (normals[v], x[v] - self.asked_at[v]);
+            self.touch(vertex, self.answer[v] + normal.dot(moved), normal);
         }
         self.near = near;
     }

@@ -4,7 +4,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::membrane::Triangle;
 use super::pattern::HELD;
 use super::{Cloth, Contacts, HessianLayout};
 
@@ -19,10 +18,10 @@ impl Cloth {
 
     /// The same in the blocks of another layout.
     pub(crate) fn hessian_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(layout, |t| t.hessian(self.stiffness_of(t), x), x, contacts, blocks);
+        self.assemble(layout, false, x, contacts, blocks);
     }
 
-    /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
+    /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`membrane`](super::membrane). Closer
     /// than [`hessian`](Self::hessian), and not always positive.
     pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
         self.hessian_bearing_in(self.layout(), x, contacts, blocks);
@@ -36,7 +35,7 @@ impl Cloth {
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
     ) {
-        self.assemble(layout, |t| t.hessian_bearing(self.stiffness_of(t), x), x, contacts, blocks);
+        self.assemble(layout, true, x, contacts, blocks);
     }
 
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
@@ -46,7 +45,7 @@ impl Cloth {
             self.masses
                 .iter()
                 .enumerate()
-                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))),
+                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.plate.own(v) + damping * mass))),
         );
         for t in &self.triangles {
             for (&v, block) in t.vertices.iter().zip(t.own_blocks(self.stiffness_of(t), x)) {
@@ -66,7 +65,7 @@ impl Cloth {
     fn assemble(
         &self,
         layout: &HessianLayout,
-        of_triangle: impl Fn(&Triangle) -> [DMat3; 6],
+        bearing: bool,
         x: &[DVec3],
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
@@ -74,7 +73,7 @@ impl Cloth {
         blocks.clear();
         blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
-            let parts = of_triangle(t);
+            let parts = t.hessian(self.stiffness_of(t), x, bearing);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
@@ -110,8 +109,7 @@ impl Cloth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology, TriMesh};
+    use crate::mesh::TriMesh;
 
     /// A triangle and another over it, half an offset apart.
     fn one_over_the_other() -> (Cloth, Vec<DVec3>) {
@@ -125,9 +123,7 @@ mod tests {
             at(0.005, 0.023, 0.01),
         ];
         let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]);
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let fabric = Fabric::by_name("jersey").unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[0]).unwrap();
+        let cloth = Cloth::sample(&mesh, "jersey", &[0]);
         let down = |(v, x): (usize, &DVec3)| if v < 3 { *x } else { *x - DVec3::Z * 9.2e-3 };
         let x = mesh.positions.iter().enumerate().map(down).collect();
         (cloth, x)

@@ -9,6 +9,7 @@ use faer::linalg::cholesky::llt::factor::{LltError, cholesky_in_place, cholesky_
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
+use faer::traits::math_utils::one;
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::factor::Precision;
@@ -74,7 +75,7 @@ pub(super) fn subtract<T: Precision>(c: MatMut<'_, T>, l: MatRef<'_, T>, onto: A
     let (triangle, rest) = c.split_at_row_mut(n);
     let (top, bottom) = l.split_at_row(n);
     let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    let minus = -T::ONE;
+    let minus = -one::<T>();
     matmul(triangle, lower, onto, top, full, top.transpose(), full, minus, Par::Seq);
     product(rest, bottom, top, onto);
 }
@@ -87,6 +88,6 @@ fn product<T: Precision>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>, o
         let ((one, other), (a, below)) = (c.split_at_row_mut(half), a.split_at_row(half));
         rayon::join(|| product(one, a, b, onto), || product(other, below, b, onto));
     } else if rows > 0 {
-        faer::linalg::matmul::matmul(c, onto, a, b.transpose(), -T::ONE, Par::Seq);
+        faer::linalg::matmul::matmul(c, onto, a, b.transpose(), -one::<T>(), Par::Seq);
     }
 }

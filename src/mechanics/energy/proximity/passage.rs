@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::near::Near;
 use super::skin::Skin;
+use crate::mesh::each_once;
 use crate::mesh::triangle_crossing::cross;
 
 /// A step whose longest move is more than so many edges is not cut but refused: to cut it would tear the cloth.
@@ -114,14 +115,10 @@ impl Passage {
 
     /// The corners of some triangles and so many rings of neighbours, ascending.
     fn around<'a>(&self, triangles: impl Iterator<Item = &'a u32>, rings: usize) -> Vec<u32> {
-        let mut found: Vec<u32> = triangles.flat_map(|&t| self.skin.triangles[t as usize]).collect();
-        for ring in 0..=rings {
-            if ring > 0 {
-                let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.neighbours(v)).copied().collect();
-                found.extend(next);
-            }
-            found.sort_unstable();
-            found.dedup();
+        let mut found = each_once(triangles.flat_map(|&t| self.skin.triangles[t as usize]));
+        for _ in 0..rings {
+            let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.neighbours(v)).copied().collect();
+            found = each_once(found.into_iter().chain(next));
         }
         found
     }

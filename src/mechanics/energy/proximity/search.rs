@@ -108,8 +108,7 @@ impl Look<'_> {
     fn triangles_at(&self, corners: [u32; 3], i: u32) -> u32 {
         let [a, b, c] = corners;
         let side = [[a, b], [b, c], [a, c]][i as usize];
-        let [low, high] = [side[0].min(side[1]), side[0].max(side[1])];
-        self.skin.edges.binary_search(&[low, high]).map_or(1, |e| self.skin.edge_triangles[e])
+        self.skin.topology.edge_between(side[0], side[1]).map_or(1, |e| self.skin.topology.edge_valence[e])
     }
 
     /// The edges that triangle `t` owns against those that `u` owns.
@@ -122,7 +121,8 @@ impl Look<'_> {
     }
 
     fn edges(&self, e: u32, f: u32, found: &mut Vec<Found>) {
-        let ([a, b], [c, d]) = (self.skin.edges[e as usize], self.skin.edges[f as usize]);
+        let edges = &self.skin.topology.edges;
+        let ([a, b], [c, d]) = (edges[e as usize], edges[f as usize]);
         if a == c || a == d || b == c || b == d {
             return;
         }
