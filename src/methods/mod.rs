@@ -53,7 +53,7 @@ impl Dressing<'_> {
             0 | 1 => Ok(()),
             n => {
                 let reason = format!("found {n} fabrics in the garment, expected one: the method as published has one");
-                Err(MethodError::Unfit { method, reason })
+                Err(MethodError::unfit(method, reason))
             }
         }
     }
@@ -142,6 +142,12 @@ pub enum MethodError {
     },
 }
 
+impl MethodError {
+    fn unfit(method: &'static str, reason: impl Into<String>) -> Self {
+        Self::Unfit { method, reason: reason.into() }
+    }
+}
+
 /// A way to drape a garment, from the placed start to rest.
 pub trait ReferenceMethod: Sync {
     /// Its name: author and year.
@@ -194,19 +200,26 @@ pub fn unwatched(_: &Moment<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Durations by name, in the order they were begun first.
-#[derive(Debug, Clone, Default)]
-struct Stopwatch(Vec<(&'static str, Duration)>);
+/// Durations by name, in the order they were begun first, since it began.
+#[derive(Debug, Clone)]
+struct Stopwatch {
+    began: Instant,
+    parts: Vec<(&'static str, Duration)>,
+}
 
 impl Stopwatch {
+    fn begin() -> Self {
+        Self { began: Instant::now(), parts: Vec::new() }
+    }
+
     /// Runs `work` on the account of `name`.
     fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let began = Instant::now();
         let out = work();
         let spent = began.elapsed();
-        match self.0.iter_mut().find(|(known, _)| *known == name) {
+        match self.parts.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += spent,
-            None => self.0.push((name, spent)),
+            None => self.parts.push((name, spent)),
         }
         out
     }

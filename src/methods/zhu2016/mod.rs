@@ -21,9 +21,7 @@ pub mod quadric;
 pub mod springs;
 pub mod units;
 
-use std::time::Instant;
-
-use super::march::{Course, Marched, Pacing, march};
+use super::march::{Course, Pacing, march};
 use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use hierarchy::Hierarchy;
 use springs::Springs;
@@ -60,39 +58,24 @@ impl ReferenceMethod for Zhu2016 {
         rule: &RestRule,
         onlooker: Spectator<'_>,
     ) -> Result<MethodDrape, MethodError> {
-        let began = Instant::now();
-        let mut watch = Stopwatch::default();
+        let mut watch = Stopwatch::begin();
         let mut springs = watch.time("springs", || Springs::new(dressing, self.strain_limit));
         let mut hierarchy = watch.time("hierarchy", || Hierarchy::new(dressing))?;
         let course = Course { method: NAME, pacing: &self.pacing, rule, friction: dressing.fabric.friction };
-        let marched = march(dressing, course, (&mut springs, &mut hierarchy), &mut watch, onlooker)?;
-        let total = began.elapsed();
-        let Marched { positions, ended, steps, simulated_s, rms_speed, iterations, corrections } = marched;
+        let marched = march(dressing, course, (&mut springs, &mut hierarchy), watch, onlooker)?;
         let counts = hierarchy.counts();
+        let of_hierarchy = [
+            ("units", hierarchy.units() as u64),
+            ("quadrics", hierarchy.slices() as u64),
+            ("world box tests", counts.world),
+            ("unit tests", counts.units),
+            ("quadric tests", counts.quadrics),
+            ("leaf triangle tests", counts.triangles),
+            ("touching", counts.touching),
+        ];
         let exhibits =
             if self.exhibit { vec![("units and quadrics", Exhibit::Lines(hierarchy.outlines()))] } else { Vec::new() };
-        Ok(MethodDrape {
-            positions,
-            ended,
-            steps,
-            simulated_s,
-            rms_speed_m_per_s: rms_speed,
-            times: watch.0,
-            total,
-            counts: [
-                ("units", hierarchy.units() as u64),
-                ("quadrics", hierarchy.slices() as u64),
-                ("world box tests", counts.world),
-                ("unit tests", counts.units),
-                ("quadric tests", counts.quadrics),
-                ("leaf triangle tests", counts.triangles),
-                ("touching", counts.touching),
-                ("linear iterations", iterations),
-                ("strain corrections", corrections),
-            ]
-            .to_vec(),
-            exhibits,
-            notes: hierarchy.notes(),
-        })
+        let counts = of_hierarchy.into_iter().chain(marched.counts).collect();
+        Ok(MethodDrape { counts, exhibits, notes: hierarchy.notes(), ..marched })
     }
 }
