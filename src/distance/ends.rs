@@ -170,28 +170,12 @@ fn region(mesh: &TriMesh, topology: &Topology, held: &[bool], stuck: &[Stuck]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::samples::cuboid;
-    use std::f64::consts::TAU;
-
-    /// A tube about the z axis, open at both ends, wound outward.
-    fn tube(radius: f64, low: f64, high: f64, around: u32, along: u32) -> TriMesh {
-        let at = |i: u32, j: u32| {
-            let a = TAU * f64::from(i) / f64::from(around);
-            DVec3::new(radius * a.cos(), radius * a.sin(), low + (high - low) * f64::from(j) / f64::from(along))
-        };
-        let positions = (0..=along).flat_map(|j| (0..around).map(move |i| at(i, j))).collect();
-        let squares = (0..along).flat_map(|j| (0..around).map(move |i| (i, j)));
-        let triangles = squares.flat_map(|(i, j)| {
-            let [a, b] = [j * around + i, j * around + (i + 1) % around];
-            [[a, b, b + around], [a, b + around, a + around]]
-        });
-        TriMesh::new(positions, triangles.collect())
-    }
+    use crate::mesh::samples::{cuboid, tube};
 
     #[test]
     fn a_foot_through_a_trouser_leg_is_inside_it_afterwards() {
         // As thick as an edge is long, so that no vertex need be in it, 6 cm out of the leg.
-        let leg = tube(0.08, 0.0, 0.4, 36, 28);
+        let leg = tube(36, 28, |a, row| DVec3::new(0.08 * a.cos(), 0.08 * a.sin(), 0.4 * row / 28.0));
         let toes =
             |length: f64| Body::new(&cuboid(DVec3::new(-0.05, -0.03, 0.02), DVec3::new(length, 0.03, 0.032))).unwrap();
         let foot = toes(0.14);

@@ -103,29 +103,15 @@ fn turned_like(was: [DVec2; 3], [a, b, c]: [f64; 3], long: [bool; 3]) -> [DVec2;
 mod tests {
     use super::*;
     use crate::mesh::longest_side;
+    use crate::mesh::samples::sheet;
     use glam::DVec3;
 
     /// Two squares of 10 cm a foot apart, in sides of a centimetre, joined along one edge by a row of vertices half-way.
     fn bridged() -> TriMesh {
-        let n = 11;
-        let mut positions = Vec::new();
-        for row in 0..=20u32 {
-            for i in 0..n {
-                let x = 0.01 * f64::from(i);
-                let place = match row {
-                    0..=9 => DVec3::new(x, 0.0, 0.01 * f64::from(row)),
-                    10 => DVec3::new(x, 0.15, 0.1),
-                    _ => DVec3::new(x, 0.3, 0.01 * f64::from(20 - row)),
-                };
-                positions.push(place);
-            }
-        }
-        let cell = |row: u32, i: u32| {
-            let a = row * n + i;
-            [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]
-        };
-        let triangles = (0..20).flat_map(|row| (0..n - 1).flat_map(move |i| cell(row, i))).collect();
-        TriMesh::new(positions, triangles)
+        // Ten rows up, ten down.
+        sheet(10, 20, |i, row| {
+            DVec3::new(i, 15.0 * (1.0 + (row - 10.0).clamp(-1.0, 1.0)), 10.0 - (row - 10.0).abs()) * 0.01
+        })
     }
 
     #[test]

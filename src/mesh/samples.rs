@@ -1,5 +1,7 @@
 //! Meshes that tests are made with.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 
 use super::TriMesh;
@@ -17,10 +19,19 @@ pub(crate) fn cuboid(low: DVec3, high: DVec3) -> TriMesh {
 
 /// So many squares side by side in so many rows, two triangles each; the vertices, row by row, are where `at` has the corners.
 pub(crate) fn sheet(columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
-    let corners = (0..=rows).flat_map(|j| (0..=columns).map(move |i| (f64::from(i), f64::from(j))));
+    squares(columns + 1, columns, rows, at)
+}
+
+/// A [`sheet`] whose sides are joined, open at both ends; `at` is told angle and row, and is outside where rows go up.
+pub(crate) fn tube(around: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    squares(around, around, rows, |i, j| at(TAU * i / f64::from(around), j))
+}
+
+fn squares(row: u32, columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+    let corners = (0..=rows).flat_map(|j| (0..row).map(move |i| (f64::from(i), f64::from(j))));
     let square = |i: u32, j: u32| {
-        let [a, b] = [j, j + 1].map(|row| row * (columns + 1) + i);
-        [[a, a + 1, b + 1], [a, b + 1, b]]
+        let [[a, b], [c, d]] = [j, j + 1].map(|j| [i, i + 1].map(|i| j * row + i % row));
+        [[a, b, d], [a, d, c]]
     };
     let triangles = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| square(i, j))).collect();
     TriMesh::new(corners.map(|(i, j)| at(i, j)).collect(), triangles)

@@ -124,20 +124,15 @@ mod tests {
     use super::super::Tree;
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::mesh::samples::tube;
 
     /// A ball of `rings` by `around` quads, dented; the pole's triangles are slivers where there are many.
     fn ball(rings: u32, around: u32, dent: f64) -> TriMesh {
-        let at = |i: u32, j: u32| {
-            let (s, c) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
-            let (y, x) = (std::f64::consts::TAU * f64::from(j % around) / f64::from(around)).sin_cos();
+        tube(around, rings, |angle, ring| {
+            let (s, c) = (std::f64::consts::PI * (1.0 - ring / f64::from(rings))).sin_cos();
+            let (y, x) = angle.sin_cos();
             DVec3::new(s * x, s * y, c) * (0.3 + dent * (7.0 * c + 3.0 * x).sin())
-        };
-        let positions = (0..=rings).flat_map(|i| (0..around).map(move |j| at(i, j))).collect();
-        let quad = |i: u32, j: u32| {
-            let [a, b] = [i * around + j, i * around + (j + 1) % around];
-            [[a, a + around, b], [b, a + around, b + around]]
-        };
-        TriMesh::new(positions, (0..rings).flat_map(|i| (0..around).flat_map(move |j| quad(i, j))).collect())
+        })
     }
 
     fn by_brute_force(mesh: &TriMesh, p: DVec3) -> f64 {
