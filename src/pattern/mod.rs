@@ -159,18 +159,4 @@ impl SewingPattern {
     pub fn edge_name(&self, at: EdgeAt) -> String {
         format!("{}.{}", self.panels[at.panel].name, at.edge)
     }
-
-    /// Meshes the panels with edges of about `edge_m` (m) and sews them together.
-    ///
-    /// # Errors
-    /// [`PatternError`] where that makes too many vertices or a panel has no mesh.
-    pub fn sew(&self, edge_m: f64) -> Result<SewnGarment, PatternError> {
-        sew::sew(self, edge_m)
-    }
-
-    /// The pattern as a drawing in its true size: panels with grain, labels, and their seams numbered.
-    #[must_use]
-    pub fn to_svg(&self) -> String {
-        draw::svg(self)
-    }
 }
