@@ -39,6 +39,12 @@ pub struct Pacing {
     pub iterations: usize,
 }
 
+impl Default for Pacing {
+    fn default() -> Self {
+        Self { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 }
+    }
+}
+
 /// The cloth of a method; as an operator, its stiffness where it was last looked at.
 pub trait Elastic: Operator {
     /// Adds the cloth's force at `x`, N, and keeps its stiffness there.

@@ -195,11 +195,6 @@ pub fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<
     }
 }
 
-/// An onlooker for who does not look.
-pub fn unwatched(_: &Moment<'_>) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 /// Durations by name, in the order they were begun first, since it began.
 #[derive(Debug, Clone)]
 struct Stopwatch {

@@ -39,19 +39,12 @@ use rest_patch::laid_flat;
 pub const NAME: &str = "thomaszewski2006";
 
 /// The method with its dials.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Thomaszewski2006 {
     /// How it is moved in time.
     pub pacing: Pacing,
     /// Whether the limit surface is to be shown.
     pub exhibit: bool,
-}
-
-impl Default for Thomaszewski2006 {
-    fn default() -> Self {
-        let pacing = Pacing { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
-        Self { pacing, exhibit: false }
-    }
 }
 
 impl ReferenceMethod for Thomaszewski2006 {

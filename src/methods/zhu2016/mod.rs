@@ -42,8 +42,7 @@ pub struct Zhu2016 {
 
 impl Default for Zhu2016 {
     fn default() -> Self {
-        let pacing = Pacing { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
-        Self { pacing, strain_limit: 0.1, exhibit: false }
+        Self { pacing: Pacing::default(), strain_limit: 0.1, exhibit: false }
     }
 }
 
