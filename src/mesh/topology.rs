@@ -6,7 +6,7 @@
 use super::lists::Lists;
 use super::{TriMesh, pieces};
 
-/// No triangle on that side of an edge.
+/// None there: no triangle on that side of an edge, no further vertex in a list of fixed length, no parent in a tree.
 pub const NONE: u32 = u32::MAX;
 
 /// The connectivity of a [`TriMesh`].

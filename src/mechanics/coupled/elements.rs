@@ -19,9 +19,12 @@ const ENOUGH: f64 = 12.0;
 /// The PARTs of elements of one kind.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Elements {
-    parts: Lists<u32>,
-    weights: Lists<f64>,
-    pairs: Lists<Pair>,
+    /// PARTs of each element, ascending.
+    pub(super) parts: Lists<u32>,
+    /// Their weights at its vertices, PART after PART.
+    pub(super) weights: Lists<f64>,
+    /// The pairs of its PARTs.
+    pub(super) pairs: Lists<Pair>,
     /// The elements that are sampled, and how many each stands for.
     pub(super) sampled: Vec<(u32, f64)>,
 }
@@ -65,41 +68,22 @@ impl Elements {
     fn sample(&mut self, parts: usize) {
         const GOLDEN: f64 = 0.618_033_988_749_895;
         let mut size = vec![0.0; parts];
-        for i in 0..self.len() {
-            let list = self.parts(i);
+        for i in 0..self.parts.len() {
+            let list = self.parts.of(i);
             for &p in list {
                 size[p as usize] += 1.0 / list.len() as f64;
             }
         }
-        for i in 0..self.len() {
-            let rate = self.parts(i).iter().map(|&p| ENOUGH / size[p as usize]).fold(0.0, f64::max).min(1.0);
+        for i in 0..self.parts.len() {
+            let rate = self.parts.of(i).iter().map(|&p| ENOUGH / size[p as usize]).fold(0.0, f64::max).min(1.0);
             if (i as f64 * GOLDEN).fract() < rate {
                 self.sampled.push((i as u32, rate.recip()));
             }
         }
     }
 
-    fn len(&self) -> usize {
-        self.parts.len()
-    }
-
-    /// PARTs of an element, ascending.
-    pub(super) fn parts(&self, i: usize) -> &[u32] {
-        self.parts.of(i)
-    }
-
-    /// Their weights at its vertices, PART after PART.
-    pub(super) fn weights(&self, i: usize) -> &[f64] {
-        self.weights.of(i)
-    }
-
-    /// The pairs of its PARTs.
-    pub(super) fn pairs(&self, i: usize) -> &[Pair] {
-        self.pairs.of(i)
-    }
-
     fn lay_out(&mut self, motions: &Motions, columns: &[Vec<(u32, u32)>]) {
-        for i in 0..self.len() {
+        for i in 0..self.parts.len() {
             let list = self.parts.of(i);
             let pair = |k: usize, l: usize| {
                 let [p, q] = [k, l].map(|place| motions.first[list[place] as usize]);
@@ -141,7 +125,7 @@ impl Layout {
         );
         let neighbours = neighbours(parts, &[&triangles, &rings]);
         let free: Vec<u32> = (0..parts as u32).filter(|&p| motions.count[p as usize] > 0).collect();
-        let order = nested_dissection(free, motions.centres(), &neighbours);
+        let order = nested_dissection(free, &motions.centre, &neighbours);
         motions.number(order.iter().copied());
         // Of each PART itself and its later neighbours, by first unknown, with the pair's number.
         let mut columns: Vec<Vec<(u32, u32)>> = vec![Vec::new(); parts];
@@ -179,8 +163,8 @@ fn neighbours(parts: usize, all: &[&Elements]) -> Adjacency {
     let mut pairs: Vec<[u32; 2]> = Vec::new();
     for elements in all {
         let mut last: &[u32] = &[];
-        for i in 0..elements.len() {
-            let list = elements.parts(i);
+        for i in 0..elements.parts.len() {
+            let list = elements.parts.of(i);
             // Inside a PART one element is like the one before.
             if list != last {
                 for (k, &p) in list.iter().enumerate() {

@@ -69,7 +69,8 @@ pub struct Motions {
     pub(super) first: Vec<u32>,
     /// Unknowns of each PART: 0, 1 or 4.
     pub(super) count: Vec<u8>,
-    centre: Vec<DVec3>,
+    /// The middles c_p, m.
+    pub(super) centre: Vec<DVec3>,
     axes: Vec<[DVec3; 3]>,
     unknowns: usize,
 }
@@ -111,11 +112,6 @@ impl Motions {
     #[must_use]
     pub fn unknowns(&self) -> usize {
         self.unknowns
-    }
-
-    /// The middles c_p, m.
-    pub(super) fn centres(&self) -> &[DVec3] {
-        &self.centre
     }
 
     /// Takes middles and axes from `x`.

@@ -104,7 +104,7 @@ fn triangles<L: Lanes>(
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();
-        for (&p, weights) in all.parts(i).iter().zip(all.weights(i).chunks_exact(3)) {
+        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(3)) {
             let (mut u, mut v) = (Pack::splat(l, 0.0), Pack::splat(l, 0.0));
             for ((&vertex, gradient), &w) in t.vertices.iter().zip(&t.gradients).zip(weights) {
                 let f = functions[p as usize].at(l, w, x[vertex as usize]);
@@ -113,7 +113,7 @@ fn triangles<L: Lanes>(
             }
             gradients.push([u.store(), v.store()]);
         }
-        for pair in all.pairs(i) {
+        for pair in all.pairs.of(i) {
             let (a, b) = (&gradients[pair.row as usize], &gradients[pair.column as usize]);
             add_full(l, &mut sums.full[pair.number as usize], a, b, &h);
         }
@@ -153,7 +153,7 @@ fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<
         sampled.next();
         let stiffness = stiffness * standing_for;
         fits.clear();
-        for (&p, weights) in all.parts(i).iter().zip(all.weights(i).chunks_exact(vertices.len())) {
+        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(vertices.len())) {
             let zero = Pack::splat(l, 0.0);
             let (mut fx, mut fy, mut fz) = (zero, zero, zero);
             for ((&v, r), &w) in vertices.iter().zip(ring).zip(weights) {
@@ -166,7 +166,7 @@ fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<
             }
             fits.push([fx.store(), fy.store(), fz.store()]);
         }
-        for pair in all.pairs(i) {
+        for pair in all.pairs.of(i) {
             let (a, b) = (&fits[pair.row as usize], &fits[pair.column as usize]);
             let ax = Pack::load(l, &a[0]) * stiffness.x;
             let ay = Pack::load(l, &a[1]) * stiffness.y;
@@ -187,7 +187,7 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
     for (v, x) in x.iter().enumerate() {
         values_at(l, functions, all, v, *x, &mut values);
         let mass = Pack::splat(l, cloth.masses[v] * damping);
-        for pair in all.pairs(v) {
+        for pair in all.pairs.of(v) {
             let a = Pack::load(l, &values[pair.row as usize]) * mass;
             let b = &values[pair.column as usize];
             for (slot, b) in sums.scalar[pair.number as usize].iter_mut().zip(b.0) {
@@ -199,7 +199,7 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
         let v = v as usize;
         values_at(l, functions, all, v, x[v], &mut values);
         let entries = block.to_cols_array();
-        for pair in all.pairs(v) {
+        for pair in all.pairs.of(v) {
             let a = Pack::load(l, &values[pair.row as usize]);
             let b = &values[pair.column as usize];
             let sum = &mut sums.full[pair.number as usize];
@@ -217,7 +217,7 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
 #[inline(always)]
 fn values_at<L: Lanes>(l: L, functions: &[Functions], all: &Elements, v: usize, x: DVec3, values: &mut Vec<Four>) {
     values.clear();
-    for (&p, &w) in all.parts(v).iter().zip(all.weights(v)) {
+    for (&p, &w) in all.parts.of(v).iter().zip(all.weights.of(v)) {
         values.push(functions[p as usize].at(l, w, x).store());
     }
 }

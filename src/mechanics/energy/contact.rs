@@ -57,7 +57,7 @@ pub(super) enum Met<'b> {
     #[default]
     Nothing,
     /// The exact distance's tangent plane where it was last asked.
-    Planes(&'b Body, Vec<DVec3>),
+    Planes(&'b Body),
     Rounded(Field<'b>),
 }
 
@@ -71,6 +71,8 @@ pub struct Contacts<'b> {
     pub(super) held: Vec<bool>,
     pub(super) asked_at: Vec<DVec3>,
     pub(super) answer: Vec<f64>,
+    /// Normals of the tangent planes, zero where never asked.
+    normals: Vec<DVec3>,
     /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
     pub(super) leave: Vec<f64>,
     /// The vertices that may be near, of the last [`update`](Self::update).
@@ -110,6 +112,7 @@ impl<'b> Contacts<'b> {
             held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],
             answer: vec![f64::NEG_INFINITY; n],
+            normals: vec![DVec3::ZERO; n],
             // Who is held is never asked.
             leave: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
             stiffness,
@@ -122,12 +125,7 @@ impl<'b> Contacts<'b> {
     /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
     pub fn by_planes(self) -> Self {
-        let n = self.areas.len();
-        let met = match self.met {
-            Met::Rounded(field) => Met::Planes(field.body(), vec![DVec3::ZERO; n]),
-            others => others,
-        };
-        Self { met, ..self }
+        Self { met: self.body().map_or(Met::Nothing, Met::Planes), ..self }
     }
 
     /// κ, N/m³.
@@ -144,18 +142,14 @@ impl<'b> Contacts<'b> {
     /// Finds what touches at `x`. Same bits on any number of threads.
     pub fn update(&mut self, x: &[DVec3]) {
         self.touches.clear();
-        match self.met {
-            Met::Nothing => return,
-            Met::Planes(..) => return self.update_planes(x),
-            Met::Rounded(_) => {}
+        if let Met::Planes(body) = self.met {
+            return self.update_planes(body, x);
         }
         self.bound(x);
         self.find_near(x);
+        let Met::Rounded(field) = &mut self.met else { return };
         let near = std::mem::take(&mut self.near);
-        let found = match &mut self.met {
-            Met::Nothing | Met::Planes(..) => Vec::new(),
-            Met::Rounded(field) => field.at(&near, x),
-        };
+        let found = field.at(&near, x);
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
             self.keep(v, x[v], distance);
@@ -191,28 +185,20 @@ impl<'b> Contacts<'b> {
     }
 
     /// [`update`](Self::update) by planes.
-    fn update_planes(&mut self, x: &[DVec3]) {
+    fn update_planes(&mut self, body: &Body, x: &[DVec3]) {
         self.find_near(x);
         let near = std::mem::take(&mut self.near);
-        let Met::Planes(body, normals) = &self.met else { return };
-        let body = *body;
-        // What was never asked has no normal.
-        let stale = |&&v: &&u32| {
-            let v = v as usize;
-            normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
-        };
-        let stale: Vec<usize> = near.iter().filter(stale).map(|&v| v as usize).collect();
+        let stale =
+            |&v: &usize| self.normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE;
+        let stale: Vec<usize> = near.iter().map(|&v| v as usize).filter(stale).collect();
         let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());
         for (v, found) in stale.into_iter().zip(found) {
             self.keep(v, x[v], found.signed_distance);
-            if let Met::Planes(_, normals) = &mut self.met {
-                normals[v] = found.normal;
-            }
+            self.normals[v] = found.normal;
         }
         for &vertex in &near {
             let v = vertex as usize;
-            let Met::Planes(_, normals) = &self.met else { return };
-            let (normal, moved) = (normals[v], x[v] - self.asked_at[v]);
+            let (normal, moved) = (self.normals[v], x[v] - self.asked_at[v]);
             self.touch(vertex, self.answer[v] + normal.dot(moved), normal);
         }
         self.near = near;
@@ -250,7 +236,7 @@ impl<'b> Contacts<'b> {
     pub(super) fn body(&self) -> Option<&'b Body> {
         match &self.met {
             Met::Nothing => None,
-            Met::Planes(body, _) => Some(*body),
+            Met::Planes(body) => Some(body),
             Met::Rounded(field) => Some(field.body()),
         }
     }

@@ -13,29 +13,13 @@ pub(crate) type Held = (Vec<(u32, f64)>, DMat3);
 impl Cloth {
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
     pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.hessian_in(self.layout(), x, contacts, blocks);
-    }
-
-    /// The same in the blocks of another layout.
-    pub(crate) fn hessian_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(layout, false, x, contacts, blocks);
+        self.hessian_in(self.layout(), false, x, contacts, blocks);
     }
 
     /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`membrane`](super::membrane). Closer
     /// than [`hessian`](Self::hessian), and not always positive.
     pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.hessian_bearing_in(self.layout(), x, contacts, blocks);
-    }
-
-    /// The same in the blocks of another layout.
-    pub(crate) fn hessian_bearing_in(
-        &self,
-        layout: &HessianLayout,
-        x: &[DVec3],
-        contacts: &Contacts,
-        blocks: &mut Vec<DMat3>,
-    ) {
-        self.assemble(layout, true, x, contacts, blocks);
+        self.hessian_in(self.layout(), true, x, contacts, blocks);
     }
 
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
@@ -62,7 +46,8 @@ impl Cloth {
         }
     }
 
-    fn assemble(
+    /// One or the other, `bearing` compression or positive, in the blocks of any layout.
+    pub(crate) fn hessian_in(
         &self,
         layout: &HessianLayout,
         bearing: bool,
@@ -143,8 +128,8 @@ mod tests {
         let layout = cloth.layout_with(&x, proximity.pairs());
         assert!(layout.pattern.rows.len() > cloth.pattern().rows.len(), "no block was added for them");
         let (mut blocks, mut without) = (Vec::new(), Vec::new());
-        cloth.hessian_in(&layout, &x, &contacts, &mut blocks);
-        cloth.hessian_in(&layout, &x, &Contacts::none(), &mut without);
+        cloth.hessian_in(&layout, false, &x, &contacts, &mut blocks);
+        cloth.hessian_in(&layout, false, &x, &Contacts::none(), &mut without);
         blocks.iter_mut().zip(without).for_each(|(a, b)| *a -= b);
         let force = |x: &[DVec3]| -> Vec<DVec3> {
             let (mut with, mut without) = (Vec::new(), Vec::new());

@@ -28,20 +28,11 @@ pub(super) fn partial<T: Precision>(panel: MatMut<'_, T>, memory: &mut MemBuffer
     let n = panel.ncols();
     if n <= WIDE {
         let (mut top, bottom) = panel.split_at_row_mut(n);
-        let LltError::NonPositivePivot { index } = match cholesky_in_place(
-            top.rb_mut(),
-            Default::default(),
-            Par::Seq,
-            MemStack::new(memory),
-            Default::default(),
-        ) {
-            Ok(_) => {
-                below(top.rb(), bottom);
-                return Ok(());
-            }
-            Err(lost) => lost,
-        };
-        return Err(index);
+        let memory = MemStack::new(memory);
+        cholesky_in_place(top.rb_mut(), Default::default(), Par::Seq, memory, Default::default())
+            .map_err(|LltError::NonPositivePivot { index }| index)?;
+        below(top.rb(), bottom);
+        return Ok(());
     }
     let half = (n / 2).next_multiple_of(16);
     let (mut left, right) = panel.split_at_col_mut(half);

@@ -9,10 +9,7 @@
 //! All of it is in blocks of 3 by 3: a ninth of the work that scalars would take.
 
 use crate::mechanics::energy::pattern::Pattern;
-use crate::mesh::Lists;
-
-/// No parent.
-pub(super) const NONE: u32 = u32::MAX;
+use crate::mesh::{Lists, NONE, renumbered};
 
 /// Up to so many columns may be put together with that share of zeros.
 const RELAXED: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
@@ -136,14 +133,7 @@ fn relax(node: &mut Supernode, nodes: &mut [Supernode]) {
 
 /// Without those that were taken in, and with parents.
 fn tidy(mut nodes: Vec<Supernode>) -> Vec<Supernode> {
-    let mut number = vec![NONE; nodes.len()];
-    let mut kept = 0;
-    for (new, node) in number.iter_mut().zip(&nodes) {
-        if !node.columns.is_empty() {
-            *new = kept;
-            kept += 1;
-        }
-    }
+    let number = renumbered(nodes.len(), |s| !nodes[s].columns.is_empty());
     nodes.retain(|node| !node.columns.is_empty());
     for s in 0..nodes.len() {
         let mut children = std::mem::take(&mut nodes[s].children);

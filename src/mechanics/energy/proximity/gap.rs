@@ -4,9 +4,7 @@ use glam::{DMat3, DVec3};
 
 use crate::mechanics::energy::friction::{ELASTIC_SLIP, huber, stiffening};
 use crate::mechanics::energy::membrane::outer;
-
-/// No vertex: fills up a place that needs fewer.
-pub(super) const NONE: u32 = u32::MAX;
+use crate::mesh::NONE;
 
 /// A gap that has faded to less than this share of its stiffness is gone.
 const FADED: f64 = 1e-3;

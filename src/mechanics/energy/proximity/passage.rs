@@ -107,7 +107,8 @@ impl Passage {
         pairs.retain(|pair| {
             let [a, b] = pair.map(|t| self.skin.triangles[t as usize]);
             let frail = |corners: [u32; 3]| corners.iter().any(|&v| self.skin.frail[v as usize]);
-            let near = a.iter().any(|v| b.contains(v) || self.skin.neighbours(*v).iter().any(|w| b.contains(w)));
+            let beside = |v: u32| self.skin.topology.neighbours(v).iter().any(|w| b.contains(w));
+            let near = a.iter().any(|v| b.contains(v) || beside(*v));
             !(near && (frail(a) || frail(b)))
         });
         pairs
@@ -117,7 +118,7 @@ impl Passage {
     fn around<'a>(&self, triangles: impl Iterator<Item = &'a u32>, rings: usize) -> Vec<u32> {
         let mut found = each_once(triangles.flat_map(|&t| self.skin.triangles[t as usize]));
         for _ in 0..rings {
-            let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.neighbours(v)).copied().collect();
+            let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.topology.neighbours(v)).copied().collect();
             found = each_once(found.into_iter().chain(next));
         }
         found

@@ -17,9 +17,10 @@ use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
 use super::Apart;
-use super::gap::{Gap, Key, Kind, NONE};
+use super::gap::{Gap, Key, Kind};
 use super::near::Near;
 use super::skin::Skin;
+use crate::mesh::NONE;
 
 /// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.
 const COINCIDENT: f64 = 1e-9;
@@ -169,7 +170,7 @@ impl Look<'_> {
     fn belongs(&self, gap: &Gap) -> bool {
         let (one, other): (Vec<_>, Vec<_>) = gap.members().partition(|(_, w)| *w > 0.0);
         let near = |(a, _): &(u32, f64)| {
-            let around = self.skin.neighbours(*a);
+            let around = self.skin.topology.neighbours(*a);
             other.iter().any(|(b, _)| around.contains(b))
         };
         one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize])

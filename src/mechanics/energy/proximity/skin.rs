@@ -1,9 +1,7 @@
 //! What the search for gaps needs to know of a cloth, made once: which triangle looks for which vertices and edges.
 
 use crate::mechanics::energy::membrane::Triangle;
-use crate::mesh::Topology;
-
-use super::gap::NONE;
+use crate::mesh::{NONE, Topology};
 
 /// The surface of a cloth, each vertex and each edge owned by one triangle.
 #[derive(Debug, Clone)]
@@ -68,11 +66,6 @@ impl Skin {
         // Of equilateral triangles with this area.
         skin.edge_m = (4.0 * total / (3.0_f64.sqrt() * triangles.len().max(1) as f64)).sqrt();
         skin
-    }
-
-    /// The vertices that share an edge with `v`, ascending.
-    pub(super) fn neighbours(&self, v: u32) -> &[u32] {
-        self.topology.neighbours(v)
     }
 }
 

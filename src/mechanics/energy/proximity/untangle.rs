@@ -16,8 +16,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::gap::{Gap, Key, Kind, NONE};
+use super::gap::{Gap, Key, Kind};
 use super::skin::Skin;
+use crate::mesh::NONE;
 
 /// How far a crossing edge is asked to go between two looks, in edges.
 const STRIDE: f64 = 0.5;
