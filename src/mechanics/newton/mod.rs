@@ -157,7 +157,7 @@ impl<'c, 'b> Descent<'c, 'b> {
 
     /// The same with relaxations that end where the last iterations brought less than this share of what all brought.
     pub(crate) fn relaxed_to(mut self, share: f64) -> Self {
-        self.relaxation = self.relaxation.ending_at(share);
+        self.relaxation.ending = share;
         self
     }
 

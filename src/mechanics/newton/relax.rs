@@ -57,7 +57,7 @@ pub(crate) struct Relaxation {
     energies: Vec<f64>,
     scratch: Scratch,
     /// Share of the decrease under which the last iterations end a call; 0 never does.
-    ending: f64,
+    pub(super) ending: f64,
 }
 
 impl Relaxation {
@@ -73,12 +73,6 @@ impl Relaxation {
         for (v, (block, _)) in own.iter().zip(&cloth.held).enumerate().filter(|(_, (_, held))| !**held) {
             self.inverse.set(v, block.inverse());
         }
-    }
-
-    /// Ends a relaxation whose last iterations brought less than this share of what all brought.
-    pub(crate) fn ending_at(mut self, share: f64) -> Self {
-        self.ending = share;
-        self
     }
 
     /// Up to `iterations` from `x`, where `contacts` must be up to date and are afterwards; returns the energy, J.

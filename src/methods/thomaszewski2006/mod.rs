@@ -30,7 +30,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::march::{Course, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
+use super::{Dressing, Exhibit, MethodDrape, MethodError, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use elements::{Elements, Made};
 use patch::{Around, Irregular, around_all, derivatives, limit_stencil};
 use rest_patch::laid_flat;
@@ -52,12 +52,7 @@ impl ReferenceMethod for Thomaszewski2006 {
         NAME
     }
 
-    fn run(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
         let mut watch = Stopwatch::begin();
         let Dressing { scene, fabric, cloth } = dressing;
         let around = watch.time("patches", || fans(dressing))?;
