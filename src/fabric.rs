@@ -115,6 +115,12 @@ impl Fabric {
         }
     }
 
+    /// Bending stiffness of all directions on average, N·m.
+    pub(crate) fn mean_bending_nm(&self) -> f64 {
+        let [weft, bias, warp] = self.bending_nm;
+        0.25 * (weft + 2.0 * bias + warp)
+    }
+
     /// Reads a fabric from TOML; `file` is named in errors.
     pub fn parse(text: &str, file: &str) -> Result<Self, FabricError> {
         let fabric: Self = toml::from_str(text)

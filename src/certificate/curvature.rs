@@ -46,7 +46,7 @@ impl Curvature {
         let pairs = pushing().flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])));
         let layout = cloth.layout_with(x, pairs);
         let mut blocks = Vec::new();
-        cloth.hessian_in(&layout, x, &Contacts::none(), &mut blocks);
+        cloth.hessian_in(&layout, false, x, &Contacts::none(), &mut blocks);
         let mut held = Vec::new();
         for t in pushing() {
             let along = outer(t.normal, t.normal);

@@ -7,6 +7,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::mesh::box_about;
+
 /// Steps along the longest side.
 const STEPS: f64 = 1023.0;
 
@@ -15,8 +17,7 @@ const ALONE: usize = 4096;
 
 /// The numbers of `points` in their order along the curve; of those in one place the first comes first.
 pub(super) fn along_a_curve(points: &[DVec3]) -> Vec<u32> {
-    let bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = points.iter().fold(bounds, |(low, high), p| (low.min(*p), high.max(*p)));
+    let (low, high) = box_about(points.iter().copied());
     let side = (high - low).max_element();
     let scale = if side > 0.0 { STEPS / side } else { 0.0 };
     let key = |p: &DVec3| {

@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::Body;
 use crate::mesh::lattice::{lattice, place};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
-use crate::mesh::{Topology, TriMesh};
+use crate::mesh::{Topology, TriMesh, longest_side};
 
 /// A way out of the body leads out of the cloth where its cosine with the cloth's normal is over this.
 pub(crate) const OUTWARD: f64 = 0.3;
@@ -85,7 +85,7 @@ impl Body {
         let corners = mesh.corners(t);
         let [a, b, c] = corners;
         let way = (b - a).cross(c - a).normalize_or_zero();
-        let shares: Vec<[f64; 3]> = lattice(a.distance(b).max(b.distance(c)).max(c.distance(a))).collect();
+        let shares: Vec<[f64; 3]> = lattice(longest_side(corners)).collect();
         let places: Vec<DVec3> = shares.iter().map(|shares| place(corners, *shares)).collect();
         let near = self.nearest_all(&places);
         if !near.iter().any(|p| p.signed_distance < -DEEP && p.normal.dot(way) < OUTWARD) {
@@ -170,39 +170,14 @@ fn region(mesh: &TriMesh, topology: &Topology, held: &[bool], stuck: &[Stuck]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
-
-    /// A tube about the z axis, open at both ends, wound outward.
-    fn tube(radius: f64, low: f64, high: f64, around: u32, along: u32) -> TriMesh {
-        let at = |i: u32, j: u32| {
-            let a = TAU * f64::from(i) / f64::from(around);
-            DVec3::new(radius * a.cos(), radius * a.sin(), low + (high - low) * f64::from(j) / f64::from(along))
-        };
-        let positions = (0..=along).flat_map(|j| (0..around).map(move |i| at(i, j))).collect();
-        let squares = (0..along).flat_map(|j| (0..around).map(move |i| (i, j)));
-        let triangles = squares.flat_map(|(i, j)| {
-            let [a, b] = [j * around + i, j * around + (i + 1) % around];
-            [[a, b, b + around], [a, b + around, a + around]]
-        });
-        TriMesh::new(positions, triangles.collect())
-    }
-
-    /// A box from `low` to `high`.
-    fn cuboid(low: DVec3, high: DVec3) -> Body {
-        let corner = |i: usize| {
-            let of = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
-            DVec3::new(of(0, low.x, high.x), of(1, low.y, high.y), of(2, low.z, high.z))
-        };
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
-    }
+    use crate::mesh::samples::{cuboid, tube};
 
     #[test]
     fn a_foot_through_a_trouser_leg_is_inside_it_afterwards() {
         // As thick as an edge is long, so that no vertex need be in it, 6 cm out of the leg.
-        let leg = tube(0.08, 0.0, 0.4, 36, 28);
-        let toes = |length: f64| cuboid(DVec3::new(-0.05, -0.03, 0.02), DVec3::new(length, 0.03, 0.032));
+        let leg = tube(36, 28, |a, row| DVec3::new(0.08 * a.cos(), 0.08 * a.sin(), 0.4 * row / 28.0));
+        let toes =
+            |length: f64| Body::new(&cuboid(DVec3::new(-0.05, -0.03, 0.02), DVec3::new(length, 0.03, 0.032))).unwrap();
         let foot = toes(0.14);
         let held = vec![false; leg.positions.len()];
         assert!(foot.stuck(&leg).len() > 8);

@@ -44,13 +44,11 @@ impl Body {
 mod tests {
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::mesh::samples::cuboid;
 
     #[test]
     fn values_are_distances_whoever_asked_before_and_those_of_a_dressed_body_are_its_own() {
-        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) * 0.02;
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let body = Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap();
+        let body = Body::new(&cuboid(DVec3::ZERO, DVec3::splat(0.02))).unwrap();
         let points = [IVec3::new(2, 2, 6), IVec3::new(-1, 2, 2), IVec3::new(2, 2, 6), IVec3::new(2, 1, 3)];
         let exact = |body: &Body| points.map(|i| body.nearest(i.as_dvec3() * LATTICE_SIDE).signed_distance);
         assert_eq!(body.at_lattice(&points[..2]), exact(&body)[..2]);

@@ -22,7 +22,7 @@ use glam::DVec3;
 use search::Search;
 
 use crate::lanes::{Four, run};
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, box_about};
 
 /// Boxes of a node, triangles of a leaf.
 const WIDE: usize = 4;
@@ -113,8 +113,7 @@ impl Tree {
             }
         }
         self.nodes[number] = Node::of(&children);
-        let low = children.iter().fold(DVec3::INFINITY, |low, child| low.min(child.low));
-        let high = children.iter().fold(DVec3::NEG_INFINITY, |high, child| high.max(child.high));
+        let (low, high) = box_about(children.iter().flat_map(|child| [child.low, child.high]));
         Child { low, high, number: number as u32 }
     }
 
@@ -160,9 +159,7 @@ impl Tree {
 
 /// Half of the triangles and the other half, whole leaves but the last.
 fn halves<'a>(order: &'a mut [u32], middles: &[DVec3]) -> (&'a mut [u32], &'a mut [u32]) {
-    let (low, high) = order.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &t| {
-        (low.min(middles[t as usize]), high.max(middles[t as usize]))
-    });
+    let (low, high) = box_about(order.iter().map(|&t| middles[t as usize]));
     let extent = high - low;
     let axis = (0..3).fold(0, |most, axis| if extent[axis] > extent[most] { axis } else { most });
     let half = WIDE * order.len().div_ceil(WIDE).div_ceil(2);

@@ -6,8 +6,23 @@ use pulp::x86::V3;
 
 use super::{Four, Lanes};
 
+macro_rules! intrinsics {
+    ($($function:ident $intrinsic:ident $(::<$imm:literal>)?)*) => {
+        $(#[inline(always)]
+        fn $function(self, a: __m256d, b: __m256d) -> __m256d {
+            self.avx.$intrinsic$(::<$imm>)?(a, b)
+        })*
+    };
+}
+
 impl Lanes for V3 {
     type Register = __m256d;
+
+    intrinsics!(add _mm256_add_pd sub _mm256_sub_pd mul _mm256_mul_pd div _mm256_div_pd max _mm256_max_pd);
+    intrinsics!(even _mm256_unpacklo_pd odd _mm256_unpackhi_pd);
+    intrinsics!(mixed _mm256_shuffle_pd::<0b1010> crossed _mm256_shuffle_pd::<0b0101>);
+    intrinsics!(low _mm256_permute2f128_pd::<0x20> high _mm256_permute2f128_pd::<0x31>);
+    intrinsics!(low_high _mm256_permute2f128_pd::<0x30> high_low _mm256_permute2f128_pd::<0x21>);
 
     #[inline(always)]
     fn load(self, four: &Four) -> __m256d {
@@ -25,77 +40,12 @@ impl Lanes for V3 {
     }
 
     #[inline(always)]
-    fn add(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_add_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn sub(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_sub_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn mul(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_mul_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn div(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_div_pd(a, b)
-    }
-
-    #[inline(always)]
     fn sqrt(self, a: __m256d) -> __m256d {
         self.avx._mm256_sqrt_pd(a)
     }
 
     #[inline(always)]
-    fn max(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_max_pd(a, b)
-    }
-
-    #[inline(always)]
     fn where_negative(self, test: __m256d, a: __m256d, b: __m256d) -> __m256d {
         self.avx._mm256_blendv_pd(b, a, test)
-    }
-
-    #[inline(always)]
-    fn even(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_unpacklo_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn odd(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_unpackhi_pd(a, b)
-    }
-
-    #[inline(always)]
-    fn mixed(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_shuffle_pd::<0b1010>(a, b)
-    }
-
-    #[inline(always)]
-    fn crossed(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_shuffle_pd::<0b0101>(a, b)
-    }
-
-    #[inline(always)]
-    fn low(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_permute2f128_pd::<0x20>(a, b)
-    }
-
-    #[inline(always)]
-    fn high(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_permute2f128_pd::<0x31>(a, b)
-    }
-
-    #[inline(always)]
-    fn low_high(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_permute2f128_pd::<0x30>(a, b)
-    }
-
-    #[inline(always)]
-    fn high_low(self, a: __m256d, b: __m256d) -> __m256d {
-        self.avx._mm256_permute2f128_pd::<0x21>(a, b)
     }
 }

@@ -165,6 +165,15 @@ operator!(Add, add);
 operator!(Sub, sub);
 operator!(Mul, mul);
 
+impl<L: Lanes> Mul<f64> for Pack<L> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, b: f64) -> Self {
+        self * Self::splat(self.lanes, b)
+    }
+}
+
 /// Four vectors of space, by coordinate.
 #[derive(Clone, Copy)]
 pub(crate) struct Vectors<L: Lanes> {
@@ -174,6 +183,11 @@ pub(crate) struct Vectors<L: Lanes> {
 }
 
 impl<L: Lanes> Vectors<L> {
+    #[inline(always)]
+    pub(crate) fn load(l: L, [x, y, z]: &[Four; 3]) -> Self {
+        Self { x: Pack::load(l, x), y: Pack::load(l, y), z: Pack::load(l, z) }
+    }
+
     /// From one vector and a fourth number in each register.
     #[inline(always)]
     pub(crate) fn from_rows(l: L, [a, b, c, d]: [L::Register; 4]) -> Self {
@@ -216,14 +230,20 @@ impl<L: Lanes> Vectors<L> {
     }
 }
 
-impl<L: Lanes> Add for Vectors<L> {
-    type Output = Self;
+macro_rules! by_coordinate {
+    ($trait:ident, $function:ident) => {
+        impl<L: Lanes> $trait for Vectors<L> {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        Self { x: self.x + b.x, y: self.y + b.y, z: self.z + b.z }
-    }
+            #[inline(always)]
+            fn $function(self, b: Self) -> Self {
+                Self { x: self.x.$function(b.x), y: self.y.$function(b.y), z: self.z.$function(b.z) }
+            }
+        }
+    };
 }
+by_coordinate!(Add, add);
+by_coordinate!(Sub, sub);
 
 impl<L: Lanes> Mul<Pack<L>> for Vectors<L> {
     type Output = Self;

@@ -78,16 +78,8 @@ pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::distance::Body;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology, TriMesh};
-
-    /// A box of 1 m with its top at z = 0.
-    fn table() -> TriMesh {
-        let corner = |i: usize| DVec3::new((i & 1) as f64 - 0.5, (i >> 1 & 1) as f64 - 0.5, (i >> 2 & 1) as f64 - 1.0);
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        TriMesh::new((0..8).map(corner).collect(), triangles)
-    }
+    use crate::mesh::TriMesh;
+    use crate::mesh::samples::cuboid;
 
     #[test]
     fn a_stretched_sheet_pressed_on_a_table_reads_back() {
@@ -96,10 +88,9 @@ mod tests {
             vec![at(-0.1, -0.1), at(0.1, -0.1), at(0.1, 0.1), at(-0.1, 0.1)]
         };
         let mesh = TriMesh::new(flat(1.0, 0.1), vec![[0, 1, 2], [0, 2, 3]]);
-        let fabric = Fabric::by_name("jersey").unwrap();
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
-        let body = Body::new(&table()).unwrap();
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
+        // A table of 1 m with its top at z = 0.
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
         let (depth, stretch) = (0.2e-3, 1.03);
         let x = flat(stretch, cloth.offset - depth);
         let stiffness = cloth.contacts(&body, &x).stiffness();

@@ -18,6 +18,7 @@ use glam::{DMat3, DVec3};
 
 use super::energy::Cloth;
 use super::principal::principal;
+use crate::mesh::outer;
 
 /// Excess length per vertex.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,8 +36,7 @@ pub fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut area = vec![0.0; x.len()];
     for triangle in cloth.triangles.iter().filter(|t| !t.sliver) {
         let (excess, across) = excess(triangle.deformation(x));
-        let tensor =
-            DMat3::from_cols(across * across.x, across * across.y, across * across.z) * (excess * triangle.area);
+        let tensor = outer(across, across) * (excess * triangle.area);
         for v in triangle.vertices.map(|v| v as usize) {
             sum[v] += tensor;
             area[v] += triangle.area;

@@ -30,6 +30,7 @@ pub(crate) fn principal(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::outer;
 
     #[test]
     fn a_matrix_is_put_together_again_from_its_principal_values() {
@@ -37,7 +38,7 @@ mod tests {
         let (values, vectors) = principal(m);
         let again = (0..3).fold(DMat3::ZERO, |sum, k| {
             let v = vectors[k];
-            sum + DMat3::from_cols(v * v.x, v * v.y, v * v.z) * values[k]
+            sum + outer(v, v) * values[k]
         });
         assert!((again - m).to_cols_array().iter().all(|d| d.abs() < 1e-12), "{again}");
     }

@@ -24,6 +24,7 @@ use glam::DVec3;
 use super::energy::contact::Touch;
 use super::energy::proximity::touching_between;
 use super::energy::{Cloth, Contacts, Friction};
+use super::newton::norm;
 use crate::distance::Body;
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
@@ -107,7 +108,7 @@ impl Forces {
             forces.held += std::mem::take(rest);
         }
         grant(&mut forces.touching, &mut forces.rest, cloth);
-        forces.residual = forces.rest.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
+        forces.residual = norm(&forces.rest);
         let mut met = vec![false; x.len()];
         for touching in &forces.touching {
             for (v, _) in &touching.shares {
@@ -198,8 +199,8 @@ fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
     let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
     // What the solver's law pushes with is near to what is needed.
     all.extend(gaps.map(|gap| Touching {
-        reaction: gap.normal() * (gap.stiffness() * gap.depth(x).max(0.0)),
-        ..Touching::at(gap.members().collect(), gap.normal(), gap.stiffness(), gap.mean(&cloth.friction))
+        reaction: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
+        ..Touching::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction))
     }));
     all
 }

@@ -12,7 +12,7 @@ use glam::DVec2;
 
 use super::import::Imported;
 use super::report::Repair;
-use super::{RestShape, TriMesh};
+use super::{RestShape, TriMesh, sides};
 use crate::quantile::nearest_rank;
 
 /// A mesh has bridges where a side is longer than so many times the usual, and than this, m: no remesher leaves such.
@@ -34,12 +34,6 @@ pub struct Bridges {
     pub longest_m: f64,
     /// What half of all sides are at most, m.
     pub usual_m: f64,
-}
-
-/// Lengths of the sides of a triangle, m: opposite the first corner, the second, the third.
-fn sides(corners: [glam::DVec3; 3]) -> [f64; 3] {
-    let [a, b, c] = corners;
-    [b.distance(c), c.distance(a), a.distance(b)]
 }
 
 impl Imported {
@@ -108,29 +102,16 @@ fn turned_like(was: [DVec2; 3], [a, b, c]: [f64; 3], long: [bool; 3]) -> [DVec2;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::longest_side;
+    use crate::mesh::samples::sheet;
     use glam::DVec3;
 
     /// Two squares of 10 cm a foot apart, in sides of a centimetre, joined along one edge by a row of vertices half-way.
     fn bridged() -> TriMesh {
-        let n = 11;
-        let mut positions = Vec::new();
-        for row in 0..=20u32 {
-            for i in 0..n {
-                let x = 0.01 * f64::from(i);
-                let place = match row {
-                    0..=9 => DVec3::new(x, 0.0, 0.01 * f64::from(row)),
-                    10 => DVec3::new(x, 0.15, 0.1),
-                    _ => DVec3::new(x, 0.3, 0.01 * f64::from(20 - row)),
-                };
-                positions.push(place);
-            }
-        }
-        let cell = |row: u32, i: u32| {
-            let a = row * n + i;
-            [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]
-        };
-        let triangles = (0..20).flat_map(|row| (0..n - 1).flat_map(move |i| cell(row, i))).collect();
-        TriMesh::new(positions, triangles)
+        // Ten rows up, ten down.
+        sheet(10, 20, |i, row| {
+            DVec3::new(i, 15.0 * (1.0 + (row - 10.0).clamp(-1.0, 1.0)), 10.0 - (row - 10.0).abs()) * 0.01
+        })
     }
 
     #[test]
@@ -145,7 +126,7 @@ mod tests {
         // Two squares of 10 by 9 cm and two rows of nearly a centimetre.
         assert!((area - 0.02).abs() < 0.0008, "{area} m²");
         for (t, (own, now)) in own.corners.iter().zip(&rest.corners).enumerate() {
-            let longest = sides(now.map(|p| p.extend(0.0))).into_iter().fold(0.0, f64::max);
+            let longest = longest_side(now.map(|p| p.extend(0.0)));
             assert!(longest < 0.016, "triangle {t}: {longest} m");
             let bridges = sides(own.map(|p| p.extend(0.0))).into_iter().any(|s| s > 0.1);
             assert_eq!(own == now, !bridges, "triangle {t}");

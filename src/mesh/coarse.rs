@@ -31,7 +31,7 @@ use parry3d_f64::shape::Triangle;
 use rayon::prelude::*;
 
 use super::decimate::{Decimated, decimate};
-use super::{RestShape, Topology, TriMesh};
+use super::{Lists, RestShape, Topology, TriMesh, each_once, outer};
 
 /// A triangle farther from its rest shape than by this factor, in any direction, is no cloth that merely hangs undraped.
 const MOST_STRETCH: f64 = 3.0;
@@ -76,10 +76,7 @@ impl Coarse {
             .with_min_len(64)
             .map(|v| {
                 let near = std::iter::once(&v).chain(topology.neighbours(v));
-                let mut about: Vec<u32> = near.flat_map(|&w| &triangles_of[w as usize]).copied().collect();
-                about.sort_unstable();
-                about.dedup();
-                about
+                each_once(near.flat_map(|&w| triangles_of.of(w as usize)).copied())
             })
             .collect();
         let anchors: Vec<_> = (mesh.positions.par_iter().zip(&onto).with_min_len(256))
@@ -164,14 +161,9 @@ impl Map {
 }
 
 /// Triangles at each vertex.
-fn incidence(mesh: &TriMesh) -> Vec<Vec<u32>> {
-    let mut of = vec![Vec::new(); mesh.vertex_count()];
-    for (t, triangle) in (0u32..).zip(&mesh.triangles) {
-        for &v in triangle {
-            of[v as usize].push(t);
-        }
-    }
-    of
+fn incidence(mesh: &TriMesh) -> Lists<u32> {
+    let corners = || (0u32..).zip(&mesh.triangles).flat_map(|(t, triangle)| triangle.map(|v| (v, t)));
+    Lists::gathered(mesh.vertex_count(), corners)
 }
 
 /// The nearest of some coarse triangles, the first of those as near, with barycentric coordinates.
@@ -203,12 +195,10 @@ fn rest_shape(
 ) -> Option<RestShape> {
     let triangles_of = incidence(mesh);
     let mut over: Vec<Vec<u32>> = (coarse.triangles.iter())
-        .map(|t| t.iter().flat_map(|&v| &triangles_of[vertices[v as usize] as usize]).copied().collect())
+        .map(|t| t.iter().flat_map(|&v| triangles_of.of(vertices[v as usize] as usize)).copied().collect())
         .collect();
-    for (anchor, triangles) in anchors.iter().zip(&triangles_of) {
-        if let Some((t, _)) = anchor {
-            over[*t].extend(triangles);
-        }
+    for (v, (t, _)) in anchors.iter().enumerate().filter_map(|(v, anchor)| Some((v, anchor.as_ref()?))) {
+        over[*t].extend(triangles_of.of(v));
     }
     let corners = (0..coarse.triangles.len())
         .map(|t| {
@@ -251,9 +241,4 @@ fn root(m: DMat2) -> DMat2 {
     let s = m.determinant().max(0.0).sqrt();
     let t = (m.x_axis.x + m.y_axis.y + 2.0 * s).sqrt();
     (m + DMat2::from_diagonal(DVec2::splat(s))) * t.recip()
-}
-
-/// a bᵀ.
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }

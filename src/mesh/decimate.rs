@@ -9,12 +9,11 @@
 
 use glam::DVec3;
 
-use super::TriMesh;
 use super::flip::{Rule, flip};
-use super::half_edge::{HalfEdgeMesh, NONE, previous};
+use super::half_edge::{HalfEdgeMesh, previous};
+use super::{NONE, TriMesh, renumbered};
 
-/// A collapse may turn no triangle, and no boundary, further than this: cos 60°, cos 45°.
-const LARGEST_TURN: f64 = 0.5;
+/// A collapse may turn no boundary further than this: cos 45°.
 const STRAIGHTEST: f64 = 0.7;
 
 /// Shape of a triangle, 4√3 A over its squared edges (1: equilateral), under which a collapse is refused, unless it was worse.
@@ -71,10 +70,7 @@ pub(super) fn decimate(mesh: &TriMesh, count: usize) -> Option<Decimated> {
     }
     flip(&mut work, Rule::Delaunay);
     let vertices: Vec<u32> = (0..n as u32).filter(|&v| work.is_vertex_alive(v)).collect();
-    let mut number = vec![NONE; n];
-    for (new, &old) in vertices.iter().enumerate() {
-        number[old as usize] = new as u32;
-    }
+    let number = renumbered(n, |v| work.is_vertex_alive(v as u32));
     let end = |mut v: u32| {
         while onto[v as usize] != v {
             v = onto[v as usize];
@@ -118,19 +114,12 @@ fn worst_shape(work: &HalfEdgeMesh, h: u32, locked: &[bool], longest: f64) -> Op
     if locked[v0 as usize] || locked[v1 as usize] || !work.can_collapse(h) || !straight(work, h) {
         return None;
     }
-    let [from, at] = [v0, v1].map(|v| work.positions[v as usize]);
+    let at = work.positions[v1 as usize];
     let mut worst = Some(f64::INFINITY);
-    work.around(v0, |k| {
-        let (b, c) = (work.target(k), work.origin(previous(k)));
-        if b == v1 || c == v1 {
-            return;
-        }
-        let [b, c] = [b, c].map(|v| work.positions[v as usize]);
-        let (old, new) = ((b - from).cross(c - from), (b - at).cross(c - at));
-        let turned = new.dot(old) < LARGEST_TURN * new.length() * old.length() || new.length_squared() == 0.0;
+    work.around_moved(v0, v1, at, |triangle| {
+        let [from, b, c] = triangle.corners;
         let (was, is) = (shape(from, b, c), shape(at, b, c));
-        let too_long = b.distance(at).max(c.distance(at)) > longest;
-        let allowed = !turned && !too_long && (is >= THINNEST || is >= was);
+        let allowed = !triangle.turns && triangle.longest <= longest && (is >= THINNEST || is >= was);
         worst = worst.filter(|_| allowed).map(|worst| worst.min(is));
     });
     worst

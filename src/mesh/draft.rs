@@ -4,9 +4,8 @@ use glam::DVec3;
 
 use super::polygon;
 use super::report::Repair;
-use super::retain;
-use super::scan::{Corner, Face};
-use super::topology::NONE;
+use super::scan::{Corner, Face, used};
+use super::{renumbered, retain};
 
 /// Triangles that still know where they come from.
 #[derive(Debug, Default)]
@@ -17,7 +16,7 @@ pub(super) struct Draft {
     pub(super) corner: Vec<[u32; 3]>,
     /// Face of the file behind each triangle.
     pub(super) face: Vec<u32>,
-    /// Mesh vertex of each file vertex, or [`NONE`].
+    /// Mesh vertex of each file vertex, or [`NONE`](super::NONE).
     pub(super) mesh_vertex: Vec<u32>,
     /// Vertices in the mesh that lie on an earlier one.
     pub(super) coincident: usize,
@@ -32,10 +31,7 @@ impl Draft {
         weld: bool,
         repairs: &mut Vec<Repair>,
     ) -> Self {
-        let mut used = vec![false; positions.len()];
-        for face in faces {
-            face.among(corners).iter().for_each(|corner| used[corner.vertex as usize] = true);
-        }
+        let used = used(positions.len(), faces, corners);
         let (stand_in, coincident) = coincident(positions, &used);
         let stands_for = |v: u32| if weld { stand_in[v as usize] } else { v };
         let mut draft = Self { coincident: if weld { 0 } else { coincident }, ..Self::default() };
@@ -103,12 +99,10 @@ impl Draft {
 
     /// Numbers the vertices that are left, in the order of the file.
     fn compact(&mut self, positions: &[DVec3], stands_for: impl Fn(u32) -> u32) {
-        let mut number = vec![NONE; positions.len()];
-        self.triangles.iter().flatten().for_each(|&v| number[v as usize] = 0);
-        for (v, slot) in number.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
-            *slot = self.positions.len() as u32;
-            self.positions.push(positions[v]);
-        }
+        let mut used = vec![false; positions.len()];
+        self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let number = renumbered(positions.len(), |v| used[v]);
+        self.positions.extend(positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| p));
         self.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
         self.mesh_vertex = (0..positions.len() as u32).map(|v| number[stands_for(v) as usize]).collect();
     }

@@ -17,26 +17,27 @@ use crate::whole_file::WholeFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
 pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> Result<(), MeshError> {
-    write(path, &imported_text(imported, positions)?)
+    write(path, imported_text(imported, positions)?)
 }
 
 /// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
 pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
-    write(path, &mesh_text(mesh))
+    write(path, mesh_text(mesh, None))
 }
 
 /// The same with the texture coordinates of each triangle's corners, m: each is written once for every group.
 pub fn write_textured(path: &Path, mesh: &TriMesh, texture: &[[DVec2; 3]]) -> Result<(), MeshError> {
-    write(path, &textured_text(mesh, texture))
+    write(path, mesh_text(mesh, Some(texture)))
 }
 
-fn textured_text(mesh: &TriMesh, texture: &[[DVec2; 3]]) -> String {
-    let mut text = format!("# {} m, z up; texture coordinates are the flat pattern in m\n", env!("CARGO_PKG_NAME"));
+fn mesh_text(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> String {
+    let note = if texture.is_some() { "; texture coordinates are the flat pattern in m" } else { "" };
+    let mut text = format!("# {} m, z up{note}\n", env!("CARGO_PKG_NAME"));
     mesh.positions.iter().for_each(|p| write_vertex(&mut text, *p));
     let mut numbers: BTreeMap<(u32, [u64; 2]), usize> = BTreeMap::new();
     let mut faces = String::new();
     let mut last = None;
-    for (t, (triangle, uvs)) in mesh.triangles.iter().zip(texture).enumerate() {
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
         let group = mesh.triangle_group.get(t).copied();
         if group != last {
             last = group;
@@ -45,22 +46,25 @@ fn textured_text(mesh: &TriMesh, texture: &[[DVec2; 3]]) -> String {
             }
         }
         faces.push('f');
-        for (v, uv) in triangle.iter().zip(uvs) {
-            let next = numbers.len() + 1;
-            let number = *numbers.entry((*v, [uv.x.to_bits(), uv.y.to_bits()])).or_insert(next);
-            if number == next {
-                let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
+        for (k, v) in triangle.iter().enumerate() {
+            let _ = write!(faces, " {}", v + 1);
+            if let Some(uv) = texture.map(|texture| texture[t][k]) {
+                let next = numbers.len() + 1;
+                let number = *numbers.entry((*v, [uv.x.to_bits(), uv.y.to_bits()])).or_insert(next);
+                if number == next {
+                    let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
+                }
+                let _ = write!(faces, "/{number}");
             }
-            let _ = write!(faces, " {}/{number}", v + 1);
         }
         faces.push('\n');
     }
     text + &faces
 }
 
-fn write(path: &Path, text: &str) -> Result<(), MeshError> {
+pub(super) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), MeshError> {
     let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-    WholeFile::write(path, text).map_err(unwritable)
+    WholeFile::write(path, contents).map_err(unwritable)
 }
 
 fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, MeshError> {
@@ -125,21 +129,6 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
         text.push('\n');
     }
     Ok(text)
-}
-
-fn mesh_text(mesh: &TriMesh) -> String {
-    let mut text = format!("# {} m, z up\n", env!("CARGO_PKG_NAME"));
-    mesh.positions.iter().for_each(|&p| write_vertex(&mut text, p));
-    let mut current = NONE;
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let group = mesh.triangle_group.get(t).copied().unwrap_or(NONE);
-        if group != current {
-            current = group;
-            let _ = writeln!(text, "g {}", mesh.groups.get(group as usize).map_or("", String::as_str));
-        }
-        let _ = writeln!(text, "f {} {} {}", triangle[0] + 1, triangle[1] + 1, triangle[2] + 1);
-    }
-    text
 }
 
 /// Shortest digits that read back as the same number. Writing into a String cannot fail.

@@ -5,7 +5,7 @@ use super::import::Imported;
 use super::report::{Remark, Repair};
 use super::rest::RestShape;
 use super::topology::{NONE, Topology};
-use super::{retain, winding};
+use super::{longest_side, renumbered, retain, winding};
 
 /// A triangle that at rest is so many times as long as worn, or as many times shorter, was not cut for where it is: what is stretched or
 /// gathered is off by tens of percent.
@@ -28,7 +28,7 @@ impl Imported {
 
     /// Turns triangles so that neighbours agree, and notes what the topology shows.
     pub(super) fn make_agree(&mut self, coincident: usize) {
-        let (turn, _, turned) = winding::agree(&self.mesh);
+        let (turn, turned) = winding::agree(&self.mesh);
         (0..turn.len()).filter(|&t| turn[t]).for_each(|t| self.turn(t));
         let report = &mut self.report;
         if turned.to_agree > 0 {
@@ -55,14 +55,13 @@ impl Imported {
         (0..drop.len()).filter(|&t| drop[t]).for_each(|t| left[self.face[t] as usize] = false);
         (0..drop.len()).filter(|&t| !drop[t]).for_each(|t| left[self.face[t] as usize] = true);
         retain(&mut self.face, |t| !drop[t]);
-        let mut number = vec![NONE; left.len()];
-        (0..).zip((0..left.len()).filter(|&f| left[f])).for_each(|(new, old)| number[old] = new);
+        let number = renumbered(left.len(), |f| left[f]);
         self.face.iter_mut().for_each(|f| *f = number[*f as usize]);
         retain(&mut source.faces, |f| left[f]);
-        let mut number = vec![NONE; mesh.positions.len()];
-        mesh.triangles.iter().flatten().for_each(|&v| number[v as usize] = 0);
-        (0..).zip(number.iter_mut().filter(|n| **n == 0)).for_each(|(new, n)| *n = new);
-        retain(&mut mesh.positions, |v| number[v] != NONE);
+        let mut used = vec![false; mesh.positions.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let number = renumbered(used.len(), |v| used[v]);
+        retain(&mut mesh.positions, |v| used[v]);
         mesh.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
         source.mesh_vertex.iter_mut().filter(|v| **v != NONE).for_each(|v| *v = number[*v as usize]);
         let triangles = drop.iter().filter(|&&drop| drop).count();
@@ -76,13 +75,8 @@ impl Imported {
         if slivers > 0 {
             self.report.remarks.push(Remark::Slivers { triangles: slivers });
         }
-        let longest = |sides: [f64; 3]| sides.into_iter().fold(0.0, f64::max);
-        let at_rest = rest.corners.iter().map(|c| longest([0, 1, 2].map(|i| c[i].distance(c[(i + 1) % 3]))));
-        let mesh = &self.mesh;
-        let worn = (0..mesh.triangles.len()).map(|t| {
-            let c = mesh.corners(t);
-            longest([0, 1, 2].map(|i| c[i].distance(c[(i + 1) % 3])))
-        });
+        let at_rest = rest.corners.iter().map(|c| longest_side(c.map(|p| p.extend(0.0))));
+        let worn = (0..self.mesh.triangles.len()).map(|t| longest_side(self.mesh.corners(t)));
         let pairs = at_rest.zip(worn).enumerate();
         let off: Vec<(f64, usize, f64, f64)> = pairs
             .map(|(t, (rest, worn))| ((rest / worn).max(worn / rest), t, rest, worn))

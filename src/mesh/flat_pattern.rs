@@ -96,28 +96,18 @@ impl std::fmt::Display for FlatPattern {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::samples::sheet;
     use glam::DVec3;
 
     /// A grid of 10 × 10 squares rolled up to a quarter of a cylinder, its flat corners, and those stretched by `stretch` along x.
     fn rolled(scale: f64, stretch: f64) -> (TriMesh, Vec<Option<[DVec2; 3]>>) {
-        let flat = |i: u32, j: u32| DVec2::new(f64::from(i), f64::from(j)) * 0.03;
-        let mut mesh = TriMesh::default();
-        for i in 0..=10 {
-            for j in 0..=10 {
-                let p = flat(i, j);
-                mesh.positions.push(DVec3::new(0.2 * (p.x / 0.2).sin(), p.y, 0.2 * (p.x / 0.2).cos()));
-            }
-        }
-        let at = |i: u32, j: u32| 11 * i + j;
-        let mut texture = Vec::new();
-        for i in 0..10 {
-            for j in 0..10 {
-                for cell in [[(i, j), (i + 1, j), (i + 1, j + 1)], [(i, j), (i + 1, j + 1), (i, j + 1)]] {
-                    mesh.triangles.push(cell.map(|(i, j)| at(i, j)));
-                    texture.push(Some(cell.map(|(i, j)| flat(i, j) * DVec2::new(stretch, 1.0) / scale)));
-                }
-            }
-        }
+        let flat = |i: f64, j: f64| DVec2::new(i, j) * 0.03;
+        let mesh = sheet(10, 10, |i, j| {
+            let p = flat(i, j);
+            DVec3::new(0.2 * (p.x / 0.2).sin(), p.y, 0.2 * (p.x / 0.2).cos())
+        });
+        let of = |v: u32| flat(f64::from(v % 11), f64::from(v / 11)) * DVec2::new(stretch, 1.0) / scale;
+        let texture = mesh.triangles.iter().map(|t| Some(t.map(of))).collect();
         (mesh, texture)
     }
 

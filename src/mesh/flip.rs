@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::half_edge::{HalfEdgeMesh, NONE, previous};
+use super::NONE;
+use super::half_edge::{HalfEdgeMesh, previous};
 
 /// A flip may bend no pair of triangles further than this: cos 30°.
 const FLAT_ENOUGH: f64 = 0.866;

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::TriMesh;
 use super::error::MeshError;
-use crate::whole_file::WholeFile;
+use super::export::write;
 
 /// Numbers of the format: what a chunk holds, what a component is, what a buffer is for.
 const JSON_CHUNK: u32 = 0x4E4F_534A;
@@ -30,8 +30,7 @@ pub fn write_glb(path: &Path, mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Re
     if let Some(found) = colours.map(<[_]>::len).filter(|&found| found != expected) {
         return Err(MeshError::WrongCount { found, expected });
     }
-    let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-    WholeFile::write(path, bytes(mesh, colours)).map_err(unwritable)
+    write(path, bytes(mesh, colours))
 }
 
 fn bytes(mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Vec<u8> {

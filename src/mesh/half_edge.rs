@@ -6,10 +6,7 @@
 
 use glam::DVec3;
 
-use crate::mesh::TriMesh;
-
-/// No half-edge, or no vertex.
-pub(crate) const NONE: u32 = u32::MAX;
+use super::{NONE, TriMesh, renumbered, retain};
 
 /// A manifold triangle mesh that can be split, collapsed and flipped.
 #[derive(Debug, Clone, Default)]
@@ -269,15 +266,10 @@ impl HalfEdgeMesh {
 
     /// The living triangles and vertices, renumbered in order, with the vertices' tags.
     pub(crate) fn compact(&self) -> (TriMesh, Vec<u8>) {
-        let mut number = vec![NONE; self.positions.len()];
-        let (mut positions, mut tags) = (Vec::with_capacity(self.living), Vec::with_capacity(self.living));
-        for (v, &h) in self.out.iter().enumerate() {
-            if h != NONE {
-                number[v] = positions.len() as u32;
-                positions.push(self.positions[v]);
-                tags.push(self.tags[v]);
-            }
-        }
+        let number = renumbered(self.out.len(), |v| self.out[v] != NONE);
+        let (mut positions, mut tags) = (self.positions.clone(), self.tags.clone());
+        retain(&mut positions, |v| number[v] != NONE);
+        retain(&mut tags, |v| number[v] != NONE);
         let triangles = self
             .origin
             .chunks_exact(3)

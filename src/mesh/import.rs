@@ -8,16 +8,16 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::TriMesh;
 use super::draft::Draft;
 use super::error::MeshError;
 use super::facing::face_outward;
 use super::frame::{Axis, Frame, Unit};
 use super::frame_guess::{guess_frame, guess_frame_around};
 use super::report::{MeshReport, Remark, Repair};
-use super::scan::{Face, Scan};
+use super::scan::{Face, Scan, used};
 use super::source::{ObjSource, read};
 use super::topology::{NONE, Topology};
+use super::{TriMesh, each_once};
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -182,12 +182,7 @@ fn chosen_faces(file: &Path, scan: &Scan, options: &ImportOptions) -> Result<Vec
 }
 
 fn used_positions(scan: &Scan, faces: &[Face]) -> Vec<DVec3> {
-    let mut used = vec![false; scan.positions.len()];
-    for face in faces {
-        for corner in face.among(&scan.corners) {
-            used[corner.vertex as usize] = true;
-        }
-    }
+    let used = used(scan.positions.len(), faces, &scan.corners);
     scan.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
 }
 
@@ -253,9 +248,7 @@ fn build(
 
 /// Groups in the order of the file, those without triangles left out.
 fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
-    let mut used: Vec<u32> = group.to_vec();
-    used.sort_unstable();
-    used.dedup();
+    let used = each_once(group.iter().copied());
     if used == [NONE] {
         return (Vec::new(), Vec::new());
     }

@@ -6,6 +6,7 @@
 
 pub mod bridges;
 pub mod coarse;
+mod collapse;
 mod decimate;
 mod draft;
 mod error;
@@ -13,6 +14,7 @@ pub mod export;
 mod facing;
 pub mod flat_pattern;
 pub(crate) mod flip;
+mod flow;
 mod frame;
 mod frame_guess;
 pub mod glb;
@@ -20,9 +22,12 @@ pub(crate) mod half_edge;
 pub mod health;
 pub mod import;
 pub(crate) mod lattice;
-mod polygon;
+mod lists;
+pub(crate) mod polygon;
 pub mod report;
 pub mod rest;
+#[cfg(test)]
+pub(crate) mod samples;
 mod scan;
 pub mod self_intersection;
 mod source;
@@ -30,10 +35,12 @@ mod topology;
 pub(crate) mod triangle_crossing;
 pub(crate) mod winding;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use error::{Keyword, LineProblem, MeshError};
+pub(crate) use flow::Flow;
 pub use frame::{Axis, Frame, Unit};
+pub(crate) use lists::Lists;
 pub use rest::RestShape;
 pub use scan::{Corner, Face};
 pub use source::ObjSource;
@@ -128,6 +135,64 @@ impl TriMesh {
 fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
     let first = *points.first()?;
     Some(points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p))))
+}
+
+/// Lengths of the sides of a triangle, m: opposite the first corner, the second, the third.
+pub(crate) fn sides([a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    [b.distance(c), c.distance(a), a.distance(b)]
+}
+
+/// The greatest of them, m.
+pub(crate) fn longest_side(corners: [DVec3; 3]) -> f64 {
+    sides(corners).into_iter().fold(0.0, f64::max)
+}
+
+/// Lower and upper corner of the box about some points, m; infinite and inside out for none.
+pub(crate) fn box_about(points: impl IntoIterator<Item = DVec3>) -> (DVec3, DVec3) {
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    points.into_iter().fold(none, |(low, high), p| (low.min(p), high.max(p)))
+}
+
+/// The connected pieces of what is alike among `count` things with these neighbours, by their first; each from there on, depth first.
+pub(crate) fn pieces<'a>(
+    count: usize,
+    neighbours: impl Fn(usize) -> &'a [u32],
+    alike: impl Fn(usize, usize) -> bool,
+) -> Vec<Vec<u32>> {
+    let mut met = vec![false; count];
+    let mut all = Vec::new();
+    for seed in 0..count {
+        if std::mem::replace(&mut met[seed], true) {
+            continue;
+        }
+        let (mut piece, mut open) = (Vec::new(), vec![seed as u32]);
+        while let Some(one) = open.pop() {
+            piece.push(one);
+            let beside = neighbours(one as usize).iter().filter(|&&other| alike(seed, other as usize));
+            open.extend(beside.filter(|&&other| !std::mem::replace(&mut met[other as usize], true)));
+        }
+        all.push(piece);
+    }
+    all
+}
+
+/// a bᵀ.
+pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Each of these once, ascending.
+pub(crate) fn each_once<T: Ord>(all: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut all: Vec<T> = all.into_iter().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The new number of each of so many things when those that are not kept go; [`NONE`] for these.
+pub(crate) fn renumbered(count: usize, keep: impl Fn(usize) -> bool) -> Vec<u32> {
+    let mut next = 0..;
+    (0..count).map(|i| if keep(i) { next.next().unwrap_or(NONE) } else { NONE }).collect()
 }
 
 /// Keeps the elements of a list whose places `keep` names.

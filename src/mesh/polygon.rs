@@ -18,7 +18,8 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 /// choice, and a face of 5,000 corners took 25 s.
 const MANY_CORNERS: usize = 32;
 
-type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
+/// A triangulation that has the sides of an outline.
+pub(crate) type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 /// Corner numbers of the triangles of a polygon, wound as it is; n − 2 of them for n ≥ 3 corners, else none.
 pub(super) fn triangulate(corners: &[DVec3]) -> Vec<[usize; 3]> {
@@ -39,6 +40,14 @@ fn delaunay(points: &[DVec2]) -> Option<Vec<[usize; 3]>> {
     let plane = Plane::try_bulk_load_cdt(places, outline, |_| crossed = true).ok()?;
     // Corners at one place would be one.
     (!crossed && plane.num_vertices() == n).then_some(())?;
+    let inside = within(&plane, n)?;
+    // Fewer or more mean an outline that touches itself.
+    (inside.len() == n - 2).then(|| inside.into_values().collect())
+}
+
+/// The faces within the outline of a triangulation, its first `n` vertices counter-clockwise, by number; `None` where a side of it is none
+/// of the triangulation's.
+pub(crate) fn within(plane: &Plane, n: usize) -> Option<BTreeMap<usize, [usize; 3]>> {
     let corner = |i: usize| FixedVertexHandle::from_index(i % n);
     // What lies to the left of the outline is inside, and so is what can be reached from there without crossing it.
     let mut inside = BTreeMap::new();
@@ -53,8 +62,7 @@ fn delaunay(points: &[DVec2]) -> Option<Vec<[usize; 3]>> {
         let open = face.adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge());
         reached.extend(open.filter_map(|edge| edge.rev().face().as_inner()));
     }
-    // Fewer or more mean an outline that touches itself.
-    (inside.len() == n - 2).then(|| inside.into_values().collect())
+    Some(inside)
 }
 
 /// The corners in the polygon's plane, counter-clockwise.

@@ -50,6 +50,13 @@ impl Face {
     }
 }
 
+/// Which of so many vertices of a file some faces have.
+pub(super) fn used(vertices: usize, faces: &[Face], corners: &[Corner]) -> Vec<bool> {
+    let mut used = vec![false; vertices];
+    faces.iter().flat_map(|face| face.among(corners)).for_each(|corner| used[corner.vertex as usize] = true);
+    used
+}
+
 /// What the lines hold.
 #[derive(Debug, Default)]
 pub(super) struct Scan {

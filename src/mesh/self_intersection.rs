@@ -51,22 +51,17 @@ fn bounds(mesh: &TriMesh, t: usize) -> Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::samples::sheet;
     use glam::DVec3;
 
     /// A sheet of n × n squares in the plane through `origin` spanned by `u` and `v`.
-    fn sheet(n: u32, origin: DVec3, u: DVec3, v: DVec3) -> TriMesh {
-        let at = |i: u32, j: u32| origin + u * f64::from(i) + v * f64::from(j);
-        let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
-        let square = |i: u32, j: u32| {
-            let k = j * (n + 1) + i;
-            [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]
-        };
-        TriMesh::new(positions, (0..n).flat_map(|j| (0..n).flat_map(move |i| square(i, j))).collect())
+    fn plane(n: u32, origin: DVec3, u: DVec3, v: DVec3) -> TriMesh {
+        sheet(n, n, |i, j| origin + u * i + v * j)
     }
 
     #[test]
     fn a_flat_sheet_does_not_cross_itself_and_a_folded_one_does() {
-        let mut mesh = sheet(12, DVec3::ZERO, DVec3::X * 0.1, DVec3::Y * 0.1);
+        let mut mesh = plane(12, DVec3::ZERO, DVec3::X * 0.1, DVec3::Y * 0.1);
         assert!(self_intersecting_pairs(&mesh).is_empty());
         // One corner of the sheet is bent through the rest of it.
         mesh.positions[0] = DVec3::new(0.55, 0.55, -0.2);
@@ -78,8 +73,8 @@ mod tests {
 
     #[test]
     fn pairs_are_those_of_brute_force() {
-        let a = sheet(9, DVec3::ZERO, DVec3::new(0.1, 0.01, 0.0), DVec3::new(0.0, 0.1, 0.02));
-        let b = sheet(7, DVec3::new(0.4, 0.1, -0.3), DVec3::new(0.01, 0.1, 0.02), DVec3::new(0.02, 0.0, 0.11));
+        let a = plane(9, DVec3::ZERO, DVec3::new(0.1, 0.01, 0.0), DVec3::new(0.0, 0.1, 0.02));
+        let b = plane(7, DVec3::new(0.4, 0.1, -0.3), DVec3::new(0.01, 0.1, 0.02), DVec3::new(0.02, 0.0, 0.11));
         let all = (0..a.triangles.len()).flat_map(|t| (0..b.triangles.len()).map(move |u| (t, u)));
         let brute: Vec<[u32; 2]> =
             all.filter(|&(t, u)| cross(a.corners(t), b.corners(u))).map(|(t, u)| [t as u32, u as u32]).collect();

@@ -3,9 +3,10 @@
 //! Edges are sorted by (smaller vertex, larger vertex); neighbours are sorted by index; so everything that iterates over
 //! them sums in the same order on any number of threads.
 
-use super::TriMesh;
+use super::lists::Lists;
+use super::{TriMesh, pieces};
 
-/// No triangle on that side of an edge.
+/// None there: no triangle on that side of an edge, no further vertex in a list of fixed length, no parent in a tree.
 pub const NONE: u32 = u32::MAX;
 
 /// The connectivity of a [`TriMesh`].
@@ -17,16 +18,20 @@ pub struct Topology {
     pub edge_triangles: Vec<[u32; 2]>,
     /// How many triangles share each edge: 1 boundary, 2 inside, more is non-manifold.
     pub edge_valence: Vec<u32>,
-    neighbour_start: Vec<u32>,
-    neighbour_list: Vec<u32>,
+    neighbours: Lists<u32>,
 }
 
 impl Topology {
     /// Reads the connectivity off the triangles; O(n log n).
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
-        let mut halves: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * mesh.triangles.len());
-        for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+        Self::of(&mesh.triangles, mesh.vertex_count())
+    }
+
+    /// The same of triangles over so many vertices.
+    pub(crate) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
+        let mut halves: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * triangles.len());
+        for (t, &[a, b, c]) in triangles.iter().enumerate() {
             for (i, j) in [(a, b), (b, c), (c, a)] {
                 halves.push((i.min(j), i.max(j), t as u32));
             }
@@ -46,39 +51,17 @@ impl Topology {
                 topology.edge_valence.push(1);
             }
         }
-        topology.link_neighbours(mesh.positions.len());
-        topology
-    }
-
-    fn link_neighbours(&mut self, vertices: usize) {
-        let mut start = vec![0u32; vertices + 1];
-        for &[a, b] in &self.edges {
-            start[a as usize + 1] += 1;
-            start[b as usize + 1] += 1;
-        }
-        for v in 0..vertices {
-            start[v + 1] += start[v];
-        }
-        let mut next = start.clone();
-        let mut list = vec![0u32; 2 * self.edges.len()];
         // Edges come sorted by (a, b): first the smaller neighbours of each vertex, then the larger, each ascending.
-        for &[a, b] in &self.edges {
-            list[next[b as usize] as usize] = a;
-            next[b as usize] += 1;
-        }
-        for &[a, b] in &self.edges {
-            list[next[a as usize] as usize] = b;
-            next[a as usize] += 1;
-        }
-        self.neighbour_start = start;
-        self.neighbour_list = list;
+        let edges = &topology.edges;
+        let smaller = || edges.iter().map(|&[a, b]| (b, a));
+        topology.neighbours = Lists::gathered(vertices, || smaller().chain(edges.iter().map(|&[a, b]| (a, b))));
+        topology
     }
 
     /// Vertices joined to `v` by an edge, ascending.
     #[must_use]
     pub fn neighbours(&self, v: u32) -> &[u32] {
-        let v = v as usize;
-        &self.neighbour_list[self.neighbour_start[v] as usize..self.neighbour_start[v + 1] as usize]
+        self.neighbours.of(v as usize)
     }
 
     /// Index of the edge between two vertices.
@@ -95,7 +78,7 @@ impl Topology {
     /// Whether each vertex lies on a boundary edge.
     #[must_use]
     pub fn boundary_vertices(&self) -> Vec<bool> {
-        let mut on = vec![false; self.neighbour_start.len().saturating_sub(1)];
+        let mut on = vec![false; self.neighbours.len()];
         self.boundary_edges().flatten().for_each(|v| on[v as usize] = true);
         on
     }
@@ -103,27 +86,13 @@ impl Topology {
     /// Component number of each vertex (by smallest vertex index) and how many components there are.
     #[must_use]
     pub fn components(&self) -> (Vec<u32>, usize) {
-        let n = self.neighbour_start.len().saturating_sub(1);
+        let n = self.neighbours.len();
+        let all = pieces(n, |v| self.neighbours.of(v), |_, _| true);
         let mut component = vec![NONE; n];
-        let mut count = 0;
-        let mut stack = Vec::new();
-        for seed in 0..n as u32 {
-            if component[seed as usize] != NONE {
-                continue;
-            }
-            component[seed as usize] = count;
-            stack.push(seed);
-            while let Some(v) = stack.pop() {
-                for &w in self.neighbours(v) {
-                    if component[w as usize] == NONE {
-                        component[w as usize] = count;
-                        stack.push(w);
-                    }
-                }
-            }
-            count += 1;
+        for (number, piece) in (0..).zip(&all) {
+            piece.iter().for_each(|&v| component[v as usize] = number);
         }
-        (component, count as usize)
+        (component, all.len())
     }
 
     /// Boundary loops as vertex cycles, each starting at its smallest vertex, ordered by it. A pinched boundary vertex

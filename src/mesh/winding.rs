@@ -19,8 +19,8 @@ pub(super) struct Turned {
     pub one_sided: usize,
 }
 
-/// Which triangles must be turned so that neighbours agree, the fewest in each patch, and the patch of each triangle.
-pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
+/// Which triangles must be turned so that neighbours agree, the fewest in each patch.
+pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Turned) {
     let topology = Topology::new(mesh);
     let n = mesh.triangles.len();
     let mut across = vec![[NONE; 3]; n];
@@ -35,14 +35,12 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
         }
     }
     let mut turn = vec![false; n];
-    let mut patch = vec![NONE; n];
+    let mut met = vec![false; n];
     let mut turned = Turned::default();
-    let mut patches = 0;
     for seed in 0..n {
-        if patch[seed] != NONE {
+        if std::mem::replace(&mut met[seed], true) {
             continue;
         }
-        patch[seed] = patches;
         let mut members = vec![seed];
         let (mut next, mut consistent) = (0, true);
         while let Some(&t) = members.get(next) {
@@ -55,8 +53,7 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
                 let (a, b) = (mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
                 let same_direction = runs_along(mesh.triangles[other], a, b);
                 let wanted = turn[t] ^ same_direction;
-                if patch[other] == NONE {
-                    patch[other] = patches;
+                if !std::mem::replace(&mut met[other], true) {
                     turn[other] = wanted;
                     members.push(other);
                 } else if turn[other] != wanted {
@@ -74,9 +71,8 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Vec<u32>, Turned) {
         } else {
             turned.to_agree += count;
         }
-        patches += 1;
     }
-    (turn, patch, turned)
+    (turn, turned)
 }
 
 /// Number of edges along which two triangles run in the same direction.
@@ -135,7 +131,7 @@ mod tests {
         assert!((signed_volumes(&mesh, &[0; 4], 1)[0] - 1.0 / 6.0).abs() < 1e-15);
         mesh.triangles[2].reverse();
         assert_eq!(disagreeing_edges(&mesh, &Topology::new(&mesh)), 3);
-        let (turn, _, turned) = agree(&mesh);
+        let (turn, turned) = agree(&mesh);
         assert_eq!(turn, [false, false, true, false]);
         assert_eq!(turned, Turned { to_agree: 1, one_sided: 0 });
     }
@@ -145,7 +141,7 @@ mod tests {
         // Five triangles around a ring, the last joined with a half turn (the five-vertex Möbius strip).
         let triangles: Vec<[u32; 3]> = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
         let positions = (0..5).map(|i| DVec3::new(f64::from(i), f64::from(i * i), f64::from(i * i * i))).collect();
-        let (turn, _, turned) = agree(&TriMesh::new(positions, triangles));
+        let (turn, turned) = agree(&TriMesh::new(positions, triangles));
         assert_eq!(turned, Turned { to_agree: 0, one_sided: 1 });
         assert_eq!(turn, [false; 5]);
     }

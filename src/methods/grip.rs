@@ -23,6 +23,7 @@ use glam::{DMat3, DVec3};
 
 use crate::mechanics::energy::contact::Touch;
 use crate::mechanics::energy::friction::ELASTIC_SLIP;
+use crate::mesh::outer;
 
 /// Tangential way in a step below which a slipping vertex takes hold, m: in steps of 20 ms an eighth of the speed that counts as rest.
 pub const SLOW: f64 = 2.5e-5;
@@ -88,7 +89,7 @@ impl Grip {
     pub fn terms<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DVec3, DMat3)> + 'a {
         self.held.iter().map(|h| {
             let n = h.normal;
-            let tangent = DMat3::IDENTITY - DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+            let tangent = DMat3::IDENTITY - outer(n, n);
             match h.state {
                 State::Sticks(anchor) => {
                     let stiffness = tangent * (h.limit / ELASTIC_SLIP);

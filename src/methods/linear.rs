@@ -11,16 +11,16 @@
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use crate::mesh::Lists;
+
 /// Rows of one task.
 const CHUNK: usize = 512;
 
 /// A symmetric matrix of 3×3 blocks, all of them, by rows with columns ascending.
 #[derive(Debug, Clone, Default)]
 pub struct BlockRows {
-    /// First block of each row, and one past the last.
-    pub starts: Vec<u32>,
-    /// Column of each block.
-    pub columns: Vec<u32>,
+    /// Columns of the blocks of each row.
+    pub(super) columns: Lists<u32>,
     /// Index of each row's diagonal block.
     pub diagonal: Vec<u32>,
     /// The blocks.
@@ -35,16 +35,8 @@ impl BlockRows {
         all.extend(pairs.flat_map(|(i, j)| [u64::from(i) << 32 | u64::from(j), u64::from(j) << 32 | u64::from(i)]));
         all.par_sort_unstable();
         all.dedup();
-        let mut starts = vec![0u32; rows + 1];
-        for &pair in &all {
-            starts[(pair >> 32) as usize + 1] += 1;
-        }
-        for i in 0..rows {
-            starts[i + 1] += starts[i];
-        }
-        let columns: Vec<u32> = all.iter().map(|&pair| pair as u32).collect();
-        let blocks = vec![Mat3A::ZERO; columns.len()];
-        let mut matrix = Self { starts, columns, diagonal: Vec::new(), blocks };
+        let columns = Lists::gathered(rows, || all.iter().map(|&pair| ((pair >> 32) as u32, pair as u32)));
+        let mut matrix = Self { columns, diagonal: Vec::new(), blocks: vec![Mat3A::ZERO; all.len()] };
         matrix.diagonal = (0..rows as u32).filter_map(|i| matrix.at(i, i)).collect();
         matrix
     }
@@ -52,22 +44,21 @@ impl BlockRows {
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.starts.len().saturating_sub(1)
+        self.columns.len()
     }
 
     /// Index of the block in row `i`, column `j`.
     #[must_use]
     pub fn at(&self, i: u32, j: u32) -> Option<u32> {
-        let (from, to) = (self.starts[i as usize] as usize, self.starts[i as usize + 1] as usize);
-        self.columns[from..to].binary_search(&j).ok().map(|k| (from + k) as u32)
+        let found = self.columns.of(i as usize).binary_search(&j).ok();
+        found.map(|k| (self.columns.range(i as usize).start + k) as u32)
     }
 
     /// Row `i` times `d`.
     #[inline]
     fn row_times(&self, i: usize, d: &[Vec3A]) -> Vec3A {
-        let range = self.starts[i] as usize..self.starts[i + 1] as usize;
         let mut sums = [Vec3A::ZERO; 2];
-        for (k, (block, &j)) in self.blocks[range.clone()].iter().zip(&self.columns[range]).enumerate() {
+        for (k, (block, &j)) in self.blocks[self.columns.range(i)].iter().zip(self.columns.of(i)).enumerate() {
             sums[k & 1] += *block * d[j as usize];
         }
         sums[0] + sums[1]
@@ -218,6 +209,6 @@ mod tests {
         assert_eq!(a.rows(), 5);
         assert_eq!(a.blocks.len(), 5 + 2 * 4);
         assert!(a.at(2, 3).is_some() && a.at(0, 2).is_none());
-        assert_eq!(a.columns[a.diagonal[3] as usize], 3);
+        assert_eq!(a.columns.entries()[a.diagonal[3] as usize], 3);
     }
 }

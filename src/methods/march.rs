@@ -20,9 +20,10 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
 use super::grip::Grip;
 use super::linear::{ConjugateGradients, Operator, System};
-use super::rest::{Ended, Rest, RestRule};
-use super::{Dressing, MethodError, Moment, Spectator, Stopwatch};
+use super::rest::{Ended, Rest, RestRule, find_velocities, rms_speed};
+use super::{Dressing, MethodDrape, MethodError, Moment, Outcome, Spectator, Stopwatch};
 use crate::GRAVITY;
+use crate::mechanics::energy::Contacts;
 use crate::mechanics::energy::contact::Touch;
 
 /// How a garment is moved in time.
@@ -38,6 +39,12 @@ pub struct Pacing {
     pub iterations: usize,
 }
 
+impl Default for Pacing {
+    fn default() -> Self {
+        Self { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 }
+    }
+}
+
 /// The cloth of a method; as an operator, its stiffness where it was last looked at.
 pub trait Elastic: Operator {
     /// Adds the cloth's force at `x`, N, and keeps its stiffness there.
@@ -46,9 +53,9 @@ pub trait Elastic: Operator {
     /// Adds each vertex's own block of that stiffness, N/m.
     fn add_own(&self, own: &mut [Mat3A]);
 
-    /// Corrects positions after a step from `from`, if the method does so; returns how many corrections it made.
-    fn limit(&mut self, _from: &[DVec3], _x: &mut [DVec3], _held: &[bool]) -> u64 {
-        0
+    /// Corrects positions after a step, if the method does so; returns how many corrections it made.
+    fn limit(&mut self, _x: &mut [DVec3]) -> Option<u64> {
+        None
     }
 }
 
@@ -58,33 +65,11 @@ pub trait Obstacle {
     fn touches(&mut self, x: &[DVec3]) -> &[Touch];
 }
 
-/// A body that is not there.
-#[derive(Debug, Clone, Copy)]
-pub struct Nothing;
-
-impl Obstacle for Nothing {
-    fn touches(&mut self, _: &[DVec3]) -> &[Touch] {
-        &[]
+impl Obstacle for Contacts<'_> {
+    fn touches(&mut self, x: &[DVec3]) -> &[Touch] {
+        self.update(x);
+        Contacts::touches(self)
     }
-}
-
-/// Where a run in time ended.
-#[derive(Debug, Clone)]
-pub struct Marched {
-    /// Positions, m.
-    pub positions: Vec<DVec3>,
-    /// Why it ended.
-    pub ended: Ended,
-    /// Steps done.
-    pub steps: usize,
-    /// Simulated time, s.
-    pub simulated_s: f64,
-    /// RMS speed of the free vertices, m/s.
-    pub rms_speed: f64,
-    /// Iterations of the linear solver.
-    pub iterations: u64,
-    /// Corrections of [`Elastic::limit`].
-    pub corrections: u64,
 }
 
 /// What a march goes by: the method's name for errors, how to move, when to stop.
@@ -111,14 +96,15 @@ struct State {
     d: Vec<Vec3A>,
 }
 
-/// Moves the cloth from where it is placed until it rests.
+/// Moves the cloth from where it is placed until it rests; tells the work of the linear solver, and the corrections of
+/// [`Elastic::limit`] where there are any.
 pub(super) fn march(
     dressing: &Dressing<'_>,
     course: Course<'_>,
     (elastic, obstacle): (&mut dyn Elastic, &mut dyn Obstacle),
-    watch: &mut Stopwatch,
+    mut watch: Stopwatch,
     onlooker: Spectator<'_>,
-) -> Result<Marched, MethodError> {
+) -> Outcome {
     let cloth = dressing.cloth;
     let n = cloth.vertex_count();
     let mut rest = Rest::new(*course.rule);
@@ -133,7 +119,7 @@ pub(super) fn march(
     };
     let mut solver = ConjugateGradients::default();
     let mut friction = Grip::new(course.friction);
-    let (mut steps, mut iterations, mut corrections) = (0, 0, 0);
+    let (mut steps, mut iterations, mut corrections) = (0, 0, None);
     let h = course.pacing.step_s;
     loop {
         let touches = watch.time("contact", || obstacle.touches(&state.x));
@@ -145,10 +131,11 @@ pub(super) fn march(
         let done = watch.time("linear solver", || solver.solve(system, limits, d));
         iterations += done as u64;
         let from = state.advance(&cloth.held);
-        corrections += watch.time("strain limiting", || elastic.limit(&from, &mut state.x, &cloth.held));
-        state.find_velocity(&from, h, touches);
+        let corrected = watch.time("strain limiting", || elastic.limit(&mut state.x));
+        corrections = corrected.map(|more| corrections.unwrap_or(0) + more);
+        find_velocities(&mut state.v, [&from, &state.x], h, touches);
         steps += 1;
-        let rms_speed = state.rms_speed(&cloth.held);
+        let rms_speed = rms_speed(state.v.iter().zip(&cloth.held).filter(|(_, held)| !**held).map(|(v, _)| v));
         if !rms_speed.is_finite() {
             return Err(MethodError::Unstable { method: course.method, step: steps });
         }
@@ -162,8 +149,19 @@ pub(super) fn march(
         };
         let stopped = onlooker(&moment).is_break().then_some(Ended::Interrupted);
         if let Some(ended) = ended.or(stopped) {
-            let simulated_s = rest.time_s();
-            return Ok(Marched { positions: state.x, ended, steps, simulated_s, rms_speed, iterations, corrections });
+            let corrected = corrections.map(|corrections| ("strain corrections", corrections));
+            return Ok(MethodDrape {
+                positions: state.x,
+                ended,
+                steps,
+                simulated_s: rest.time_s(),
+                rms_speed_m_per_s: rms_speed,
+                total: watch.began.elapsed(),
+                times: watch.parts,
+                counts: [("linear iterations", iterations)].into_iter().chain(corrected).collect(),
+                exhibits: Vec::new(),
+                notes: Vec::new(),
+            });
         }
     }
 }
@@ -213,23 +211,6 @@ impl State {
             }
         }
         from
-    }
-
-    /// v = d/h; what touches does not leave the body with it.
-    fn find_velocity(&mut self, from: &[DVec3], h: f64, touches: &[Touch]) {
-        for ((v, x), from) in self.v.iter_mut().zip(&self.x).zip(from) {
-            *v = (*x - *from) / h;
-        }
-        for t in touches {
-            let v = &mut self.v[t.vertex as usize];
-            *v -= t.normal * v.dot(t.normal).max(0.0);
-        }
-    }
-
-    fn rms_speed(&self, held: &[bool]) -> f64 {
-        let free = self.v.iter().zip(held).filter(|(_, held)| !**held);
-        let (sum, count) = free.fold((0.0, 0usize), |(sum, n), (v, _)| (sum + v.length_squared(), n + 1));
-        (sum / count.max(1) as f64).sqrt()
     }
 }
 

@@ -53,7 +53,7 @@ impl Dressing<'_> {
             0 | 1 => Ok(()),
             n => {
                 let reason = format!("found {n} fabrics in the garment, expected one: the method as published has one");
-                Err(MethodError::Unfit { method, reason })
+                Err(MethodError::unfit(method, reason))
             }
         }
     }
@@ -142,6 +142,15 @@ pub enum MethodError {
     },
 }
 
+impl MethodError {
+    fn unfit(method: &'static str, reason: impl Into<String>) -> Self {
+        Self::Unfit { method, reason: reason.into() }
+    }
+}
+
+/// The drape, or why there is none.
+pub type Outcome = Result<MethodDrape, MethodError>;
+
 /// A way to drape a garment, from the placed start to rest.
 pub trait ReferenceMethod: Sync {
     /// Its name: author and year.
@@ -151,23 +160,13 @@ pub trait ReferenceMethod: Sync {
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn run(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError>;
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome;
 
     /// Drapes until the garment rests by `rule`; `onlooker` is told of every step and may end it.
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn drape(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
+    fn drape(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
         dressing.of_one_fabric(self.name())?;
         // In the pool: hundreds of short parallel loops follow.
         rayon::scope(|_| self.run(dressing, rule, onlooker))
@@ -189,24 +188,26 @@ pub fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<
     }
 }
 
-/// An onlooker for who does not look.
-pub fn unwatched(_: &Moment<'_>) -> ControlFlow<()> {
-    ControlFlow::Continue(())
+/// Durations by name, in the order they were begun first, since it began.
+#[derive(Debug, Clone)]
+struct Stopwatch {
+    began: Instant,
+    parts: Vec<(&'static str, Duration)>,
 }
 
-/// Durations by name, in the order they were begun first.
-#[derive(Debug, Clone, Default)]
-struct Stopwatch(Vec<(&'static str, Duration)>);
-
 impl Stopwatch {
+    fn begin() -> Self {
+        Self { began: Instant::now(), parts: Vec::new() }
+    }
+
     /// Runs `work` on the account of `name`.
     fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let began = Instant::now();
         let out = work();
         let spent = began.elapsed();
-        match self.0.iter_mut().find(|(known, _)| *known == name) {
+        match self.parts.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += spent,
-            None => self.0.push((name, spent)),
+            None => self.parts.push((name, spent)),
         }
         out
     }

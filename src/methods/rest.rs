@@ -8,6 +8,10 @@
 //! Source: the stopping rule of this project's comparison; the papers give none but "until the speed falls under a
 //! tolerance" (\[20\]).
 
+use glam::DVec3;
+
+use crate::mechanics::energy::contact::Touch;
+
 /// When a garment counts as resting, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestRule {
@@ -71,6 +75,24 @@ impl Rest {
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
+}
+
+/// Velocities (m/s) after a step of `h` seconds between these positions (m); what touches does not leave the body with it: cloth does not
+/// bounce.
+pub(super) fn find_velocities(v: &mut [DVec3], [from, to]: [&[DVec3]; 2], h: f64, touches: &[Touch]) {
+    for ((v, to), from) in v.iter_mut().zip(to).zip(from) {
+        *v = (*to - *from) / h;
+    }
+    for t in touches {
+        let v = &mut v[t.vertex as usize];
+        *v -= t.normal * v.dot(t.normal).max(0.0);
+    }
+}
+
+/// √(Σ |v_i|² / n) of the vertices that are free, m/s.
+pub(super) fn rms_speed<'v>(free: impl Iterator<Item = &'v DVec3>) -> f64 {
+    let (sum, count) = free.fold((0.0, 0usize), |(sum, n), v| (sum + v.length_squared(), n + 1));
+    (sum / count.max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

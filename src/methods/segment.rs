@@ -9,12 +9,12 @@
 //! Our reading: the source says that arms, legs, trunk and hip are segmented, not how.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec3};
 use ordered_float::OrderedFloat;
 
-use crate::mesh::{NONE, Topology, TriMesh};
+use crate::mesh::{Flow, Lists, NONE, Topology, TriMesh, outer, pieces};
 
 /// Bands from the highest vertex to the farthest.
 const BANDS: f64 = 56.0;
@@ -42,6 +42,15 @@ struct Ring {
 }
 
 impl Segments {
+    /// Those of a body that must be closed; else why not, `what` of it having no inside.
+    pub(super) fn of_closed(mesh: &TriMesh, what: &str) -> Result<Self, String> {
+        let topology = Topology::new(mesh);
+        match topology.boundary_edges().count() {
+            0 => Ok(Self::new(mesh, &topology)),
+            open => Err(format!("the body is not closed ({open} boundary edges), so no {what} of it has an inside")),
+        }
+    }
+
     /// Cuts a connected body; further components are units of their own.
     #[must_use]
     pub fn new(mesh: &TriMesh, topology: &Topology) -> Self {
@@ -79,24 +88,13 @@ fn geodesics(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     let mut distance = vec![f64::INFINITY; mesh.vertex_count()];
     let mut by_height: Vec<u32> = (0..mesh.vertex_count() as u32).collect();
     by_height.sort_by_key(|&v| (Reverse(OrderedFloat(mesh.positions[v as usize].z)), v));
+    let mut flow = Flow::new(topology, &mesh.positions);
     for start in by_height {
         if distance[start as usize].is_finite() || topology.neighbours(start).is_empty() {
             continue;
         }
-        distance[start as usize] = 0.0;
-        let mut queue = BinaryHeap::from([(Reverse(OrderedFloat(0.0)), start)]);
-        while let Some((Reverse(OrderedFloat(d)), v)) = queue.pop() {
-            if d > distance[v as usize] {
-                continue;
-            }
-            for &w in topology.neighbours(v) {
-                let through = d + length(mesh, v, w);
-                if through < distance[w as usize] {
-                    distance[w as usize] = through;
-                    queue.push((Reverse(OrderedFloat(through)), w));
-                }
-            }
-        }
+        flow.run(&[start], f64::INFINITY, |_| true);
+        flow.reached.iter().for_each(|&v| distance[v as usize] = flow.distance[v as usize]);
     }
     distance
 }
@@ -104,13 +102,11 @@ fn geodesics(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
 /// The ring of each triangle, and the rings with their neighbours; noise is joined to the ring it borders on most.
 fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Vec<Ring>) {
     let n = mesh.triangles.len();
-    let mut beside: Vec<Vec<usize>> = vec![Vec::new(); n];
-    for (&[s, t], &valence) in topology.edge_triangles.iter().zip(&topology.edge_valence) {
-        if valence > 1 && t != NONE {
-            beside[s as usize].push(t as usize);
-            beside[t as usize].push(s as usize);
-        }
-    }
+    let joined = || {
+        let inner = topology.edge_triangles.iter().zip(&topology.edge_valence);
+        inner.filter(|(pair, valence)| **valence > 1 && pair[1] != NONE).map(|(pair, _)| *pair)
+    };
+    let beside = Lists::gathered(n, || joined().flat_map(|[s, t]| [(s, t), (t, s)]));
     let areas = mesh.triangle_areas();
     let mut band = band.to_vec();
     // Two rounds: what is joined to its neighbour's band in the first is a ring with it in the second.
@@ -120,7 +116,7 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
         rings.iter().for_each(|r| *of_band.entry(r.band).or_default() += r.area);
         let mut border = vec![std::collections::BTreeMap::<usize, usize>::new(); rings.len()];
         for t in 0..n {
-            for &s in beside[t].iter().filter(|&&s| ring_of[s] != ring_of[t]) {
+            for s in beside.of(t).iter().map(|&s| s as usize).filter(|&s| ring_of[s] != ring_of[t]) {
                 *border[ring_of[t]].entry(band[s]).or_default() += 1;
             }
         }
@@ -135,8 +131,8 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
             continue;
         }
         for t in 0..n {
-            for &s in &beside[t] {
-                let (a, b) = (ring_of[t], ring_of[s]);
+            for &s in beside.of(t) {
+                let (a, b) = (ring_of[t], ring_of[s as usize]);
                 if rings[a].band < rings[b].band {
                     rings[a].children.insert(b);
                     rings[b].parents.insert(a);
@@ -149,24 +145,14 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
 }
 
 /// Connected pieces of bands.
-fn flood(beside: &[Vec<usize>], band: &[usize], areas: &[f64]) -> (Vec<usize>, Vec<Ring>) {
-    let mut ring_of = vec![usize::MAX; band.len()];
+fn flood(beside: &Lists<u32>, band: &[usize], areas: &[f64]) -> (Vec<usize>, Vec<Ring>) {
+    let mut ring_of = vec![0; band.len()];
     let mut rings: Vec<Ring> = Vec::new();
-    for seed in 0..band.len() {
-        if ring_of[seed] != usize::MAX {
-            continue;
-        }
-        let mut ring = Ring { band: band[seed], ..Ring::default() };
-        let mut stack = vec![seed];
-        ring_of[seed] = rings.len();
-        while let Some(t) = stack.pop() {
+    for piece in pieces(band.len(), |t| beside.of(t), |t, s| band[t] == band[s]) {
+        let mut ring = Ring { band: band[piece[0] as usize], ..Ring::default() };
+        for t in piece.into_iter().map(|t| t as usize) {
             ring.area += areas[t];
-            for &s in &beside[t] {
-                if ring_of[s] == usize::MAX && band[s] == band[seed] {
-                    ring_of[s] = rings.len();
-                    stack.push(s);
-                }
-            }
+            ring_of[t] = rings.len();
         }
         rings.push(ring);
     }
@@ -211,7 +197,7 @@ fn units(rings: &[Ring]) -> Vec<usize> {
 pub fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
     let mut covariance = DMat3::ZERO;
     for (p, w) in points {
-        covariance += DMat3::from_cols(p * p.x, p * p.y, p * p.z) * w;
+        covariance += outer(p, p) * w;
     }
     let mut axis = DVec3::new(0.31, 0.17, 1.0);
     for _ in 0..200 {

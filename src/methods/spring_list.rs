@@ -81,8 +81,7 @@ pub fn springs(triangles: &[[u32; 3]], topology: &Topology, rest: &RestShape, fa
             edge.tip = tip;
         }
     }
-    let [weft, bias, warp] = fabric.bending_nm;
-    let plate = 0.25 * (weft + 2.0 * bias + warp);
+    let plate = fabric.mean_bending_nm();
     let of_edge = |e: &Edge| {
         let length = e.length / e.weight;
         (length, e.stiffness / e.weight * e.area / (length * length))

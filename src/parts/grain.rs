@@ -12,15 +12,13 @@
 //! Source: own. The direction is that of the rest shape (the warp runs up the garment and along a sleeve), the length that of the
 //! garment as placed; an edge between two triangles takes the mean of both directions. Limits: as good as the rest shape's grain.
 
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{Lists, RestShape, Topology, TriMesh};
 
 /// Squared extents of every garment edge along weft and warp.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grain {
-    /// First entry of each vertex.
-    start: Vec<usize>,
-    /// l_u², l_v² to each neighbour, in the order of [`Topology::neighbours`], m².
-    squares: Vec<[f64; 2]>,
+    /// l_u², l_v² from each vertex to its neighbours, in the order of [`Topology::neighbours`], m².
+    squares: Lists<[f64; 2]>,
 }
 
 impl Grain {
@@ -28,13 +26,12 @@ impl Grain {
     #[must_use]
     pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape) -> Self {
         let of_edge: Vec<[f64; 2]> = (0..topology.edges.len()).map(|e| squares(mesh, topology, rest, e)).collect();
-        let mut grain = Self { start: vec![0], squares: Vec::with_capacity(2 * of_edge.len()) };
+        let mut squares = Lists::default();
         for v in 0..mesh.vertex_count() as u32 {
             let edges = topology.neighbours(v).iter().filter_map(|&w| topology.edge_between(v, w));
-            grain.squares.extend(edges.map(|e| of_edge[e]));
-            grain.start.push(grain.squares.len());
+            squares.push(edges.map(|e| of_edge[e]));
         }
-        grain
+        Self { squares }
     }
 }
 
@@ -72,7 +69,7 @@ impl Ruler<'_> {
             let length = match self.grain {
                 None => x.distance(self.mesh.positions[w as usize]),
                 Some((grain, [weft, warp])) => {
-                    let [u, v] = grain.squares[grain.start[v as usize] + i];
+                    let [u, v] = grain.squares.of(v as usize)[i];
                     (weft * weft * u + warp * warp * v).sqrt()
                 }
             };

@@ -26,7 +26,7 @@ pub(crate) use seeding::spread_seeds;
 
 use rayon::prelude::*;
 
-use crate::mesh::Topology;
+use crate::mesh::{Topology, pieces};
 use crate::range_table::RangeTable;
 
 /// The PART number of a vertex outside every level.
@@ -95,40 +95,20 @@ impl Parts {
         hole_vertices: usize,
     ) -> Self {
         let n = label.len();
-        let mut piece_of_vertex = vec![UNASSIGNED; n];
-        let mut pieces: Vec<Part> = Vec::new();
-        let mut stack = Vec::new();
-        for seed in 0..n {
-            if label[seed] == UNASSIGNED || piece_of_vertex[seed] != UNASSIGNED {
-                continue;
-            }
-            let piece = pieces.len() as u32;
-            let mut vertices = Vec::new();
-            piece_of_vertex[seed] = piece;
-            stack.push(seed as u32);
-            while let Some(v) = stack.pop() {
-                vertices.push(v);
-                for &w in topology.neighbours(v) {
-                    if label[w as usize] == label[seed] && piece_of_vertex[w as usize] == UNASSIGNED {
-                        piece_of_vertex[w as usize] = piece;
-                        stack.push(w);
-                    }
-                }
-            }
+        let alike = |v: usize, w: usize| label[v] == label[w];
+        let mut found = pieces(n, |v| topology.neighbours(v as u32), alike);
+        found.retain(|piece| label[piece[0] as usize] != UNASSIGNED);
+        let part = |mut vertices: Vec<u32>| {
             vertices.sort_unstable();
-            pieces.push(Part { level: level_of(label[seed]), vertices });
-        }
+            Part { level: level_of(label[vertices[0] as usize]), vertices }
+        };
+        let mut parts: Vec<Part> = found.into_iter().map(part).collect();
         // Pieces are found by smallest vertex; the stable sort keeps that order within a level.
-        let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
-        order.sort_by_key(|&p| pieces[p as usize].level);
-        let mut number = vec![0u32; pieces.len()];
-        for (new, &old) in order.iter().enumerate() {
-            number[old as usize] = new as u32;
-        }
-        let mut parts = pieces;
         parts.sort_by_key(|p| p.level);
-        let part_of_vertex: Vec<u32> =
-            piece_of_vertex.iter().map(|&p| number.get(p as usize).copied().unwrap_or(UNASSIGNED)).collect();
+        let mut part_of_vertex = vec![UNASSIGNED; n];
+        for (p, part) in (0..).zip(&parts) {
+            part.vertices.iter().for_each(|&v| part_of_vertex[v as usize] = p);
+        }
         let mut parts_per_level = vec![0; own_extent.len()];
         for part in &parts {
             if let Some(count) = parts_per_level.get_mut(part.level as usize) {

@@ -10,6 +10,7 @@ use std::collections::BinaryHeap;
 use ordered_float::OrderedFloat;
 
 use super::grain::Ruler;
+use crate::mesh::Lists;
 
 /// The nearest seed of each of these connected vertices, and how many seeds it takes for none to be farther than half of
 /// `extent_m`. `local` is the place of a vertex in the list, `None` for others.
@@ -39,7 +40,11 @@ pub(crate) fn spread_seeds(
     ruler: Ruler<'_>,
     mut enough: impl FnMut(f64, usize, &[u32]) -> bool,
 ) {
-    let graph = Graph::new(vertices, local, ruler);
+    // The edges inside the piece, by place in its list: neighbour and length, m.
+    let mut graph = Lists::default();
+    for &v in vertices {
+        graph.push(ruler.neighbours(v).filter_map(|(w, length)| Some((local(w)?, length))));
+    }
     let mut spread = Spread::new(vertices.len());
     let (mut next, mut radius_m) = (0, f64::INFINITY);
     for seed in 0..vertices.len() {
@@ -52,24 +57,6 @@ pub(crate) fn spread_seeds(
     }
     // Every vertex is a seed, and no caller asks for less than a distance of 0.
     debug_assert!(vertices.is_empty() || radius_m == 0.0);
-}
-
-/// The edges inside the piece, by place in its list.
-struct Graph {
-    start: Vec<usize>,
-    /// Neighbour and length, m.
-    edges: Vec<(usize, f64)>,
-}
-
-impl Graph {
-    fn new(vertices: &[u32], local: impl Fn(u32) -> Option<usize>, ruler: Ruler<'_>) -> Self {
-        let mut graph = Self { start: vec![0], edges: Vec::new() };
-        for &v in vertices {
-            graph.edges.extend(ruler.neighbours(v).filter_map(|(w, length)| Some((local(w)?, length))));
-            graph.start.push(graph.edges.len());
-        }
-        graph
-    }
 }
 
 /// How far every vertex is from its nearest seed, and which that is.
@@ -100,12 +87,12 @@ impl Spread {
     }
 
     /// Dijkstra's algorithm from the seeds put since the last time, over what they are nearer to.
-    fn flow(&mut self, graph: &Graph) {
+    fn flow(&mut self, graph: &Lists<(usize, f64)>) {
         while let Some(Reverse((OrderedFloat(d), i))) = self.heap.pop() {
             if d > self.distance[i] {
                 continue;
             }
-            for &(j, length) in &graph.edges[graph.start[i]..graph.start[i + 1]] {
+            for &(j, length) in graph.of(i) {
                 // Whoever lies behind a vertex goes where it goes, even where the way is shorter by less than a rounding: so
                 // pieces are connected.
                 let follows = self.before[j] == i && self.seed_of_vertex[j] != self.seed_of_vertex[i];

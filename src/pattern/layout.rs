@@ -16,14 +16,7 @@ const TRIED: usize = 48;
 /// What to add to the points of each panel, m; the lower left corner of all comes to the origin.
 #[must_use]
 pub fn laid_out(pattern: &SewingPattern) -> Vec<DVec2> {
-    let boxes: Vec<[DVec2; 2]> = pattern
-        .panels
-        .iter()
-        .map(|panel| {
-            let points = panel.edges.iter().flat_map(|e| e.curve.divided(16));
-            points.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
-        })
-        .collect();
+    let boxes: Vec<[DVec2; 2]> = pattern.panels.iter().map(|panel| box_about(panel.points())).collect();
     let sizes: Vec<DVec2> = boxes.iter().map(|[low, high]| high - low).collect();
     // Rows as wide as some of the panels beside each other; what is then largest in a picture of this shape.
     let sums = |first: usize| {
@@ -48,6 +41,12 @@ pub fn laid_out(pattern: &SewingPattern) -> Vec<DVec2> {
         offset.y = height - y - size.y - low.y;
     }
     offsets
+}
+
+/// Lower and upper corner of the box about some points, m.
+pub(super) fn box_about(points: impl IntoIterator<Item = DVec2>) -> [DVec2; 2] {
+    let none = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    points.into_iter().fold(none, |[low, high], p| [low.min(p), high.max(p)])
 }
 
 /// Boxes one after the other in rows, the first row at 0.

@@ -67,6 +67,11 @@ impl PatternPanel {
         self.rotation * flat.extend(0.0) + self.translation
     }
 
+    /// Its loop by points, m, sixteen parts an edge.
+    fn points(&self) -> impl Iterator<Item = DVec2> + '_ {
+        self.edges.iter().flat_map(|edge| edge.curve.divided(16))
+    }
+
     /// Area inside its loop, m²; negative where the loop runs clockwise.
     #[must_use]
     pub fn signed_area(&self) -> f64 {
@@ -153,19 +158,5 @@ impl SewingPattern {
     #[must_use]
     pub fn edge_name(&self, at: EdgeAt) -> String {
         format!("{}.{}", self.panels[at.panel].name, at.edge)
-    }
-
-    /// Meshes the panels with edges of about `edge_m` (m) and sews them together.
-    ///
-    /// # Errors
-    /// [`PatternError`] where that makes too many vertices or a panel has no mesh.
-    pub fn sew(&self, edge_m: f64) -> Result<SewnGarment, PatternError> {
-        sew::sew(self, edge_m)
-    }
-
-    /// The pattern as a drawing in its true size: panels with grain, labels, and their seams numbered.
-    #[must_use]
-    pub fn to_svg(&self) -> String {
-        draw::svg(self)
     }
 }

@@ -9,9 +9,11 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 use spade::handles::FixedVertexHandle;
-use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation as _};
+use spade::{AngleLimit, Point2, RefinementParameters, Triangulation as _};
 
-type Plane = ConstrainedDelaunayTriangulation<Point2<f64>>;
+use super::layout::box_about;
+use crate::mesh::each_once;
+use crate::mesh::polygon::{Plane, within};
 
 /// Lattice points nearer to the outline than this share of an edge are left out.
 const CLEARANCE: f64 = 0.6;
@@ -63,10 +65,7 @@ pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Mesh
     let mut number = vec![u32::MAX; plane.num_vertices()];
     (0..n).for_each(|i| number[i] = i as u32);
     let mut points = outline.to_vec();
-    let mut used: Vec<usize> = faces.values().flatten().copied().filter(|&v| v >= n).collect();
-    used.sort_unstable();
-    used.dedup();
-    for v in used {
+    for v in each_once(faces.values().flatten().copied().filter(|&v| v >= n)) {
         number[v] = points.len() as u32;
         let p = plane.vertex(FixedVertexHandle::from_index(v)).position();
         points.push(DVec2::new(p.x, p.y));
@@ -77,36 +76,19 @@ pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Mesh
 
 /// The faces within the outline, by number.
 fn inside(plane: &Plane, n: usize) -> Result<BTreeMap<usize, [usize; 3]>, String> {
-    let corner = |i: usize| FixedVertexHandle::from_index(i % n);
-    let mut inside = BTreeMap::new();
-    let mut reached = Vec::new();
-    for i in 0..n {
-        let side = plane.get_edge_from_neighbors(corner(i), corner(i + 1));
-        let face = side.and_then(|side| side.face().as_inner());
-        reached.push(face.ok_or_else(|| "its outline is lost in the triangulation".to_owned())?);
-    }
-    while let Some(face) = reached.pop() {
-        if inside.insert(face.fix().index(), face.vertices().map(|v| v.fix().index())).is_some() {
-            continue;
-        }
-        let open = face.adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge());
-        reached.extend(open.filter_map(|edge| edge.rev().face().as_inner()));
-    }
-    Ok(inside)
+    within(plane, n).ok_or_else(|| "its outline is lost in the triangulation".to_owned())
 }
 
 /// Middles of the inner edges that must be divided.
 fn chords(plane: &Plane, faces: &BTreeMap<usize, [usize; 3]>, class: &[u32]) -> Vec<Point2<f64>> {
     let n = class.len();
     let on_outline = |v: usize| v < n;
-    let mut edges: Vec<[usize; 2]> = faces
+    let edges = faces
         .values()
         .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
         .filter(|[a, b]| !(on_outline(*a) && on_outline(*b) && (a.abs_diff(*b) == 1 || a.abs_diff(*b) == n - 1)))
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
+        .map(|[a, b]| [a.min(b), a.max(b)]);
+    let edges = each_once(edges);
     let mut found: Vec<[usize; 2]> = edges.iter().filter(|e| e.iter().all(|&v| on_outline(v))).copied().collect();
     // Edges of an inner vertex to two vertices of the outline that are one.
     let mut met: BTreeMap<(usize, u32), usize> = BTreeMap::new();
@@ -125,8 +107,7 @@ fn chords(plane: &Plane, faces: &BTreeMap<usize, [usize; 3]>, class: &[u32]) -> 
 
 /// Points of a lattice of equilateral triangles within the outline and away from it, row by row.
 fn lattice(outline: &[DVec2], edge_m: f64) -> Vec<DVec2> {
-    let low = outline.iter().fold(DVec2::INFINITY, |low, p| low.min(*p));
-    let high = outline.iter().fold(DVec2::NEG_INFINITY, |high, p| high.max(*p));
+    let [low, high] = box_about(outline.iter().copied());
     let middle = 0.5 * (low + high);
     let step = DVec2::new(edge_m, 0.75_f64.sqrt() * edge_m);
     let reach = (0.5 * (high - low) / step).ceil();
@@ -144,11 +125,7 @@ fn lattice(outline: &[DVec2], edge_m: f64) -> Vec<DVec2> {
         for column in -columns..=columns {
             let shift = if row.rem_euclid(2) == 0 { 0.0 } else { 0.5 };
             let p = DVec2::new(middle.x + (column as f64 + shift) * step.x, y);
-            let crossed = |[a, b]: &&[DVec2; 2]| {
-                (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-            };
-            let within = near.iter().filter(crossed).count() % 2 == 1;
-            if within && near.iter().all(|[a, b]| to_segment(p, *a, *b) >= clear) {
+            if is_within(p, &near) && near.iter().all(|[a, b]| to_segment(p, *a, *b) >= clear) {
                 points.push(p);
             }
         }
@@ -156,8 +133,15 @@ fn lattice(outline: &[DVec2], edge_m: f64) -> Vec<DVec2> {
     points
 }
 
+/// Whether a point lies within an outline of these sides, of which those at its height matter.
+pub(super) fn is_within(p: DVec2, sides: &[[DVec2; 2]]) -> bool {
+    let crossed =
+        |[a, b]: &&[DVec2; 2]| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+    sides.iter().filter(crossed).count() % 2 == 1
+}
+
 /// Distance of a point to a segment, m.
-pub(super) fn to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
+fn to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
     let d = b - a;
     let t = ((p - a).dot(d) / d.length_squared()).clamp(0.0, 1.0);
     p.distance(a + t * d)

@@ -149,8 +149,7 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
         let [from, to] = pair else { return Err(expected()) };
         let (from, to) = (index(from).ok_or_else(expected)?, index(to).ok_or_else(expected)?);
         ends.push([from, to]);
-        let label = object.get("label").filter(|v| !v.is_null()).map(|v| label(v, &place)).transpose()?;
-        let label = label.filter(|label| !label.is_empty());
+        let label = label(object, &place)?;
         let curvature = object.get("curvature").filter(|v| !v.is_null());
         let straight = Curve::Line { a: vertices[from], b: vertices[to] };
         let curve = curvature.map_or(Ok(straight), |v| curve(&place, v, vertices[from], vertices[to], of))?;
@@ -163,13 +162,15 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
             return Err(PatternError::Open { panel, edge: i, before, found: *from, expected });
         }
     }
-    let label = object.get("label").filter(|v| !v.is_null()).map(|v| label(v, &place)).transpose()?;
+    let label = label(object, &place)?;
     let (rotation, translation) = upright(angles, translation * of.metres_per_unit);
-    Ok(PatternPanel { name: name.to_owned(), label: label.filter(|l| !l.is_empty()), edges, rotation, translation })
+    Ok(PatternPanel { name: name.to_owned(), label, edges, rotation, translation })
 }
 
-fn label(value: &Value, place: &str) -> Result<String, PatternError> {
-    Ok(At::new(value, format!("{place}, label")).text("a text")?.to_owned())
+fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, PatternError> {
+    let Some(value) = object.get("label").filter(|v| !v.is_null()) else { return Ok(None) };
+    let text = At::new(value, format!("{place}, label")).text("a text")?;
+    Ok((!text.is_empty()).then(|| text.to_owned()))
 }
 
 /// Placement with z up and the front at −y.

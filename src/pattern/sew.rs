@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::outline::{Outline, divisions, outlines};
 use super::panel_mesh::{self, Meshed};
 use super::{EdgeAt, PatternError, SewingPattern, laid_out};
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{RestShape, Topology, TriMesh, each_once};
 
 /// Edge lengths a garment is made with, m.
 const EDGES: [f64; 2] = [2e-3, 0.2];
@@ -61,35 +61,41 @@ pub struct SewnGarment {
     pub notes: Vec<String>,
 }
 
-pub(super) fn sew(pattern: &SewingPattern, edge_m: f64) -> Result<SewnGarment, PatternError> {
-    if !(EDGES[0]..=EDGES[1]).contains(&edge_m) {
-        let [low_cm, high_cm] = EDGES.map(|m| 100.0 * m);
-        return Err(PatternError::EdgeLength { found_cm: 100.0 * edge_m, low_cm, high_cm });
+impl SewingPattern {
+    /// Meshes the panels with edges of about `edge_m` (m) and sews them together.
+    ///
+    /// # Errors
+    /// [`PatternError`] where that makes too many vertices or a panel has no mesh.
+    pub fn sew(&self, edge_m: f64) -> Result<SewnGarment, PatternError> {
+        if !(EDGES[0]..=EDGES[1]).contains(&edge_m) {
+            let [low_cm, high_cm] = EDGES.map(|m| 100.0 * m);
+            return Err(PatternError::EdgeLength { found_cm: 100.0 * edge_m, low_cm, high_cm });
+        }
+        let counts = divisions(self, edge_m);
+        let area: f64 = self.panels.iter().map(|p| p.signed_area().abs()).sum();
+        let found = (area / (0.75_f64.sqrt() * edge_m * edge_m)) as usize + counts.iter().flatten().sum::<usize>();
+        if found > MOST_VERTICES {
+            return Err(PatternError::TooFine { edge_cm: 100.0 * edge_m, found, most: MOST_VERTICES });
+        }
+        let outlines = outlines(self, &counts);
+        let meshed: Vec<Meshed> = (self.panels.par_iter().zip(&outlines))
+            .map(|(panel, outline)| {
+                let failed = |reason| PatternError::NoMesh { panel: panel.name.clone(), reason };
+                if panel.signed_area() > 0.0 {
+                    return panel_mesh::mesh(&outline.points, &outline.class, edge_m).map_err(failed);
+                }
+                // The other way round, and its outline in the loop's order again.
+                let n = outline.points.len() as u32;
+                let points: Vec<DVec2> = outline.points.iter().rev().copied().collect();
+                let class: Vec<u32> = outline.class.iter().rev().copied().collect();
+                let (mut points, mut triangles) = panel_mesh::mesh(&points, &class, edge_m).map_err(failed)?;
+                points[..n as usize].reverse();
+                triangles.as_flattened_mut().iter_mut().filter(|v| **v < n).for_each(|v| *v = n - 1 - *v);
+                Ok((points, triangles))
+            })
+            .collect::<Result<_, PatternError>>()?;
+        Ok(join(self, &outlines, meshed))
     }
-    let counts = divisions(pattern, edge_m);
-    let area: f64 = pattern.panels.iter().map(|p| p.signed_area().abs()).sum();
-    let found = (area / (0.75_f64.sqrt() * edge_m * edge_m)) as usize + counts.iter().flatten().sum::<usize>();
-    if found > MOST_VERTICES {
-        return Err(PatternError::TooFine { edge_cm: 100.0 * edge_m, found, most: MOST_VERTICES });
-    }
-    let outlines = outlines(pattern, &counts);
-    let meshed: Vec<Meshed> = (pattern.panels.par_iter().zip(&outlines))
-        .map(|(panel, outline)| {
-            let failed = |reason| PatternError::NoMesh { panel: panel.name.clone(), reason };
-            if panel.signed_area() > 0.0 {
-                return panel_mesh::mesh(&outline.points, &outline.class, edge_m).map_err(failed);
-            }
-            // The other way round, and its outline in the loop's order again.
-            let n = outline.points.len() as u32;
-            let points: Vec<DVec2> = outline.points.iter().rev().copied().collect();
-            let class: Vec<u32> = outline.class.iter().rev().copied().collect();
-            let (mut points, mut triangles) = panel_mesh::mesh(&points, &class, edge_m).map_err(failed)?;
-            points[..n as usize].reverse();
-            triangles.as_flattened_mut().iter_mut().filter(|v| **v < n).for_each(|v| *v = n - 1 - *v);
-            Ok((points, triangles))
-        })
-        .collect::<Result<_, PatternError>>()?;
-    Ok(join(pattern, &outlines, meshed))
 }
 
 fn join(pattern: &SewingPattern, outlines: &[Outline], meshed: Vec<Meshed>) -> SewnGarment {
@@ -147,10 +153,7 @@ fn join(pattern: &SewingPattern, outlines: &[Outline], meshed: Vec<Meshed>) -> S
             }
         }
     }
-    for vertices in labelled.values_mut() {
-        vertices.sort_unstable();
-        vertices.dedup();
-    }
+    labelled.values_mut().for_each(|vertices| *vertices = each_once(vertices.drain(..)));
     SewnGarment { mesh, rest: RestShape::new(corners), flat, panels, seams, labelled, notes }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Each yields a checked table whose name and source say how it was made. Bounds are centimetres.
 
-use super::{Extent, GapRule, Level, METRES_PER_CM, RangeTable, TableError};
+use super::{Extent, Level, METRES_PER_CM, RangeTable, TableError};
 
 /// Levels that a made table can have: more than any garment fills, few enough to make at once.
 pub(crate) const MOST_LEVELS: usize = 10_000;
@@ -86,9 +86,7 @@ impl RangeTable {
         if !distances_m.iter().any(|d| d.is_finite()) {
             return Err(TableError::value("the sample of a quantile table", "no finite distance", "at least one"));
         }
-        let bounds: Vec<f64> = std::iter::once(0.0).chain(inner).chain([f64::INFINITY]).collect();
-        let levels = bounds.len() - 1;
-        let made = Self::from_bounds(format!("{levels} quantile levels"), &bounds)?;
+        let made = Self::from_inner_bounds(format!("{} quantile levels", inner.len() + 1), &inner)?;
         Ok(made.with_source(format!("equal shares of {} distances", distances_m.len())))
     }
 
@@ -106,17 +104,16 @@ impl RangeTable {
         }
         let steps = (count - 2) as f64;
         let ratio = last_cm / first_cm;
-        let inner = (0..count - 1).map(|i| first_cm * ratio.powf(i as f64 / steps));
-        let bounds: Vec<f64> = std::iter::once(0.0).chain(inner).chain([f64::INFINITY]).collect();
-        let made = Self::from_bounds(format!("{count} geometric levels, {first_cm} to {last_cm} cm"), &bounds)?;
+        let inner: Vec<f64> = (0..count - 1).map(|i| first_cm * ratio.powf(i as f64 / steps)).collect();
+        let name = format!("{count} geometric levels, {first_cm} to {last_cm} cm");
+        let made = Self::from_inner_bounds(name, &inner)?;
         Ok(made.with_source(format!("bounds grow by the factor {:.4}", ratio.powf(1.0 / steps))))
     }
 
     /// A table from its inner bounds, from 0 to open.
     pub fn from_inner_bounds(name: impl Into<String>, inner_cm: &[f64]) -> Result<Self, TableError> {
         let bounds: Vec<f64> = std::iter::once(0.0).chain(inner_cm.iter().copied()).chain([f64::INFINITY]).collect();
-        let table = Self::from_bounds(name, &bounds)?;
-        Ok(Self { gap: GapRule::default(), ..table })
+        Self::from_bounds(name, &bounds)
     }
 }
 

@@ -35,13 +35,6 @@ pub struct Arranged {
     pub turned: f64,
 }
 
-/// The same, and what it tells of the garment.
-pub(super) struct Arrangement {
-    pub(super) arranged: Arranged,
-    /// Whether it has shoulder seams.
-    pub(super) has_shoulders: bool,
-}
-
 /// Where a pattern expects a body's marks, m.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Expected {
@@ -104,8 +97,8 @@ pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
     Expected { shoulder_z, waist_z, arm_fall }
 }
 
-/// Moves the panels to a body.
-pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> Arrangement {
+/// Moves the panels to a body; returns how, and whether the garment has shoulder seams.
+pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arranged, bool) {
     let armpit_z = body.armpit_z.or(body.shoulder_z).unwrap_or(f64::INFINITY);
     let expected = expected(pattern, armpit_z);
     let mut done = Arranged::default();
@@ -129,7 +122,7 @@ pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> Arrangem
         panel.rotation = turn * panel.rotation;
         panel.translation = turn * panel.translation + body.middle.extend(done.raised);
     }
-    Arrangement { arranged: done, has_shoulders: expected.shoulder_z.is_some() }
+    (done, expected.shoulder_z.is_some())
 }
 
 /// Turns each side's sleeves by this much downwards about the middle of the edges that hold them.

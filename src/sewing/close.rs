@@ -245,23 +245,15 @@ fn solve(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::samples::sheet;
 
     #[test]
     fn a_strip_of_a_cylinder_lies_flat_at_its_own_lengths() {
         // A third of a cylinder of 10 cm, as the eye sees it from the front, a few triangles turned over.
-        let (nu, nv) = (12usize, 8usize);
-        let at = |i: usize, j: usize| (0.2 * (i as f64 / nu as f64 - 0.5), 0.02 * j as f64);
-        let around = |(s, z): (f64, f64)| DVec3::new(0.1 * (s / 0.1).sin(), -0.1 * (s / 0.1).cos(), z);
-        let id = |i: usize, j: usize| (j * (nu + 1) + i) as u32;
-        let places: Vec<(f64, f64)> = (0..=nv).flat_map(|j| (0..=nu).map(move |i| at(i, j))).collect();
-        let cell = |i: usize, j: usize| {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        };
-        let triangles: Vec<[u32; 3]> = (0..nv).flat_map(|j| (0..nu).flat_map(move |i| cell(i, j))).collect();
-        let mesh = TriMesh::new(places.iter().map(|p| around(*p)).collect(), triangles);
-        let corners = mesh.triangles.iter().map(|t| t.map(|v| DVec2::new(places[v as usize].0, places[v as usize].1)));
-        let rest = RestShape::new(corners.collect());
+        let flat = sheet(12, 8, |i, j| DVec3::new(0.2 * (i / 12.0 - 0.5), 0.02 * j, 0.0));
+        let rest = RestShape::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
+        let around = |p: &DVec3| DVec3::new(0.1 * (p.x / 0.1).sin(), -0.1 * (p.x / 0.1).cos(), p.y);
+        let mesh = flat.with_positions(flat.positions.iter().map(around).collect());
         let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
         seen.swap(30, 31);
         let flat = laid_flat(&mesh, &rest, &seen);

@@ -10,7 +10,8 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, box_about};
+use crate::quantile::extremes;
 use crate::shapes::girth::{Plane, SectionLoop, section};
 
 /// Between two planes, m.
@@ -128,8 +129,7 @@ fn middle(body: &TriMesh, low: f64, height: f64) -> DVec2 {
     let curves = section(body, Plane::horizontal(low + 0.6 * height));
     let largest = curves.into_iter().filter(|c| c.closed).max_by(|a, b| a.length().total_cmp(&b.length()));
     let box_of = |c: SectionLoop| {
-        let (low, high) =
-            c.points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+        let (low, high) = box_about(c.points);
         (0.5 * (low + high)).truncate()
     };
     largest.map_or(DVec2::ZERO, box_of)
@@ -152,8 +152,7 @@ fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
 }
 
 fn extent(curve: &SectionLoop, across: DVec2) -> f64 {
-    let along = curve.points.iter().map(|p| p.truncate().dot(across));
-    let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let (low, high) = extremes(curve.points.iter().map(|p| p.truncate().dot(across)));
     high - low
 }
 
@@ -167,8 +166,7 @@ fn level(body: &TriMesh, z: f64, middle: DVec2, across: DVec2) -> Level {
     let mut girths = [LEAST_ARM; 2];
     for curve in section(body, Plane::horizontal(z)).into_iter().filter(|c| c.closed) {
         let along = |p: &DVec3| (p.truncate() - middle).dot(across);
-        let (low, high) =
-            curve.points.iter().map(along).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) = extremes(curve.points.iter().map(along));
         let length = curve.length();
         if low < 0.0 && high > 0.0 {
             if found.trunk.as_ref().is_none_or(|t| t.length() < length) {

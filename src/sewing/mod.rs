@@ -19,8 +19,8 @@ pub use landmarks::Landmarks;
 pub(crate) use shut::draw_shut;
 
 use crate::distance::Body;
+use crate::mesh::{Topology, each_once};
 use crate::pattern::{PatternError, SewingPattern, SewnGarment};
-use arrange::Arrangement;
 use close::{Closing, close};
 
 /// Edge lengths of the garments before the one that is asked for, m, the gap they keep from the body, m, and the most steps they
@@ -67,7 +67,7 @@ pub fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn
     let began = Instant::now();
     let landmarks = Landmarks::of(body.mesh());
     let mut pattern = pattern.clone();
-    let Arrangement { arranged, has_shoulders } = arrange::arrange(&mut pattern, &landmarks);
+    let (arranged, has_shoulders) = arrange::arrange(&mut pattern, &landmarks);
     // What is worn below the arms is drawn shut and hangs inside of them.
     let armless = if has_shoulders { None } else { landmarks.without_arms(body.mesh()) };
     let armless = armless.and_then(|mesh| Body::new_open(&mesh).ok());
@@ -115,14 +115,12 @@ fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Opti
     }
     for holding in HOLDING {
         let found: Vec<&String> = garment.labelled.keys().filter(|label| label.starts_with(holding)).collect();
-        let mut vertices: Vec<u32> = found.iter().flat_map(|label| &garment.labelled[*label]).copied().collect();
-        vertices.sort_unstable();
-        vertices.dedup();
+        let vertices = each_once(found.iter().flat_map(|label| &garment.labelled[*label]).copied());
         if let (Some(label), false) = (found.first(), vertices.is_empty()) {
             return (vertices, Some((*label).clone()));
         }
     }
-    let topology = crate::mesh::Topology::new(&garment.mesh);
+    let topology = Topology::new(&garment.mesh);
     let height = |edge: &[u32]| edge.iter().map(|&v| x[v as usize].z).sum::<f64>() / edge.len().max(1) as f64;
     let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
     highest.map_or((Vec::new(), None), |edge| (edge, Some("top edge".to_owned())))

@@ -16,7 +16,7 @@ use crate::mesh::bridges::Bridges;
 use crate::mesh::import::Imported;
 use crate::mesh::report::{Remark, Repair};
 use crate::mesh::self_intersection::self_intersecting_pairs;
-use crate::mesh::{RestShape, TriMesh};
+use crate::mesh::{RestShape, TriMesh, longest_side};
 
 /// A mesh has open seams that are shut at rest where it has sides so many times as long as any at rest.
 const SHUT: f64 = 3.0;
@@ -37,8 +37,8 @@ const ROUNDS: i32 = 3;
 /// as it is.
 pub(crate) fn draw_shut(imported: &mut Imported, rest: &RestShape, body: &Body) {
     let Some(Bridges { longest_m, .. }) = Bridges::of(&imported.mesh) else { return };
-    let sides = rest.corners.iter().flat_map(|c| [0, 1, 2].map(|i| c[i].distance(c[(i + 1) % 3])));
-    if SHUT * sides.fold(0.0, f64::max) > longest_m {
+    let at_rest = rest.corners.iter().map(|c| longest_side(c.map(|p| p.extend(0.0))));
+    if SHUT * at_rest.fold(0.0, f64::max) > longest_m {
         return;
     }
     let (x, steps) = drawn_shut(&imported.mesh, rest, body);

@@ -104,11 +104,6 @@ impl Anatomy {
         self.neck.join(field, p, 0.06)
     }
 
-    /// The arm on the side of `p`.
-    pub(super) fn arm_at(&self, p: DVec3) -> Sided<'_, Sweep> {
-        Sided::new(&self.arm, p.x)
-    }
-
     /// Trunk, neck and legs.
     pub(super) fn torso_and_legs(&self, p: DVec3) -> Jet {
         Legs(self).join(self.torso(p), p, 0.05)
@@ -116,7 +111,7 @@ impl Anatomy {
 
     /// Everything but the head.
     pub(super) fn below_the_head(&self, p: DVec3) -> Jet {
-        self.arm_at(p).join(self.torso_and_legs(p), p, 0.065)
+        Sided::new(&self.arm, p.x).join(self.torso_and_legs(p), p, 0.065)
     }
 }
 

@@ -65,14 +65,7 @@ impl DressForm {
         let tags = vec![0; rough.positions.len()];
         // A closed surface of genus 0 has two triangles for each vertex but two.
         let density = Density::Vertices(triangles / 2 + 2);
-        let skin = Skin {
-            solid: &self.anatomy,
-            head: m.stature - 0.2 * m.scale(),
-            crotch: m.crotch,
-            axilla: m.axilla,
-            scale: m.scale(),
-        };
-        let (mut mesh, _) = remesh(&rough, tags, &skin, density).ok_or(ShapeError::NotManifold { what: "body" })?;
+        let (mut mesh, _) = remesh(&rough, tags, self, density).ok_or(ShapeError::NotManifold { what: "body" })?;
         self.correct(&mut mesh);
         Ok(mesh)
     }
@@ -94,34 +87,28 @@ impl DressForm {
     }
 }
 
-/// The surface of the form, finer at wrists, hands, ankles, head, crotch and armpits than on the trunk.
-struct Skin<'a> {
-    solid: &'a Anatomy,
-    head: f64,
-    crotch: f64,
-    axilla: f64,
-    scale: f64,
-}
-
-impl Surface for Skin<'_> {
+/// Finer at wrists, hands, ankles, head, crotch and armpits than on the trunk.
+impl Surface for DressForm {
     fn project(&self, p: DVec3, _tag: u8) -> DVec3 {
-        onto_surface(self.solid, p, CLOSE)
+        onto_surface(&self.anatomy, p, CLOSE)
     }
 
     fn relative_size(&self, p: DVec3) -> f64 {
+        let (m, Anatomy { arm, leg, trunk, wrist_at, .. }) = (&self.measures, &self.anatomy);
+        let scale = m.scale();
         // Along the arm from the shoulder to the wrist the radius halves, and so do the triangles; the same towards the feet.
         let mirrored = DVec3::new(p.x.abs(), p.y, p.z);
-        let t = self.solid.arm.along(mirrored) / self.solid.wrist_at;
-        let off_axis = (mirrored - self.solid.arm.centre(t * self.solid.wrist_at)).length();
-        let on_arm = 1.0 - smooth_step(0.10, 0.16, off_axis / self.scale);
+        let t = arm.along(mirrored) / wrist_at;
+        let off_axis = (mirrored - arm.centre(t * wrist_at)).length();
+        let on_arm = 1.0 - smooth_step(0.10, 0.16, off_axis / scale);
         let arm = 1.0 - 0.52 * on_arm * smooth_step(0.1, 0.95, t);
-        let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / self.scale));
-        let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - self.head);
+        let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / scale));
+        let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - (m.stature - 0.2 * scale));
         // Crotch and armpits are saddles narrower than an edge of the trunk's.
-        let crotch = DVec3::new(0.0, self.solid.leg.centre(self.crotch).y, self.crotch);
-        let pit = self.solid.trunk.centre(self.axilla) + self.solid.trunk.section(self.axilla)[2] * DVec3::X;
+        let crotch = DVec3::new(0.0, leg.centre(m.crotch).y, m.crotch);
+        let pit = trunk.centre(m.axilla) + trunk.section(m.axilla)[2] * DVec3::X;
         let saddle =
-            |at: DVec3, finer: f64| 1.0 - finer * (1.0 - smooth_step(0.03, 0.12, mirrored.distance(at) / self.scale));
+            |at: DVec3, finer: f64| 1.0 - finer * (1.0 - smooth_step(0.03, 0.12, mirrored.distance(at) / scale));
         let saddle = saddle(crotch, 0.55).min(saddle(pit, 0.4));
         arm.min(ankle).min(head).min(saddle)
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::jet::Jet;
 use super::solid::Solid;
-use crate::mesh::{Topology, TriMesh};
+use crate::mesh::{Topology, TriMesh, renumbered, retain};
 
 /// Newton steps of a projection; the relaxation before it moves a vertex by a fraction of an edge.
 const STEPS: usize = 3;
@@ -64,21 +64,13 @@ fn largest_component(mesh: &TriMesh, tags: &[u8]) -> (TriMesh, Vec<u8>) {
         sizes[component[v as usize] as usize] += 1;
     }
     let largest = (0..count).max_by_key(|&c| (sizes[c], std::cmp::Reverse(c))).unwrap_or(0) as u32;
-    let mut number = vec![u32::MAX; mesh.positions.len()];
-    let (mut kept, mut kept_tags) = (TriMesh::default(), Vec::new());
-    for v in 0..mesh.positions.len() {
-        if used[v] && component[v] == largest {
-            number[v] = kept.positions.len() as u32;
-            kept.positions.push(mesh.positions[v]);
-            kept_tags.push(tags[v]);
-        }
-    }
-    kept.triangles = mesh
-        .triangles
-        .iter()
-        .filter(|t| component[t[0] as usize] == largest)
-        .map(|t| t.map(|v| number[v as usize]))
-        .collect();
+    let keep = |v: usize| used[v] && component[v] == largest;
+    let number = renumbered(mesh.positions.len(), keep);
+    let (mut kept, mut kept_tags) = (TriMesh::new(mesh.positions.clone(), Vec::new()), tags.to_vec());
+    retain(&mut kept.positions, keep);
+    retain(&mut kept_tags, keep);
+    let of_largest = mesh.triangles.iter().filter(|t| component[t[0] as usize] == largest);
+    kept.triangles = of_largest.map(|t| t.map(|v| number[v as usize])).collect();
     (kept, kept_tags)
 }
 

@@ -187,19 +187,11 @@ pub fn loop_around(mesh: &TriMesh, plane: Plane) -> Option<SectionLoop> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::samples::tube;
 
     /// An open prism of n sides and radius r between z = 0 and 1, standing at `x`.
     fn prism(n: u32, r: f64, x: f64) -> TriMesh {
-        let mut mesh = TriMesh::default();
-        for i in 0..n {
-            let a = std::f64::consts::TAU * f64::from(i) / f64::from(n);
-            for z in [0.0, 1.0] {
-                mesh.positions.push(DVec3::new(x + r * a.cos(), r * a.sin(), z));
-            }
-            let (p, q) = (2 * i, 2 * ((i + 1) % n));
-            mesh.triangles.extend([[p, q, p + 1], [q, q + 1, p + 1]]);
-        }
-        mesh
+        tube(n, 1, |a, z| DVec3::new(x + r * a.cos(), r * a.sin(), z))
     }
 
     #[test]

@@ -57,21 +57,11 @@ impl Work for Search<'_> {
     }
 }
 
-#[inline(always)]
-fn load<L: Lanes>(l: L, v: &[Four; 3]) -> Vectors<L> {
-    Vectors { x: Pack::load(l, &v[0]), y: Pack::load(l, &v[1]), z: Pack::load(l, &v[2]) }
-}
-
-#[inline(always)]
-fn minus<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
-    Vectors { x: a.x - b.x, y: a.y - b.y, z: a.z - b.z }
-}
-
 /// Squares of the distances to the boxes of a node.
 #[inline(always)]
 fn boxes<L: Lanes>(l: L, node: &Node, p: Vectors<L>) -> Pack<L> {
     let zero = Pack::splat(l, 0.0);
-    let (below, above) = (minus(load(l, &node.low), p), minus(p, load(l, &node.high)));
+    let (below, above) = (Vectors::load(l, &node.low) - p, p - Vectors::load(l, &node.high));
     let x = below.x.max(above.x).max(zero);
     let y = below.y.max(above.y).max(zero);
     let z = below.z.max(above.z).max(zero);
@@ -93,15 +83,15 @@ fn nearest_of<L: Lanes>(l: L, leaf: &Leaf, p: Vectors<L>, best: &mut Nearest) {
 /// Squares of the distances to the triangles of a leaf.
 #[inline(always)]
 fn triangles<L: Lanes>(l: L, leaf: &Leaf, p: Vectors<L>) -> Pack<L> {
-    let (u, w) = (load(l, &leaf.u), load(l, &leaf.w));
-    let q = minus(p, load(l, &leaf.a));
+    let (u, w) = (Vectors::load(l, &leaf.u), Vectors::load(l, &leaf.w));
+    let q = p - Vectors::load(l, &leaf.a);
     let (uu, uw, ww, qu, qw) = (u.dot(u), u.dot(w), w.dot(w), q.dot(u), q.dot(w));
     // To the sides.
-    let v = minus(w, u);
+    let v = w - u;
     let along_u = unit(l, qu * Pack::load(l, &leaf.per_side[0]));
     let along_w = unit(l, qw * Pack::load(l, &leaf.per_side[1]));
     let along_v = unit(l, (qw - qu - uw + uu) * Pack::load(l, &leaf.per_side[2]));
-    let [to_u, to_w, to_v] = [minus(q, u * along_u), minus(q, w * along_w), minus(minus(q, u), v * along_v)];
+    let [to_u, to_w, to_v] = [q - u * along_u, q - w * along_w, q - u - v * along_v];
     let sides = least(least(to_u.dot(to_u), to_w.dot(to_w)), to_v.dot(to_v));
     // To the plane, where all three coordinates of the point below are positive.
     let (second, third) = (ww * qu - uw * qw, uu * qw - uw * qu);
@@ -134,20 +124,15 @@ mod tests {
     use super::super::Tree;
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::mesh::samples::tube;
 
     /// A ball of `rings` by `around` quads, dented; the pole's triangles are slivers where there are many.
     fn ball(rings: u32, around: u32, dent: f64) -> TriMesh {
-        let at = |i: u32, j: u32| {
-            let (s, c) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
-            let (y, x) = (std::f64::consts::TAU * f64::from(j % around) / f64::from(around)).sin_cos();
+        tube(around, rings, |angle, ring| {
+            let (s, c) = (std::f64::consts::PI * (1.0 - ring / f64::from(rings))).sin_cos();
+            let (y, x) = angle.sin_cos();
             DVec3::new(s * x, s * y, c) * (0.3 + dent * (7.0 * c + 3.0 * x).sin())
-        };
-        let positions = (0..=rings).flat_map(|i| (0..around).map(move |j| at(i, j))).collect();
-        let quad = |i: u32, j: u32| {
-            let [a, b] = [i * around + j, i * around + (j + 1) % around];
-            [[a, a + around, b], [b, a + around, b + around]]
-        };
-        TriMesh::new(positions, (0..rings).flat_map(|i| (0..around).flat_map(move |j| quad(i, j))).collect())
+        })
     }
 
     fn by_brute_force(mesh: &TriMesh, p: DVec3) -> f64 {

@@ -7,6 +7,7 @@
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
 use crate::mechanics::energy::pattern::Pattern;
 use crate::mechanics::energy::{Cloth, bending::Bending};
+use crate::mesh::Lists;
 
 use super::motions::Motions;
 use super::weights::Weights;
@@ -18,12 +19,12 @@ const ENOUGH: f64 = 12.0;
 /// The PARTs of elements of one kind.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Elements {
-    starts: Vec<u32>,
-    parts: Vec<u32>,
-    weight_starts: Vec<u32>,
-    weights: Vec<f64>,
-    pair_starts: Vec<u32>,
-    pairs: Vec<Pair>,
+    /// PARTs of each element, ascending.
+    pub(super) parts: Lists<u32>,
+    /// Their weights at its vertices, PART after PART.
+    pub(super) weights: Lists<f64>,
+    /// The pairs of its PARTs.
+    pub(super) pairs: Lists<Pair>,
     /// The elements that are sampled, and how many each stands for.
     pub(super) sampled: Vec<(u32, f64)>,
 }
@@ -49,23 +50,15 @@ pub(super) struct Place {
 impl Elements {
     /// From the vertices of each element.
     fn new<'a>(weights: &Weights, parts: usize, all: impl Iterator<Item = &'a [u32]>) -> Self {
-        let mut e = Self { starts: vec![0], weight_starts: vec![0], ..Self::default() };
+        let (mut e, mut own) = (Self::default(), Vec::new());
+        let of = |v: u32| weights.of(v as usize);
+        let weight = |p: u32, v: u32| of(v).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
         for vertices in all {
-            let first = e.parts.len();
-            for &v in vertices {
-                for &(p, _) in weights.of(v as usize) {
-                    if !e.parts[first..].contains(&p) {
-                        e.parts.push(p);
-                    }
-                }
-            }
-            e.parts[first..].sort_unstable();
-            for &p in &e.parts[first..] {
-                let of = |&v: &u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
-                e.weights.extend(vertices.iter().map(of));
-            }
-            e.starts.push(e.parts.len() as u32);
-            e.weight_starts.push(e.weights.len() as u32);
+            own.extend(vertices.iter().flat_map(|&v| of(v)).map(|&(p, _)| p));
+            own.sort_unstable();
+            own.dedup();
+            e.weights.push(own.iter().flat_map(|&p| vertices.iter().map(move |&v| weight(p, v))));
+            e.parts.push(own.drain(..));
         }
         e.sample(parts);
         e
@@ -75,55 +68,32 @@ impl Elements {
     fn sample(&mut self, parts: usize) {
         const GOLDEN: f64 = 0.618_033_988_749_895;
         let mut size = vec![0.0; parts];
-        for i in 0..self.len() {
-            let list = self.parts(i);
+        for i in 0..self.parts.len() {
+            let list = self.parts.of(i);
             for &p in list {
                 size[p as usize] += 1.0 / list.len() as f64;
             }
         }
-        for i in 0..self.len() {
-            let rate = self.parts(i).iter().map(|&p| ENOUGH / size[p as usize]).fold(0.0, f64::max).min(1.0);
+        for i in 0..self.parts.len() {
+            let rate = self.parts.of(i).iter().map(|&p| ENOUGH / size[p as usize]).fold(0.0, f64::max).min(1.0);
             if (i as f64 * GOLDEN).fract() < rate {
                 self.sampled.push((i as u32, rate.recip()));
             }
         }
     }
 
-    fn len(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    /// PARTs of an element, ascending.
-    pub(super) fn parts(&self, i: usize) -> &[u32] {
-        &self.parts[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
-
-    /// Their weights at its vertices, PART after PART.
-    pub(super) fn weights(&self, i: usize) -> &[f64] {
-        &self.weights[self.weight_starts[i] as usize..self.weight_starts[i + 1] as usize]
-    }
-
-    /// The pairs of its PARTs.
-    pub(super) fn pairs(&self, i: usize) -> &[Pair] {
-        &self.pairs[self.pair_starts[i] as usize..self.pair_starts[i + 1] as usize]
-    }
-
     fn lay_out(&mut self, motions: &Motions, columns: &[Vec<(u32, u32)>]) {
-        self.pair_starts.push(0);
-        for i in 0..self.len() {
-            let list = self.parts(i).to_vec();
-            for (k, &p) in list.iter().enumerate() {
-                for (l, &q) in list[..=k].iter().enumerate() {
-                    let (row, column) =
-                        if motions.first[p as usize] >= motions.first[q as usize] { (k, l) } else { (l, k) };
-                    let later = motions.first[list[row] as usize];
-                    let of = &columns[list[column] as usize];
-                    // PARTs that do not move have no pair: they add to one that nobody reads.
-                    let number = of.binary_search_by_key(&later, |e| e.0).map_or(0, |at| of[at].1);
-                    self.pairs.push(Pair { row: row as u8, column: column as u8, number });
-                }
-            }
-            self.pair_starts.push(self.pairs.len() as u32);
+        for i in 0..self.parts.len() {
+            let list = self.parts.of(i);
+            let pair = |k: usize, l: usize| {
+                let [p, q] = [k, l].map(|place| motions.first[list[place] as usize]);
+                let (row, column) = if p >= q { (k, l) } else { (l, k) };
+                let of = &columns[list[column] as usize];
+                // PARTs that do not move have no pair: they add to one that nobody reads.
+                let number = of.binary_search_by_key(&p.max(q), |e| e.0).map_or(0, |at| of[at].1);
+                Pair { row: row as u8, column: column as u8, number }
+            };
+            self.pairs.push((0..list.len()).flat_map(|k| (0..=k).map(move |l| pair(k, l))));
         }
     }
 }
@@ -155,7 +125,7 @@ impl Layout {
         );
         let neighbours = neighbours(parts, &[&triangles, &rings]);
         let free: Vec<u32> = (0..parts as u32).filter(|&p| motions.count[p as usize] > 0).collect();
-        let order = nested_dissection(free, motions.centres(), &neighbours);
+        let order = nested_dissection(free, &motions.centre, &neighbours);
         motions.number(order.iter().copied());
         // Of each PART itself and its later neighbours, by first unknown, with the pair's number.
         let mut columns: Vec<Vec<(u32, u32)>> = vec![Vec::new(); parts];
@@ -193,8 +163,8 @@ fn neighbours(parts: usize, all: &[&Elements]) -> Adjacency {
     let mut pairs: Vec<[u32; 2]> = Vec::new();
     for elements in all {
         let mut last: &[u32] = &[];
-        for i in 0..elements.len() {
-            let list = elements.parts(i);
+        for i in 0..elements.parts.len() {
+            let list = elements.parts.of(i);
             // Inside a PART one element is like the one before.
             if list != last {
                 for (k, &p) in list.iter().enumerate() {

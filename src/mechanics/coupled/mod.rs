@@ -85,31 +85,16 @@ pub fn solve(
     start: &[DVec3],
     options: &CoupledOptions,
 ) -> Result<CoupledResult, CoupledError> {
-    solve_before(garment, body, parts, start, options, &mut |_| ControlFlow::Continue(()))
-}
-
-/// [`solve`] before an onlooker.
-///
-/// # Errors
-/// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
-pub fn solve_before(
-    garment: &Garment<'_>,
-    body: &Body,
-    parts: &Parts,
-    start: &[DVec3],
-    options: &CoupledOptions,
-    onlooker: Onlooker<'_>,
-) -> Result<CoupledResult, CoupledError> {
-    solve_given(garment, body, parts, start, Given::default(), options, onlooker)
+    solve_given(garment, body, parts, start, Given::default(), options, &mut |_| ControlFlow::Continue(()))
 }
 
 /// What a solve may take for given, and when it is good enough for what comes after it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Given<'a> {
+pub struct Given<'a> {
     /// Signed distances of the garment as placed, m; none where they are not known.
-    pub(crate) distance_m: &'a [f64],
-    /// The solve ends where its last [`LATE`] steps brought less than this share of what all have.
-    pub(crate) least_share: f64,
+    pub distance_m: &'a [f64],
+    /// The solve ends where its last six steps brought less than this share of what all have.
+    pub least_share: f64,
 }
 
 /// Length that hangs of a garment laid flat, over its widest extent.
@@ -118,8 +103,11 @@ const FLAT: f64 = 0.25;
 /// Steps by which the end of a solve is told that need not be followed to it.
 const LATE: usize = 6;
 
-/// [`solve_before`] with something [`Given`].
-pub(crate) fn solve_given(
+/// [`solve`] with something [`Given`], before an onlooker.
+///
+/// # Errors
+/// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
+pub fn solve_given(
     garment: &Garment<'_>,
     body: &Body,
     parts: &Parts,

@@ -20,10 +20,11 @@ use glam::{DMat3, DVec3};
 
 use super::options::Motion;
 use super::weights::Weights;
-use crate::lanes::{Four, Lanes, Pack};
+use crate::lanes::{Four, Lanes, Pack, Vectors};
 use crate::mechanics::energy::pattern::Pattern;
 use crate::mechanics::newton::{SolveError, Solver};
 use crate::mechanics::principal::principal;
+use crate::mesh::{each_once, outer};
 use crate::parts::Parts;
 
 /// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
@@ -42,9 +43,9 @@ impl Functions {
     #[inline(always)]
     pub(super) fn at<L: Lanes>(&self, l: L, w: f64, x: DVec3) -> Pack<L> {
         let y = x - self.centre;
-        let [ax, ay, az] = [Pack::load(l, &self.axes[0]), Pack::load(l, &self.axes[1]), Pack::load(l, &self.axes[2])];
+        let Vectors { x: ax, y: ay, z: az } = Vectors::load(l, &self.axes);
         let one = Pack::load(l, &Four([1.0, 0.0, 0.0, 0.0]));
-        (one + ax * Pack::splat(l, y.x) + ay * Pack::splat(l, y.y) + az * Pack::splat(l, y.z)) * Pack::splat(l, w)
+        (one + ax * y.x + ay * y.y + az * y.z) * w
     }
 }
 
@@ -68,7 +69,8 @@ pub struct Motions {
     pub(super) first: Vec<u32>,
     /// Unknowns of each PART: 0, 1 or 4.
     pub(super) count: Vec<u8>,
-    centre: Vec<DVec3>,
+    /// The middles c_p, m.
+    pub(super) centre: Vec<DVec3>,
     axes: Vec<[DVec3; 3]>,
     unknowns: usize,
 }
@@ -112,11 +114,6 @@ impl Motions {
         self.unknowns
     }
 
-    /// The middles c_p, m.
-    pub(super) fn centres(&self) -> &[DVec3] {
-        &self.centre
-    }
-
     /// Takes middles and axes from `x`.
     pub fn centre_at(&mut self, x: &[DVec3]) {
         let n = self.first.len();
@@ -135,7 +132,7 @@ impl Motions {
         for (v, x) in x.iter().enumerate() {
             for &(p, w) in self.weights.of(v) {
                 let d = *x - self.centre[p as usize];
-                spread[p as usize] += DMat3::from_cols(d * d.x, d * d.y, d * d.z) * w;
+                spread[p as usize] += outer(d, d) * w;
             }
         }
         for (((axes, spread), sum), _) in
@@ -204,13 +201,8 @@ impl Motions {
     /// # Errors
     /// [`SolveError`] where positions are not finite.
     pub fn nearest(&self, x: &[DVec3], u: &[DVec3]) -> Result<Vec<DVec3>, SolveError> {
-        let mut pairs = Vec::new();
-        for v in 0..x.len() {
-            let row = self.weights.of(v);
-            pairs.extend(row.iter().flat_map(|&(p, _)| row.iter().map(move |&(q, _)| (p, q))));
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
+        let of = |v: usize| self.weights.of(v).iter().map(|&(p, _)| p);
+        let pairs = each_once((0..x.len()).flat_map(|v| of(v).flat_map(move |p| of(v).map(move |q| (p, q)))));
         let span = |p: u32| (self.first[p as usize]..).take(self.count[p as usize] as usize);
         let all = pairs.iter().flat_map(|&(p, q)| span(p).flat_map(move |i| span(q).map(move |j| (i, j))));
         let pattern = Pattern::new(self.unknowns, all);

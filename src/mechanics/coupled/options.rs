@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::mechanics::energy::EnergyError;
 use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::Record;
+use crate::word::word;
 
 /// Why PARTs could not be solved together.
 #[derive(Debug, thiserror::Error)]
@@ -62,10 +63,7 @@ impl std::str::FromStr for Motion {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        [Self::Affine, Self::Translation]
-            .into_iter()
-            .find(|m| m.name() == text)
-            .ok_or_else(|| format!("found `{text}`, expected affine or translation"))
+        word(text).ok_or_else(|| format!("found `{text}`, expected affine or translation"))
     }
 }
 

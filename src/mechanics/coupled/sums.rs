@@ -104,16 +104,16 @@ fn triangles<L: Lanes>(
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();
-        for (&p, weights) in all.parts(i).iter().zip(all.weights(i).chunks_exact(3)) {
+        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(3)) {
             let (mut u, mut v) = (Pack::splat(l, 0.0), Pack::splat(l, 0.0));
             for ((&vertex, gradient), &w) in t.vertices.iter().zip(&t.gradients).zip(weights) {
                 let f = functions[p as usize].at(l, w, x[vertex as usize]);
-                u = u + f * Pack::splat(l, gradient.x);
-                v = v + f * Pack::splat(l, gradient.y);
+                u = u + f * gradient.x;
+                v = v + f * gradient.y;
             }
             gradients.push([u.store(), v.store()]);
         }
-        for pair in all.pairs(i) {
+        for pair in all.pairs.of(i) {
             let (a, b) = (&gradients[pair.row as usize], &gradients[pair.column as usize]);
             add_full(l, &mut sums.full[pair.number as usize], a, b, &h);
         }
@@ -127,14 +127,14 @@ fn add_full<L: Lanes>(l: L, sum: &mut [Four; 36], a: &[Four; 2], b: &[Four; 2], 
     let (bu, bv) = (Pack::load(l, &b[0]), Pack::load(l, &b[1]));
     let (mut by_u, mut by_v) = ([Four::ZERO; 9], [Four::ZERO; 9]);
     for i in 0..9 {
-        by_u[i] = (bu * Pack::splat(l, huu[i]) + bv * Pack::splat(l, huv[i])).store();
-        by_v[i] = (bu * Pack::splat(l, hvu[i]) + bv * Pack::splat(l, hvv[i])).store();
+        by_u[i] = (bu * huu[i] + bv * huv[i]).store();
+        by_v[i] = (bu * hvu[i] + bv * hvv[i]).store();
     }
     let (au, av) = (Pack::load(l, &a[0]), Pack::load(l, &a[1]));
     for b in 0..4 {
         for i in 0..9 {
             let slot = &mut sum[9 * b + i];
-            let more = au * Pack::splat(l, by_u[i].0[b]) + av * Pack::splat(l, by_v[i].0[b]);
+            let more = au * by_u[i].0[b] + av * by_v[i].0[b];
             *slot = (Pack::load(l, slot) + more).store();
         }
     }
@@ -153,28 +153,28 @@ fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<
         sampled.next();
         let stiffness = stiffness * standing_for;
         fits.clear();
-        for (&p, weights) in all.parts(i).iter().zip(all.weights(i).chunks_exact(vertices.len())) {
+        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(vertices.len())) {
             let zero = Pack::splat(l, 0.0);
             let (mut fx, mut fy, mut fz) = (zero, zero, zero);
             for ((&v, r), &w) in vertices.iter().zip(ring).zip(weights) {
                 if w > 0.0 {
                     let f = functions[p as usize].at(l, w, x[v as usize]);
-                    fx = fx + f * Pack::splat(l, r.x);
-                    fy = fy + f * Pack::splat(l, r.y);
-                    fz = fz + f * Pack::splat(l, r.z);
+                    fx = fx + f * r.x;
+                    fy = fy + f * r.y;
+                    fz = fz + f * r.z;
                 }
             }
             fits.push([fx.store(), fy.store(), fz.store()]);
         }
-        for pair in all.pairs(i) {
+        for pair in all.pairs.of(i) {
             let (a, b) = (&fits[pair.row as usize], &fits[pair.column as usize]);
-            let ax = Pack::load(l, &a[0]) * Pack::splat(l, stiffness.x);
-            let ay = Pack::load(l, &a[1]) * Pack::splat(l, stiffness.y);
-            let az = Pack::load(l, &a[2]) * Pack::splat(l, stiffness.z);
+            let ax = Pack::load(l, &a[0]) * stiffness.x;
+            let ay = Pack::load(l, &a[1]) * stiffness.y;
+            let az = Pack::load(l, &a[2]) * stiffness.z;
             let sum = &mut sums.scalar[pair.number as usize];
             for (i, slot) in sum.iter_mut().enumerate() {
-                let along = ax * Pack::splat(l, b[0].0[i]) + ay * Pack::splat(l, b[1].0[i]);
-                *slot = (Pack::load(l, slot) + (along + az * Pack::splat(l, b[2].0[i]))).store();
+                let along = ax * b[0].0[i] + ay * b[1].0[i];
+                *slot = (Pack::load(l, slot) + (along + az * b[2].0[i])).store();
             }
         }
     }
@@ -187,11 +187,11 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
     for (v, x) in x.iter().enumerate() {
         values_at(l, functions, all, v, *x, &mut values);
         let mass = Pack::splat(l, cloth.masses[v] * damping);
-        for pair in all.pairs(v) {
+        for pair in all.pairs.of(v) {
             let a = Pack::load(l, &values[pair.row as usize]) * mass;
             let b = &values[pair.column as usize];
             for (slot, b) in sums.scalar[pair.number as usize].iter_mut().zip(b.0) {
-                *slot = (Pack::load(l, slot) + a * Pack::splat(l, b)).store();
+                *slot = (Pack::load(l, slot) + a * b).store();
             }
         }
     }
@@ -199,14 +199,14 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
         let v = v as usize;
         values_at(l, functions, all, v, x[v], &mut values);
         let entries = block.to_cols_array();
-        for pair in all.pairs(v) {
+        for pair in all.pairs.of(v) {
             let a = Pack::load(l, &values[pair.row as usize]);
             let b = &values[pair.column as usize];
             let sum = &mut sums.full[pair.number as usize];
             for (b, slots) in b.0.iter().zip(sum.chunks_exact_mut(9)) {
-                let a = a * Pack::splat(l, *b);
+                let a = a * *b;
                 for (slot, entry) in slots.iter_mut().zip(entries) {
-                    *slot = (Pack::load(l, slot) + a * Pack::splat(l, entry)).store();
+                    *slot = (Pack::load(l, slot) + a * entry).store();
                 }
             }
         }
@@ -217,7 +217,7 @@ fn vertices<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &Sta
 #[inline(always)]
 fn values_at<L: Lanes>(l: L, functions: &[Functions], all: &Elements, v: usize, x: DVec3, values: &mut Vec<Four>) {
     values.clear();
-    for (&p, &w) in all.parts(v).iter().zip(all.weights(v)) {
+    for (&p, &w) in all.parts.of(v).iter().zip(all.weights.of(v)) {
         values.push(functions[p as usize].at(l, w, x).store());
     }
 }

@@ -15,25 +15,18 @@
 //! 1968), with a limit to its reach. Tried: three quarters to twice the half-width; half of it folds less well (10 mm instead of 4 on a
 //! skirt in 343 PARTs), twice takes more time for the same. Limits: a vertex in no PART goes with the nearest along the cloth.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use glam::DVec3;
-use ordered_float::OrderedFloat;
 use rayon::prelude::*;
 
-use crate::mesh::Topology;
+use crate::mesh::{Flow, Lists, Topology};
 use crate::parts::{Parts, UNASSIGNED};
 
 /// Weights under this share are left out: they cost as much as any and move nothing.
 const LEAST: f64 = 0.03;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Weights {
-    starts: Vec<u32>,
-    entries: Vec<(u32, f64)>,
-}
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Weights(Lists<(u32, f64)>);
 
 impl Weights {
     /// Weights of every vertex; one of a piece of garment without any PART has none.
@@ -56,14 +49,13 @@ impl Weights {
                 rows[v as usize].push((p as u32, kernel));
             }
         }
-        let mut weights = Self { starts: vec![0], entries: Vec::new() };
+        let mut weights = Self::default();
         for mut row in rows {
             let sum: f64 = row.iter().map(|e| e.1).sum();
             row.retain(|e| e.1 >= LEAST * sum);
             let sum: f64 = row.iter().map(|e| e.1).sum();
             row.sort_unstable_by_key(|e| e.0);
-            weights.entries.extend(row.into_iter().map(|(p, kernel)| (p, kernel / sum)));
-            weights.starts.push(weights.entries.len() as u32);
+            weights.0.push(row.into_iter().map(|(p, kernel)| (p, kernel / sum)));
         }
         weights
     }
@@ -71,18 +63,15 @@ impl Weights {
     /// PARTs and weights of a vertex, by PART number.
     #[must_use]
     pub fn of(&self, v: usize) -> &[(u32, f64)] {
-        &self.entries[self.starts[v] as usize..self.starts[v + 1] as usize]
+        self.0.of(v)
     }
 
     /// The same with no weight at the vertices that are held.
     #[must_use]
     pub fn without(&self, held: &[bool]) -> Self {
-        let mut weights = Self { starts: vec![0], entries: Vec::with_capacity(self.entries.len()) };
+        let mut weights = Self::default();
         for (v, &held) in held.iter().enumerate() {
-            if !held {
-                weights.entries.extend_from_slice(self.of(v));
-            }
-            weights.starts.push(weights.entries.len() as u32);
+            weights.0.push(if held { &[] } else { self.of(v) }.iter().copied());
         }
         weights
     }
@@ -124,52 +113,4 @@ fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32
         (!inside(v) && t < 1.0).then_some((v, (1.0 - t) * (1.0 - t)))
     };
     flow.reached.iter().filter_map(|&v| kernel(v)).collect()
-}
-
-/// Dijkstra's algorithm along garment edges, its memory kept from run to run.
-struct Flow<'a> {
-    topology: &'a Topology,
-    placed: &'a [DVec3],
-    distance: Vec<f64>,
-    source: Vec<u32>,
-    reached: Vec<u32>,
-    heap: BinaryHeap<Reverse<(OrderedFloat<f64>, u32)>>,
-}
-
-impl<'a> Flow<'a> {
-    fn new(topology: &'a Topology, placed: &'a [DVec3]) -> Self {
-        let n = placed.len();
-        let (distance, source) = (vec![f64::INFINITY; n], vec![0; n]);
-        Self { topology, placed, distance, source, reached: Vec::new(), heap: BinaryHeap::new() }
-    }
-
-    /// Distances, m, from `sources` over what is `allowed`, as far as `most`.
-    fn run(&mut self, sources: &[u32], most: f64, allowed: impl Fn(u32) -> bool) {
-        for v in self.reached.drain(..) {
-            self.distance[v as usize] = f64::INFINITY;
-        }
-        for &v in sources {
-            self.distance[v as usize] = 0.0;
-            self.source[v as usize] = v;
-            self.reached.push(v);
-            self.heap.push(Reverse((OrderedFloat(0.0), v)));
-        }
-        while let Some(Reverse((OrderedFloat(d), v))) = self.heap.pop() {
-            if d > self.distance[v as usize] {
-                continue;
-            }
-            for &w in self.topology.neighbours(v) {
-                let there = d + self.placed[v as usize].distance(self.placed[w as usize]);
-                let before = self.distance[w as usize];
-                if there < most && there < before && allowed(w) {
-                    if before == f64::INFINITY {
-                        self.reached.push(w);
-                    }
-                    self.distance[w as usize] = there;
-                    self.source[w as usize] = self.source[v as usize];
-                    self.heap.push(Reverse((OrderedFloat(there), w)));
-                }
-            }
-        }
-    }
 }

@@ -25,15 +25,12 @@
 //!
 //! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
 
-use std::ops::Range;
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::fan::Fan;
 use super::plate::Plate;
 use crate::fabric::Fabric;
-use crate::lanes::{Four, Lanes};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
@@ -50,7 +47,7 @@ pub struct Bending {
     vertices: Vec<u32>,
     weights: Vec<DVec3>,
     /// All of them summed up.
-    plate: Plate,
+    pub(super) plate: Plate,
 }
 
 /// One ring or hinge: its part of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
@@ -65,7 +62,7 @@ impl Bending {
     /// Rings and hinges of a mesh in its rest shape.
     #[must_use]
     pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabrics: &[Fabric]) -> Self {
-        let stiffness: Vec<DVec3> = fabrics.iter().map(stiffness).collect();
+        let stiffness: Vec<DVec3> = fabrics.iter().map(bending_stiffness).collect();
         let fans = Fan::all(mesh, rest);
         let mut bending = Self::default();
         let mut share = vec![vec![0.0; mesh.vertex_count()]; fabrics.len()];
@@ -90,8 +87,7 @@ impl Bending {
                 bending.push_ring(v as u32, fan, weights, whole);
             }
         }
-        let mean: Vec<f64> =
-            fabrics.iter().map(|f| f.bending_nm).map(|[u, bias, v]| 0.25 * (u + 2.0 * bias + v)).collect();
+        let mean: Vec<f64> = fabrics.iter().map(Fabric::mean_bending_nm).collect();
         let inner = topology.edges.iter().zip(&topology.edge_triangles).zip(&topology.edge_valence);
         for ((&edge, &[s, t]), &valence) in inner {
             if valence > 1 && (bare[s as usize] || bare[t as usize]) {
@@ -151,30 +147,6 @@ impl Bending {
         })
     }
 
-    /// The vertices in two ranges, of about as much work each for [`add_gradient`](Self::add_gradient).
-    pub(super) fn halves(&self) -> [Range<usize>; 2] {
-        self.plate.halves()
-    }
-
-    /// Adds the gradient of the pairs of `vertices` (each with those before it) to `gradient`, N, which must be zero before;
-    /// returns their energy, J.
-    #[inline(always)]
-    pub(super) fn add_gradient<L: Lanes>(
-        &self,
-        l: L,
-        vertices: Range<usize>,
-        x: &[Four],
-        gradient: &mut [Four],
-    ) -> f64 {
-        self.plate.add_gradient(l, vertices, x, gradient)
-    }
-
-    /// Q_vv, N/m.
-    #[must_use]
-    pub fn own_scalar(&self, v: usize) -> f64 {
-        self.plate.own(v)
-    }
-
     /// Energy of all elements, J.
     #[must_use]
     pub fn energy(&self, x: &[DVec3]) -> f64 {
@@ -191,26 +163,10 @@ impl Bending {
         }
         0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
     }
-
-    /// Every pair of vertices that bend together and Q_ij (N/m), the first after the second; a few twice, the second time with nothing.
-    pub(crate) fn pairs(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        self.plate.pairs()
-    }
-
-    /// The Hessian's scalars, N/m: each pair of an element once, the diagonal included.
-    pub fn hessian(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        self.elements.iter().flat_map(|e| {
-            let (vertices, weights) = self.parts(e);
-            let row = move |i: usize| {
-                (0..=i).map(move |j| ([vertices[i], vertices[j]], (weights[i] * e.stiffness).dot(weights[j])))
-            };
-            (0..vertices.len()).flat_map(row)
-        })
-    }
 }
 
 /// (B_u, H, B_v), N·m.
-fn stiffness(fabric: &Fabric) -> DVec3 {
+pub(crate) fn bending_stiffness(fabric: &Fabric) -> DVec3 {
     let [weft, bias, warp] = fabric.bending_nm;
     DVec3::new(weft, (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp)), warp)
 }

@@ -255,6 +255,15 @@ impl Cloth {
     }
 }
 
+#[cfg(test)]
+impl Cloth {
+    /// Of a mesh that is at rest as it lies, in a built-in fabric.
+    pub(crate) fn sample(mesh: &TriMesh, fabric: &str, held: &[u32]) -> Self {
+        let (topology, rest) = (Topology::new(mesh), RestShape::from_edges(mesh).unwrap());
+        Self::new(mesh, &topology, &rest, &Fabric::by_name(fabric).unwrap(), held).unwrap()
+    }
+}
+
 /// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
 /// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
 fn sag(mesh: &TriMesh) -> f64 {

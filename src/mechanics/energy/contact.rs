@@ -52,16 +52,17 @@ impl Touch {
 const PLANE: f64 = 2e-3;
 
 /// What there is to touch, and by which distance.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) enum Met<'b> {
+    #[default]
     Nothing,
     /// The exact distance's tangent plane where it was last asked.
-    Planes(&'b Body, Vec<DVec3>),
+    Planes(&'b Body),
     Rounded(Field<'b>),
 }
 
 /// What the cloth meets at its current positions, with the memory that makes asking again cheap.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Contacts<'b> {
     pub(super) met: Met<'b>,
     /// h of each vertex, m.
@@ -70,6 +71,8 @@ pub struct Contacts<'b> {
     pub(super) held: Vec<bool>,
     pub(super) asked_at: Vec<DVec3>,
     pub(super) answer: Vec<f64>,
+    /// Normals of the tangent planes, zero where never asked.
+    normals: Vec<DVec3>,
     /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
     pub(super) leave: Vec<f64>,
     /// The vertices that may be near, of the last [`update`](Self::update).
@@ -88,21 +91,7 @@ impl<'b> Contacts<'b> {
     /// Nothing to touch.
     #[must_use]
     pub fn none() -> Self {
-        Self {
-            met: Met::Nothing,
-            offsets: Vec::new(),
-            areas: Vec::new(),
-            held: Vec::new(),
-            asked_at: Vec::new(),
-            answer: Vec::new(),
-            leave: Vec::new(),
-            near: Vec::new(),
-            stiffness: 0.0,
-            touches: Vec::new(),
-            friction: Friction::none(),
-            proximity: None,
-            cover: Cover::default(),
-        }
+        Self::default()
     }
 
     /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at their `offsets` (m) with
@@ -123,14 +112,12 @@ impl<'b> Contacts<'b> {
             held: held.to_vec(),
             asked_at: vec![DVec3::ZERO; n],
             answer: vec![f64::NEG_INFINITY; n],
+            normals: vec![DVec3::ZERO; n],
             // Who is held is never asked.
             leave: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
-            near: Vec::new(),
             stiffness,
-            touches: Vec::new(),
             friction,
-            proximity: None,
-            cover: Cover::default(),
+            ..Self::none()
         }
     }
 
@@ -138,13 +125,7 @@ impl<'b> Contacts<'b> {
     /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
     pub fn by_planes(self) -> Self {
-        let n = self.areas.len();
-        let met = match self.met {
-            Met::Nothing => Met::Nothing,
-            Met::Planes(body, normals) => Met::Planes(body, normals),
-            Met::Rounded(field) => Met::Planes(field.body(), vec![DVec3::ZERO; n]),
-        };
-        Self { met, ..self }
+        Self { met: self.body().map_or(Met::Nothing, Met::Planes), ..self }
     }
 
     /// κ, N/m³.
@@ -161,28 +142,29 @@ impl<'b> Contacts<'b> {
     /// Finds what touches at `x`. Same bits on any number of threads.
     pub fn update(&mut self, x: &[DVec3]) {
         self.touches.clear();
-        match self.met {
-            Met::Nothing => return,
-            Met::Planes(..) => return self.update_planes(x),
-            Met::Rounded(_) => {}
+        if let Met::Planes(body) = self.met {
+            return self.update_planes(body, x);
         }
         self.bound(x);
         self.find_near(x);
+        let Met::Rounded(field) = &mut self.met else { return };
         let near = std::mem::take(&mut self.near);
-        let found = match &mut self.met {
-            Met::Nothing | Met::Planes(..) => Vec::new(),
-            Met::Rounded(field) => field.at(&near, x),
-        };
+        let found = field.at(&near, x);
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
             let v = vertex as usize;
             self.keep(v, x[v], distance);
-            let depth = self.offsets[v] - distance;
-            if depth > 0.0 {
-                let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex, depth, normal, stiffness });
-            }
+            self.touch(vertex, distance, normal);
         }
         self.near = near;
+    }
+
+    /// A vertex touches where its distance is less than its offset.
+    fn touch(&mut self, vertex: u32, distance: f64, normal: DVec3) {
+        let v = vertex as usize;
+        let depth = self.offsets[v] - distance;
+        if depth > 0.0 {
+            self.touches.push(Touch { vertex, depth, normal, stiffness: self.stiffness * self.areas[v] });
+        }
     }
 
     /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
@@ -203,32 +185,21 @@ impl<'b> Contacts<'b> {
     }
 
     /// [`update`](Self::update) by planes.
-    fn update_planes(&mut self, x: &[DVec3]) {
+    fn update_planes(&mut self, body: &Body, x: &[DVec3]) {
         self.find_near(x);
         let near = std::mem::take(&mut self.near);
-        let Met::Planes(body, normals) = &self.met else { return };
-        let body = *body;
-        // What was never asked has no normal.
-        let stale = |&&v: &&u32| {
-            let v = v as usize;
-            normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE
-        };
-        let stale: Vec<usize> = near.iter().filter(stale).map(|&v| v as usize).collect();
+        let stale =
+            |&v: &usize| self.normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE;
+        let stale: Vec<usize> = near.iter().map(|&v| v as usize).filter(stale).collect();
         let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());
         for (v, found) in stale.into_iter().zip(found) {
             self.keep(v, x[v], found.signed_distance);
-            if let Met::Planes(_, normals) = &mut self.met {
-                normals[v] = found.normal;
-            }
+            self.normals[v] = found.normal;
         }
-        let Met::Planes(_, normals) = &self.met else { return };
         for &vertex in &near {
             let v = vertex as usize;
-            let depth = self.offsets[v] - (self.answer[v] + normals[v].dot(x[v] - self.asked_at[v]));
-            if depth > 0.0 {
-                let stiffness = self.stiffness * self.areas[v];
-                self.touches.push(Touch { vertex, depth, normal: normals[v], stiffness });
-            }
+            let (normal, moved) = (self.normals[v], x[v] - self.asked_at[v]);
+            self.touch(vertex, self.answer[v] + normal.dot(moved), normal);
         }
         self.near = near;
     }
@@ -265,7 +236,7 @@ impl<'b> Contacts<'b> {
     pub(super) fn body(&self) -> Option<&'b Body> {
         match &self.met {
             Met::Nothing => None,
-            Met::Planes(body, _) => Some(*body),
+            Met::Planes(body) => Some(body),
             Met::Rounded(field) => Some(field.body()),
         }
     }

@@ -67,8 +67,7 @@ impl Contacts<'_> {
         if self.cover.given_up {
             return Covered::Done;
         }
-        let triangles = cloth.triangles.iter().map(|t| t.vertices).collect();
-        let garment = TriMesh::new(std::mem::take(x), triangles);
+        let garment = mesh_of(cloth, std::mem::take(x));
         let pairs = crossing_pairs(&garment, body.mesh());
         if !pairs.is_empty() && self.cover.ends < ENDS {
             self.cover.ends += 1;
@@ -94,11 +93,15 @@ impl Contacts<'_> {
         let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else {
             return 0;
         };
-        let garment = TriMesh::new(x.to_vec(), cloth.triangles.iter().map(|t| t.vertices).collect());
+        let garment = mesh_of(cloth, x.to_vec());
         let mut crossing: Vec<u32> = crossing_pairs(&garment, body.mesh()).into_iter().map(|[t, _]| t).collect();
         crossing.dedup();
         crossing.into_iter().map(|t| self.cover.add(cloth, &cloth.triangles[t as usize], body, x, true)).sum()
     }
+}
+
+fn mesh_of(cloth: &Cloth, x: Vec<DVec3>) -> TriMesh {
+    TriMesh::new(x, cloth.triangles.iter().map(|t| t.vertices).collect())
 }
 
 impl Cover {
@@ -181,18 +184,12 @@ impl Cover {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology};
+    use crate::mesh::samples::cuboid;
 
     /// A box of this half width and depth under z = 0.
     fn post(half: f64) -> Body {
-        let corner = |i: usize| {
-            let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
-            DVec3::new(side(0) + 0.014, side(1) + 0.01, if i >> 2 & 1 == 1 { 0.0 } else { -0.3 })
-        };
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
+        let (at, half) = (DVec3::new(0.014, 0.01, 0.0), DVec3::new(half, half, 0.0));
+        Body::new(&cuboid(at - half - DVec3::Z * 0.3, at + half)).unwrap()
     }
 
     /// Two triangles of 3 cm with the post 1.5 mm through both.
@@ -200,9 +197,7 @@ mod tests {
         let at = |x: f64, y: f64| DVec3::new(x, y, -1.5e-3);
         let x = vec![at(0.0, 0.0), at(0.03, 0.0), at(0.0, 0.03), at(0.03, 0.03)];
         let mesh = TriMesh::new(x.clone(), vec![[0, 1, 2], [2, 1, 3]]);
-        let fabric = Fabric::by_name("jersey").unwrap();
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        (Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[3]).unwrap(), x)
+        (Cloth::sample(&mesh, "jersey", &[3]), x)
     }
 
     /// Contacts that cover the post, by now slid along it, and where the cloth is.

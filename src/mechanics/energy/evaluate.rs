@@ -40,7 +40,7 @@ impl Cloth {
         padded.clear();
         padded.extend(x.iter().map(|p| Four([p.x, p.y, p.z, 0.0])));
         let (first, second) = self.packs.split_at(self.packs.len() / 2);
-        let [above, below] = self.bending.halves();
+        let [above, below] = self.bending.plate.halves();
         let x_of_all = &*padded;
         let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
         let (a, b) = rayon::join(|| run(half(first, above, one)), || run(half(second, below, other)));
@@ -81,7 +81,7 @@ impl Work for Half<'_> {
     fn with<L: Lanes>(self, l: L) -> f64 {
         self.gradient.clear();
         self.gradient.resize(self.x.len(), Four::ZERO);
-        let bending = self.cloth.bending.add_gradient(l, self.vertices, self.x, self.gradient);
+        let bending = self.cloth.bending.plate.add_gradient(l, self.vertices, self.x, self.gradient);
         bending + packs::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
     }
 }

@@ -100,14 +100,11 @@ fn spline(f: DVec3, stencil: &Stencil) -> (f64, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::TriMesh;
+    use crate::mesh::samples::cuboid;
 
     /// The cube [0, 0.2]³ m.
     fn cube() -> Body {
-        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) * 0.2;
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
+        Body::new(&cuboid(DVec3::ZERO, DVec3::splat(0.2))).unwrap()
     }
 
     #[test]

@@ -4,7 +4,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::membrane::Triangle;
 use super::pattern::HELD;
 use super::{Cloth, Contacts, HessianLayout};
 
@@ -14,29 +13,13 @@ pub(crate) type Held = (Vec<(u32, f64)>, DMat3);
 impl Cloth {
     /// Blocks of the positive part of ∇²E at `x`, N/m, in the order of [`pattern`](Self::pattern).
     pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.hessian_in(self.layout(), x, contacts, blocks);
+        self.hessian_in(self.layout(), false, x, contacts, blocks);
     }
 
-    /// The same in the blocks of another layout.
-    pub(crate) fn hessian_in(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.assemble(layout, |t| t.hessian(self.stiffness_of(t), x), x, contacts, blocks);
-    }
-
-    /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`Triangle::hessian_bearing`]. Closer
+    /// Blocks of ∇²E at `x`, N/m, with the compression that the triangles bear: see [`membrane`](super::membrane). Closer
     /// than [`hessian`](Self::hessian), and not always positive.
     pub fn hessian_bearing(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
-        self.hessian_bearing_in(self.layout(), x, contacts, blocks);
-    }
-
-    /// The same in the blocks of another layout.
-    pub(crate) fn hessian_bearing_in(
-        &self,
-        layout: &HessianLayout,
-        x: &[DVec3],
-        contacts: &Contacts,
-        blocks: &mut Vec<DMat3>,
-    ) {
-        self.assemble(layout, |t| t.hessian_bearing(self.stiffness_of(t), x), x, contacts, blocks);
+        self.hessian_in(self.layout(), true, x, contacts, blocks);
     }
 
     /// Each vertex's own block of the positive part of ∇²E + ε M at `x`, N/m.
@@ -46,7 +29,7 @@ impl Cloth {
             self.masses
                 .iter()
                 .enumerate()
-                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.own_scalar(v) + damping * mass))),
+                .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.plate.own(v) + damping * mass))),
         );
         for t in &self.triangles {
             for (&v, block) in t.vertices.iter().zip(t.own_blocks(self.stiffness_of(t), x)) {
@@ -63,10 +46,11 @@ impl Cloth {
         }
     }
 
-    fn assemble(
+    /// One or the other, `bearing` compression or positive, in the blocks of any layout.
+    pub(crate) fn hessian_in(
         &self,
         layout: &HessianLayout,
-        of_triangle: impl Fn(&Triangle) -> [DMat3; 6],
+        bearing: bool,
         x: &[DVec3],
         contacts: &Contacts,
         blocks: &mut Vec<DMat3>,
@@ -74,7 +58,7 @@ impl Cloth {
         blocks.clear();
         blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
         for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
-            let parts = of_triangle(t);
+            let parts = t.hessian(self.stiffness_of(t), x, bearing);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
@@ -110,8 +94,7 @@ impl Cloth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology, TriMesh};
+    use crate::mesh::TriMesh;
 
     /// A triangle and another over it, half an offset apart.
     fn one_over_the_other() -> (Cloth, Vec<DVec3>) {
@@ -125,9 +108,7 @@ mod tests {
             at(0.005, 0.023, 0.01),
         ];
         let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]);
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let fabric = Fabric::by_name("jersey").unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[0]).unwrap();
+        let cloth = Cloth::sample(&mesh, "jersey", &[0]);
         let down = |(v, x): (usize, &DVec3)| if v < 3 { *x } else { *x - DVec3::Z * 9.2e-3 };
         let x = mesh.positions.iter().enumerate().map(down).collect();
         (cloth, x)
@@ -147,8 +128,8 @@ mod tests {
         let layout = cloth.layout_with(&x, proximity.pairs());
         assert!(layout.pattern.rows.len() > cloth.pattern().rows.len(), "no block was added for them");
         let (mut blocks, mut without) = (Vec::new(), Vec::new());
-        cloth.hessian_in(&layout, &x, &contacts, &mut blocks);
-        cloth.hessian_in(&layout, &x, &Contacts::none(), &mut without);
+        cloth.hessian_in(&layout, false, &x, &contacts, &mut blocks);
+        cloth.hessian_in(&layout, false, &x, &Contacts::none(), &mut without);
         blocks.iter_mut().zip(without).for_each(|(a, b)| *a -= b);
         let force = |x: &[DVec3]| -> Vec<DVec3> {
             let (mut with, mut without) = (Vec::new(), Vec::new());

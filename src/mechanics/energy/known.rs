@@ -49,21 +49,16 @@ impl Contacts<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology, TriMesh};
+    use crate::mesh::TriMesh;
+    use crate::mesh::samples::cuboid;
 
     #[test]
     fn what_is_known_changes_nothing_that_is_found() {
-        let corner = |i: usize| DVec3::new((i & 1) as f64 - 0.5, (i >> 1 & 1) as f64 - 0.5, (i >> 2) as f64 - 1.0);
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let body = Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap();
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
         let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
         let placed = vec![at(0.0, 0.0, 0.001), at(0.1, 0.0, 0.05), at(0.1, 0.1, 0.2), at(0.0, 0.1, 0.0005)];
         let mesh = TriMesh::new(placed.clone(), vec![[0, 1, 2], [0, 2, 3]]);
-        let fabric = Fabric::by_name("jersey").unwrap();
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
         let known: Vec<f64> = placed.iter().map(|x| body.nearest(*x).signed_distance).collect();
         // The second comes down to the body, the third does not, the last goes into it.
         let mut x = placed.clone();

@@ -42,7 +42,7 @@ impl HessianLayout {
             })
         };
         let more: Vec<[u32; 2]> = more.collect();
-        let of_all = || sides().chain(bending.pairs().map(|(pair, _)| pair)).chain(more.iter().copied());
+        let of_all = || sides().chain(bending.plate.pairs().map(|(pair, _)| pair)).chain(more.iter().copied());
         let neighbours = Adjacency::new(n, of_all);
         let free: Vec<u32> = (0..n as u32).filter(|&v| !held[v as usize]).collect();
         let order = nested_dissection(free, placed, &neighbours);
@@ -58,8 +58,8 @@ impl HessianLayout {
         };
         let triangle_slots = triangles.iter().map(slots).collect();
         let mut bending_blocks = vec![0.0; pattern.rows.len()];
-        let own = order.iter().map(|&v| ([v, v], bending.own_scalar(v as usize)));
-        for ([a, b], scalar) in bending.pairs().chain(own) {
+        let own = order.iter().map(|&v| ([v, v], bending.plate.own(v as usize)));
+        for ([a, b], scalar) in bending.plate.pairs().chain(own) {
             if let Some(sum) = bending_blocks.get_mut(slot(a, b).block as usize) {
                 *sum += scalar;
             }

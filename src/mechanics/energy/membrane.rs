@@ -42,6 +42,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::fabric::Fabric;
+pub(crate) use crate::mesh::outer;
 use crate::mesh::rest::raised;
 
 /// One triangle's rest data.
@@ -64,10 +65,10 @@ pub struct Triangle {
 /// Membrane stiffness, N/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffness {
-    pub(super) uu: f64,
-    pub(super) uv: f64,
-    pub(super) vv: f64,
-    pub(super) shear: f64,
+    pub(crate) uu: f64,
+    pub(crate) uv: f64,
+    pub(crate) vv: f64,
+    pub(crate) shear: f64,
     /// Uniaxial k_u and k_v.
     pub(super) weft: f64,
     pub(super) warp: f64,
@@ -209,22 +210,16 @@ impl Triangle {
         self.area * 0.5 * (tu * su + tv * sv + tau * gamma)
     }
 
-    /// The positive part of the Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m.
+    /// The Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m: its positive part, or the `bearing` one, exact but for
+    /// compression past what the triangle bears and not always positive.
     #[must_use]
-    pub fn hessian(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 6] {
-        self.second(c, x, false)
-    }
-
-    /// The bearing Hessian, in the order of [`hessian`](Self::hessian): exact but for compression past what the triangle
-    /// bears. Not always positive.
-    #[must_use]
-    pub fn hessian_bearing(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 6] {
-        self.second(c, x, true)
-    }
-
-    fn second(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
+    pub fn hessian(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
         let [huu, huv, hvv] = self.by_gradient(c, x, bearing);
-        self.blocks(huu, huv, hvv)
+        let block = |i: usize, j: usize| {
+            let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
+            huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)
+        };
+        [block(0, 0), block(1, 1), block(2, 2), block(1, 0), block(2, 0), block(2, 1)]
     }
 
     /// Second derivatives of ψ by F_u and F_v: uu, uv, vv, N/m.
@@ -249,26 +244,12 @@ impl Triangle {
         [huu, huv, hvv]
     }
 
-    /// The corners' own blocks of [`hessian`](Self::hessian), N/m.
+    /// The corners' own blocks of the positive [`hessian`](Self::hessian), N/m.
     pub(crate) fn own_blocks(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 3] {
         let [huu, huv, hvv] = self.by_gradient(c, x, false);
         let both = huv + huv.transpose();
         self.gradients.map(|g| (huu * (g.x * g.x) + hvv * (g.y * g.y) + both * (g.x * g.y)) * self.area)
     }
-
-    /// From second derivatives by F_u and F_v to those by the corners.
-    fn blocks(&self, huu: DMat3, huv: DMat3, hvv: DMat3) -> [DMat3; 6] {
-        let block = |i: usize, j: usize| {
-            let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
-            huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)
-        };
-        [block(0, 0), block(1, 1), block(2, 2), block(1, 0), block(2, 0), block(2, 1)]
-    }
-}
-
-/// a bᵀ.
-pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// The nearest positive semi-definite matrix to [[a, t], [t, b]], as (a, b, t).

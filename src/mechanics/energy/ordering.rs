@@ -14,6 +14,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 
+use crate::mesh::{Lists, box_about};
+
 /// This many vertices are cut no further: below it a separator costs as much as it saves.
 const LEAF: usize = 24;
 
@@ -22,45 +24,27 @@ const ALONE: usize = 1000;
 
 /// Neighbours of each vertex, one list after the other.
 #[derive(Debug, Clone, Default)]
-pub struct Adjacency {
-    starts: Vec<u32>,
-    others: Vec<u32>,
-}
+pub struct Adjacency(Lists<u32>);
 
 impl Adjacency {
     /// Of `count` vertices, from pairs, in any order, repeated or not; a vertex is no neighbour of itself.
     #[must_use]
     pub fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
-        let mut starts = vec![0u32; count + 1];
-        for [a, b] in pairs().filter(|[a, b]| a != b) {
-            starts[a as usize + 1] += 1;
-            starts[b as usize + 1] += 1;
-        }
-        for i in 0..count {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut all = vec![0; starts[count] as usize];
-        for [a, b] in pairs().filter(|[a, b]| a != b) {
-            for (v, w) in [(a, b), (b, a)] {
-                all[next[v as usize] as usize] = w;
-                next[v as usize] += 1;
-            }
-        }
-        let mut kept = Self { starts: vec![0], others: Vec::with_capacity(all.len()) };
+        let both_ways = || pairs().filter(|[a, b]| a != b).flat_map(|[a, b]| [(a, b), (b, a)]);
+        let mut all = Lists::gathered(count, both_ways);
+        let mut kept = Lists::default();
         for v in 0..count {
-            let list = &mut all[starts[v] as usize..starts[v + 1] as usize];
+            let list = all.of_mut(v);
             list.sort_unstable();
-            kept.others.extend(list.chunk_by(|a, b| a == b).map(|same| same[0]));
-            kept.starts.push(kept.others.len() as u32);
+            kept.push(list.chunk_by(|a, b| a == b).map(|same| same[0]));
         }
-        kept
+        Self(kept)
     }
 
     /// Neighbours of a vertex, ascending.
     #[must_use]
     pub fn of(&self, v: u32) -> &[u32] {
-        &self.others[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
+        self.0.of(v as usize)
     }
 }
 
@@ -141,9 +125,7 @@ impl Cut<'_> {
         if members.len() <= 2 {
             return members.sort_unstable();
         }
-        let bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let at = members.iter().map(|&v| self.positions[v as usize]);
-        let (low, high) = at.fold(bounds, |(low, high), p| (low.min(p), high.max(p)));
+        let (low, high) = box_about(members.iter().map(|&v| self.positions[v as usize]));
         let middle = members.len() / 2;
         self.select(members, middle, (high - low).max_position());
         let (one, other) = members.split_at_mut(middle);

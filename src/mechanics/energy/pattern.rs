@@ -6,6 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::ordering::Adjacency;
+use crate::mesh::each_once;
 
 /// Marks a vertex that is held, and a block that falls away with it.
 pub const HELD: u32 = u32::MAX;
@@ -32,18 +33,15 @@ impl Pattern {
     /// From pairs (row, column) of unknowns, in any order, repeated or not; every diagonal block is there.
     #[must_use]
     pub fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
-        let mut all: Vec<(u32, u32)> = pairs.map(|(i, j)| (i.min(j), i.max(j))).collect();
-        all.extend((0..unknowns as u32).map(|i| (i, i)));
-        all.sort_unstable();
-        all.dedup();
-        let mut starts = vec![0; unknowns + 1];
-        for &(column, _) in &all {
-            starts[column as usize + 1] += 1;
+        let own = (0..unknowns as u32).map(|i| (i, i));
+        let all = each_once(pairs.map(|(i, j)| (i.min(j), i.max(j))).chain(own));
+        let mut pattern = Self { starts: vec![0], rows: Vec::with_capacity(all.len()) };
+        // Every column has its diagonal at least.
+        for column in all.chunk_by(|a, b| a.0 == b.0) {
+            pattern.rows.extend(column.iter().map(|(_, row)| row));
+            pattern.starts.push(pattern.rows.len() as u32);
         }
-        for i in 0..unknowns {
-            starts[i + 1] += starts[i];
-        }
-        Self { starts, rows: all.into_iter().map(|(_, row)| row).collect() }
+        pattern
     }
 
     /// Of neighbours, with the vertex of each unknown in `order` and the unknown of each vertex.

@@ -18,13 +18,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::lanes::{Four, Lanes, Pack};
+use crate::mesh::Lists;
 
 /// The pairs j < i with Q_ij, by i, two at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Plate {
-    /// First two of each i.
-    starts: Vec<u32>,
-    twos: Vec<Two>,
+    twos: Lists<Two>,
     /// Q_ii, N/m: what its pairs add up to.
     own: Vec<f64>,
 }
@@ -44,7 +43,7 @@ fn gather<'a>(
     i: u32,
     elements: impl Iterator<Item = (&'a (&'a [u32], &'a [DVec3], DVec3), usize)>,
     row: &mut Vec<(u32, f64)>,
-    twos: &mut Vec<Two>,
+    twos: &mut Lists<Two>,
 ) {
     row.clear();
     for ((vertices, weights, stiffness), at) in elements {
@@ -65,52 +64,32 @@ fn gather<'a>(
     if let (1, Some(&(j, _))) = (row.len() % 2, row.first()) {
         row.push((j, 0.0));
     }
-    twos.extend(row.as_chunks::<2>().0.iter().map(|two| Two { others: two.map(|e| e.0), scalars: two.map(|e| e.1) }));
+    twos.push(row.as_chunks::<2>().0.iter().map(|two| Two { others: two.map(|e| e.0), scalars: two.map(|e| e.1) }));
 }
 
 impl Plate {
     /// From elements: vertices, weights and stiffness of each.
     pub(super) fn new(vertices: usize, elements: &[(&[u32], &[DVec3], DVec3)]) -> Self {
-        let mut starts = vec![0u32; vertices + 1];
-        for v in elements.iter().flat_map(|e| e.0) {
-            starts[*v as usize + 1] += 1;
-        }
-        for i in 0..vertices {
-            starts[i + 1] += starts[i];
-        }
         // Each vertex's elements in their order, and its place in them.
-        let mut next = starts.clone();
-        let mut of = vec![(0u32, 0u32); starts[vertices] as usize];
-        for (e, element) in (0u32..).zip(elements) {
-            for (k, &v) in (0u32..).zip(element.0) {
-                of[next[v as usize] as usize] = (e, k);
-                next[v as usize] += 1;
-            }
-        }
+        let of = Lists::gathered(vertices, || {
+            let numbered = (0u32..).zip(elements);
+            numbered.flat_map(|(e, element)| (0u32..).zip(element.0).map(move |(k, &v)| (v, (e, k))))
+        });
         let numbers: Vec<usize> = (0..vertices).collect();
-        let rows: Vec<(Vec<Two>, Vec<u32>)> = (numbers.par_chunks(CHUNK))
+        let rows: Vec<Lists<Two>> = (numbers.par_chunks(CHUNK))
             .map(|chunk| {
-                let (mut twos, mut counts, mut row) = (Vec::new(), Vec::with_capacity(chunk.len()), Vec::new());
+                let (mut twos, mut row) = (Lists::default(), Vec::new());
                 for &i in chunk {
-                    let before = twos.len();
-                    let own = of[starts[i] as usize..starts[i + 1] as usize].iter();
-                    gather(i as u32, own.map(|&(e, k)| (&elements[e as usize], k as usize)), &mut row, &mut twos);
-                    counts.push((twos.len() - before) as u32);
+                    let own = of.of(i).iter().map(|&(e, k)| (&elements[e as usize], k as usize));
+                    gather(i as u32, own, &mut row, &mut twos);
                 }
-                (twos, counts)
+                twos
             })
             .collect();
-        let mut plate = Self { starts: vec![0], own: vec![0.0; vertices], ..Self::default() };
-        plate.twos.reserve_exact(rows.iter().map(|(twos, _)| twos.len()).sum());
-        for (twos, counts) in rows {
-            plate.twos.extend(twos);
-            for count in counts {
-                let end = plate.starts.last().map_or(0, |end| end + count);
-                plate.starts.push(end);
-            }
-        }
+        let mut plate = Self { own: vec![0.0; vertices], ..Self::default() };
+        rows.into_iter().for_each(|twos| plate.twos.append(twos));
         for i in 0..vertices {
-            for two in &plate.twos[plate.starts[i] as usize..plate.starts[i + 1] as usize] {
+            for two in plate.twos.of(i) {
                 for (j, scalar) in two.others.into_iter().zip(two.scalars) {
                     plate.own[i] -= scalar;
                     plate.own[j as usize] -= scalar;
@@ -120,11 +99,10 @@ impl Plate {
         plate
     }
 
-    /// Every pair j < i as [i, j] with Q_ij, N/m.
+    /// Every pair j < i as [i, j] with Q_ij, N/m; a few twice, the second time with nothing.
     pub(super) fn pairs(&self) -> impl Iterator<Item = ([u32; 2], f64)> + '_ {
-        let of = |i: usize| &self.twos[self.starts[i] as usize..self.starts[i + 1] as usize];
         let both = move |i: usize, two: &Two| [0, 1].map(|k| ([i as u32, two.others[k]], two.scalars[k]));
-        (0..self.own.len()).flat_map(move |i| of(i).iter().flat_map(move |two| both(i, two)))
+        (0..self.own.len()).flat_map(move |i| self.twos.of(i).iter().flat_map(move |two| both(i, two)))
     }
 
     /// Q_ii, N/m.
@@ -132,14 +110,14 @@ impl Plate {
         self.own[i]
     }
 
-    /// Two ranges of vertices with about as many pairs each.
+    /// Two ranges of vertices with about as many pairs each: as much work for [`add_gradient`](Self::add_gradient).
     pub(super) fn halves(&self) -> [Range<usize>; 2] {
-        let vertices = self.starts.len().saturating_sub(1);
-        let middle = self.starts.partition_point(|&s| 2 * (s as usize) < self.twos.len()).min(vertices);
+        let (vertices, all) = (self.twos.len(), self.twos.entries().len());
+        let middle = self.twos.starts().partition_point(|&s| 2 * (s as usize) < all).min(vertices);
         [0..middle, middle..vertices]
     }
 
-    /// Adds the gradient of the pairs of `vertices` to `gradient`, N, which must be zero before; returns their energy, J.
+    /// Adds the gradient of the pairs of `vertices` (each with those before it) to `gradient`, N, which must be zero before; returns their energy, J.
     #[inline(always)]
     pub(super) fn add_gradient<L: Lanes>(
         &self,
@@ -153,7 +131,7 @@ impl Plate {
         for i in vertices {
             let here = l.load(&x[i]);
             let mut sum = l.load(&gradient[i]);
-            for two in &self.twos[self.starts[i] as usize..self.starts[i + 1] as usize] {
+            for two in self.twos.of(i) {
                 let [j, k] = [two.others[0] as usize, two.others[1] as usize];
                 // What the other gets; in this order a load is an operand and no instruction of its own.
                 let push = l.mul(l.sub(here, l.load(&x[j])), l.splat(two.scalars[0]));

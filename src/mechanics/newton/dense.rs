@@ -9,6 +9,7 @@ use faer::linalg::cholesky::llt::factor::{LltError, cholesky_in_place, cholesky_
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
+use faer::traits::math_utils::one;
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::factor::Precision;
@@ -27,20 +28,11 @@ pub(super) fn partial<T: Precision>(panel: MatMut<'_, T>, memory: &mut MemBuffer
     let n = panel.ncols();
     if n <= WIDE {
         let (mut top, bottom) = panel.split_at_row_mut(n);
-        let LltError::NonPositivePivot { index } = match cholesky_in_place(
-            top.rb_mut(),
-            Default::default(),
-            Par::Seq,
-            MemStack::new(memory),
-            Default::default(),
-        ) {
-            Ok(_) => {
-                below(top.rb(), bottom);
-                return Ok(());
-            }
-            Err(lost) => lost,
-        };
-        return Err(index);
+        let memory = MemStack::new(memory);
+        cholesky_in_place(top.rb_mut(), Default::default(), Par::Seq, memory, Default::default())
+            .map_err(|LltError::NonPositivePivot { index }| index)?;
+        below(top.rb(), bottom);
+        return Ok(());
     }
     let half = (n / 2).next_multiple_of(16);
     let (mut left, right) = panel.split_at_col_mut(half);
@@ -74,7 +66,7 @@ pub(super) fn subtract<T: Precision>(c: MatMut<'_, T>, l: MatRef<'_, T>, onto: A
     let (triangle, rest) = c.split_at_row_mut(n);
     let (top, bottom) = l.split_at_row(n);
     let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    let minus = -T::ONE;
+    let minus = -one::<T>();
     matmul(triangle, lower, onto, top, full, top.transpose(), full, minus, Par::Seq);
     product(rest, bottom, top, onto);
 }
@@ -87,6 +79,6 @@ fn product<T: Precision>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>, o
         let ((one, other), (a, below)) = (c.split_at_row_mut(half), a.split_at_row(half));
         rayon::join(|| product(one, a, b, onto), || product(other, below, b, onto));
     } else if rows > 0 {
-        faer::linalg::matmul::matmul(c, onto, a, b.transpose(), -T::ONE, Par::Seq);
+        faer::linalg::matmul::matmul(c, onto, a, b.transpose(), -one::<T>(), Par::Seq);
     }
 }

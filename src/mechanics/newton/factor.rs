@@ -5,7 +5,11 @@
 //! and what that takes from the rows below is the front's own update. Groves go side by side, each with its updates on a stack; in
 //! the crown above them the threads share each front's dense part. Nothing is allocated after the first time.
 
+use std::ops::{AddAssign, Neg, Range, SubAssign};
+
 use faer::dyn_stack::MemBuffer;
+use faer::traits::RealField;
+use faer::traits::math_utils::{from_f64, zero};
 use faer::{Accum, MatMut, MatRef};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -15,36 +19,10 @@ use super::dense::{memory, partial, subtract};
 use super::forest::{Forest, Front, Grove};
 
 /// The two precisions.
-pub(super) trait Precision:
-    faer::traits::RealField + Copy + std::ops::Neg<Output = Self> + std::ops::AddAssign + std::ops::SubAssign
-{
-    const ZERO: Self;
-    const ONE: Self;
-    fn of(x: f64) -> Self;
-    fn wide(self) -> f64;
-}
+pub(super) trait Precision: RealField + Copy + Into<f64> + Neg<Output = Self> + AddAssign + SubAssign {}
 
-impl Precision for f32 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    fn of(x: f64) -> Self {
-        x as Self
-    }
-    fn wide(self) -> f64 {
-        f64::from(self)
-    }
-}
-
-impl Precision for f64 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    fn of(x: f64) -> Self {
-        x
-    }
-    fn wide(self) -> f64 {
-        self
-    }
-}
+impl Precision for f32 {}
+impl Precision for f64 {}
 
 /// The matrix A + D to factor.
 #[derive(Clone, Copy)]
@@ -90,17 +68,17 @@ impl<T: Precision> Factor<T> {
         };
         for grove in &forest.groves {
             self.groves.push(Planted {
-                panels: vec![T::ZERO; grove.panels_len],
-                stack: vec![T::ZERO; grove.stack_len],
+                panels: vec![zero::<T>(); grove.panels_len],
+                stack: vec![zero::<T>(); grove.stack_len],
                 live: Vec::new(),
                 memory: room()?,
-                above: vec![T::ZERO; unknowns - 3 * forest.crown.1],
+                above: vec![zero::<T>(); unknowns - 3 * forest.crown.1],
                 rows: Vec::new(),
             });
         }
         let crown = forest.fronts[forest.crown.0..].iter();
-        self.crown = crown.map(|f| (vec![T::ZERO; f.panel_len()], vec![T::ZERO; f.update_len()])).collect();
-        self.side = vec![T::ZERO; unknowns];
+        self.crown = crown.map(|f| (vec![zero::<T>(); f.panel_len()], vec![zero::<T>(); f.update_len()])).collect();
+        self.side = vec![zero::<T>(); unknowns];
         self.memory = Some(room()?);
         Ok(())
     }
@@ -180,17 +158,17 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
 ) -> Result<(), SolveError> {
     let height = front.height();
     let (columns, rows) = (3 * front.columns, 3 * front.rows.len());
-    panel.fill(T::ZERO);
+    panel.fill(zero());
     for entry in &forest.entries[front.entries.clone()] {
         let block = matrix.blocks[entry.block as usize];
         let block = if entry.transposed { block.transpose() } else { block };
         for (c, column) in block.to_cols_array_2d().into_iter().enumerate() {
             let at = entry.at as usize + c * height;
-            panel[at..at + 3].copy_from_slice(&column.map(T::of));
+            panel[at..at + 3].copy_from_slice(&column.map(from_f64));
         }
     }
     for (k, &unknown) in forest.order[front.first..front.first + front.columns].iter().enumerate() {
-        let shift = T::of(matrix.diagonal[unknown as usize]);
+        let shift: T = from_f64(matrix.diagonal[unknown as usize]);
         for c in 3 * k..3 * k + 3 {
             panel[c * (height + 1)] += shift;
         }
@@ -219,7 +197,7 @@ fn extend<T: Precision>(
     forest: &Forest,
     child: &Front,
     update: &[T],
-    columns: std::ops::Range<usize>,
+    columns: Range<usize>,
     into: &mut [T],
     rows: usize,
     skip: usize,
@@ -276,13 +254,13 @@ impl<T: Precision> Factor<T> {
 
     fn take(&mut self, forest: &Forest, x: &[DVec3]) {
         for (s, &old) in self.side.chunks_exact_mut(3).zip(&forest.order) {
-            s.copy_from_slice(&x[old as usize].to_array().map(T::of));
+            s.copy_from_slice(&x[old as usize].to_array().map(from_f64));
         }
     }
 
     fn give(&self, forest: &Forest, x: &mut [DVec3]) {
         for (s, &old) in self.side.chunks_exact(3).zip(&forest.order) {
-            x[old as usize] = DVec3::new(s[0].wide(), s[1].wide(), s[2].wide());
+            x[old as usize] = DVec3::new(s[0].into(), s[1].into(), s[2].into());
         }
     }
 }

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::groves::{cut, postorder};
-use super::supernodes::{Supernode, Upper, supernodes};
+use super::supernodes::{Supernode, Upper, supernodes, upper};
 use crate::mechanics::energy::pattern::Pattern;
 
 /// A block of the matrix and where its first number goes in the front's panel.
@@ -91,7 +91,7 @@ pub(super) struct Forest {
 
 impl Forest {
     pub(super) fn new(pattern: &Pattern) -> Self {
-        let upper = Upper::new(pattern);
+        let upper = upper(pattern);
         let nodes = supernodes(pattern, &upper);
         let (groves, crown) = cut(&nodes);
         // Nodes in their final order, and each grove's share of them.
@@ -160,7 +160,7 @@ impl Forest {
                 for &row in &pattern.rows[pattern.column(old)] {
                     take(new[row as usize], &mut self.rows);
                 }
-                for &(row, _) in upper.row(old) {
+                for &(row, _) in upper.of(old) {
                     take(new[row as usize], &mut self.rows);
                 }
             }
@@ -188,7 +188,7 @@ impl Forest {
                 for block in pattern.column(old) {
                     put(pattern.rows[block], block as u32, false);
                 }
-                for &(row, block) in upper.row(old) {
+                for &(row, block) in upper.of(old) {
                     put(row, block, true);
                 }
             }

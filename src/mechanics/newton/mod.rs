@@ -157,7 +157,7 @@ impl<'c, 'b> Descent<'c, 'b> {
 
     /// The same with relaxations that end where the last iterations brought less than this share of what all brought.
     pub(crate) fn relaxed_to(mut self, share: f64) -> Self {
-        self.relaxation = self.relaxation.ending_at(share);
+        self.relaxation.ending = share;
         self
     }
 
@@ -226,7 +226,7 @@ impl<'c, 'b> Descent<'c, 'b> {
         } = self;
         let cloth = *cloth;
         relaxation.prepare(cloth, contacts, &self.blocks);
-        let slope: f64 = gradient.iter().zip(&*direction).map(|(g, d)| g.dot(*d)).sum();
+        let slope = dot(gradient, direction);
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (pace.longest_move_m / longest).min(1.0);
         let mut t = (first * onward.reach(direction, *farthest)).min(pace.longest_move_m / longest);
@@ -284,7 +284,7 @@ impl<'c, 'b> Descent<'c, 'b> {
 }
 
 /// ‖a‖₂.
-fn norm(a: &[DVec3]) -> f64 {
+pub(super) fn norm(a: &[DVec3]) -> f64 {
     a.iter().map(|a| a.length_squared()).sum::<f64>().sqrt()
 }
 

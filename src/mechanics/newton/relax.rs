@@ -57,7 +57,7 @@ pub(crate) struct Relaxation {
     energies: Vec<f64>,
     scratch: Scratch,
     /// Share of the decrease under which the last iterations end a call; 0 never does.
-    ending: f64,
+    pub(super) ending: f64,
 }
 
 impl Relaxation {
@@ -73,12 +73,6 @@ impl Relaxation {
         for (v, (block, _)) in own.iter().zip(&cloth.held).enumerate().filter(|(_, (_, held))| !**held) {
             self.inverse.set(v, block.inverse());
         }
-    }
-
-    /// Ends a relaxation whose last iterations brought less than this share of what all brought.
-    pub(crate) fn ending_at(mut self, share: f64) -> Self {
-        self.ending = share;
-        self
     }
 
     /// Up to `iterations` from `x`, where `contacts` must be up to date and are afterwards; returns the energy, J.
@@ -170,21 +164,12 @@ impl Relaxation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
-    use crate::mesh::{RestShape, Topology, TriMesh};
+    use crate::mesh::samples::sheet;
 
     /// A hanging sheet of 30 by 30 vertices, a centimetre apart, its upper edge held.
-    fn sheet() -> (Cloth, Vec<DVec3>) {
-        let n = 30;
-        let at = |i: u32| DVec3::new(f64::from(i % n), 0.0, f64::from(i / n)) * 0.01;
-        let quads = (0..n * n).filter(|i| i % n + 1 < n && i / n + 1 < n);
-        let triangles = quads.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
-        let mesh = TriMesh::new((0..n * n).map(at).collect(), triangles);
-        let held: Vec<u32> = (n * (n - 1)..n * n).collect();
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let fabric = Fabric::by_name("cotton").unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &held).unwrap();
-        (cloth, mesh.positions)
+    fn hanging() -> (Cloth, Vec<DVec3>) {
+        let mesh = sheet(29, 29, |i, j| DVec3::new(i, 0.0, j) * 0.01);
+        (Cloth::sample(&mesh, "cotton", &(29 * 30..30 * 30).collect::<Vec<_>>()), mesh.positions)
     }
 
     fn relaxed(cloth: &Cloth, x: &mut Vec<DVec3>, iterations: usize) -> [f64; 2] {
@@ -200,7 +185,7 @@ mod tests {
 
     #[test]
     fn takes_off_what_is_as_short_as_a_triangle() {
-        let (cloth, flat) = sheet();
+        let (cloth, flat) = hanging();
         let weight_alone = cloth.energy(&flat, &Contacts::none());
         let mut x = flat.clone();
         for (i, x) in x.iter_mut().enumerate() {
@@ -217,7 +202,7 @@ mod tests {
 
     #[test]
     fn energy_falls_with_every_iteration() {
-        let (cloth, mut x) = sheet();
+        let (cloth, mut x) = hanging();
         for (i, x) in x.iter_mut().enumerate().filter(|(i, _)| !cloth.held[*i]) {
             x.y += 2e-3 * (0.7 * i as f64).sin();
         }

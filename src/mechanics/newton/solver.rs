@@ -16,6 +16,7 @@ use glam::{DMat3, DVec3};
 
 use super::factor::{Factor, Matrix};
 use super::forest::{Forest, Front};
+use super::norm;
 use crate::mechanics::energy::pattern::Pattern;
 
 /// What can go wrong in a solve.
@@ -189,29 +190,17 @@ fn row_sums(pattern: &Pattern, Matrix { blocks, diagonal }: Matrix<'_>) -> Vec<f
     sums
 }
 
-/// ‖x‖₂.
-fn norm(x: &[DVec3]) -> f64 {
-    x.iter().map(|v| v.length_squared()).sum::<f64>().sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
     use crate::mechanics::energy::{Cloth, Contacts};
-    use crate::mesh::{RestShape, Topology, TriMesh};
+    use crate::mesh::samples::sheet;
 
     /// Nothing holds a sheet that has no mass in the matrix either: it may go anywhere, and the matrix is singular.
     #[test]
     fn what_double_precision_loses_is_solved_and_what_is_no_number_is_refused() {
-        let n = 6;
-        let at = |i: u32| DVec3::new(f64::from(i % n), 0.0, f64::from(i / n)) * 0.01;
-        let quads = (0..n * n).filter(|i| i % n + 1 < n && i / n + 1 < n);
-        let triangles = quads.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
-        let mesh = TriMesh::new((0..n * n).map(at).collect(), triangles);
-        let rest = RestShape::from_edges(&mesh).unwrap();
-        let fabric = Fabric::by_name("denim").unwrap();
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabric, &[]).unwrap();
+        let mesh = sheet(5, 5, |i, j| DVec3::new(i, 0.0, j) * 0.01);
+        let cloth = Cloth::sample(&mesh, "denim", &[]);
         let mut blocks = Vec::new();
         cloth.hessian(&mesh.positions, &Contacts::none(), &mut blocks);
         let (pattern, none) = (cloth.pattern(), vec![0.0; mesh.vertex_count()]);
@@ -219,13 +208,7 @@ mod tests {
         let mut pull = vec![DVec3::ZERO; mesh.vertex_count()];
         for (i, &v) in cloth.order().iter().enumerate() {
             let row = (mesh.positions[v as usize].z / 0.01).round();
-            pull[i].z = if row == 0.0 {
-                -1e-2
-            } else if row == 5.0 {
-                1e-2
-            } else {
-                0.0
-            };
+            pull[i].z = [-1e-2, 0.0, 0.0, 0.0, 0.0, 1e-2][row as usize];
         }
         let mut x = pull.clone();
         let mut solver = Solver::new(pattern).unwrap();

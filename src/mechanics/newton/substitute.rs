@@ -2,6 +2,7 @@
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::traits::math_utils::{one, zero};
 use faer::{Accum, ColMut, ColRef, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
@@ -20,7 +21,7 @@ impl<T: Precision> Factor<T> {
                 for &row in &forest.rows[forest.fronts[root as usize].rows.clone()] {
                     let at = 3 * (row as usize - forest.crown.1);
                     for (x, more) in high[at..at + 3].iter_mut().zip(&mut planted.above[at..at + 3]) {
-                        *x -= std::mem::replace(more, T::ZERO);
+                        *x -= std::mem::replace(more, zero());
                     }
                 }
             }
@@ -31,9 +32,7 @@ impl<T: Precision> Factor<T> {
             down(front, panel, &mut high[at..at + 3 * front.columns], &mut rows);
             for (&row, some) in forest.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
                 let at = 3 * (row as usize - forest.crown.1);
-                for (x, less) in high[at..at + 3].iter_mut().zip(some) {
-                    *x -= *less;
-                }
+                take(&mut high[at..], some);
             }
         }
     }
@@ -80,9 +79,7 @@ impl<T: Precision> Planted<T> {
                 match (row as usize).checked_sub(grove.unknowns.end) {
                     None => {
                         let at = 3 * (row as usize - grove.unknowns.start);
-                        for (x, less) in own[at..at + 3].iter_mut().zip(some) {
-                            *x -= *less;
-                        }
+                        take(&mut own[at..], some);
                     }
                     Some(_) => {
                         let at = 3 * (row as usize - forest.crown.1);
@@ -111,6 +108,11 @@ impl<T: Precision> Planted<T> {
     }
 }
 
+/// x ← x − less, as many as these are.
+fn take<T: Precision>(x: &mut [T], less: &[T]) {
+    x.iter_mut().zip(less).for_each(|(x, less)| *x -= *less);
+}
+
 /// The unknowns of a front's rows.
 fn gather<'a, T: Precision + 'a>(forest: &Forest, front: &Front, rows: &mut Vec<T>, of: impl Fn(usize) -> &'a [T]) {
     rows.clear();
@@ -126,10 +128,10 @@ fn down<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &mut Vec<T>
     let (top, bottom) = panel.split_at_row(n);
     solve_lower_triangular_in_place(top, MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
     rows.clear();
-    rows.resize(bottom.nrows(), T::ZERO);
+    rows.resize(bottom.nrows(), zero());
     if !rows.is_empty() {
         let (x, rows) = (ColRef::from_slice(&*x), ColMut::from_slice_mut(rows));
-        matmul(rows, Accum::Replace, bottom, x, T::ONE, Par::Seq);
+        matmul(rows, Accum::Replace, bottom, x, one(), Par::Seq);
     }
 }
 
@@ -139,7 +141,14 @@ fn up<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &[T]) {
     let panel = MatRef::from_column_major_slice(panel, front.height(), n);
     let (top, bottom) = panel.split_at_row(n);
     if !rows.is_empty() {
-        matmul(ColMut::from_slice_mut(x), Accum::Add, bottom.transpose(), ColRef::from_slice(rows), -T::ONE, Par::Seq);
+        matmul(
+            ColMut::from_slice_mut(x),
+            Accum::Add,
+            bottom.transpose(),
+            ColRef::from_slice(rows),
+            -one::<T>(),
+            Par::Seq,
+        );
     }
     solve_upper_triangular_in_place(top.transpose(), MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
 }

@@ -9,9 +9,7 @@
 //! All of it is in blocks of 3 by 3: a ninth of the work that scalars would take.
 
 use crate::mechanics::energy::pattern::Pattern;
-
-/// No parent.
-pub(super) const NONE: u32 = u32::MAX;
+use crate::mesh::{Lists, NONE, renumbered};
 
 /// Up to so many columns may be put together with that share of zeros.
 const RELAXED: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
@@ -31,39 +29,13 @@ pub(super) struct Supernode {
 }
 
 /// A pattern's upper half by rows: the columns before i that meet row i, and their blocks.
-#[derive(Debug)]
-pub(super) struct Upper {
-    starts: Vec<u32>,
-    entries: Vec<(u32, u32)>,
-}
+pub(super) type Upper = Lists<(u32, u32)>;
 
-impl Upper {
-    pub(super) fn new(pattern: &Pattern) -> Self {
-        let n = pattern.unknowns();
-        let mut starts = vec![0; n + 1];
-        for &i in &pattern.rows {
-            starts[i as usize + 1] += 1;
-        }
-        for i in 0..n {
-            // The diagonal is no part of it.
-            starts[i + 1] = starts[i] + starts[i + 1] - 1;
-        }
-        let mut next = starts.clone();
-        let mut entries = vec![(0, 0); pattern.rows.len() - n];
-        for j in 0..n {
-            for block in pattern.column(j).skip(1) {
-                let place = &mut next[pattern.rows[block] as usize];
-                entries[*place as usize] = (j as u32, block as u32);
-                *place += 1;
-            }
-        }
-        Self { starts, entries }
-    }
-
-    /// Columns and blocks of a row, columns ascending.
-    pub(super) fn row(&self, i: usize) -> &[(u32, u32)] {
-        &self.entries[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
+/// Of a pattern; columns ascend.
+pub(super) fn upper(pattern: &Pattern) -> Upper {
+    // The diagonal is no part of it.
+    let below = |j: usize| pattern.column(j).skip(1).map(move |block| (pattern.rows[block], (j as u32, block as u32)));
+    Lists::gathered(pattern.unknowns(), || (0..pattern.unknowns()).flat_map(below))
 }
 
 /// Parent of each column, and how many rows its factor has below the diagonal.
@@ -71,7 +43,7 @@ fn elimination_tree(upper: &Upper, n: usize) -> (Vec<u32>, Vec<u32>) {
     let mut parent = vec![NONE; n];
     let mut ancestor = vec![NONE; n];
     for i in 0..n {
-        for &(j, _) in upper.row(i) {
+        for &(j, _) in upper.of(i) {
             let mut at = j as usize;
             while at != i {
                 let next = std::mem::replace(&mut ancestor[at], i as u32);
@@ -88,7 +60,7 @@ fn elimination_tree(upper: &Upper, n: usize) -> (Vec<u32>, Vec<u32>) {
     let mut seen = vec![NONE; n];
     for i in 0..n {
         seen[i] = i as u32;
-        for &(j, _) in upper.row(i) {
+        for &(j, _) in upper.of(i) {
             let mut at = j as usize;
             while seen[at] != i as u32 {
                 seen[at] = i as u32;
@@ -161,14 +133,7 @@ fn relax(node: &mut Supernode, nodes: &mut [Supernode]) {
 
 /// Without those that were taken in, and with parents.
 fn tidy(mut nodes: Vec<Supernode>) -> Vec<Supernode> {
-    let mut number = vec![NONE; nodes.len()];
-    let mut kept = 0;
-    for (new, node) in number.iter_mut().zip(&nodes) {
-        if !node.columns.is_empty() {
-            *new = kept;
-            kept += 1;
-        }
-    }
+    let number = renumbered(nodes.len(), |s| !nodes[s].columns.is_empty());
     nodes.retain(|node| !node.columns.is_empty());
     for s in 0..nodes.len() {
         let mut children = std::mem::take(&mut nodes[s].children);

@@ -155,7 +155,9 @@ fn longest<L: Lanes>(l: L, d: &[Four]) -> f64 {
 mod tests {
     use glam::{DMat3, DVec3};
 
+    use super::super::dot as product;
     use super::*;
+    use crate::mesh::outer;
 
     /// Vectors of 21 vertices: a group of sixteen, one of four and one left over.
     fn noise(seed: f64) -> Vec<DVec3> {
@@ -169,13 +171,9 @@ mod tests {
         flat
     }
 
-    fn product(a: &[DVec3], b: &[DVec3]) -> f64 {
-        a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
-    }
-
     fn block(i: usize) -> DMat3 {
         let v = DVec3::new(0.3, 0.1 * i as f64, -0.4);
-        DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0 + i as f64)) + DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+        DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0 + i as f64)) + outer(v, v)
     }
 
     #[test]

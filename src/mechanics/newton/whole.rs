@@ -31,10 +31,11 @@ pub(crate) struct Whole {
 }
 
 impl Whole {
-    /// Solves with `blocks`; the solution is in `unknowns`.
-    pub(super) fn solve(&mut self, here: &State<'_>, positive: bool) -> Result<(), SolveError> {
-        let State { cloth, gradient, damping, .. } = *here;
+    /// Solves with the `bearing` or the positive Hessian; the solution is in `unknowns`.
+    pub(super) fn solve(&mut self, here: &State<'_>, bearing: bool) -> Result<(), SolveError> {
+        let State { cloth, x, contacts, gradient, damping } = *here;
         let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+        cloth.hessian_in(layout, bearing, x, contacts, &mut self.blocks);
         let solver = match &mut self.solver {
             Some(solver) => solver,
             none => none.insert(Solver::new(&layout.pattern)?),
@@ -43,7 +44,7 @@ impl Whole {
         self.damped.extend(layout.order.iter().map(|&v| cloth.masses[v as usize] * damping));
         self.unknowns.clear();
         self.unknowns.extend(layout.order.iter().map(|&v| -gradient[v as usize]));
-        solver.solve(&layout.pattern, &self.blocks, &self.damped, positive, &mut self.unknowns)
+        solver.solve(&layout.pattern, &self.blocks, &self.damped, !bearing, &mut self.unknowns)
     }
 
     /// Makes a place for every pair of vertices that a gap couples, if there is none yet.
@@ -60,22 +61,18 @@ impl Whole {
 
 impl Tangent for Whole {
     fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError> {
-        let State { cloth, x, contacts, .. } = *here;
+        let State { cloth, x, .. } = *here;
         self.couple(here);
         let mut solved = false;
         if self.waiting == 0 {
-            let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
-            cloth.hessian_bearing_in(layout, x, contacts, &mut self.blocks);
-            solved = self.solve(here, false).is_ok();
+            solved = self.solve(here, true).is_ok();
             self.pause = if solved { 0 } else { (2 * self.pause).clamp(1, LONGEST_PAUSE) };
             self.waiting = self.pause;
         }
         self.bearing = solved;
         if !solved {
             self.waiting -= 1;
-            let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
-            cloth.hessian_in(layout, x, contacts, &mut self.blocks);
-            self.solve(here, true)?;
+            self.solve(here, false)?;
         }
         d.clear();
         d.resize(x.len(), DVec3::ZERO);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Contactless;
+use super::{Contactless, PaperOptions, PartForces};
 
 /// The sums of (2) over one PART, before p_f and q_f.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -23,38 +23,20 @@ pub(super) struct Sums {
     pub(super) contact: bool,
 }
 
-/// Forces and displacement of a PART along the three axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Balance {
-    pub(super) adjacent: DVec3,
-    pub(super) stiffness: DVec3,
-    pub(super) displacement: DVec3,
-    pub(super) degenerate: [bool; 3],
-}
-
-/// Solves (6) and (7), or (9) without contact. `gravity` and `anti_force` are F⁰ and F¹ in N.
-pub(super) fn balance(
-    sums: &Sums,
-    gravity: DVec3,
-    anti_force: DVec3,
-    line_force: f64,
-    sign: Contactless,
-    degenerate_below: f64,
-) -> Balance {
-    let mut out =
-        Balance { adjacent: DVec3::ZERO, stiffness: DVec3::ZERO, displacement: DVec3::ZERO, degenerate: [false; 3] };
-    let rises = !sums.contact && sign == Contactless::AsPrinted;
-    let load = if rises { gravity } else { anti_force - gravity };
+/// Solves (6) and (7), or (9) without contact, from the F⁰, F¹ and p_f of a PART.
+pub(super) fn balance(part: &mut PartForces, sums: &Sums, options: &PaperOptions) {
+    let rises = !sums.contact && options.contactless == Contactless::AsPrinted;
+    let load = if rises { part.gravity } else { part.anti_force - part.gravity };
     for axis in 0..3 {
-        if sums.garment[axis].abs() <= degenerate_below * sums.largest {
+        if sums.garment[axis].abs() <= options.degenerate_below * sums.largest {
             // Without contact (9) asks nothing of the stiffness along x and y, so nothing is missing there.
-            out.degenerate[axis] = sums.contact || axis == 2;
+            part.degenerate[axis] = sums.contact || axis == 2;
             continue;
         }
-        out.stiffness[axis] = line_force * sums.garment[axis];
-        out.displacement[axis] = load[axis] / out.stiffness[axis];
+        part.stiffness[axis] = part.line_force * sums.garment[axis];
+        part.displacement[axis] = load[axis] / part.stiffness[axis];
         // F² = D Fᵃ, which is the load itself; written so that a PART that is held (Fᵃ infinite) has one too.
-        out.adjacent[axis] = load[axis];
+        part.adjacent[axis] = load[axis];
     }
-    out
+    part.resultant = part.gravity + part.anti_force + part.adjacent;
 }

@@ -117,7 +117,7 @@ pub enum PaperWarning {
 }
 
 /// The forces on one PART, N, in the paper's signs, and what they do.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartForces {
     /// Its level, from 0.
     pub level: u32,

@@ -128,21 +128,18 @@ pub fn solve_cut(
             LineForce::Given(value) => value,
             LineForce::FromMembrane => strip.line_force(&part.vertices, hi.z, hi.z - lo.z),
         };
-        let b = balance(s, gravity, anti_force, line_force, options.contactless, options.degenerate_below);
-        PartForces {
+        let mut forces = PartForces {
             level: part.level,
             vertices: part.vertices.len(),
             area_m2: s.area,
             gravity,
             anti_force,
-            adjacent: b.adjacent,
-            stiffness: b.stiffness,
-            resultant: gravity + anti_force + b.adjacent,
-            displacement: b.displacement,
             line_force,
             contact: s.contact,
-            degenerate: b.degenerate,
-        }
+            ..PartForces::default()
+        };
+        balance(&mut forces, s, options);
+        forces
     });
     let displacement = |p: u32| forces.get(p as usize).map_or(DVec3::ZERO, |f| f.displacement);
     let moved = garment.positions.iter().zip(&parts.part_of_vertex).map(|(&x, &p)| x + displacement(p));

@@ -8,6 +8,7 @@ use crate::GRAVITY;
 use crate::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts, Covered};
 use crate::mechanics::newton::{Descent, Pace, Rest, SolveError, Solver, Tangent, Whole};
+use crate::mesh::box_about;
 
 /// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
 /// under gravity is a millimetre.
@@ -245,7 +246,6 @@ fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize, at_rest: bool) -> St
 
 /// The longest side of the box about `x`, m: about the length that hangs, whichever way the cloth lies as yet.
 fn extent(x: &[DVec3]) -> f64 {
-    let bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = x.iter().fold(bounds, |(low, high), p| (low.min(*p), high.max(*p)));
+    let (low, high) = box_about(x.iter().copied());
     (high - low).max_element().max(0.0)
 }

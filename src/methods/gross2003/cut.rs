@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::pieces::{Piece, unfit};
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{Lists, RestShape, Topology, TriMesh, each_once, pieces};
 use crate::methods::{Dressing, MethodError};
 use crate::sewing::laid_flat;
 
@@ -107,30 +107,10 @@ fn beside(topology: &Topology) -> impl Iterator<Item = [u32; 2]> + '_ {
 
 /// Connected sets of triangles of one label, by their first triangle.
 fn components(label: &[usize], topology: &Topology) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); label.len()];
-    for [s, t] in beside(topology).filter(|[s, t]| label[*s as usize] == label[*t as usize]) {
-        neighbours[s as usize].push(t);
-        neighbours[t as usize].push(s);
-    }
-    let mut seen = vec![false; label.len()];
-    let mut all = Vec::new();
-    for seed in 0..label.len() as u32 {
-        if std::mem::replace(&mut seen[seed as usize], true) {
-            continue;
-        }
-        let mut found = vec![seed];
-        let mut next = 0;
-        while next < found.len() {
-            for &t in &neighbours[found[next] as usize] {
-                if !std::mem::replace(&mut seen[t as usize], true) {
-                    found.push(t);
-                }
-            }
-            next += 1;
-        }
-        found.sort_unstable();
-        all.push(found);
-    }
+    let across = || beside(topology).flat_map(|[s, t]| [(s, t), (t, s)]);
+    let neighbours = Lists::gathered(label.len(), across);
+    let mut all = pieces(label.len(), |t| neighbours.of(t), |s, t| label[s] == label[t]);
+    all.iter_mut().for_each(|piece| piece.sort_unstable());
     all
 }
 
@@ -167,9 +147,7 @@ fn joined(mut label: Vec<usize>, topology: &Topology) -> Vec<usize> {
 /// A set of triangles as a piece, laid flat.
 fn opened(dressing: &Dressing<'_>, name: String, of_garment: &[u32]) -> Result<Piece, MethodError> {
     let scene = dressing.scene;
-    let mut vertices: Vec<u32> = of_garment.iter().flat_map(|&t| scene.garment.triangles[t as usize]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let vertices = each_once(of_garment.iter().flat_map(|&t| scene.garment.triangles[t as usize]));
     let local = |v: u32| vertices.binary_search(&v).unwrap_or_default() as u32;
     let triangles: Vec<[u32; 3]> = of_garment.iter().map(|&t| scene.garment.triangles[t as usize].map(local)).collect();
     let mesh = TriMesh::new(vertices.iter().map(|&v| scene.garment.positions[v as usize]).collect(), triangles.clone());

@@ -17,6 +17,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::quantile::extremes;
 use crate::shapes::girth::hull;
 
 /// A taper under this makes a cylinder, 1/m: its apex would be ten kilometres away.
@@ -55,8 +56,7 @@ impl Developable {
         let local = |p: &DVec3| turn * (*p - origin);
         let (own, cloth): (Vec<DVec3>, Vec<DVec3>) =
             (points.iter().map(local).collect(), worn.iter().map(local).collect());
-        let heights = own.iter().chain(&cloth).map(|p| p.z);
-        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        let (low, high) = extremes(own.iter().chain(&cloth).map(|p| p.z));
         let reach = low.abs().max(high.abs());
         let most = (1.0 - LEAST_END) / reach.max(1e-3);
         let mut best: Option<(f64, Self)> = None;
@@ -102,13 +102,7 @@ impl Developable {
         let mut sums = vec![0.0];
         for i in 0..base.len() {
             let (a, b) = (base[i], base[(i + 1) % base.len()]);
-            let side = if taper == 0.0 {
-                a.distance(b)
-            } else {
-                let [a, b] = [a, b].map(|p| p.extend(-1.0 / taper));
-                a.cross(b).length().atan2(a.dot(b))
-            };
-            sums.push(sums[i] + side);
+            sums.push(sums[i] + along(taper, a, b));
         }
         Some(Self { origin, turn, taper, base, turns, sums, ends })
     }
@@ -150,17 +144,7 @@ impl Developable {
     pub fn sum_at(&self, x: DVec3) -> f64 {
         let p = self.local(x).truncate();
         let (i, b) = self.met(if p.length_squared() > 0.0 { p } else { DVec2::X });
-        self.sums[i] + self.along(i, b)
-    }
-
-    /// From corner `i` to a point of its side.
-    fn along(&self, i: usize, b: DVec2) -> f64 {
-        let a = self.base[i];
-        if self.taper == 0.0 {
-            return a.distance(b);
-        }
-        let [a, b] = [a, b].map(|p| p.extend(-1.0 / self.taper));
-        a.cross(b).length().atan2(a.dot(b))
+        self.sums[i] + along(self.taper, self.base[i], b)
     }
 
     /// Where the point of the surface before `x` lies when it is unrolled from Ω = `middle` to both sides, m: across to the right as
@@ -215,6 +199,15 @@ impl Developable {
     }
 }
 
+/// From a corner of the polygon to a point of its side: an angle at the apex, or a length on a cylinder.
+fn along(taper: f64, a: DVec2, b: DVec2) -> f64 {
+    if taper == 0.0 {
+        return a.distance(b);
+    }
+    let [a, b] = [a, b].map(|p| p.extend(-1.0 / taper));
+    a.cross(b).length().atan2(a.dot(b))
+}
+
 /// Angle from `a` to `b` counter-clockwise, 0 to 2π.
 fn turned(a: DVec2, b: DVec2) -> f64 {
     let angle = a.perp_dot(b).atan2(a.dot(b));
@@ -243,11 +236,8 @@ mod tests {
             let cone = Developable::with_taper(&rings(0.2, taper), taper, 0.0, FRAME, [-0.3, 0.3]).unwrap();
             // The whole angle is 2π sin α, of a cylinder the girth.
             let exact = if taper == 0.0 { 0.2 } else { 0.2 / 0.2f64.hypot(1.0 / taper) } * std::f64::consts::TAU;
-            assert!(
-                (cone.sums[cone.base.len()] / exact - 1.0).abs() < 1e-4,
-                "{taper}: {} expected {exact}",
-                cone.sums[cone.base.len()]
-            );
+            let found = cone.sums[cone.base.len()];
+            assert!((found / exact - 1.0).abs() < 1e-4, "{taper}: {found} expected {exact}");
         }
     }
 

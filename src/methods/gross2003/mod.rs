@@ -28,13 +28,15 @@ use glam::DVec3;
 
 use super::rest::{Ended, Rest};
 use super::spring_list::springs;
-use super::{Dressing, Exhibit, MethodDrape, MethodError, Moment, ReferenceMethod, RestRule, Spectator, Stopwatch};
+use super::{
+    Dressing, Exhibit, MethodDrape, MethodError, Moment, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
+};
 use crate::mechanics::energy::Cloth;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::pattern::SewnGarment;
 use crate::scene::Scene;
 use developable::Developable;
-use pieces::{Piece, distortion, parts};
+use pieces::{Piece, distortion, parts, unfit};
 use verlet::{Sheet, Tempo};
 
 /// The method's name.
@@ -82,12 +84,7 @@ impl ReferenceMethod for Gross2003 {
         NAME
     }
 
-    fn run(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
         let Dressing { scene, fabric, cloth } = dressing;
         let cutting = Instant::now();
         let pieces = match &self.sewn {
@@ -104,8 +101,7 @@ impl ReferenceMethod for Gross2003 {
                 1e3 * cutting.elapsed().as_secs_f64()
             ));
         }
-        let began = Instant::now();
-        let mut watch = Stopwatch::default();
+        let mut watch = Stopwatch::begin();
         let worn = &scene.garment.positions;
         let parts = watch.time("bounding surfaces", || parts(dressing, &pieces))?;
         let surfaces: Vec<Developable> = watch.time("bounding surfaces", || {
@@ -114,10 +110,7 @@ impl ReferenceMethod for Gross2003 {
                     part.pieces.iter().flat_map(|&p| &pieces[p].vertices).map(|&v| worn[v as usize]).collect();
                 let found = Developable::around(&part.points, part.axis, &own, cloth.offset + CLEARANCE);
                 let names = || part.pieces.iter().map(|&p| pieces[p].name.clone()).collect::<Vec<_>>().join("; ");
-                found.ok_or_else(|| MethodError::Unfit {
-                    method: NAME,
-                    reason: format!("no cone or cylinder bounds the part of the body under {}", names()),
-                })
+                found.ok_or_else(|| unfit(format!("no cone or cylinder bounds the part of the body under {}", names())))
             };
             parts.iter().map(around).collect::<Result<_, _>>()
         })?;
@@ -182,7 +175,7 @@ impl ReferenceMethod for Gross2003 {
             }
         }
         corrections += sheet.corrections;
-        let total = began.elapsed();
+        let total = watch.began.elapsed();
         let exhibits = if self.exhibit { exhibited(&surfaces, apart.mesh.clone(), frames) } else { Vec::new() };
         Ok(MethodDrape {
             ended: ended.unwrap_or(Ended::Interrupted),
@@ -190,7 +183,7 @@ impl ReferenceMethod for Gross2003 {
             simulated_s: time_s + rest.time_s(),
             rms_speed_m_per_s: sheet.rms_speed(),
             positions: sheet.x,
-            times: watch.0,
+            times: watch.parts,
             total,
             counts: [
                 ("pieces", pieces.len() as u64),

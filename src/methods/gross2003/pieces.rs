@@ -8,10 +8,11 @@
 use glam::{DVec2, DVec3};
 
 use super::NAME;
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{RestShape, TriMesh};
 use crate::methods::segment::{Segments, longest};
 use crate::methods::{Dressing, MethodError};
 use crate::pattern::SewnGarment;
+use crate::quantile::{extremes, nearest_rank};
 
 /// A piece is a limb's if that is nearest to so many of its vertices.
 const OF_LIMB: f64 = 0.5;
@@ -45,7 +46,7 @@ pub struct BodyPart {
 }
 
 pub(super) fn unfit(reason: impl Into<String>) -> MethodError {
-    MethodError::Unfit { method: NAME, reason: reason.into() }
+    MethodError::unfit(NAME, reason)
 }
 
 /// The panels of a pattern.
@@ -96,7 +97,7 @@ pub fn distortion(pieces: &[Piece], rest: &RestShape) -> [f64; 2] {
             }));
         }
     }
-    [crate::quantile::nearest_rank(&off, 0.95), off.iter().copied().fold(0.0, f64::max)]
+    [nearest_rank(&off, 0.95), off.iter().copied().fold(0.0, f64::max)]
 }
 
 /// The direction in which the points of a limb spread most about their mean, upwards; without the upper third, where it joins the
@@ -124,12 +125,7 @@ fn spread(points: &[DVec3]) -> DVec3 {
 /// [`MethodError::Unfit`] for a body that is not closed.
 pub fn parts(dressing: &Dressing<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>, MethodError> {
     let (scene, body) = (dressing.scene, dressing.scene.body.mesh());
-    let topology = Topology::new(body);
-    let open = topology.boundary_edges().count();
-    if open > 0 {
-        return Err(unfit(format!("the body is not closed ({open} boundary edges), so no part of it has an inside")));
-    }
-    let segments = Segments::new(body, &topology);
+    let segments = Segments::of_closed(body, "part").map_err(unfit)?;
     let count = segments.is_limb.len();
     let unit = |t: u32| segments.of_triangle[t as usize] as usize;
     let nearest: Vec<usize> =
@@ -161,9 +157,8 @@ pub fn parts(dressing: &Dressing<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>,
         }
         let points: Vec<DVec3> = body.positions.iter().zip(inside).filter(|(_, i)| *i).map(|(p, _)| *p).collect();
         let axis = if limb < count { spread(&points) } else { DVec3::Z };
-        let along =
-            of.iter().flat_map(|&p| &pieces[p].vertices).map(|&v| scene.garment.positions[v as usize].dot(axis));
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        let vertices = of.iter().flat_map(|&p| &pieces[p].vertices);
+        let (low, high) = extremes(vertices.map(|&v| scene.garment.positions[v as usize].dot(axis)));
         let under = points.into_iter().filter(|p| (low..=high).contains(&p.dot(axis))).collect();
         all.push(BodyPart { pieces: of, axis, points: under });
     }

@@ -21,6 +21,7 @@ use glam::DVec3;
 
 use crate::GRAVITY;
 use crate::mechanics::energy::Contacts;
+use crate::methods::rest::{find_velocities, rms_speed};
 use crate::methods::spring_list::Spring;
 
 /// How cloth of constraints is moved.
@@ -88,13 +89,7 @@ impl<'b> Sheet<'b> {
                 self.meet(&from);
             }
         }
-        for ((v, x), from) in self.v.iter_mut().zip(&self.x).zip(&from) {
-            *v = (*x - *from) / h;
-        }
-        for t in self.body.touches() {
-            let v = &mut self.v[t.vertex as usize];
-            *v -= t.normal * v.dot(t.normal).max(0.0);
-        }
+        find_velocities(&mut self.v, [&from, &self.x], h, self.body.touches());
     }
 
     /// Bends once.
@@ -157,9 +152,7 @@ impl<'b> Sheet<'b> {
     /// RMS speed of what is not held, m/s.
     #[must_use]
     pub fn rms_speed(&self) -> f64 {
-        let free = self.v.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0);
-        let (sum, count) = free.fold((0.0, 0usize), |(sum, n), (v, _)| (sum + v.length_squared(), n + 1));
-        (sum / count.max(1) as f64).sqrt()
+        rms_speed(self.v.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(v, _)| v))
     }
 }
 

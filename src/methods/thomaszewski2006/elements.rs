@@ -32,13 +32,14 @@ use rayon::prelude::*;
 
 use super::strain::{Frame, polar, positive_part, pulls};
 use crate::fabric::Fabric;
+use crate::mechanics::energy::bending::bending_stiffness;
+use crate::mechanics::energy::membrane::Stiffness;
+use crate::mesh::Lists;
 use crate::methods::linear::Operator;
 use crate::methods::march::Elastic;
 
 /// Elements, or vertices, of one task.
 const CHUNK: usize = 256;
-/// A floor for H as a share of B_u + B_v, as elsewhere in this project.
-const LEAST_TWIST: f64 = 0.1;
 
 /// Weights of a control vertex: b_u, b_v, w_uu, w_uv, w_vv.
 pub(super) type Weights = [f32; 5];
@@ -67,64 +68,44 @@ struct Pull {
 pub struct Elements {
     constants: Constants,
     areas: Vec<f32>,
-    starts: Vec<u32>,
-    vertices: Vec<u32>,
-    weights: Vec<Weights>,
+    /// The control vertices of each element.
+    vertices: Lists<(u32, Weights)>,
     frames: Vec<Frame>,
-    /// Of each vertex: where its entries begin; element and weights.
-    vertex_starts: Vec<u32>,
-    entries: Vec<(u32, Weights)>,
+    /// The elements of each vertex.
+    elements: Lists<(u32, Weights)>,
     strains: Vec<[f32; 3]>,
     pulls: Vec<Pull>,
 }
 
-/// One element on its way in: area, vertices and weights.
+/// One element on its way in: its area, and its control vertices.
 #[derive(Debug, Clone)]
 pub(super) struct Made {
     pub(super) area: f64,
-    pub(super) vertices: Vec<u32>,
-    pub(super) weights: Vec<Weights>,
+    pub(super) vertices: Vec<(u32, Weights)>,
 }
 
 impl Elements {
     pub(super) fn new(made: &[Made], vertex_count: usize, fabric: &Fabric) -> Self {
-        let (k_u, k_v, nu) = (fabric.stretch_weft_n_per_m, fabric.stretch_warp_n_per_m, fabric.poisson);
-        let d = 1.0 - nu * nu;
-        let [weft, bias, warp] = fabric.bending_nm;
-        let twist = (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp));
+        let membrane = Stiffness::new(fabric);
         let constants = Constants {
-            uu: (k_u / d) as f32,
-            uv: (nu * (k_u * k_v).sqrt() / d) as f32,
-            vv: (k_v / d) as f32,
-            shear: fabric.shear_n_per_m as f32,
-            bending: [weft as f32, twist as f32, warp as f32],
+            uu: membrane.uu as f32,
+            uv: membrane.uv as f32,
+            vv: membrane.vv as f32,
+            shear: membrane.shear as f32,
+            bending: bending_stiffness(fabric).to_array().map(|b| b as f32),
         };
-        let mut starts = vec![0u32];
-        let mut vertex_starts = vec![0u32; vertex_count + 1];
-        for m in made {
-            starts.push(starts[starts.len() - 1] + m.vertices.len() as u32);
-            m.vertices.iter().for_each(|&v| vertex_starts[v as usize + 1] += 1);
-        }
-        for v in 0..vertex_count {
-            vertex_starts[v + 1] += vertex_starts[v];
-        }
-        let mut next = vertex_starts.clone();
-        let mut entries = vec![(0, [0.0; 5]); starts[made.len()] as usize];
-        for (e, m) in (0u32..).zip(made) {
-            for (&v, &w) in m.vertices.iter().zip(&m.weights) {
-                entries[next[v as usize] as usize] = (e, w);
-                next[v as usize] += 1;
-            }
-        }
+        let mut vertices = Lists::default();
+        made.iter().for_each(|m| vertices.push(m.vertices.iter().copied()));
+        let elements = Lists::gathered(vertex_count, || {
+            let numbered = (0u32..).zip(made);
+            numbered.flat_map(|(e, m)| m.vertices.iter().map(move |&(v, weights)| (v, (e, weights))))
+        });
         Self {
             constants,
             areas: made.iter().map(|m| m.area as f32).collect(),
-            starts,
-            vertices: made.iter().flat_map(|m| m.vertices.iter().copied()).collect(),
-            weights: made.iter().flat_map(|m| m.weights.iter().copied()).collect(),
+            vertices,
             frames: vec![Frame::default(); made.len()],
-            vertex_starts,
-            entries,
+            elements,
             strains: vec![[0.0; 3]; made.len()],
             pulls: Vec::new(),
         }
@@ -145,10 +126,9 @@ impl Elements {
     /// The five sums of an element's weights with vectors of its vertices.
     #[inline]
     fn sums(&self, e: usize, of: impl Fn(u32) -> Vec3A) -> [Vec3A; 5] {
-        let range = self.starts[e] as usize..self.starts[e + 1] as usize;
         let mut sums = [Vec3A::ZERO; 5];
-        for (&v, w) in self.vertices[range.clone()].iter().zip(&self.weights[range]) {
-            let x = of(v);
+        for (v, w) in self.vertices.of(e) {
+            let x = of(*v);
             for k in 0..5 {
                 sums[k] += w[k] * x;
             }
@@ -160,7 +140,7 @@ impl Elements {
     #[inline]
     fn gathered(&self, v: usize, pulls: &[Pull]) -> Vec3A {
         let mut sum = Vec3A::ZERO;
-        for (e, w) in &self.entries[self.vertex_starts[v] as usize..self.vertex_starts[v + 1] as usize] {
+        for (e, w) in self.elements.of(v) {
             let p = &pulls[*e as usize];
             let across = w[2] * p.moments[0] + w[3] * p.moments[1] + w[4] * p.moments[2];
             sum += w[0] * p.along_u + w[1] * p.along_v + across * p.n;
@@ -182,7 +162,7 @@ impl Elastic for Elements {
         let this = &*self;
         let pull = |e: usize, frame: &mut Frame, kept: &mut [f32; 3]| {
             // All weights sum to nothing: differences keep the digits.
-            let base = x[this.vertices[this.starts[e] as usize] as usize];
+            let base = x[this.vertices.of(e)[0].0 as usize];
             let [f_u, f_v, x_uu, x_uv, x_vv] = this.sums(e, |v| (x[v as usize] - base).as_vec3a());
             let second = [x_uu, x_uv, x_vv];
             let (mut found, strain, stretch) = polar(f_u, f_v, second);
@@ -215,9 +195,7 @@ impl Elastic for Elements {
     fn add_own(&self, own: &mut [Mat3A]) {
         let c = &self.constants;
         own.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(v, own)| {
-            for (e, [b_u, b_v, w_uu, w_uv, w_vv]) in
-                &self.entries[self.vertex_starts[v] as usize..self.vertex_starts[v + 1] as usize]
-            {
+            for (e, [b_u, b_v, w_uu, w_uv, w_vv]) in self.elements.of(v) {
                 let (f, a) = (&self.frames[*e as usize], self.areas[*e as usize]);
                 let (p, q) = (f.r_u * *b_u, f.r_v * *b_v);
                 let g = f.r_v * *b_u + f.r_u * *b_v;

@@ -26,15 +26,11 @@ mod patch;
 mod rest_patch;
 mod strain;
 
-use std::time::Instant;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::march::{Course, Marched, Obstacle, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
-use crate::mechanics::energy::Contacts;
-use crate::mechanics::energy::contact::Touch;
+use super::march::{Course, Pacing, march};
+use super::{Dressing, Exhibit, MethodDrape, MethodError, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use elements::{Elements, Made};
 use patch::{Around, Irregular, around_all, derivatives, limit_stencil};
 use rest_patch::laid_flat;
@@ -43,7 +39,7 @@ use rest_patch::laid_flat;
 pub const NAME: &str = "thomaszewski2006";
 
 /// The method with its dials.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Thomaszewski2006 {
     /// How it is moved in time.
     pub pacing: Pacing,
@@ -51,68 +47,29 @@ pub struct Thomaszewski2006 {
     pub exhibit: bool,
 }
 
-impl Default for Thomaszewski2006 {
-    fn default() -> Self {
-        let pacing = Pacing { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
-        Self { pacing, exhibit: false }
-    }
-}
-
-/// The body as this project asks for it.
-struct Met<'b>(Contacts<'b>);
-
-impl Obstacle for Met<'_> {
-    fn touches(&mut self, x: &[DVec3]) -> &[Touch] {
-        self.0.update(x);
-        self.0.touches()
-    }
-}
-
 impl ReferenceMethod for Thomaszewski2006 {
     fn name(&self) -> &'static str {
         NAME
     }
 
-    fn run(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        let began = Instant::now();
-        let mut watch = Stopwatch::default();
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
+        let mut watch = Stopwatch::begin();
         let Dressing { scene, fabric, cloth } = dressing;
         let around = watch.time("patches", || fans(dressing))?;
         let mut elements = watch.time("patches", || elements_of(dressing, &around))?;
-        let mut body = watch.time("contact", || Met(cloth.contacts_by_planes(&scene.body, &scene.garment.positions)));
+        let mut body = watch.time("contact", || cloth.contacts_by_planes(&scene.body, &scene.garment.positions));
         let course = Course { method: NAME, pacing: &self.pacing, rule, friction: fabric.friction };
-        let marched = march(dressing, course, (&mut elements, &mut body), &mut watch, onlooker)?;
-        let total = began.elapsed();
-        let Marched { positions, ended, steps, simulated_s, rms_speed, iterations, .. } = marched;
+        let marched = march(dressing, course, (&mut elements, &mut body), watch, onlooker)?;
         let irregular = around.iter().filter(|a| a.ring.len() != if a.closed { 6 } else { 4 }).count();
+        let of_patches = [("elements", elements.count() as u64), ("irregular vertices", irregular as u64)];
         let exhibits = if self.exhibit {
-            let surface = scene.garment.with_positions(limit(&around, &positions));
+            let surface = scene.garment.with_positions(limit(&around, &marched.positions));
             vec![("limit surface", Exhibit::Surface(surface))]
         } else {
             Vec::new()
         };
-        Ok(MethodDrape {
-            positions,
-            ended,
-            steps,
-            simulated_s,
-            rms_speed_m_per_s: rms_speed,
-            times: watch.0,
-            total,
-            counts: [
-                ("elements", elements.count() as u64),
-                ("irregular vertices", irregular as u64),
-                ("linear iterations", iterations),
-            ]
-            .to_vec(),
-            exhibits,
-            notes: Vec::new(),
-        })
+        let counts = of_patches.into_iter().chain(marched.counts).collect();
+        Ok(MethodDrape { counts, exhibits, ..marched })
     }
 }
 
@@ -126,7 +83,7 @@ fn fans(dressing: &Dressing<'_>) -> Result<Vec<Around>, MethodError> {
             }
             Irregular::Vertex(v) => format!("the triangles at vertex {} are no single fan", v + 1),
         };
-        MethodError::Unfit { method: NAME, reason: format!("{reason}, so there is no subdivision surface") }
+        MethodError::unfit(NAME, format!("{reason}, so there is no subdivision surface"))
     })
 }
 
@@ -147,10 +104,9 @@ fn elements_of(dressing: &Dressing<'_>, around: &[Around]) -> Result<Elements, M
         .map(|t| {
             let flat = laid_flat(t, &scene.garment, &scene.rest, &scene.topology, around);
             let found = derivatives(scene.garment.triangles[t], around);
-            found.and_then(|found| rest_patch::element(&found, &flat)).ok_or_else(|| MethodError::Unfit {
-                method: NAME,
-                reason: format!("the patch of triangle {} has no rest shape that lies flat", t + 1),
-            })
+            let reason = || format!("the patch of triangle {} has no rest shape that lies flat", t + 1);
+            let made = found.and_then(|found| rest_patch::element(&found, &flat));
+            made.ok_or_else(|| MethodError::unfit(NAME, reason()))
         })
         .collect();
     Ok(Elements::new(&made?, cloth.vertex_count(), fabric))

@@ -101,14 +101,14 @@ pub(super) fn element(found: &[(u32, Derivatives)], flat: &[(u32, DVec2)]) -> Op
     }
     let inverse = j.inverse();
     let curving = [sums[2], sums[3], sums[4]].map(|second| inverse * second);
-    let weights = found.iter().map(|(_, [s, t, ss, st, tt])| {
+    let weighted = found.iter().map(|(v, [s, t, ss, st, tt])| {
         // The gradient by s, t times J⁻¹.
         let b = inverse.transpose() * DVec2::new(*s, *t);
         let second = [ss, st, tt];
         let [ss, st, tt] = std::array::from_fn(|k| second[k] - curving[k].dot(DVec2::new(*s, *t)));
         let w = inverse.transpose() * DMat2::from_cols(DVec2::new(ss, st), DVec2::new(st, tt)) * inverse;
         // κ_uv is counted once: H x_uv².
-        [b.x, b.y, w.x_axis.x, w.x_axis.y, w.y_axis.y].map(|w| w as f32)
+        (*v, [b.x, b.y, w.x_axis.x, w.x_axis.y, w.y_axis.y].map(|w| w as f32))
     });
-    Some(Made { area: 0.5 * det, vertices: found.iter().map(|f| f.0).collect(), weights: weights.collect() })
+    Some(Made { area: 0.5 * det, vertices: weighted.collect() })
 }

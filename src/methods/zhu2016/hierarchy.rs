@@ -18,7 +18,6 @@ use rayon::prelude::*;
 use super::closest::closest;
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
-use crate::mesh::Topology;
 use crate::methods::march::Obstacle;
 use crate::methods::segment::Segments;
 use crate::methods::{Dressing, MethodError};
@@ -84,13 +83,7 @@ impl Hierarchy {
     pub fn new(dressing: &Dressing<'_>) -> Result<Self, MethodError> {
         let Dressing { scene, cloth, .. } = dressing;
         let mesh = scene.body.mesh();
-        let topology = Topology::new(mesh);
-        let open = topology.boundary_edges().count();
-        if open > 0 {
-            let reason = format!("the body is not closed ({open} boundary edges), so no unit of it has an inside");
-            return Err(MethodError::Unfit { method: super::NAME, reason });
-        }
-        let segments = Segments::new(mesh, &topology);
+        let segments = Segments::of_closed(mesh, "unit").map_err(|reason| MethodError::unfit(super::NAME, reason))?;
         let mut of_unit = vec![Vec::new(); segments.is_limb.len()];
         for (t, &unit) in (0u32..).zip(&segments.of_triangle) {
             of_unit[unit as usize].push(t);

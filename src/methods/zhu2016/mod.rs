@@ -21,10 +21,8 @@ pub mod quadric;
 pub mod springs;
 pub mod units;
 
-use std::time::Instant;
-
-use super::march::{Course, Marched, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, ReferenceMethod, RestRule, Spectator, Stopwatch};
+use super::march::{Course, Pacing, march};
+use super::{Dressing, Exhibit, MethodDrape, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use hierarchy::Hierarchy;
 use springs::Springs;
 
@@ -44,8 +42,7 @@ pub struct Zhu2016 {
 
 impl Default for Zhu2016 {
     fn default() -> Self {
-        let pacing = Pacing { step_s: 0.02, damping_per_s: 6.0, tolerance: 1e-2, iterations: 200 };
-        Self { pacing, strain_limit: 0.1, exhibit: false }
+        Self { pacing: Pacing::default(), strain_limit: 0.1, exhibit: false }
     }
 }
 
@@ -54,45 +51,25 @@ impl ReferenceMethod for Zhu2016 {
         NAME
     }
 
-    fn run(
-        &self,
-        dressing: &Dressing<'_>,
-        rule: &RestRule,
-        onlooker: Spectator<'_>,
-    ) -> Result<MethodDrape, MethodError> {
-        let began = Instant::now();
-        let mut watch = Stopwatch::default();
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
+        let mut watch = Stopwatch::begin();
         let mut springs = watch.time("springs", || Springs::new(dressing, self.strain_limit));
         let mut hierarchy = watch.time("hierarchy", || Hierarchy::new(dressing))?;
         let course = Course { method: NAME, pacing: &self.pacing, rule, friction: dressing.fabric.friction };
-        let marched = march(dressing, course, (&mut springs, &mut hierarchy), &mut watch, onlooker)?;
-        let total = began.elapsed();
-        let Marched { positions, ended, steps, simulated_s, rms_speed, iterations, corrections } = marched;
+        let marched = march(dressing, course, (&mut springs, &mut hierarchy), watch, onlooker)?;
         let counts = hierarchy.counts();
+        let of_hierarchy = [
+            ("units", hierarchy.units() as u64),
+            ("quadrics", hierarchy.slices() as u64),
+            ("world box tests", counts.world),
+            ("unit tests", counts.units),
+            ("quadric tests", counts.quadrics),
+            ("leaf triangle tests", counts.triangles),
+            ("touching", counts.touching),
+        ];
         let exhibits =
             if self.exhibit { vec![("units and quadrics", Exhibit::Lines(hierarchy.outlines()))] } else { Vec::new() };
-        Ok(MethodDrape {
-            positions,
-            ended,
-            steps,
-            simulated_s,
-            rms_speed_m_per_s: rms_speed,
-            times: watch.0,
-            total,
-            counts: [
-                ("units", hierarchy.units() as u64),
-                ("quadrics", hierarchy.slices() as u64),
-                ("world box tests", counts.world),
-                ("unit tests", counts.units),
-                ("quadric tests", counts.quadrics),
-                ("leaf triangle tests", counts.triangles),
-                ("touching", counts.touching),
-                ("linear iterations", iterations),
-                ("strain corrections", corrections),
-            ]
-            .to_vec(),
-            exhibits,
-            notes: hierarchy.notes(),
-        })
+        let counts = of_hierarchy.into_iter().chain(marched.counts).collect();
+        Ok(MethodDrape { counts, exhibits, notes: hierarchy.notes(), ..marched })
     }
 }

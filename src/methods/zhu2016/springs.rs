@@ -15,6 +15,7 @@
 use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use crate::mesh::Lists;
 use crate::methods::Dressing;
 use crate::methods::linear::{BlockRows, Operator};
 use crate::methods::march::Elastic;
@@ -26,7 +27,7 @@ const SWEEPS: usize = 30;
 const CHUNK: usize = 256;
 
 /// A spring as its first vertex sees it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Arm {
     other: u32,
     block: u32,
@@ -46,8 +47,8 @@ struct Limit {
 /// All springs of a garment.
 #[derive(Debug, Clone)]
 pub struct Springs {
-    starts: Vec<u32>,
-    arms: Vec<Arm>,
+    /// Of each vertex.
+    arms: Lists<Arm>,
     limits: Vec<Limit>,
     matrix: BlockRows,
 }
@@ -73,37 +74,23 @@ impl Springs {
                 Limit { ends, longest: rest * (1.0 + strain_limit), share }
             })
             .collect();
-        let (starts, arms) = arms(&springs, &matrix);
-        Self { starts, arms, limits, matrix }
+        // Each spring is seen by both its ends.
+        let ends =
+            |s: &Spring| [(s.ends[0], s.ends[1]), (s.ends[1], s.ends[0])].map(|ends| (ends, s.rest, s.stiffness));
+        let arm = |((own, other), rest, stiffness): ((u32, u32), f64, f64)| {
+            let row = matrix.columns.range(own as usize);
+            let block = matrix.at(own, other).map_or(0, |k| k - row.start as u32);
+            (own, Arm { other, block, rest: rest as f32, stiffness: stiffness as f32 })
+        };
+        let arms = Lists::gathered(matrix.rows(), || springs.iter().flat_map(ends).map(arm));
+        Self { arms, limits, matrix }
     }
 
     /// Number of springs of both kinds.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.arms.len() / 2
+        self.arms.entries().len() / 2
     }
-}
-
-/// The springs by the vertex that sees them.
-fn arms(springs: &[Spring], matrix: &BlockRows) -> (Vec<u32>, Vec<Arm>) {
-    let rows = matrix.rows();
-    let mut starts = vec![0u32; rows + 1];
-    for v in springs.iter().flat_map(|s| s.ends) {
-        starts[v as usize + 1] += 1;
-    }
-    for v in 0..rows {
-        starts[v + 1] += starts[v];
-    }
-    let mut next = starts.clone();
-    let mut arms = vec![Arm { other: 0, block: 0, rest: 0.0, stiffness: 0.0 }; 2 * springs.len()];
-    for &Spring { ends: [a, b], rest, stiffness } in springs {
-        for (own, other) in [(a, b), (b, a)] {
-            let block = matrix.at(own, other).map_or(0, |k| k - matrix.starts[own as usize]);
-            arms[next[own as usize] as usize] = Arm { other, block, rest: rest as f32, stiffness: stiffness as f32 };
-            next[own as usize] += 1;
-        }
-    }
-    (starts, arms)
 }
 
 impl Operator for Springs {
@@ -120,8 +107,9 @@ impl Elastic for Springs {
     }
 
     fn linearise(&mut self, x: &[DVec3], force: &mut [DVec3]) {
-        let Self { starts, arms, matrix, .. } = self;
-        let BlockRows { starts: rows, diagonal, blocks, .. } = matrix;
+        let Self { arms, matrix, .. } = self;
+        let BlockRows { columns, diagonal, blocks } = matrix;
+        let rows = columns.starts();
         blocks.fill(Mat3A::ZERO);
         let mut tasks = Vec::with_capacity(force.len() / CHUNK + 1);
         let mut left = blocks.as_mut_slice();
@@ -138,7 +126,7 @@ impl Elastic for Springs {
                 let row = (rows[v] - base) as usize;
                 let mut sum = Vec3A::ZERO;
                 let mut own = Mat3A::ZERO;
-                for arm in &arms[starts[v] as usize..starts[v + 1] as usize] {
+                for arm in arms.of(v) {
                     let to = (x[arm.other as usize] - x[v]).as_vec3a();
                     let length = to.length();
                     let n = to / length.max(f32::MIN_POSITIVE);
@@ -160,7 +148,7 @@ impl Elastic for Springs {
         });
     }
 
-    fn limit(&mut self, _from: &[DVec3], x: &mut [DVec3], _held: &[bool]) -> u64 {
+    fn limit(&mut self, x: &mut [DVec3]) -> Option<u64> {
         let mut corrections = 0;
         for _ in 0..SWEEPS {
             let before = corrections;
@@ -179,6 +167,6 @@ impl Elastic for Springs {
                 break;
             }
         }
-        corrections
+        Some(corrections)
     }
 }

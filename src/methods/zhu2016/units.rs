@@ -9,8 +9,9 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, box_about};
 use crate::methods::segment::longest;
+use crate::quantile::extremes;
 
 /// Height of a slice h, m.
 const HEIGHT: f64 = 0.04;
@@ -66,19 +67,15 @@ impl BodyUnit {
         let axis = if is_limb { longest(weighted.iter().map(|(p, w)| (*p - origin, *w / weight))) } else { DVec3::Z };
         let turn = frame(axis);
         let local: Vec<[DVec3; 3]> = triangles.iter().map(|&t| corners(t).map(|p| turn * (p - origin))).collect();
-        let z = |c: &[DVec3; 3]| {
-            (
-                c.iter().map(|p| p.z).fold(f64::INFINITY, f64::min),
-                c.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max),
-            )
-        };
-        let ends = local.iter().map(z).fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let z = |c: &[DVec3; 3]| extremes(c.map(|p| p.z));
+        let ends = extremes(local.as_flattened().iter().map(|p| p.z));
         let (low, high) = (ends.0 - offset, ends.1 + offset);
+        let around = box_about(triangles.iter().flat_map(|&t| corners(t)));
         let count = ((high - low) / HEIGHT).ceil().max(1.0);
         let height = (high - low) / count;
         let mut unit = Self {
             is_limb,
-            bounds: bounds(triangles.iter().map(|&t| corners(t)), offset),
+            bounds: (around.0 - offset, around.1 + offset),
             origin,
             turn,
             low,
@@ -181,12 +178,6 @@ fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> 
     let half = DVec2::from_angle(std::f64::consts::PI / SECTORS as f64);
     let (left, right) = (middle.rotate(half), middle.rotate(DVec2::new(half.x, -half.y)));
     left.perp_dot(off) <= radius && right.perp_dot(off) >= -radius && middle.dot(off) >= -radius
-}
-
-fn bounds(corners: impl Iterator<Item = [DVec3; 3]>, offset: f64) -> (DVec3, DVec3) {
-    let all =
-        corners.flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-    (all.0 - offset, all.1 + offset)
 }
 
 /// A rotation whose third row is `axis`.

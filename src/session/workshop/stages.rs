@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::{Piece, Sewn, Target, Workshop};
 use crate::drape::{Distances, DrapeError, ENOUGH, Levels, stage_two, told};
 use crate::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Onlooker};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Given, Onlooker};
 use crate::parts::Parts;
 use crate::scene::Scene;
 use crate::session::desk::{ms_since, sums};
@@ -85,7 +85,7 @@ impl Workshop {
         let start = reached.clone();
         let max_steps = if rest_follows { GLANCE_STEPS } else { WARM_STEPS };
         let few = CoupledOptions { max_steps, ..options.clone() };
-        let solved = coupled::solve_before(&garment, &scene.body, &parts, &start, &few, &mut |x| {
+        let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, Given::default(), &few, &mut |x| {
             reached.clear();
             reached.extend_from_slice(x);
             let step = Arc::new(preview(x));
@@ -152,6 +152,7 @@ fn glance(
     let level = levels.coarser.first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
     let two = CoupledOptions { max_steps: GLANCE_STEPS, ..options.clone() };
     let coarse = levels.restrict(1, start);
-    let solved = coupled::solve_before(&level.garment(), &scene.body, &levels.parts(1, parts), &coarse, &two, onlooker);
+    let parts = levels.parts(1, parts);
+    let solved = coupled::solve_given(&level.garment(), &scene.body, &parts, &coarse, Given::default(), &two, onlooker);
     solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
 }

@@ -127,37 +127,32 @@ impl GarmentSpec {
 
     /// Checks every length.
     pub fn check(&self) -> Result<(), ShapeError> {
-        let check = |name: &'static str, found: f64, low: f64, high: f64| {
-            if (low..=high).contains(&found) { Ok(()) } else { Err(ShapeError::Length { name, found, low, high }) }
-        };
-        check("length_cm", self.length_cm, 15.0, 160.0)?;
-        check("ease.bust_cm", self.ease.bust_cm, 4.0, 80.0)?;
-        check("ease.waist_cm", self.ease.waist_cm, 4.0, 100.0)?;
-        check("ease.hip_cm", self.ease.hip_cm, 4.0, 100.0)?;
-        check("flare_cm", self.flare_cm, 0.0, 400.0)?;
-        check("fullness", self.fullness, 0.0, 3.0)?;
-        if let Some(edge) = self.edge_length_cm {
-            check("edge_length_cm", edge, 0.05, 8.0)?;
-        }
-        if let Some(sleeves) = &self.sleeves {
-            check("sleeves.length", sleeves.length, 0.2, 1.0)?;
-            check("sleeves.ease_cm", sleeves.ease_cm, 4.0, 40.0)?;
-            check("sleeves.cuff_ease_cm", sleeves.cuff_ease_cm, 4.0, 60.0)?;
-        }
-        if let Some(strap) = self.strap_cm {
-            check("strap_cm", strap, 2.0, 10.0)?;
-        }
-        match (self.carried_by, &self.neckline) {
-            (Support::Shoulders, None) => {
-                Err(ShapeError::Spec("a garment carried by the shoulders needs [neckline]".to_owned()))
+        let (sleeves, neckline) = (self.sleeves.as_ref(), self.neckline.as_ref());
+        let lengths = [
+            ("length_cm", Some(self.length_cm), 15.0, 160.0),
+            ("ease.bust_cm", Some(self.ease.bust_cm), 4.0, 80.0),
+            ("ease.waist_cm", Some(self.ease.waist_cm), 4.0, 100.0),
+            ("ease.hip_cm", Some(self.ease.hip_cm), 4.0, 100.0),
+            ("flare_cm", Some(self.flare_cm), 0.0, 400.0),
+            ("fullness", Some(self.fullness), 0.0, 3.0),
+            ("edge_length_cm", self.edge_length_cm, 0.05, 8.0),
+            ("sleeves.length", sleeves.map(|s| s.length), 0.2, 1.0),
+            ("sleeves.ease_cm", sleeves.map(|s| s.ease_cm), 4.0, 40.0),
+            ("sleeves.cuff_ease_cm", sleeves.map(|s| s.cuff_ease_cm), 4.0, 60.0),
+            ("strap_cm", self.strap_cm, 2.0, 10.0),
+            ("neckline.width_cm", neckline.map(|n| n.width_cm), 14.0, 30.0),
+            ("neckline.front_depth_cm", neckline.map(|n| n.front_depth_cm), 3.0, 30.0),
+            ("neckline.back_depth_cm", neckline.map(|n| n.back_depth_cm), 1.0, 30.0),
+        ];
+        for (name, found, low, high) in lengths {
+            if let Some(found) = found.filter(|found| !(low..=high).contains(found)) {
+                return Err(ShapeError::Length { name, found, low, high });
             }
-            (_, Some(neckline)) => {
-                check("neckline.width_cm", neckline.width_cm, 14.0, 30.0)?;
-                check("neckline.front_depth_cm", neckline.front_depth_cm, 3.0, 30.0)?;
-                check("neckline.back_depth_cm", neckline.back_depth_cm, 1.0, 30.0)
-            }
-            _ => Ok(()),
         }
+        if self.carried_by == Support::Shoulders && neckline.is_none() {
+            return Err(ShapeError::Spec("a garment carried by the shoulders needs [neckline]".to_owned()));
+        }
+        Ok(())
     }
 }
 

@@ -1,22 +1,13 @@
 //! Split, collapse and the last few vertices.
 
 use super::Surface;
-use crate::mesh::half_edge::{HalfEdgeMesh, NONE, previous};
+use crate::mesh::NONE;
+use crate::mesh::half_edge::HalfEdgeMesh;
 
-/// A collapse may turn no triangle further than this: cos 60°.
-const LARGEST_TURN: f64 = 0.5;
-/// Edges and their lengths relative to the local size, m, for which `keep` holds, in order of `key`.
+/// Lengths of the edges relative to the local size, m, for which `keep` holds, with the edges.
 fn edges(mesh: &HalfEdgeMesh, surface: &dyn Surface, keep: impl Fn(f64) -> bool) -> Vec<(f64, u32)> {
-    let mut found = Vec::new();
-    for h in 0..mesh.half_edge_count() as u32 {
-        if mesh.is_first(h) {
-            let length = relative_length(mesh, surface, h);
-            if keep(length) {
-                found.push((length, h));
-            }
-        }
-    }
-    found
+    let all = (0..mesh.half_edge_count() as u32).filter(|&h| mesh.is_first(h));
+    all.map(|h| (relative_length(mesh, surface, h), h)).filter(|(length, _)| keep(*length)).collect()
 }
 
 fn relative_length(mesh: &HalfEdgeMesh, surface: &dyn Surface, h: u32) -> f64 {
@@ -65,17 +56,7 @@ fn try_collapse(mesh: &mut HalfEdgeMesh, surface: &dyn Surface, h: u32, longest:
     let size = surface.relative_size(at);
     let mut fine = true;
     for (v, other) in [(v0, v1), (v1, v0)] {
-        mesh.around(v, |k| {
-            let (b, c) = (mesh.target(k), mesh.origin(previous(k)));
-            if b == other || c == other {
-                return;
-            }
-            let (pb, pc) = (mesh.positions[b as usize], mesh.positions[c as usize]);
-            let old = (pb - mesh.positions[v as usize]).cross(pc - mesh.positions[v as usize]);
-            let new = (pb - at).cross(pc - at);
-            fine &= new.dot(old) >= LARGEST_TURN * new.length() * old.length() && new.length_squared() > 0.0;
-            fine &= pb.distance(at).max(pc.distance(at)) <= longest * size;
-        });
+        mesh.around_moved(v, other, at, |triangle| fine &= !triangle.turns && triangle.longest <= longest * size);
     }
     if fine {
         mesh.collapse(h, at);

@@ -8,7 +8,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Surface;
-use crate::mesh::half_edge::{HalfEdgeMesh, NONE, previous};
+use crate::mesh::NONE;
+use crate::mesh::half_edge::{HalfEdgeMesh, previous};
 
 /// Moves every vertex once.
 pub(super) fn relax(mesh: &mut HalfEdgeMesh, surface: &dyn Surface) {

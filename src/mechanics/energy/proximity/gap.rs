@@ -4,9 +4,7 @@ use glam::{DMat3, DVec3};
 
 use crate::mechanics::energy::friction::{ELASTIC_SLIP, huber, stiffening};
 use crate::mechanics::energy::membrane::outer;
-
-/// No vertex: fills up a place that needs fewer.
-pub(super) const NONE: u32 = u32::MAX;
+use crate::mesh::NONE;
 
 /// A gap that has faded to less than this share of its stiffness is gone.
 const FADED: f64 = 1e-3;
@@ -44,11 +42,11 @@ pub struct Gap {
     /// The place on the body that it is taken from, m; zero of a gap of the cloth with itself.
     pub(super) body: DVec3,
     /// n, from the second place to the first.
-    pub(super) normal: DVec3,
+    pub(in crate::mechanics) normal: DVec3,
     /// h: how far apart along n the two places are kept, m.
     pub(super) goal: f64,
     /// κ A, N/m.
-    pub(super) stiffness: f64,
+    pub(in crate::mechanics) stiffness: f64,
     /// κ A to begin with, N/m.
     pub(super) first: f64,
     /// Whether it is there no more, and fades.
@@ -89,16 +87,6 @@ impl Gap {
     /// What is missing to the goal at `x`, m: positive where they press.
     pub(crate) fn depth(&self, x: &[DVec3]) -> f64 {
         self.goal - self.normal.dot(self.across(x))
-    }
-
-    /// n.
-    pub(crate) fn normal(&self) -> DVec3 {
-        self.normal
-    }
-
-    /// κ A, N/m.
-    pub(crate) fn stiffness(&self) -> f64 {
-        self.stiffness
     }
 
     /// The part of the slip since [`from`](Self::from) along the plane, m.

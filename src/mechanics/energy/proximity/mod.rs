@@ -50,6 +50,8 @@ pub(in crate::mechanics) use place::touching_between;
 pub(super) use place::{Place, offset};
 pub(crate) use skin::Skin;
 
+use crate::mesh::NONE;
+
 /// Pressure that takes up half the offset, Pa: a garment's layers lie on each other by their weight, some 2 Pa each; where more is
 /// needed a gap grows stiffer.
 const HALF_OFFSET_PRESSURE: f64 = 200.0;
@@ -165,14 +167,11 @@ impl Proximity {
         self.since = if crossing.len() < self.fewest { 0 } else { self.since + 1 };
         self.fewest = self.fewest.min(crossing.len());
         if !crossing.is_empty() {
-            let back = if self.since < PATIENCE {
-                untangle::gaps(skin, x, crossing, Apart::stiffness(most))
-            } else {
-                Vec::new()
-            };
+            let patient = self.since < PATIENCE;
+            let back = patient.then(|| untangle::gaps(skin, x, crossing, Apart::stiffness(most)));
             // About a crossing nobody knows which side is the right one.
             gaps.retain(|gap| !gap.members().any(|(v, _)| passage.is_tangled(v)));
-            gaps.extend(back);
+            gaps.extend(back.into_iter().flatten());
         }
         gaps.extend(to_body);
         gaps.sort_unstable_by_key(|gap| gap.key);
@@ -237,7 +236,7 @@ impl Proximity {
                 let v = gap.key.vertices;
                 (1..v.len()).flat_map(move |i| (0..i).map(move |j| [v[i], v[j]]))
             })
-            .filter(|[a, b]| *a != gap::NONE && *b != gap::NONE)
+            .filter(|[a, b]| *a != NONE && *b != NONE)
     }
 
     /// Gaps that press at `x`.

@@ -105,23 +105,8 @@ fn bounds(triangle: &[u32; 3], x: &[DVec3]) -> Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fabric::Fabric;
     use crate::mechanics::energy::Cloth;
-    use crate::mesh::{RestShape, Topology, TriMesh};
-
-    /// A sheet of n × n squares of a centimetre.
-    fn sheet(n: u32) -> (Arc<Skin>, Vec<DVec3>) {
-        let x: Vec<DVec3> =
-            (0..=n).flat_map(|j| (0..=n).map(move |i| DVec3::new(f64::from(i), f64::from(j), 0.0) * 0.01)).collect();
-        let square = |i: u32, j: u32| {
-            let k = j * (n + 1) + i;
-            [[k, k + 1, k + n + 2], [k, k + n + 2, k + n + 1]]
-        };
-        let mesh = TriMesh::new(x.clone(), (0..n).flat_map(|j| (0..n).flat_map(move |i| square(i, j))).collect());
-        let (topology, rest) = (Topology::new(&mesh), RestShape::from_edges(&mesh).unwrap());
-        let cloth = Cloth::new(&mesh, &topology, &rest, &Fabric::by_name("jersey").unwrap(), &[]).unwrap();
-        (Arc::new(Skin::new(&cloth.triangles, x.len())), x)
-    }
+    use crate::mesh::samples::sheet;
 
     /// Every pair, box against box.
     fn brute(skin: &Skin, x: &[DVec3], nearer: f64) -> Vec<[usize; 2]> {
@@ -133,7 +118,9 @@ mod tests {
     /// Rolled up step by step, the whole of it moving, one end of it, or next to nothing.
     #[test]
     fn however_the_cloth_moves_the_pairs_are_those_of_brute_force() {
-        let (skin, flat) = sheet(14);
+        let mesh = sheet(14, 14, |i, j| DVec3::new(i, j, 0.0) * 0.01);
+        let skin = Arc::new(Skin::new(&Cloth::sample(&mesh, "jersey", &[]).triangles, mesh.vertex_count()));
+        let flat = mesh.positions;
         let mut near = Near::new(Arc::clone(&skin), 3e-3);
         let mut lists = Vec::new();
         let moves = [

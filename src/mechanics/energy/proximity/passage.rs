@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::near::Near;
 use super::skin::Skin;
+use crate::mesh::each_once;
 use crate::mesh::triangle_crossing::cross;
 
 /// A step whose longest move is more than so many edges is not cut but refused: to cut it would tear the cloth.
@@ -106,7 +107,8 @@ impl Passage {
         pairs.retain(|pair| {
             let [a, b] = pair.map(|t| self.skin.triangles[t as usize]);
             let frail = |corners: [u32; 3]| corners.iter().any(|&v| self.skin.frail[v as usize]);
-            let near = a.iter().any(|v| b.contains(v) || self.skin.neighbours(*v).iter().any(|w| b.contains(w)));
+            let beside = |v: u32| self.skin.topology.neighbours(v).iter().any(|w| b.contains(w));
+            let near = a.iter().any(|v| b.contains(v) || beside(*v));
             !(near && (frail(a) || frail(b)))
         });
         pairs
@@ -114,14 +116,10 @@ impl Passage {
 
     /// The corners of some triangles and so many rings of neighbours, ascending.
     fn around<'a>(&self, triangles: impl Iterator<Item = &'a u32>, rings: usize) -> Vec<u32> {
-        let mut found: Vec<u32> = triangles.flat_map(|&t| self.skin.triangles[t as usize]).collect();
-        for ring in 0..=rings {
-            if ring > 0 {
-                let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.neighbours(v)).copied().collect();
-                found.extend(next);
-            }
-            found.sort_unstable();
-            found.dedup();
+        let mut found = each_once(triangles.flat_map(|&t| self.skin.triangles[t as usize]));
+        for _ in 0..rings {
+            let next: Vec<u32> = found.iter().flat_map(|&v| self.skin.topology.neighbours(v)).copied().collect();
+            found = each_once(found.into_iter().chain(next));
         }
         found
     }

@@ -5,11 +5,11 @@
 
 use glam::DVec3;
 
-use super::gap::{Gap, Key, Kind, NONE};
+use super::gap::{Gap, Key, Kind};
 use crate::distance::{Body, OUTWARD, SurfacePoint};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::membrane::Triangle;
-use crate::mesh::lattice;
+use crate::mesh::{NONE, lattice};
 
 /// The distance that a place keeps is the cloth's thickness, but at least this, m: what the body rises between two places of a lattice.
 const LEAST_OFFSET: f64 = 6e-4;

@@ -17,9 +17,10 @@ use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
 use super::Apart;
-use super::gap::{Gap, Key, Kind, NONE};
+use super::gap::{Gap, Key, Kind};
 use super::near::Near;
 use super::skin::Skin;
+use crate::mesh::NONE;
 
 /// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.
 const COINCIDENT: f64 = 1e-9;
@@ -108,8 +109,7 @@ impl Look<'_> {
     fn triangles_at(&self, corners: [u32; 3], i: u32) -> u32 {
         let [a, b, c] = corners;
         let side = [[a, b], [b, c], [a, c]][i as usize];
-        let [low, high] = [side[0].min(side[1]), side[0].max(side[1])];
-        self.skin.edges.binary_search(&[low, high]).map_or(1, |e| self.skin.edge_triangles[e])
+        self.skin.topology.edge_between(side[0], side[1]).map_or(1, |e| self.skin.topology.edge_valence[e])
     }
 
     /// The edges that triangle `t` owns against those that `u` owns.
@@ -122,7 +122,8 @@ impl Look<'_> {
     }
 
     fn edges(&self, e: u32, f: u32, found: &mut Vec<Found>) {
-        let ([a, b], [c, d]) = (self.skin.edges[e as usize], self.skin.edges[f as usize]);
+        let edges = &self.skin.topology.edges;
+        let ([a, b], [c, d]) = (edges[e as usize], edges[f as usize]);
         if a == c || a == d || b == c || b == d {
             return;
         }
@@ -169,7 +170,7 @@ impl Look<'_> {
     fn belongs(&self, gap: &Gap) -> bool {
         let (one, other): (Vec<_>, Vec<_>) = gap.members().partition(|(_, w)| *w > 0.0);
         let near = |(a, _): &(u32, f64)| {
-            let around = self.skin.neighbours(*a);
+            let around = self.skin.topology.neighbours(*a);
             other.iter().any(|(b, _)| around.contains(b))
         };
         one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize])

@@ -16,8 +16,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::gap::{Gap, Key, Kind, NONE};
+use super::gap::{Gap, Key, Kind};
 use super::skin::Skin;
+use crate::mesh::NONE;
 
 /// How far a crossing edge is asked to go between two looks, in edges.
 const STRIDE: f64 = 0.5;
@@ -32,7 +33,7 @@ pub(super) fn gaps(skin: &Skin, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64)
         for (one, other) in [(t, u), (u, t)] {
             let [a, b, c] = skin.triangles[one as usize];
             for side in [[a, b], [b, c], [c, a]] {
-                let edge = skin.edges.binary_search(&[side[0].min(side[1]), side[0].max(side[1])]).ok();
+                let edge = skin.topology.edge_between(side[0], side[1]);
                 if let Some(gap) = edge.and_then(|edge| crossing(skin, x, edge, other as usize, stiffness)) {
                     found.insert(gap.key, gap);
                 }
@@ -43,7 +44,7 @@ pub(super) fn gaps(skin: &Skin, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64)
 }
 
 fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f64) -> Option<Gap> {
-    let ([p, q], corners) = (skin.edges[edge], skin.triangles[triangle]);
+    let ([p, q], corners) = (skin.topology.edges[edge], skin.triangles[triangle]);
     if corners.contains(&p) || corners.contains(&q) {
         return None;
     }
