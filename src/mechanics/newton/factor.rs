@@ -240,12 +240,12 @@ impl<T: Precision> Factor<T> {
     pub(super) fn lower(&mut self, forest: &Forest, x: &[DVec3]) -> Vec<f64> {
         self.take(forest, x);
         self.forward(forest);
-        self.side.iter().map(|s| s.wide()).collect()
+        self.side.iter().map(|&s| s.into()).collect()
     }
 
     /// L⁻ᵀ y, of what is in the factor's own order.
     pub(super) fn upper(&mut self, forest: &Forest, y: &[f64]) -> Vec<DVec3> {
-        self.side.iter_mut().zip(y).for_each(|(s, y)| *s = T::of(*y));
+        self.side.iter_mut().zip(y).for_each(|(s, y)| *s = from_f64(*y));
         self.backward(forest);
         let mut x = vec![DVec3::ZERO; forest.order.len()];
         self.give(forest, &mut x);
