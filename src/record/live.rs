@@ -107,10 +107,7 @@ impl LiveEncoder {
         self.eye = Eye::on(garment, self.front, ROOM / views as f64).unwrap_or_default();
         let (stream, storage) = open((self.builder)())?;
         let seen = |(name, path)| on_the_body(name, path, &self.eye);
-        let mut row = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")]
-            .map(seen)
-            .into_iter()
-            .collect::<Vec<_>>();
+        let mut row = Vec::from([("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")].map(seen));
         for (i, pin) in pins.iter().enumerate() {
             let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
             row.push((1.0, View::spatial(format!("Pin: {}", pin.label), &[&body, &garment], &self.eye).into()));
