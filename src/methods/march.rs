@@ -21,7 +21,7 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use super::grip::Grip;
 use super::linear::{ConjugateGradients, Operator, System};
 use super::rest::{Ended, Rest, RestRule, find_velocities, rms_speed};
-use super::{Dressing, MethodDrape, MethodError, Moment, Outcome, Spectator, Stopwatch};
+use super::{Dressing, MethodDrape, MethodError, MethodOutcome, Moment, Spectator, Stopwatch};
 use crate::GRAVITY;
 use crate::mechanics::energy::Contacts;
 use crate::mechanics::energy::contact::Touch;
@@ -104,7 +104,7 @@ pub(super) fn march(
     (elastic, obstacle): (&mut dyn Elastic, &mut dyn Obstacle),
     mut watch: Stopwatch,
     onlooker: Spectator<'_>,
-) -> Outcome {
+) -> MethodOutcome {
     let cloth = dressing.cloth;
     let n = cloth.vertex_count();
     let mut rest = Rest::new(*course.rule);

@@ -149,7 +149,7 @@ impl MethodError {
 }
 
 /// The drape, or why there is none.
-pub type Outcome = Result<MethodDrape, MethodError>;
+pub type MethodOutcome = Result<MethodDrape, MethodError>;
 
 /// A way to drape a garment, from the placed start to rest.
 pub trait ReferenceMethod: Sync {
@@ -160,13 +160,13 @@ pub trait ReferenceMethod: Sync {
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome;
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome;
 
     /// Drapes until the garment rests by `rule`; `onlooker` is told of every step and may end it.
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn drape(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
+    fn drape(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         dressing.of_one_fabric(self.name())?;
         // In the pool: hundreds of short parallel loops follow.
         rayon::scope(|_| self.run(dressing, rule, onlooker))

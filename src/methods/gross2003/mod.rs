@@ -29,7 +29,7 @@ use glam::DVec3;
 use super::rest::{Ended, Rest};
 use super::spring_list::springs;
 use super::{
-    Dressing, Exhibit, MethodDrape, MethodError, Moment, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
+    Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, Moment, ReferenceMethod, RestRule, Spectator, Stopwatch,
 };
 use crate::mechanics::energy::Cloth;
 use crate::mesh::{RestShape, Topology, TriMesh};
@@ -84,7 +84,7 @@ impl ReferenceMethod for Gross2003 {
         NAME
     }
 
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         let Dressing { scene, fabric, cloth } = dressing;
         let cutting = Instant::now();
         let pieces = match &self.sewn {

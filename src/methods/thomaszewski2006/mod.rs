@@ -30,7 +30,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::march::{Course, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodError, Outcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
+use super::{
+    Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
+};
 use elements::{Elements, Made};
 use patch::{Around, Irregular, around_all, derivatives, limit_stencil};
 use rest_patch::laid_flat;
@@ -52,7 +54,7 @@ impl ReferenceMethod for Thomaszewski2006 {
         NAME
     }
 
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> Outcome {
+    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         let mut watch = Stopwatch::begin();
         let Dressing { scene, fabric, cloth } = dressing;
         let around = watch.time("patches", || fans(dressing))?;
