@@ -5,7 +5,7 @@
 //! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y; most of the spectrum lies near one, so
 //! what is soft or negative stands apart and comes first. By Sylvester's law there are as many negative λ as H has ways on which the energy
 //! falls, whatever B, so that of single precision does. (On B⁻¹H in the inner product of B, which needs no halves of a solve, each vector
-//! and B times it part by a third more every step, and after some 28 nothing is left but rounding.)
+//! and B times it part a little more every step, and after some 28 nothing is left but rounding.)
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -40,7 +40,7 @@ pub(crate) const NEGATIVE: f64 = -1e-6;
 const EXHAUSTED: f64 = 1e-6;
 
 /// Steps after which the lowest λ is asked for again, and the changes of it that end a search: one that leads out need not be known well;
-/// of none one must be sure. Of thirty searches none that had changed by less than a hundredth found a way out later.
+/// of none one must be sure. Of some twenty searches none that had changed by less than a hundredth found a way out later.
 const AGAIN: usize = 4;
 const SETTLED: f64 = 0.05;
 const SURE: f64 = 0.01;
