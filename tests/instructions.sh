@@ -10,11 +10,10 @@ trap 'rm -r "$XDG_CACHE_HOME"' EXIT
 
 # check GARMENT FABRIC MILLIONS
 check() {
-    set -- "$1" "$2" "$3" --garment "$1" --fabric "$2" --threads 1 --no-save
     garment=$1 fabric=$2 known=$3
-    shift 3
+    set -- --garment "$garment" --fabric "$fabric" --threads 1 --no-save
     # Once without being counted, so that body and garment are in the cache.
-    "$program" "$@" >/dev/null 2>&1
+    "$program" "$@" >/dev/null
     valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$@" >/dev/null 2>"$XDG_CACHE_HOME/counted"
     now=$(sed -n 's/.*Collected : \([0-9]*\).*/\1/p' "$XDG_CACHE_HOME/counted")
     [ -n "$now" ] || { cat "$XDG_CACHE_HOME/counted"; exit 1; }

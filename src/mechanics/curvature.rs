@@ -115,9 +115,9 @@ impl Curved<'_> {
         let mut matrix = Mat::<f64>::zeros(until.steps.min(3 * n), until.steps.min(3 * n));
         // A start that leans to no side, the same on every machine: multiples of the golden section.
         let start = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
-        let first: Vec<DVec3> =
+        let begin: Vec<DVec3> =
             (0..n).map(|i| DVec3::new(start(3 * i + 1), start(3 * i + 2), start(3 * i + 3))).collect();
-        let mut y = solver.lower(&first);
+        let mut y = solver.lower(&begin);
         let (mut steps, mut before) = (0, 0.0);
         while steps < matrix.nrows() {
             let whole = dot(&y, &y).sqrt();
@@ -155,11 +155,11 @@ impl Curved<'_> {
         };
         let values: Vec<f64> = (0..steps).map(|i| eigen.S()[i]).collect();
         let wanted = values.iter().filter(|l| **l < NEGATIVE).count().max(1);
-        let mut vector = |k: usize| {
+        let vector = |k: usize| {
             let shares: Vec<f64> = (0..steps).map(|i| eigen.U()[(i, k)]).collect();
             if k < steps { solver.upper(&basis.sum(&shares)) } else { vec![DVec3::ZERO; n] }
         };
-        let vectors = (0..wanted).map(&mut vector).collect();
+        let vectors = (0..wanted).map(vector).collect();
         Ritz { values, vectors }
     }
 }
