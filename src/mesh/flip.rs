@@ -8,6 +8,9 @@ use super::half_edge::{HalfEdgeMesh, previous};
 /// A flip may bend no pair of triangles further than this: cos 30°.
 const FLAT_ENOUGH: f64 = 0.866;
 
+/// Passes by angles, at most: a flip may make the next one wanted.
+const SWEEPS: usize = 3;
+
 /// What a flip is to improve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rule {
@@ -19,41 +22,69 @@ pub(crate) enum Rule {
 
 /// Flips every inner edge that the rule would rather have the other way.
 pub(crate) fn flip(mesh: &mut HalfEdgeMesh, rule: Rule) {
-    let sweeps = if rule == Rule::Delaunay { 3 } else { 1 };
-    for _ in 0..sweeps {
-        let mut flips = 0;
-        for h in 0..mesh.half_edge_count() as u32 {
-            if mesh.is_first(h) && mesh.twin(h) != NONE && wants_flip(mesh, h, rule) && mesh.flip(h) {
-                flips += 1;
+    match rule {
+        Rule::Valence => flip_by_valence(mesh),
+        Rule::Delaunay => {
+            for _ in 0..SWEEPS {
+                let mut flips = 0;
+                for h in 0..mesh.half_edge_count() as u32 {
+                    flips +=
+                        usize::from(is_inner(mesh, h) && opposes(mesh, h) && may_flip(mesh, h, rule) && mesh.flip(h));
+                }
+                if flips == 0 {
+                    break;
+                }
             }
-        }
-        if flips == 0 {
-            break;
         }
     }
 }
 
-fn wants_flip(mesh: &HalfEdgeMesh, h: u32, rule: Rule) -> bool {
-    let g = mesh.twin(h);
-    let (v0, v1, a, b) = (mesh.origin(h), mesh.target(h), mesh.origin(previous(h)), mesh.origin(previous(g)));
-    let [p0, p1, pa, pb] = [v0, v1, a, b].map(|v| mesh.positions[v as usize]);
-    let better = match rule {
-        Rule::Valence => {
-            let off = |v: u32, change: i64| {
-                let best = if mesh.is_boundary(v) { 4 } else { 6 };
-                (mesh.valence(v) as i64 + change - best).pow(2)
-            };
-            off(v0, -1) + off(v1, -1) + off(a, 1) + off(b, 1) < off(v0, 0) + off(v1, 0) + off(a, 0) + off(b, 0)
-        }
-        Rule::Delaunay => {
-            let cot = |x: DVec3, y: DVec3| x.dot(y) / x.cross(y).length().max(1e-30);
-            cot(p0 - pa, p1 - pa) + cot(p0 - pb, p1 - pb) < -1e-9
-        }
-    };
-    if !better {
-        return false;
+/// Neighbours are counted once, in one pass over the edges, and then with every flip: to walk about four vertices for every edge of a large
+/// mesh is to wait for memory.
+fn flip_by_valence(mesh: &mut HalfEdgeMesh) {
+    let mut over: Vec<i64> =
+        (0..mesh.positions.len() as u32).map(|v| if mesh.is_boundary(v) { -4 } else { -6 }).collect();
+    for h in (0..mesh.half_edge_count() as u32).filter(|&h| mesh.is_first(h)) {
+        over[mesh.origin(h) as usize] += 1;
+        over[mesh.target(h) as usize] += 1;
     }
-    // The turned pair must face the way the old pair did, and neither may become a sliver.
+    for h in 0..mesh.half_edge_count() as u32 {
+        if !is_inner(mesh, h) {
+            continue;
+        }
+        let [v0, v1, a, b] = diamond(mesh, h).map(|v| v as usize);
+        let off = |change: i64| {
+            let [less, more] = [-change, change];
+            (over[v0] + less).pow(2) + (over[v1] + less).pow(2) + (over[a] + more).pow(2) + (over[b] + more).pow(2)
+        };
+        if off(1) < off(0) && may_flip(mesh, h, Rule::Valence) && mesh.flip(h) {
+            for (v, change) in [(v0, -1), (v1, -1), (a, 1), (b, 1)] {
+                over[v] += change;
+            }
+        }
+    }
+}
+
+fn is_inner(mesh: &HalfEdgeMesh, h: u32) -> bool {
+    mesh.is_first(h) && mesh.twin(h) != NONE
+}
+
+/// The ends of an inner edge, and the vertices opposite to it.
+fn diamond(mesh: &HalfEdgeMesh, h: u32) -> [u32; 4] {
+    let g = mesh.twin(h);
+    [mesh.origin(h), mesh.target(h), mesh.origin(previous(h)), mesh.origin(previous(g))]
+}
+
+/// Whether the angles opposite an edge add up to more than 180°.
+fn opposes(mesh: &HalfEdgeMesh, h: u32) -> bool {
+    let [p0, p1, pa, pb] = diamond(mesh, h).map(|v| mesh.positions[v as usize]);
+    let cot = |x: DVec3, y: DVec3| x.dot(y) / x.cross(y).length().max(1e-30);
+    cot(p0 - pa, p1 - pa) + cot(p0 - pb, p1 - pb) < -1e-9
+}
+
+/// Whether the pair faces the same way when it is turned, and neither becomes a sliver.
+fn may_flip(mesh: &HalfEdgeMesh, h: u32, rule: Rule) -> bool {
+    let [p0, p1, pa, pb] = diamond(mesh, h).map(|v| mesh.positions[v as usize]);
     let old = (p1 - p0).cross(pa - p0).normalize_or_zero() + (p0 - p1).cross(pb - p1).normalize_or_zero();
     let old = old.normalize_or_zero();
     let (first, second) = ((p0 - pa).cross(pb - pa), (p1 - pb).cross(pa - pb));

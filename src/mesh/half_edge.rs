@@ -129,12 +129,6 @@ impl HalfEdgeMesh {
         });
     }
 
-    pub(crate) fn valence(&self, v: u32) -> usize {
-        let mut count = 0;
-        self.neighbours(v, |_| count += 1);
-        count
-    }
-
     fn adjacent(&self, a: u32, b: u32) -> bool {
         let mut found = false;
         self.neighbours(a, |w| found |= w == b);

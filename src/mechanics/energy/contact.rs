@@ -19,6 +19,7 @@
 //! kept off as well (`cover.rs`).
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::cover::Cover;
 use super::field::{Field, SIDE};
@@ -50,6 +51,9 @@ impl Touch {
 
 /// A plane stands for the body this far about the point it was taken at, m: over a radius of 5 cm it is then off by 0.04 mm.
 const PLANE: f64 = 2e-3;
+
+/// Vertices that a thread passes over at least: what is near is a comparison.
+const STRETCH: usize = 8192;
 
 /// What there is to touch, and by which distance.
 #[derive(Debug, Clone, Default)]
@@ -170,12 +174,10 @@ impl<'b> Contacts<'b> {
     /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
     fn find_near(&mut self, x: &[DVec3]) {
         let Self { near, asked_at, leave, .. } = self;
+        let vertices = x.par_iter().zip(asked_at).zip(leave).enumerate().with_min_len(STRETCH);
+        let found = vertices.filter(|(_, ((x, asked_at), leave))| x.distance_squared(**asked_at) > **leave);
         near.clear();
-        for (v, ((x, asked_at), leave)) in x.iter().zip(asked_at).zip(leave).enumerate() {
-            if x.distance_squared(*asked_at) > *leave {
-                near.push(v as u32);
-            }
-        }
+        near.par_extend(found.map(|(v, _)| v as u32));
     }
 
     /// Remembers a vertex's distance and where it was asked.

@@ -7,11 +7,15 @@
 use std::ops::Range;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::packs::{self, TrianglePack};
 use super::{Cloth, Contacts};
 use crate::GRAVITY;
 use crate::lanes::{Four, Lanes, Work, run};
+
+/// Vertices that a thread passes over at a time where nothing but memory is waited for; fewer are passed over by one.
+const STRETCH: usize = 16_384;
 
 /// Memory of an evaluation, kept from one to the next.
 #[derive(Debug, Clone, Default)]
@@ -37,8 +41,9 @@ impl Cloth {
     /// [`gradient`](Self::gradient) with memory to use again.
     pub fn evaluate(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>, scratch: &mut Scratch) -> f64 {
         let Scratch { x: padded, halves: [one, other] } = scratch;
-        padded.clear();
-        padded.extend(x.iter().map(|p| Four([p.x, p.y, p.z, 0.0])));
+        padded.resize(x.len(), Four::ZERO);
+        let stretches = padded.par_chunks_mut(STRETCH).zip(x.par_chunks(STRETCH));
+        stretches.for_each(|(to, x)| to.iter_mut().zip(x).for_each(|(to, p)| *to = Four([p.x, p.y, p.z, 0.0])));
         let (first, second) = self.packs.split_at(self.packs.len() / 2);
         let [above, below] = self.bending.plate.halves();
         let x_of_all = &*padded;
@@ -54,14 +59,20 @@ impl Cloth {
     /// Both halves' gradients and gravity's, where a vertex is not held; returns the energy of gravity.
     fn join(&self, x: &[Four], [one, other]: [&[Four]; 2], gradient: &mut Vec<DVec3>) -> f64 {
         gradient.resize(x.len(), DVec3::ZERO);
-        let mut energy = 0.0;
-        let vertices = x.iter().zip(one).zip(other).zip(&self.masses).zip(&self.held);
-        for (out, ((((x, Four(a)), Four(b)), &mass), &held)) in gradient.iter_mut().zip(vertices) {
-            let weight = mass * GRAVITY;
-            energy += weight * x.0[2];
-            *out = if held { DVec3::ZERO } else { DVec3::new(a[0] + b[0], a[1] + b[1], a[2] + b[2] + weight) };
-        }
-        energy
+        let halves = one.par_chunks(STRETCH).zip(other.par_chunks(STRETCH));
+        let own = self.masses.par_chunks(STRETCH).zip(self.held.par_chunks(STRETCH));
+        let stretches = gradient.par_chunks_mut(STRETCH).zip(x.par_chunks(STRETCH)).zip(halves).zip(own);
+        let weights = stretches.map(|(((gradient, x), (one, other)), (masses, held))| {
+            let mut energy = 0.0;
+            let vertices = x.iter().zip(one).zip(other).zip(masses).zip(held);
+            for (out, ((((x, Four(a)), Four(b)), &mass), &held)) in gradient.iter_mut().zip(vertices) {
+                let weight = mass * GRAVITY;
+                energy += weight * x.0[2];
+                *out = if held { DVec3::ZERO } else { DVec3::new(a[0] + b[0], a[1] + b[1], a[2] + b[2] + weight) };
+            }
+            energy
+        });
+        weights.collect::<Vec<f64>>().into_iter().sum()
     }
 }
 

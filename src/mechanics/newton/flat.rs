@@ -4,11 +4,18 @@
 //! [`Blocks`] hold their matrices entry by entry, four vertices together.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use crate::lanes::{Four, Lanes, Pack, Vectors};
 
 /// Fours of a group: sixteen vertices, four registers a vector of four vertices.
 const GROUP: usize = 12;
+
+/// Vertices of a stretch, whole groups: what a thread passes over at a time. Fewer are passed over by one, whose sums are of one piece.
+const STRETCH_VERTICES: usize = 16_384;
+
+/// Fours of a stretch.
+pub(super) const STRETCH: usize = STRETCH_VERTICES / 16 * GROUP;
 
 /// Coordinates of all vertices.
 #[derive(Debug, Clone, Default)]
@@ -18,30 +25,41 @@ impl Flat {
     /// Minus these vectors.
     pub(super) fn set_opposite(&mut self, vectors: &[DVec3]) {
         self.0.resize(vectors.len().div_ceil(16) * GROUP, Four::ZERO);
-        let (fours, rest) = vectors.as_chunks::<4>();
-        let (groups, _) = self.0.as_chunks_mut::<3>();
-        for (group, four) in groups.iter_mut().zip(fours) {
-            *group = opposite(four);
-        }
-        if !rest.is_empty() {
-            let at = |i: usize| rest.get(i).copied().unwrap_or_default();
-            groups[fours.len()] = opposite(&[at(0), at(1), at(2), at(3)]);
-        }
+        let stretches = self.0.par_chunks_mut(STRETCH).zip(vectors.par_chunks(STRETCH_VERTICES));
+        stretches.for_each(|(to, vectors)| set_opposite(to, vectors));
     }
 
     /// x + t times these, for as many vertices as x has.
     pub(super) fn added_to(&self, x: &[DVec3], t: f64, out: &mut Vec<DVec3>) {
         out.resize(x.len(), DVec3::ZERO);
-        let (groups, _) = self.0.as_chunks::<3>();
-        let ((fours, rest), (x_fours, x_rest)) = (out.as_chunks_mut::<4>(), x.as_chunks::<4>());
-        for ((to, from), group) in fours.iter_mut().zip(x_fours).zip(groups) {
-            *to = moved(from, t, group);
-        }
-        if !rest.is_empty() {
-            let at = |i: usize| x_rest.get(i).copied().unwrap_or_default();
-            let last = moved(&[at(0), at(1), at(2), at(3)], t, &groups[x_fours.len()]);
-            rest.copy_from_slice(&last[..x_rest.len()]);
-        }
+        let ends = out.par_chunks_mut(STRETCH_VERTICES).zip(x.par_chunks(STRETCH_VERTICES));
+        ends.zip(self.0.par_chunks(STRETCH)).for_each(|((to, from), d)| add(from, t, d, to));
+    }
+}
+
+fn set_opposite(to: &mut [Four], vectors: &[DVec3]) {
+    let (fours, rest) = vectors.as_chunks::<4>();
+    let (groups, _) = to.as_chunks_mut::<3>();
+    for (group, four) in groups.iter_mut().zip(fours) {
+        *group = opposite(four);
+    }
+    if !rest.is_empty() {
+        let at = |i: usize| rest.get(i).copied().unwrap_or_default();
+        groups[fours.len()] = opposite(&[at(0), at(1), at(2), at(3)]);
+    }
+}
+
+/// x + t d.
+fn add(x: &[DVec3], t: f64, d: &[Four], out: &mut [DVec3]) {
+    let (groups, _) = d.as_chunks::<3>();
+    let ((fours, rest), (x_fours, x_rest)) = (out.as_chunks_mut::<4>(), x.as_chunks::<4>());
+    for ((to, from), group) in fours.iter_mut().zip(x_fours).zip(groups) {
+        *to = moved(from, t, group);
+    }
+    if !rest.is_empty() {
+        let at = |i: usize| x_rest.get(i).copied().unwrap_or_default();
+        let last = moved(&[at(0), at(1), at(2), at(3)], t, &groups[x_fours.len()]);
+        rest.copy_from_slice(&last[..x_rest.len()]);
     }
 }
 

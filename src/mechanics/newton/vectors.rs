@@ -1,8 +1,11 @@
 //! The sums of L-BFGS over all coordinates, in lanes: each passes over memory once, for that is what they wait for.
 //!
-//! Sums go in four registers that do not wait for each other, in an order that depends on the length alone.
+//! Sums go in four registers that do not wait for each other, in stretches of [`STRETCH`] on all threads, in an order that depends on the
+//! length alone.
 
-use super::flat::{Blocks, Flat};
+use rayon::prelude::*;
+
+use super::flat::{Blocks, Flat, STRETCH};
 use crate::lanes::{Four, Lanes, Pack, Vectors, Work, run};
 
 /// A pair of L-BFGS: s and y, and 1 / sᵀy, 1/J.
@@ -18,62 +21,75 @@ pub(super) const MEMORY: usize = 6;
 
 /// Turns `down` = −∇E into the direction: the two loops of L-BFGS. Returns the slope along it, dᵀ∇E (J), and its longest move (m).
 pub(super) fn turn(pairs: &[Pair], inverse: &Blocks, scale: f64, down: &Flat, direction: &mut Flat) -> [f64; 2] {
-    run(Turn { pairs, inverse, scale, down, direction })
-}
-
-struct Turn<'a> {
-    pairs: &'a [Pair],
-    inverse: &'a Blocks,
-    scale: f64,
-    down: &'a Flat,
-    direction: &'a mut Flat,
-}
-
-impl Work for Turn<'_> {
-    type Output = [f64; 2];
-
-    #[inline(always)]
-    fn with<L: Lanes>(self, l: L) -> [f64; 2] {
-        let Self { pairs, inverse, scale, down: Flat(down), direction: Flat(d) } = self;
-        d.clear();
-        d.extend_from_slice(down);
-        let mut shares = [0.0; MEMORY];
-        // Each pass subtracts one pair and multiplies with the next.
-        if let [.., last] = pairs {
-            let mut product = dot(l, d, &last.s.0);
-            for k in (0..pairs.len()).rev() {
-                shares[k] = pairs[k].rho * product;
-                let next = if k > 0 { &pairs[k - 1].s.0 } else { down };
-                product = add_and_dot(l, d, -shares[k], &pairs[k].y.0, next);
-            }
-        }
-        precondition(l, d, inverse, scale);
-        if let [first, ..] = pairs {
-            let mut product = dot(l, d, &first.y.0);
-            for (k, pair) in pairs.iter().enumerate() {
-                let back = pair.rho * product;
-                let next = pairs.get(k + 1).map_or(down, |next| &next.y.0);
-                product = add_and_dot(l, d, shares[k] - back, &pair.s.0, next);
-            }
-            [-product, longest(l, d)]
-        } else {
-            [-dot(l, d, down), longest(l, d)]
+    let (Flat(down), Flat(d)) = (down, direction);
+    d.resize(down.len(), Four::ZERO);
+    stretches(d).zip(down.par_chunks(STRETCH)).for_each(|(d, down)| d.copy_from_slice(down));
+    let mut shares = [0.0; MEMORY];
+    // Each pass subtracts one pair and multiplies with the next.
+    if let [.., last] = pairs {
+        let mut product = dot(d, &last.s.0);
+        for k in (0..pairs.len()).rev() {
+            shares[k] = pairs[k].rho * product;
+            let next = if k > 0 { &pairs[k - 1].s.0 } else { down };
+            product = add_and_dot(d, -shares[k], &pairs[k].y.0, next);
         }
     }
+    let blocks = inverse.0.par_chunks(STRETCH / 3);
+    stretches(d).zip(blocks).for_each(|(d, blocks)| run(Precondition { d, blocks, scale }));
+    let slope = if let [first, ..] = pairs {
+        let mut product = dot(d, &first.y.0);
+        for (k, pair) in pairs.iter().enumerate() {
+            let back = pair.rho * product;
+            let next = pairs.get(k + 1).map_or(down, |next| &next.y.0);
+            product = add_and_dot(d, shares[k] - back, &pair.s.0, next);
+        }
+        -product
+    } else {
+        -dot(d, down)
+    };
+    let longest = d.par_chunks(STRETCH).map(|d| run(Longest(d))).reduce(|| 0.0, f64::max);
+    [slope, longest]
 }
 
 /// Makes the pair of a move by t times `s`, from where −∇E was `before` to where it is `after`: s becomes t s. Returns sᵀy and
 /// yᵀ D⁻¹ y, J.
 pub(super) fn difference(pair: &mut Pair, t: f64, before: &Flat, after: &Flat, inverse: &Blocks) -> [f64; 2] {
-    run(Difference { pair, t, before, after, inverse })
+    let (s, y) = (&mut pair.s.0, &mut pair.y.0);
+    y.resize(s.len(), Four::ZERO);
+    let ends = before.0.par_chunks(STRETCH).zip(after.0.par_chunks(STRETCH));
+    let all = stretches(s).zip(stretches(y)).zip(ends).zip(inverse.0.par_chunks(STRETCH / 3));
+    let sums = all.map(|(((s, y), (before, after)), blocks)| run(Difference { s, y, t, before, after, blocks }));
+    let sums: Vec<[f64; 2]> = sums.collect();
+    sums.into_iter().reduce(|a, b| [a[0] + b[0], a[1] + b[1]]).unwrap_or_default()
+}
+
+/// a·b.
+fn dot(a: &[Four], b: &[Four]) -> f64 {
+    summed(a.par_chunks(STRETCH).zip(b.par_chunks(STRETCH)).map(|(a, b)| run(Dot { a, b })))
+}
+
+/// a ← a + t b; returns a·c.
+fn add_and_dot(a: &mut [Four], t: f64, b: &[Four], c: &[Four]) -> f64 {
+    let others = b.par_chunks(STRETCH).zip(c.par_chunks(STRETCH));
+    summed(stretches(a).zip(others).map(|(a, (b, c))| run(AddAndDot { a, t, b, c })))
+}
+
+fn stretches(a: &mut [Four]) -> impl IndexedParallelIterator<Item = &mut [Four]> {
+    a.par_chunks_mut(STRETCH)
+}
+
+/// Sum of the stretches' sums, in their order.
+fn summed(sums: impl IndexedParallelIterator<Item = f64>) -> f64 {
+    sums.collect::<Vec<_>>().into_iter().sum()
 }
 
 struct Difference<'a> {
-    pair: &'a mut Pair,
+    s: &'a mut [Four],
+    y: &'a mut [Four],
     t: f64,
-    before: &'a Flat,
-    after: &'a Flat,
-    inverse: &'a Blocks,
+    before: &'a [Four],
+    after: &'a [Four],
+    blocks: &'a [[Four; 6]],
 }
 
 impl Work for Difference<'_> {
@@ -81,14 +97,12 @@ impl Work for Difference<'_> {
 
     #[inline(always)]
     fn with<L: Lanes>(self, l: L) -> [f64; 2] {
-        let Self { pair, t, before: Flat(before), after: Flat(after), inverse } = self;
-        let (s, y) = (&mut pair.s.0, &mut pair.y.0);
-        y.resize(s.len(), Four::ZERO);
+        let Self { s, y, t, before, after, blocks } = self;
         let t = Pack::splat(l, t);
         let (mut curvature, mut scaled) = (Pack::splat(l, 0.0), Pack::splat(l, 0.0));
         let (s, y) = (s.as_chunks_mut::<3>().0.iter_mut(), y.as_chunks_mut::<3>().0.iter_mut());
         let ends = before.as_chunks::<3>().0.iter().zip(after.as_chunks::<3>().0);
-        for (((s, y), (before, after)), block) in s.zip(y).zip(ends).zip(&inverse.0) {
+        for (((s, y), (before, after)), block) in s.zip(y).zip(ends).zip(blocks) {
             for i in 0..3 {
                 let move_by = t * Pack::load(l, &s[i]);
                 let change = Pack::load(l, &before[i]) - Pack::load(l, &after[i]);
@@ -102,53 +116,88 @@ impl Work for Difference<'_> {
     }
 }
 
-/// a·b.
-#[inline(always)]
-fn dot<L: Lanes>(l: L, a: &[Four], b: &[Four]) -> f64 {
-    let mut sums = [Pack::splat(l, 0.0); 4];
-    for (a, b) in a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0) {
-        for i in 0..4 {
-            sums[i] = sums[i] + Pack::load(l, &a[i]) * Pack::load(l, &b[i]);
-        }
-    }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum()
+struct Dot<'a> {
+    a: &'a [Four],
+    b: &'a [Four],
 }
 
-/// a ← a + t b; returns a·c.
-#[inline(always)]
-fn add_and_dot<L: Lanes>(l: L, a: &mut [Four], t: f64, b: &[Four], c: &[Four]) -> f64 {
-    let t = Pack::splat(l, t);
-    let mut sums = [Pack::splat(l, 0.0); 4];
-    let others = b.as_chunks::<4>().0.iter().zip(c.as_chunks::<4>().0);
-    for (a, (b, c)) in a.as_chunks_mut::<4>().0.iter_mut().zip(others) {
-        for i in 0..4 {
-            let moved = Pack::load(l, &a[i]) + t * Pack::load(l, &b[i]);
-            sums[i] = sums[i] + moved * Pack::load(l, &c[i]);
-            a[i] = moved.store();
+impl Work for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        let mut sums = [Pack::splat(l, 0.0); 4];
+        for (a, b) in self.a.as_chunks::<4>().0.iter().zip(self.b.as_chunks::<4>().0) {
+            for i in 0..4 {
+                sums[i] = sums[i] + Pack::load(l, &a[i]) * Pack::load(l, &b[i]);
+            }
         }
+        ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum()
     }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum()
+}
+
+struct AddAndDot<'a> {
+    a: &'a mut [Four],
+    t: f64,
+    b: &'a [Four],
+    c: &'a [Four],
+}
+
+impl Work for AddAndDot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        let Self { a, t, b, c } = self;
+        let t = Pack::splat(l, t);
+        let mut sums = [Pack::splat(l, 0.0); 4];
+        let others = b.as_chunks::<4>().0.iter().zip(c.as_chunks::<4>().0);
+        for (a, (b, c)) in a.as_chunks_mut::<4>().0.iter_mut().zip(others) {
+            for i in 0..4 {
+                let moved = Pack::load(l, &a[i]) + t * Pack::load(l, &b[i]);
+                sums[i] = sums[i] + moved * Pack::load(l, &c[i]);
+                a[i] = moved.store();
+            }
+        }
+        ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum()
+    }
 }
 
 /// d ← scale D⁻¹ d.
-#[inline(always)]
-fn precondition<L: Lanes>(l: L, d: &mut [Four], inverse: &Blocks, scale: f64) {
-    let scale = Pack::splat(l, scale);
-    for (d, block) in d.as_chunks_mut::<3>().0.iter_mut().zip(&inverse.0) {
-        *d = (Blocks::times(l, block, Vectors::from_flat(l, d)) * scale).flat(l);
+struct Precondition<'a> {
+    d: &'a mut [Four],
+    blocks: &'a [[Four; 6]],
+    scale: f64,
+}
+
+impl Work for Precondition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) {
+        let scale = Pack::splat(l, self.scale);
+        for (d, block) in self.d.as_chunks_mut::<3>().0.iter_mut().zip(self.blocks) {
+            *d = (Blocks::times(l, block, Vectors::from_flat(l, d)) * scale).flat(l);
+        }
     }
 }
 
 /// The longest vector.
-#[inline(always)]
-fn longest<L: Lanes>(l: L, d: &[Four]) -> f64 {
-    let mut most = Pack::splat(l, 0.0);
-    for d in d.as_chunks::<3>().0 {
-        let d = Vectors::from_flat(l, d);
-        most = d.dot(d).max(most);
+struct Longest<'a>(&'a [Four]);
+
+impl Work for Longest<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        let mut most = Pack::splat(l, 0.0);
+        for d in self.0.as_chunks::<3>().0 {
+            let d = Vectors::from_flat(l, d);
+            most = d.dot(d).max(most);
+        }
+        let Four([a, b, c, d]) = most.store();
+        a.max(b).max(c.max(d)).sqrt()
     }
-    let Four([a, b, c, d]) = most.store();
-    a.max(b).max(c.max(d)).sqrt()
 }
 
 #[cfg(test)]
