@@ -12,7 +12,7 @@ use crate::lanes::{Four, Lanes, Pack, Vectors};
 const GROUP: usize = 12;
 
 /// Vertices of a stretch, whole groups: what a thread passes over at a time. Fewer are passed over by one, whose sums are of one piece.
-const STRETCH_VERTICES: usize = 16_384;
+pub(super) const STRETCH_VERTICES: usize = 16_384;
 
 /// Fours of a stretch.
 pub(super) const STRETCH: usize = STRETCH_VERTICES / 16 * GROUP;

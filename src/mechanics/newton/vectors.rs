@@ -205,13 +205,13 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::super::dot as product;
+    use super::super::flat::STRETCH_VERTICES;
     use super::*;
     use crate::mesh::outer;
 
-    /// Vectors of 21 vertices: a group of sixteen, one of four and one left over.
-    fn noise(seed: f64) -> Vec<DVec3> {
+    fn noise(vertices: usize, seed: f64) -> Vec<DVec3> {
         let at = |i: usize, k: f64| (seed + 1.7 * i as f64 + k).sin();
-        (0..21).map(|i| DVec3::new(at(i, 0.0), at(i, 0.5), at(i, 2.1))).collect()
+        (0..vertices).map(|i| DVec3::new(at(i, 0.0), at(i, 0.5), at(i, 2.1))).collect()
     }
 
     fn flat(vectors: &[DVec3]) -> Flat {
@@ -221,19 +221,26 @@ mod tests {
     }
 
     fn block(i: usize) -> DMat3 {
-        let v = DVec3::new(0.3, 0.1 * i as f64, -0.4);
-        DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0 + i as f64)) + outer(v, v)
+        let v = DVec3::new(0.3, 0.1 * (i % 21) as f64, -0.4);
+        DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0 + (i % 21) as f64)) + outer(v, v)
     }
 
     #[test]
     fn the_direction_is_that_of_the_two_loops_vertex_by_vertex() {
-        let (gradient, x) = (noise(0.3), noise(9.0));
+        // A group of sixteen, one of four and one left over; the same after two whole stretches.
+        for vertices in [21, 2 * STRETCH_VERTICES + 21] {
+            agrees_with_the_two_loops(vertices);
+        }
+    }
+
+    fn agrees_with_the_two_loops(n: usize) {
+        let (gradient, x) = (noise(n, 0.3), noise(n, 9.0));
         let mut inverse = Blocks::default();
-        inverse.clear(21);
-        (0..21).for_each(|i| inverse.set(i, block(i)));
+        inverse.clear(n);
+        (0..n).for_each(|i| inverse.set(i, block(i)));
         let (mut pairs, mut plain) = (Vec::new(), Vec::new());
         for k in [0.0, 1.0, 2.0] {
-            let (s, before, t) = (noise(k), noise(5.0 + k), 0.3 + k);
+            let (s, before, t) = (noise(n, k), noise(n, 5.0 + k), 0.3 + k);
             let after: Vec<DVec3> = before.iter().zip(&s).map(|(b, s)| *b - *s * (2.0 + t) - DVec3::X).collect();
             let mut pair = Pair { s: flat(&s), ..Pair::default() };
             let [curvature, scaled] = difference(&mut pair, t, &flat(&before), &flat(&after), &inverse);
