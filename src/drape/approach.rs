@@ -33,6 +33,7 @@ const STEPS: usize = 10;
 const LEAST_VERTICES: usize = 1500;
 
 /// Steps on a coarser garment, at most: a stiff one takes over a hundred to its rest, of which the first bring it into the right folds.
+/// With eighty, five stiff garments of 16,000 take 239 steps at full resolution for 213.
 const COARSE_STEPS: usize = 20;
 
 /// From where stage two ended, by finer PARTs and the rest of coarser garments; where that fails, nothing is lost. `observer` is told of the
