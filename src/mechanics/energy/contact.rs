@@ -174,10 +174,15 @@ impl<'b> Contacts<'b> {
     /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
     fn find_near(&mut self, x: &[DVec3]) {
         let Self { near, asked_at, leave, .. } = self;
-        let vertices = x.par_iter().zip(asked_at).zip(leave).enumerate().with_min_len(STRETCH);
-        let found = vertices.filter(|(_, ((x, asked_at), leave))| x.distance_squared(**asked_at) > **leave);
+        let is_near = |((x, asked_at), leave): &((&DVec3, &DVec3), &f64)| x.distance_squared(**asked_at) > **leave;
         near.clear();
-        near.par_extend(found.map(|(v, _)| v as u32));
+        if x.len() < 2 * STRETCH {
+            let vertices = (0..).zip(x.iter().zip(&*asked_at).zip(&*leave));
+            near.extend(vertices.filter(|(_, vertex)| is_near(vertex)).map(|(v, _)| v));
+        } else {
+            let vertices = x.par_iter().zip(&*asked_at).zip(&*leave).enumerate().with_min_len(STRETCH);
+            near.par_extend(vertices.filter(|(_, vertex)| is_near(vertex)).map(|(v, _)| v as u32));
+        }
     }
 
     /// Remembers a vertex's distance and where it was asked.
