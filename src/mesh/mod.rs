@@ -7,6 +7,7 @@
 pub mod bridges;
 pub mod coarse;
 mod collapse;
+pub(crate) mod curve;
 mod decimate;
 mod draft;
 mod error;

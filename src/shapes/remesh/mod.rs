@@ -19,6 +19,7 @@ mod relax;
 use glam::DVec3;
 
 use crate::mesh::TriMesh;
+use crate::mesh::curve::along_curve;
 use crate::mesh::flip::{Rule, flip};
 use crate::mesh::half_edge::HalfEdgeMesh;
 
@@ -48,6 +49,8 @@ const ROUNDS: usize = 3;
 const COUNT_ROUNDS: usize = 3;
 /// Passes of flips and relaxation after the last change of count.
 const POLISH: usize = 4;
+/// Vertices from which on their order matters: fewer stay in the processor's caches wherever they are.
+const SCATTERED: usize = 32_768;
 
 /// Remeshes `mesh`, whose boundary vertices carry tags, to the wanted density. `None` where it is not a manifold.
 pub(crate) fn remesh(
@@ -90,7 +93,8 @@ pub(crate) fn remesh(
         relax::relax(&mut work, surface);
     }
     flip(&mut work, Rule::Delaunay);
-    Some(work.compact())
+    let (mesh, tags) = work.compact();
+    Some(if mesh.vertex_count() < SCATTERED { (mesh, tags) } else { along_curve(&mesh, &tags) })
 }
 
 fn round(work: &mut HalfEdgeMesh, surface: &dyn Surface, edge: f64) {
