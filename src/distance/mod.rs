@@ -14,7 +14,6 @@
 //! Limits: the sign is exact for closed, consistently wound surfaces without self-intersections; where a body intersects
 //! itself, points in the doubly covered pocket may read as outside. An open body has no inside: see [`Body::new_open`].
 
-mod curve;
 mod ends;
 mod lattice;
 mod tree;
@@ -22,7 +21,6 @@ mod worn;
 
 use std::sync::Arc;
 
-use curve::along_a_curve;
 use glam::DVec3;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
@@ -33,6 +31,7 @@ pub(crate) use lattice::LATTICE_SIDE;
 use lattice::Lattice;
 use tree::{Nearest, Tree};
 
+use crate::mesh::curve::along_a_curve;
 use crate::mesh::winding::signed_volumes;
 use crate::mesh::{Topology, TriMesh};
 

@@ -19,7 +19,7 @@ mod relax;
 use glam::DVec3;
 
 use crate::mesh::TriMesh;
-use crate::mesh::curve::along_curve;
+use crate::mesh::curve::mesh_along_a_curve;
 use crate::mesh::flip::{Rule, flip};
 use crate::mesh::half_edge::HalfEdgeMesh;
 
@@ -94,7 +94,7 @@ pub(crate) fn remesh(
     }
     flip(&mut work, Rule::Delaunay);
     let (mesh, tags) = work.compact();
-    Some(if mesh.vertex_count() < SCATTERED { (mesh, tags) } else { along_curve(&mesh, &tags) })
+    Some(if mesh.vertex_count() < SCATTERED { (mesh, tags) } else { mesh_along_a_curve(&mesh, &tags) })
 }
 
 fn round(work: &mut HalfEdgeMesh, surface: &dyn Surface, edge: f64) {
