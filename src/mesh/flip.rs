@@ -120,7 +120,7 @@ mod tests {
         // Every other diagonal the other way: eight neighbours and four by turns.
         for (square, pair) in (0..).zip(crossed.triangles.as_chunks_mut::<2>().0) {
             let [[a, b, d], [_, _, c]] = *pair;
-            if (square + square / n) % 2 == 0 {
+            if (square + square / n).is_multiple_of(2) {
                 *pair = [[a, b, c], [b, d, c]];
             }
         }
