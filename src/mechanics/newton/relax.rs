@@ -213,4 +213,20 @@ mod tests {
             last = after;
         }
     }
+
+    #[test]
+    fn several_stretches_give_the_same_bits_on_one_thread_and_on_two() {
+        let n = 150;
+        let mesh = sheet(n - 1, n - 1, |i, j| DVec3::new(i, 0.1 * (i * j).sin(), j) * 0.01);
+        let cloth = Cloth::sample(&mesh, "cotton", &(n * (n - 1)..n * n).collect::<Vec<_>>());
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut x = mesh.positions.clone();
+            let energies = pool.install(|| relaxed(&cloth, &mut x, 8));
+            (energies, x)
+        };
+        let (energies, x) = on(1);
+        assert!(energies[1] < energies[0], "{energies:?}");
+        assert!((energies, x) == on(2));
+    }
 }
