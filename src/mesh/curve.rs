@@ -3,8 +3,8 @@
 //! The bits of a point's three coordinates, in 1024 steps of the longest side of the box about all points, are put in turn into one number,
 //! and points sorted by it (G. M. Morton: "A computer oriented geodetic data base", IBM, 1966). A search that begins where the one
 //! before ended then reads what that one has read. So do sums over triangles: a remesher numbers vertices as it makes them, by splits all over
-//! the surface, and what goes from neighbour to neighbour waits for memory once the positions outgrow the processor's caches. With its
-//! vertices in this order a knit skirt of 64,000 rests in 11 s instead of 17.
+//! the surface, and what goes from neighbour to neighbour waits for memory once the positions outgrow the processor's caches.
+//! With its vertices in this order the last three steps of a preview of 250,000 took 4.0 s for 5.1, and 1.9 for 5.6, both beside other work.
 
 use glam::DVec3;
 use rayon::prelude::*;

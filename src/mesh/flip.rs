@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn flips_by_neighbours_even_them_out_and_leave_nothing_to_flip() {
+    fn flips_by_neighbours_even_them_out() {
         let n: u32 = 12;
         let mut crossed = sheet(n, n, |i, j| DVec3::new(i, j, 0.0) * 0.01);
         // Every other diagonal the other way: eight neighbours and four by turns.

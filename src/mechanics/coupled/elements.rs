@@ -14,7 +14,7 @@ use super::weights::Weights;
 
 /// Elements of this many for each PART are sampled for the Hessian: a PART has twelve unknowns, a triangle says three things. The
 /// energy and its gradient take them all. Where a PART has more than [`MANY`], one in [`BEYOND`] of those as well: beside a gradient of so many
-/// they cost nothing, and with twelve of 6,000 a skirt of 62,500 vertices in 22 PARTs went to and fro for 40 steps where it takes five.
+/// they cost nothing, and twelve of 6,000 are luck. (No cure: a skirt of 62,500 vertices in 22 PARTs has crept for 40 steps with either.)
 const ENOUGH: f64 = 12.0;
 const MANY: f64 = 4000.0;
 const BEYOND: f64 = 50.0;
