@@ -42,7 +42,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
     let mut sum = vec![0.0; x.len()];
     let mut area = vec![0.0; x.len()];
     let mut strains: Vec<f64> = Vec::with_capacity(cloth.triangles.len());
-    for triangle in &cloth.triangles {
+    for triangle in &*cloth.triangles {
         let strain = 100.0 * principal_strain(triangle.deformation(x));
         strains.push(strain);
         for v in triangle.vertices {

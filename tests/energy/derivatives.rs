@@ -34,10 +34,11 @@ fn membrane_gradient() {
     let crushed: Vec<DVec3> = stretched.iter().map(|p| DVec3::new(0.6 * p.x, p.y, 0.7 * p.z)).collect();
     for x in [&stretched, &crushed] {
         let mut gradient = vec![DVec3::ZERO; x.len()];
-        for t in &cloth.triangles {
-            t.add_gradient(&stiffness, x, &mut gradient);
+        for t in &*cloth.triangles {
+            t.add_gradient(&stiffness, t.slack(), x, &mut gradient);
         }
-        check_gradient(x, |x| cloth.triangles.iter().map(|t| t.energy(&stiffness, x)).sum(), &gradient, "membrane");
+        let energy = |x: &[DVec3]| cloth.triangles.iter().map(|t| t.energy(&stiffness, t.slack(), x)).sum();
+        check_gradient(x, energy, &gradient, "membrane");
     }
 }
 
@@ -52,7 +53,7 @@ fn bending_gradient() {
     let whole = cloth.gradient(&x, &Contacts::none(), &mut gradient);
     let mut others = vec![DVec3::ZERO; x.len()];
     gravity::add_gradient(&cloth.masses, &mut others);
-    let membrane: f64 = cloth.triangles.iter().map(|t| t.add_gradient(&stiffness, &x, &mut others)).sum();
+    let membrane: f64 = cloth.triangles.iter().map(|t| t.add_gradient(&stiffness, t.slack(), &x, &mut others)).sum();
     gradient.iter_mut().zip(&others).for_each(|(g, other)| *g -= *other);
     check_gradient(&x, |x| cloth.bending.energy(x), &gradient, "bending");
     let rest = whole - membrane - gravity::energy(&cloth.masses, &x);

@@ -10,7 +10,7 @@ use crate::patch::{cloth, deformed, fabric, sheet};
 /// Membrane plus bending: the cloth's own energy.
 fn elastic(cloth: &Cloth, x: &[DVec3]) -> f64 {
     let stiffness = Stiffness::new(&fabric());
-    cloth.triangles.iter().map(|t| t.energy(&stiffness, x)).sum::<f64>() + cloth.bending.energy(x)
+    cloth.triangles.iter().map(|t| t.energy(&stiffness, t.slack(), x)).sum::<f64>() + cloth.bending.energy(x)
 }
 
 #[test]

@@ -4,9 +4,9 @@
 //! pair by pair. The pattern is built PART by PART: the column of a PART's unknown holds what is left of its own block, then its
 //! neighbours that come later in the order of elimination.
 
+use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
 use crate::mechanics::energy::pattern::Pattern;
-use crate::mechanics::energy::{Cloth, bending::Bending};
 use crate::mesh::Lists;
 
 use super::motions::Motions;
@@ -19,17 +19,17 @@ const ENOUGH: f64 = 12.0;
 const MANY: f64 = 4000.0;
 const BEYOND: f64 = 50.0;
 
-/// The PARTs of elements of one kind.
+/// The PARTs of those elements of one kind that the Hessian is summed over.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Elements {
-    /// PARTs of each element, ascending.
+    /// Which of all they are, and how many each stands for.
+    pub(super) sampled: Vec<(u32, f64)>,
+    /// PARTs of each, ascending.
     pub(super) parts: Lists<u32>,
     /// Their weights at its vertices, PART after PART.
     pub(super) weights: Lists<f64>,
     /// The pairs of its PARTs.
     pub(super) pairs: Lists<Pair>,
-    /// The elements that are sampled, and how many each stands for.
-    pub(super) sampled: Vec<(u32, f64)>,
 }
 
 /// Two PARTs of an element, by their places in its list: rows of the later, columns of the earlier.
@@ -51,38 +51,27 @@ pub(super) struct Place {
 }
 
 impl Elements {
-    /// From the vertices of each element.
-    fn new<'a>(weights: &Weights, parts: usize, all: impl Iterator<Item = &'a [u32]>) -> Self {
-        let (mut e, mut own) = (Self::default(), Vec::new());
-        let of = |v: u32| weights.of(v as usize);
-        let weight = |p: u32, v: u32| of(v).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
-        for vertices in all {
-            own.extend(vertices.iter().flat_map(|&v| of(v)).map(|&(p, _)| p));
-            own.sort_unstable();
-            own.dedup();
+    /// Of all elements, whose PARTs are given, those that are sampled; `vertices` are an element's.
+    fn sampled<'a>(weights: &Weights, count: usize, parts: &Lists<u32>, vertices: impl Fn(usize) -> &'a [u32]) -> Self {
+        let mut e = Self { sampled: sample(count, parts), ..Self::default() };
+        let weight = |p: u32, v: u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
+        for &(i, _) in &e.sampled {
+            let (own, vertices) = (parts.of(i as usize), vertices(i as usize));
             e.weights.push(own.iter().flat_map(|&p| vertices.iter().map(move |&v| weight(p, v))));
-            e.parts.push(own.drain(..));
+            e.parts.push(own.iter().copied());
         }
-        e.sample(parts);
         e
     }
 
-    /// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each PART.
-    fn sample(&mut self, parts: usize) {
-        const GOLDEN: f64 = 0.618_033_988_749_895;
-        let mut size = vec![0.0; parts];
-        for i in 0..self.parts.len() {
-            let list = self.parts.of(i);
-            for &p in list {
-                size[p as usize] += 1.0 / list.len() as f64;
-            }
+    /// The vertices, every one.
+    fn vertices(weights: &Weights, count: usize) -> Self {
+        let mut e = Self::default();
+        for v in 0..count {
+            e.sampled.push((v as u32, 1.0));
+            e.parts.push(weights.of(v).iter().map(|w| w.0));
+            e.weights.push(weights.of(v).iter().map(|w| w.1));
         }
-        for i in 0..self.parts.len() {
-            let rate = self.parts.of(i).iter().map(|&p| enough(size[p as usize])).fold(0.0, f64::max).min(1.0);
-            if (i as f64 * GOLDEN).fract() < rate {
-                self.sampled.push((i as u32, rate.recip()));
-            }
-        }
+        e
     }
 
     fn lay_out(&mut self, motions: &Motions, columns: &[Vec<(u32, u32)>]) {
@@ -99,6 +88,38 @@ impl Elements {
             self.pairs.push((0..list.len()).flat_map(|k| (0..=k).map(move |l| pair(k, l))));
         }
     }
+}
+
+/// PARTs of each element, ascending, from the vertices of each.
+fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Lists<u32> {
+    let (mut parts, mut own) = (Lists::default(), Vec::new());
+    for vertices in all {
+        own.extend(vertices.iter().flat_map(|&v| weights.of(v as usize)).map(|w| w.0));
+        own.sort_unstable();
+        own.dedup();
+        parts.push(own.drain(..));
+    }
+    parts
+}
+
+/// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each PART.
+fn sample(count: usize, parts: &Lists<u32>) -> Vec<(u32, f64)> {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let mut size = vec![0.0; count];
+    for i in 0..parts.len() {
+        let list = parts.of(i);
+        for &p in list {
+            size[p as usize] += 1.0 / list.len() as f64;
+        }
+    }
+    let mut sampled = Vec::new();
+    for i in 0..parts.len() {
+        let rate = parts.of(i).iter().map(|&p| enough(size[p as usize])).fold(0.0, f64::max).min(1.0);
+        if (i as f64 * GOLDEN).fract() < rate {
+            sampled.push((i as u32, rate.recip()));
+        }
+    }
+    sampled
 }
 
 /// Share of the elements of a PART of this size that is sampled.
@@ -123,15 +144,21 @@ impl Layout {
     pub(super) fn new(cloth: &Cloth, motions: &mut Motions) -> Self {
         let parts = motions.first.len();
         let weights = &motions.weights;
-        let of = |all: Vec<&[u32]>| Elements::new(weights, parts, all.into_iter());
-        let (mut triangles, (mut rings, mut vertices)) = rayon::join(
-            || of(cloth.triangles.iter().map(|t| &t.vertices[..]).collect()),
+        let triangle = |i: usize| &cloth.triangles[i].vertices[..];
+        let ring = |i: usize| cloth.bending.element(i).0;
+        let ((mut triangles, mut pairs), (mut rings, of_rings)) = rayon::join(
             || {
-                let numbers: Vec<u32> = (0..cloth.vertex_count() as u32).collect();
-                (of(Bending::elements(&cloth.bending).map(|e| e.0).collect()), of(numbers.chunks(1).collect()))
+                let of = parts_of(weights, (0..cloth.triangles.len()).map(triangle));
+                (Elements::sampled(weights, parts, &of, triangle), pairs_of(&of))
+            },
+            || {
+                let of = parts_of(weights, (0..cloth.bending.len()).map(ring));
+                (Elements::sampled(weights, parts, &of, ring), pairs_of(&of))
             },
         );
-        let neighbours = neighbours(parts, &[&triangles, &rings]);
+        let mut vertices = Elements::vertices(weights, cloth.vertex_count());
+        pairs.extend(of_rings);
+        let neighbours = Adjacency::new(parts, || pairs.iter().copied());
         let free: Vec<u32> = (0..parts as u32).filter(|&p| motions.count[p as usize] > 0).collect();
         let order = nested_dissection(free, &motions.centre, &neighbours);
         motions.number(order.iter().copied());
@@ -166,21 +193,21 @@ impl Layout {
     }
 }
 
-/// PARTs that share an element with each.
-fn neighbours(parts: usize, all: &[&Elements]) -> Adjacency {
+/// Pairs of PARTs that share an element.
+fn pairs_of(parts: &Lists<u32>) -> Vec<[u32; 2]> {
     let mut pairs: Vec<[u32; 2]> = Vec::new();
-    for elements in all {
-        let mut last: &[u32] = &[];
-        for i in 0..elements.parts.len() {
-            let list = elements.parts.of(i);
-            // Inside a PART one element is like the one before.
-            if list != last {
-                for (k, &p) in list.iter().enumerate() {
-                    pairs.extend(list[..k].iter().map(|&q| [p, q]));
-                }
+    let mut last: &[u32] = &[];
+    for i in 0..parts.len() {
+        let list = parts.of(i);
+        // Inside a PART one element is like the one before.
+        if list != last {
+            for (k, &p) in list.iter().enumerate() {
+                pairs.extend(list[..k].iter().map(|&q| [p, q]));
             }
-            last = list;
         }
+        last = list;
     }
-    Adjacency::new(parts, || pairs.iter().copied())
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
 }

@@ -55,11 +55,11 @@ impl Reduced {
             sums.clear(layout.places.len());
         }
         let [first, second] = &mut *sums;
-        let (sampled, half) = (&layout.triangles.sampled, layout.triangles.sampled.len() / 2);
+        let (all, half) = (layout.triangles.sampled.len(), layout.triangles.sampled.len() / 2);
         rayon::join(
-            || first.add(&functions, here, &layout.triangles, Element::Triangles(&sampled[..half])),
+            || first.add(&functions, here, &layout.triangles, Element::Triangles(0..half)),
             || {
-                second.add(&functions, here, &layout.triangles, Element::Triangles(&sampled[half..]));
+                second.add(&functions, here, &layout.triangles, Element::Triangles(half..all));
                 second.add(&functions, here, &layout.rings, Element::Rings);
                 second.add(&functions, here, &layout.vertices, Element::Vertices);
             },

@@ -9,6 +9,8 @@
 //! The four f_a are one register. What comes on the diagonal alone is kept by itself, a ninth of the work. Same bits on every machine
 //! ([`lanes`](crate::lanes)).
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
 
 use super::elements::Elements;
@@ -17,10 +19,10 @@ use crate::lanes::{Four, Lanes, Pack, Work, run};
 use crate::mechanics::newton::State;
 
 /// What is summed.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Element<'a> {
-    /// The membrane of these triangles, and how many each stands for.
-    Triangles(&'a [(u32, f64)]),
+#[derive(Debug, Clone)]
+pub(super) enum Element {
+    /// The membrane of these triangles, by place among the sampled.
+    Triangles(Range<usize>),
     /// Bending of the sampled rings.
     Rings,
     /// Masses times the damping, contact and friction.
@@ -44,7 +46,7 @@ impl Sums {
         self.scalar.resize(pairs, [Four::ZERO; 4]);
     }
 
-    pub(super) fn add(&mut self, functions: &[Functions], here: &State<'_>, elements: &Elements, what: Element<'_>) {
+    pub(super) fn add(&mut self, functions: &[Functions], here: &State<'_>, elements: &Elements, what: Element) {
         run(Adding { sums: self, functions, here, elements, what });
     }
 
@@ -70,7 +72,7 @@ struct Adding<'a, 'b> {
     functions: &'a [Functions],
     here: &'a State<'b>,
     elements: &'a Elements,
-    what: Element<'a>,
+    what: Element,
 }
 
 impl Work for Adding<'_, '_> {
@@ -93,18 +95,18 @@ fn triangles<L: Lanes>(
     functions: &[Functions],
     here: &State<'_>,
     all: &Elements,
-    sampled: &[(u32, f64)],
+    sampled: Range<usize>,
 ) {
     let State { cloth, x, .. } = *here;
     let mut gradients: Vec<[Four; 2]> = Vec::new();
-    for &(i, standing_for) in sampled {
-        let i = i as usize;
-        let t = &cloth.triangles[i];
-        let [huu, huv, hvv] = t.by_gradient(cloth.stiffness_of(t), x, false);
+    for k in sampled {
+        let (i, standing_for) = all.sampled[k];
+        let t = &cloth.triangles[i as usize];
+        let [huu, huv, hvv] = t.by_gradient(cloth.stiffness_of(t), cloth.slack[i as usize], x, false);
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();
-        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(3)) {
+        for (&p, weights) in all.parts.of(k).iter().zip(all.weights.of(k).chunks_exact(3)) {
             let (mut u, mut v) = (Pack::splat(l, 0.0), Pack::splat(l, 0.0));
             for ((&vertex, gradient), &w) in t.vertices.iter().zip(&t.gradients).zip(weights) {
                 let f = functions[p as usize].at(l, w, x[vertex as usize]);
@@ -113,7 +115,7 @@ fn triangles<L: Lanes>(
             }
             gradients.push([u.store(), v.store()]);
         }
-        for pair in all.pairs.of(i) {
+        for pair in all.pairs.of(k) {
             let (a, b) = (&gradients[pair.row as usize], &gradients[pair.column as usize]);
             add_full(l, &mut sums.full[pair.number as usize], a, b, &h);
         }
@@ -144,16 +146,11 @@ fn add_full<L: Lanes>(l: L, sum: &mut [Four; 36], a: &[Four; 2], b: &[Four; 2], 
 fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<'_>, all: &Elements) {
     let State { cloth, x, .. } = *here;
     let mut fits: Vec<[Four; 3]> = Vec::new();
-    let mut sampled = all.sampled.iter().peekable();
-    for (i, (vertices, ring, stiffness)) in cloth.bending.elements().enumerate() {
-        let standing_for = match sampled.peek() {
-            Some(&&(next, standing_for)) if next as usize == i => standing_for,
-            _ => continue,
-        };
-        sampled.next();
+    for (k, &(i, standing_for)) in all.sampled.iter().enumerate() {
+        let (vertices, ring, stiffness) = cloth.bending.element(i as usize);
         let stiffness = stiffness * standing_for;
         fits.clear();
-        for (&p, weights) in all.parts.of(i).iter().zip(all.weights.of(i).chunks_exact(vertices.len())) {
+        for (&p, weights) in all.parts.of(k).iter().zip(all.weights.of(k).chunks_exact(vertices.len())) {
             let zero = Pack::splat(l, 0.0);
             let (mut fx, mut fy, mut fz) = (zero, zero, zero);
             for ((&v, r), &w) in vertices.iter().zip(ring).zip(weights) {
@@ -166,7 +163,7 @@ fn rings<L: Lanes>(l: L, sums: &mut Sums, functions: &[Functions], here: &State<
             }
             fits.push([fx.store(), fy.store(), fz.store()]);
         }
-        for pair in all.pairs.of(i) {
+        for pair in all.pairs.of(k) {
             let (a, b) = (&fits[pair.row as usize], &fits[pair.column as usize]);
             let ax = Pack::load(l, &a[0]) * stiffness.x;
             let ay = Pack::load(l, &a[1]) * stiffness.y;

@@ -141,10 +141,19 @@ impl Bending {
 
     /// Vertices, weights of x_uu, x_uv, x_vv, and stiffness A·(B_u, H, B_v) of every element.
     pub(crate) fn elements(&self) -> impl Iterator<Item = (&[u32], &[DVec3], DVec3)> + '_ {
-        self.elements.iter().map(|e| {
-            let (vertices, weights) = self.parts(e);
-            (vertices, weights, e.stiffness)
-        })
+        (0..self.len()).map(|i| self.element(i))
+    }
+
+    /// One of [`elements`](Self::elements).
+    pub(crate) fn element(&self, i: usize) -> (&[u32], &[DVec3], DVec3) {
+        let e = &self.elements[i];
+        let (vertices, weights) = self.parts(e);
+        (vertices, weights, e.stiffness)
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.elements.len()
     }
 
     /// Energy of all elements, J.

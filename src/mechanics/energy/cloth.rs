@@ -17,12 +17,13 @@ use super::contact::Contacts;
 use super::friction::Friction;
 use super::layout::HessianLayout;
 use super::membrane::{Stiffness, Triangle};
-use super::packs::TrianglePack;
+use super::packs::{TrianglePack, packed};
 use super::pattern::Pattern;
 use super::proximity::{Proximity, Skin};
 use crate::GRAVITY;
 use crate::distance::Body;
 use crate::fabric::{Fabric, at_vertices};
+use crate::lanes::Four;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with
@@ -57,13 +58,16 @@ pub struct Cloth {
     /// What it is cut from, as the triangles number them.
     pub fabrics: Arc<Vec<Fabric>>,
     /// The triangles' rest data.
-    pub triangles: Vec<Triangle>,
+    pub triangles: Arc<Vec<Triangle>>,
+    /// Share of each triangle's stiffness that is left under compression.
+    pub slack: Arc<Vec<f64>>,
     /// The rings that bend.
     pub bending: Arc<Bending>,
     /// Of each fabric.
     pub(super) stiffness: Vec<Stiffness>,
-    /// The triangles by fours.
-    pub(super) packs: Vec<TrianglePack>,
+    /// The triangles by fours, and their slack.
+    pub(super) packs: Arc<Vec<TrianglePack>>,
+    pub(super) packed_slack: Arc<Vec<Four>>,
     placed: Arc<Vec<DVec3>>,
     /// Where to go back to where a start crosses.
     clear: Arc<Vec<DVec3>>,
@@ -131,8 +135,10 @@ impl Cloth {
             return Err(EnergyError::NothingFree { count: n });
         }
         let placed = Arc::new(mesh.positions.clone());
+        let slack: Vec<f64> = triangles.iter().map(Triangle::slack).collect();
         Ok(Self {
-            packs: TrianglePack::all(&triangles),
+            packs: Arc::new(TrianglePack::all(&triangles)),
+            packed_slack: Arc::new(packed(&triangles, &slack)),
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
             areas,
@@ -142,7 +148,8 @@ impl Cloth {
             thickness: Arc::new(thickness),
             friction: Arc::new(at_vertices(mesh, rest, fabrics, |fabric| fabric.friction)),
             fabrics: Arc::new(fabrics.to_vec()),
-            triangles,
+            triangles: Arc::new(triangles),
+            slack: Arc::new(slack),
             bending: Arc::new(bending),
             stiffness: fabrics.iter().map(Stiffness::new).collect(),
             clear: Arc::clone(&placed),
@@ -187,11 +194,10 @@ impl Cloth {
 
     /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle; slivers keep none.
     #[must_use]
-    pub fn with_slack(mut self, slack: &[f64]) -> Self {
-        for (t, &slack) in self.triangles.iter_mut().zip(slack).filter(|(t, _)| !t.sliver) {
-            t.slack = slack;
-        }
-        self.packs = TrianglePack::all(&self.triangles);
+    pub fn with_slack(mut self, mut slack: Vec<f64>) -> Self {
+        slack.iter_mut().zip(&*self.triangles).filter(|(_, t)| t.sliver).for_each(|(slack, _)| *slack = 0.0);
+        self.packed_slack = Arc::new(packed(&self.triangles, &slack));
+        self.slack = Arc::new(slack);
         self
     }
 

@@ -44,11 +44,13 @@ impl Cloth {
         padded.resize(x.len(), Four::ZERO);
         let stretches = padded.par_chunks_mut(STRETCH).zip(x.par_chunks(STRETCH));
         stretches.for_each(|(to, x)| to.iter_mut().zip(x).for_each(|(to, p)| *to = Four([p.x, p.y, p.z, 0.0])));
-        let (first, second) = self.packs.split_at(self.packs.len() / 2);
+        let middle = self.packs.len() / 2;
+        let ((first, second), (slack, other_slack)) = (self.packs.split_at(middle), self.packed_slack.split_at(middle));
         let [above, below] = self.bending.plate.halves();
         let x_of_all = &*padded;
         let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
-        let (a, b) = rayon::join(|| run(half(first, above, one)), || run(half(second, below, other)));
+        let (a, b) =
+            rayon::join(|| run(half((first, slack), above, one)), || run(half((second, other_slack), below, other)));
         let weight = self.join(padded, [one, other], gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
@@ -79,7 +81,7 @@ impl Cloth {
 /// Membrane and bending of half the triangles and half the pairs.
 struct Half<'a> {
     cloth: &'a Cloth,
-    packs: &'a [TrianglePack],
+    packs: (&'a [TrianglePack], &'a [Four]),
     vertices: Range<usize>,
     x: &'a [Four],
     gradient: &'a mut Vec<Four>,

@@ -31,8 +31,8 @@ impl Cloth {
                 .enumerate()
                 .map(|(v, mass)| DMat3::from_diagonal(DVec3::splat(self.bending.plate.own(v) + damping * mass))),
         );
-        for t in &self.triangles {
-            for (&v, block) in t.vertices.iter().zip(t.own_blocks(self.stiffness_of(t), x)) {
+        for (t, &slack) in self.triangles.iter().zip(&*self.slack) {
+            for (&v, block) in t.vertices.iter().zip(t.own_blocks(self.stiffness_of(t), slack, x)) {
                 blocks[v as usize] += block;
             }
         }
@@ -57,8 +57,8 @@ impl Cloth {
     ) {
         blocks.clear();
         blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
-        for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
-            let parts = t.hessian(self.stiffness_of(t), x, bearing);
+        for ((t, &slack), slots) in self.triangles.iter().zip(&*self.slack).zip(&layout.triangle_slots) {
+            let parts = t.hessian(self.stiffness_of(t), slack, x, bearing);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };

@@ -54,8 +54,6 @@ pub struct Triangle {
     pub area: f64,
     /// Gradients b_i of the shape functions, 1/m.
     pub gradients: [DVec2; 3],
-    /// Share r of the stiffness that is left under compression.
-    pub slack: f64,
     /// Whether it is a sliver, and counts as higher than it is.
     pub sliver: bool,
     /// Number of the fabric it is cut from.
@@ -165,10 +163,15 @@ impl Triangle {
             vertices,
             area: 0.5 * double.abs(),
             gradients: [gradient(b, c), gradient(c, a), gradient(a, b)],
-            slack: if sliver { 0.0 } else { SLACK },
             sliver,
             fabric: 0,
         })
+    }
+
+    /// Share r of the stiffness that is left under compression: [`SLACK`], and of a sliver none.
+    #[must_use]
+    pub fn slack(&self) -> f64 {
+        if self.sliver { 0.0 } else { SLACK }
     }
 
     /// Length of its longest side at rest, m.
@@ -186,21 +189,21 @@ impl Triangle {
         [(b - a) * p.x + (c - a) * q.x, (b - a) * p.y + (c - a) * q.y]
     }
 
-    /// Energy A ψ, J.
+    /// Energy A ψ, J, with share r left under compression.
     #[must_use]
-    pub fn energy(&self, c: &Stiffness, x: &[DVec3]) -> f64 {
+    pub fn energy(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> f64 {
         let [fu, fv] = self.deformation(x);
         let (su, sv, gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
-        let k = c.tangent(self.slack, su, sv);
+        let k = c.tangent(r, su, sv);
         self.area * (0.5 * k.uu * su * su + k.uv * su * sv + 0.5 * k.vv * sv * sv + 0.5 * c.shear * gamma * gamma)
     }
 
     /// Adds the energy's gradient to `gradient`, N; returns the energy.
-    pub fn add_gradient(&self, c: &Stiffness, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+    pub fn add_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length(), fv.length());
         let (su, sv, gamma) = (lu - 1.0, lv - 1.0, fu.dot(fv));
-        let k = c.tangent(self.slack, su, sv);
+        let k = c.tangent(r, su, sv);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * gamma);
         let pu = self.area * (fu * (tu / lu.max(SHORTEST)) + fv * tau);
         let pv = self.area * (fv * (tv / lv.max(SHORTEST)) + fu * tau);
@@ -213,8 +216,8 @@ impl Triangle {
     /// The Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m: its positive part, or the `bearing` one, exact but for
     /// compression past what the triangle bears and not always positive.
     #[must_use]
-    pub fn hessian(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
-        let [huu, huv, hvv] = self.by_gradient(c, x, bearing);
+    pub fn hessian(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
+        let [huu, huv, hvv] = self.by_gradient(c, r, x, bearing);
         let block = |i: usize, j: usize| {
             let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
             huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)
@@ -223,11 +226,11 @@ impl Triangle {
     }
 
     /// Second derivatives of ψ by F_u and F_v: uu, uv, vv, N/m.
-    pub(crate) fn by_gradient(&self, c: &Stiffness, x: &[DVec3], bearing: bool) -> [DMat3; 3] {
+    pub(crate) fn by_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 3] {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
         let (u, v) = (fu / lu, fv / lv);
-        let k = c.tangent(self.slack, lu - 1.0, lv - 1.0);
+        let k = c.tangent(r, lu - 1.0, lv - 1.0);
         let (su, sv) = (lu - 1.0, lv - 1.0);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * fu.dot(fv));
         let n = fu.cross(fv).normalize_or_zero();
@@ -245,8 +248,8 @@ impl Triangle {
     }
 
     /// The corners' own blocks of the positive [`hessian`](Self::hessian), N/m.
-    pub(crate) fn own_blocks(&self, c: &Stiffness, x: &[DVec3]) -> [DMat3; 3] {
-        let [huu, huv, hvv] = self.by_gradient(c, x, false);
+    pub(crate) fn own_blocks(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> [DMat3; 3] {
+        let [huu, huv, hvv] = self.by_gradient(c, r, x, false);
         let both = huv + huv.transpose();
         self.gradients.map(|g| (huu * (g.x * g.x) + hvv * (g.y * g.y) + both * (g.x * g.y)) * self.area)
     }

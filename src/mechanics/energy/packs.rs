@@ -26,7 +26,6 @@ pub(super) struct TrianglePack {
     second: [Four; 2],
     third: [Four; 2],
     area: Four,
-    slack: Four,
     vertices: [[u32; 3]; 4],
     fabric: u16,
 }
@@ -34,12 +33,7 @@ pub(super) struct TrianglePack {
 impl TrianglePack {
     /// Of all triangles, fabric by fabric, each in their order.
     pub(super) fn all(triangles: &[Triangle]) -> Vec<Self> {
-        if triangles.iter().all(|t| t.fabric == triangles[0].fabric) {
-            return triangles.chunks(4).map(Self::new).collect();
-        }
-        let mut sorted = triangles.to_vec();
-        sorted.sort_by_key(|t| t.fabric);
-        sorted.chunk_by(|a, b| a.fabric == b.fabric).flat_map(|same| same.chunks(4).map(Self::new)).collect()
+        by_fours(triangles, triangles, Self::new)
     }
 
     fn new(four: &[Triangle]) -> Self {
@@ -47,7 +41,6 @@ impl TrianglePack {
             second: [Four::ZERO; 2],
             third: [Four::ZERO; 2],
             area: Four::ZERO,
-            slack: Four::ZERO,
             vertices: [[0; 3]; 4],
             fabric: four[0].fabric,
         };
@@ -55,34 +48,57 @@ impl TrianglePack {
             let [_, p, q] = t.gradients;
             (pack.second[0].0[i], pack.second[1].0[i]) = (p.x, p.y);
             (pack.third[0].0[i], pack.third[1].0[i]) = (q.x, q.y);
-            (pack.area.0[i], pack.slack.0[i]) = (t.area, t.slack);
+            pack.area.0[i] = t.area;
             pack.vertices[i] = t.vertices;
         }
         pack
     }
 }
 
+/// What each triangle has one of, in the order of their packs.
+pub(super) fn packed(triangles: &[Triangle], of_each: &[f64]) -> Vec<Four> {
+    by_fours(triangles, of_each, |few| Four(std::array::from_fn(|i| few.get(i).copied().unwrap_or(0.0))))
+}
+
+/// What up to four triangles of one fabric have, four after four.
+fn by_fours<T: Copy, U>(triangles: &[Triangle], of_each: &[T], four: impl Fn(&[T]) -> U) -> Vec<U> {
+    if triangles.iter().all(|t| t.fabric == triangles[0].fabric) {
+        return of_each.chunks(4).map(four).collect();
+    }
+    let mut sorted: Vec<(u16, T)> = triangles.iter().map(|t| t.fabric).zip(of_each.iter().copied()).collect();
+    sorted.sort_by_key(|t| t.0);
+    let few = sorted.chunk_by(|a, b| a.0 == b.0).flat_map(|same| same.chunks(4));
+    few.map(|few| four(&few.iter().map(|t| t.1).collect::<Vec<T>>())).collect()
+}
+
 /// Adds the gradient of the triangles to `gradient`, N, by the stiffness of the fabric of each; returns their energy, J.
 #[inline(always)]
 pub(super) fn add_gradient<L: Lanes>(
     l: L,
-    packs: &[TrianglePack],
+    (packs, slack): (&[TrianglePack], &[Four]),
     stiffness: &[Stiffness],
     x: &[Four],
     gradient: &mut [Four],
 ) -> f64 {
     let mut energy = 0.0;
-    let mut left = packs;
+    let (mut left, mut left_slack) = (packs, slack);
     while let Some(first) = left.first() {
-        let (same, others) = left.split_at(left.partition_point(|pack| pack.fabric == first.fabric));
-        energy += of_one_fabric(l, same, &stiffness[first.fabric as usize], x, gradient);
-        left = others;
+        let end = left.partition_point(|pack| pack.fabric == first.fabric);
+        let ((same, others), (slack, others_slack)) = (left.split_at(end), left_slack.split_at(end));
+        energy += of_one_fabric(l, (same, slack), &stiffness[first.fabric as usize], x, gradient);
+        (left, left_slack) = (others, others_slack);
     }
     energy
 }
 
 #[inline(always)]
-fn of_one_fabric<L: Lanes>(l: L, packs: &[TrianglePack], c: &Stiffness, x: &[Four], gradient: &mut [Four]) -> f64 {
+fn of_one_fabric<L: Lanes>(
+    l: L,
+    (packs, slack): (&[TrianglePack], &[Four]),
+    c: &Stiffness,
+    x: &[Four],
+    gradient: &mut [Four],
+) -> f64 {
     // Of one length, so that one check of an index does for both.
     let gradient = &mut gradient[..x.len()];
     let (zero, one, half) = (Pack::splat(l, 0.0), Pack::splat(l, 1.0), Pack::splat(l, 0.5));
@@ -90,7 +106,7 @@ fn of_one_fabric<L: Lanes>(l: L, packs: &[TrianglePack], c: &Stiffness, x: &[Fou
     let (cuu, cuv, cvv) = (Pack::splat(l, c.uu), Pack::splat(l, c.uv), Pack::splat(l, c.vv));
     let (weft, warp, shear) = (Pack::splat(l, c.weft), Pack::splat(l, c.warp), Pack::splat(l, c.shear));
     let mut energy = zero;
-    for pack in packs {
+    for (pack, slack) in packs.iter().zip(slack) {
         // By value: a reference would be read, and checked, again after every store.
         let [t0, t1, t2, t3] = pack.vertices;
         let ((a0, b0), (a1, b1)) = (edges(l, x, t0), edges(l, x, t1));
@@ -98,7 +114,7 @@ fn of_one_fabric<L: Lanes>(l: L, packs: &[TrianglePack], c: &Stiffness, x: &[Fou
         let (a, b) = (Vectors::from_rows(l, [a0, a1, a2, a3]), Vectors::from_rows(l, [b0, b1, b2, b3]));
         let [pu, pv] = [Pack::load(l, &pack.second[0]), Pack::load(l, &pack.second[1])];
         let [qu, qv] = [Pack::load(l, &pack.third[0]), Pack::load(l, &pack.third[1])];
-        let (area, r) = (Pack::load(l, &pack.area), Pack::load(l, &pack.slack));
+        let (area, r) = (Pack::load(l, &pack.area), Pack::load(l, slack));
         let (fu, fv) = (a * pu + b * qu, a * pv + b * qv);
         let (lu, lv, gamma) = (fu.dot(fu).sqrt(), fv.dot(fv).sqrt(), fu.dot(fv));
         let (su, sv) = (lu - one, lv - one);
@@ -144,7 +160,7 @@ mod tests {
     use crate::fabric::Fabric;
     use crate::lanes::{Work, run};
 
-    struct Packed<'a>(&'a [TrianglePack], &'a [Stiffness], &'a [Four], &'a mut [Four]);
+    struct Packed<'a>((&'a [TrianglePack], &'a [Four]), &'a [Stiffness], &'a [Four], &'a mut [Four]);
 
     impl Work for Packed<'_> {
         type Output = f64;
@@ -172,22 +188,24 @@ mod tests {
         let scales = [[1.05, 1.1], [0.8, 1.2], [1.3, 0.7], [0.6, 0.5], [1.2, 0.999], [0.0, 1.1], [1.0, 1.0]];
         for (count, fabrics) in (1..=scales.len()).flat_map(|count| [(count, 1), (count, 2)]) {
             let mut x: Vec<DVec3> = Vec::new();
-            let mut triangles = Vec::new();
+            let (mut triangles, mut slack) = (Vec::new(), Vec::new());
             for (i, scale) in scales.iter().enumerate().take(count) {
                 let first = x.len() as u32;
                 let mut t = Triangle::new([first, first + 1, first + 2], rest(i)).unwrap();
-                t.slack = 0.1 + 0.02 * i as f64;
+                slack.push(0.1 + 0.02 * i as f64);
                 t.fabric = (i % fabrics) as u16;
                 triangles.push(t);
                 let turned = |p: DVec2| DVec3::new(0.8 * p.x, p.y, -0.6 * p.x) + DVec3::new(0.3, 0.1, 1.2);
                 x.extend(rest(i).map(|p| turned(p * DVec2::from(*scale))));
             }
             let mut expected = vec![DVec3::ZERO; x.len()];
+            let one_by_one = triangles.iter().zip(&slack);
             let energy: f64 =
-                triangles.iter().map(|t| t.add_gradient(&stiffness[t.fabric as usize], &x, &mut expected)).sum();
+                one_by_one.map(|(t, &r)| t.add_gradient(&stiffness[t.fabric as usize], r, &x, &mut expected)).sum();
             let padded: Vec<Four> = x.iter().map(|p| Four([p.x, p.y, p.z, 0.0])).collect();
             let mut gradient = vec![Four::ZERO; x.len()];
-            let packed = run(Packed(&TrianglePack::all(&triangles), &stiffness, &padded, &mut gradient));
+            let packs = (&*TrianglePack::all(&triangles), &*packed(&triangles, &slack));
+            let packed = run(Packed(packs, &stiffness, &padded, &mut gradient));
             assert!((packed - energy).abs() < 1e-12 * energy, "{count} triangles: {packed} J packed, {energy} J");
             for (v, (g, expected)) in gradient.iter().zip(&expected).enumerate() {
                 let Four([gx, gy, gz, zero]) = *g;

@@ -73,7 +73,7 @@ pub(in crate::mechanics) fn touching_between(
 ) -> Vec<([u32; 3], [f64; 3], DVec3)> {
     let far: Vec<f64> = body.nearest_all(x).iter().map(|near| near.signed_distance).collect();
     let mut asked: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
-    for t in &cloth.triangles {
+    for t in &*cloth.triangles {
         let keeps = offset(cloth, t) + margin;
         let corners = t.vertices.map(|v| x[v as usize]);
         let clear = |at: DVec3| {
