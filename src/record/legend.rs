@@ -62,16 +62,35 @@ impl Legend<'_> {
         // The viewer writes a text under its point.
         let mut places = vec![single([x + 0.5 * STRIP[0], y - 0.5])];
         let mut labels = vec![format!("{}, {}", self.title, self.unit)];
-        let steps = steps(self.range.high);
-        for tick in 0..=steps {
-            let t = f64::from(tick) / f64::from(steps);
-            let value = self.range.low + t * (self.range.high - self.range.low);
-            let bound = if self.open_end && tick == steps { "≥" } else { "" };
+        for (t, label) in self.ticks() {
             places.push(single([at(t), y + THICKNESS + DROP]));
-            labels.push(format!("{bound}{}", number(value)));
+            labels.push(label);
         }
         open.log(&format!("{path}/ticks"), &texts(places, labels))
     }
+
+    /// The numbers under the strip, and how far along it: in halves where more of them would lie over each other.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let by = |steps: u32| -> Vec<(f64, String)> {
+            let all = (0..=steps).map(|tick| {
+                let t = f64::from(tick) / f64::from(steps);
+                let bound = if self.open_end && tick == steps { "≥" } else { "" };
+                (t, format!("{bound}{}", number(self.range.low + t * (self.range.high - self.range.low))))
+            });
+            all.collect()
+        };
+        let round = by(steps(self.range.high));
+        let widest = round.windows(2).map(|two| 0.5 * (width(&two[0].1) + width(&two[1].1))).fold(0.0, f64::max);
+        if widest * (round.len() - 1) as f64 > ROOM { by(2) } else { round }
+    }
+}
+
+/// Digits that have room side by side under a strip, in a window 1280 wide.
+const ROOM: f64 = 13.0;
+
+/// Width of a number, in digits.
+fn width(label: &str) -> f64 {
+    label.chars().map(|c| if c == '.' { 0.5 } else { 1.0 }).sum()
 }
 
 /// A line of text in the middle of a place of the drawing.
@@ -127,7 +146,7 @@ pub(crate) fn number(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{CAPTION, number, steps, titled};
+    use super::{CAPTION, ColourMap, Legend, Range, number, steps, titled};
 
     #[test]
     fn ticks_are_round() {
@@ -136,6 +155,19 @@ mod tests {
         {
             assert_eq!(steps(high), expected, "{high}");
         }
+    }
+
+    #[test]
+    fn numbers_lie_beside_each_other() {
+        let told = |high: f64, open_end: bool| {
+            let range = Range { low: 0.0, high };
+            let legend = Legend { title: "error", unit: "mm", map: ColourMap::ALARM, range, open_end };
+            legend.ticks().into_iter().map(|tick| tick.1).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(told(25.0, false), "0 5 10 15 20 25");
+        assert_eq!(told(2.5, false), "0 0.5 1 1.5 2 2.5");
+        assert_eq!(told(250.0, true), "0 125 ≥250");
+        assert_eq!(told(300.0, true), "0 100 200 ≥300");
     }
 
     #[test]

@@ -107,7 +107,7 @@ pub(crate) fn explained(rows: &[Row]) -> &'static str {
 
 /// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
 pub(crate) fn rows_table(rows: &[Row]) -> Table {
-    let header = ["", "garment", "table", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"];
+    let header = ["", "garment", "setting", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"];
     let mut table = console::table(console::OPEN, header, [0].into_iter().chain(3..));
     let refs: Vec<&Row> = rows.iter().collect();
     let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
