@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::{DQuat, DVec3};
 use partwise::distance::Body;
+use partwise::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine};
 use partwise::mesh::{RestShape, Topology, TriMesh};
@@ -90,4 +91,24 @@ fn a_cloth_rests_on_a_sphere() {
     assert!(end.positions.iter().all(|&p| body.nearest(p).signed_distance >= 0.0), "a vertex is inside");
     assert!(drift(&mesh, &end).truncate().length() < 5e-3, "slid off centre");
     assert!(end.positions[0].z < 0.03, "the corner stays at {}", end.positions[0].z);
+}
+
+/// Over an edge of a radius of 8 mm the rounded distance is more than the exact one by more than this cloth is thick.
+#[test]
+fn a_thin_cloth_keeps_out_of_a_narrow_edge_without_pressing_harder() {
+    let body = table(0.05, 0.008);
+    let mut mesh = rectangle(DVec3::X * 0.2, DVec3::Y * 0.01, 100, 5);
+    for p in &mut mesh.positions {
+        *p += DVec3::new(-0.1, -0.005, 5e-4);
+    }
+    let fabric = Fabric { thickness_m: 5e-5, ..fabric(0.2, 300.0, 0.2, 5e-6, 0.3) };
+    let (topology, rest) = (Topology::new(&mesh), RestShape::from_edges(&mesh).unwrap());
+    let middle: Vec<u32> = (0..=5).map(|row| 101 * row + 50).collect();
+    let cloth = Cloth::new(&mesh, &topology, &rest, &fabric, &middle).unwrap();
+    let options = RefineOptions { max_steps: Some(200), ..RefineOptions::default() };
+    let end = refine(&cloth, &body, mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let least = end.positions.iter().map(|&p| body.nearest(p).signed_distance).fold(1.0, f64::min);
+    assert_eq!(end.stop, Stop::Converged, "{} steps, residual {:e}", end.steps, end.residual_over_weight);
+    assert!(least >= 0.0, "inside by {least:e} m");
+    assert_eq!(end.contact_stiffness, cloth.contact_stiffness());
 }

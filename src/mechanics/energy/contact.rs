@@ -82,7 +82,7 @@ pub struct Contacts<'b> {
     /// The vertices that may be near, of the last [`update`](Self::update).
     near: Vec<u32>,
     stiffness: f64,
-    touches: Vec<Touch>,
+    pub(super) touches: Vec<Touch>,
     /// Where the cloth holds on to the body.
     pub friction: Friction,
     /// Where the cloth meets itself; not asked where there is none.
@@ -246,16 +246,6 @@ impl<'b> Contacts<'b> {
             Met::Planes(body) => Some(body),
             Met::Rounded(field) => Some(field.body()),
         }
-    }
-
-    /// Vertices inside the body at the positions `x` last updated, and the deepest's depth (m), by the exact distance.
-    #[must_use]
-    pub fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
-        let Some(body) = self.body() else { return (0, 0.0) };
-        // The rounded distance is more than the exact one by less than the lattice's side: see `field`.
-        let near = self.touches.iter().filter(|t| self.offsets[t.vertex as usize] - t.depth < SIDE);
-        let exact = near.map(|t| -body.nearest(x[t.vertex as usize]).signed_distance);
-        exact.filter(|&d| d > 0.0).fold((0, 0.0), |(n, deepest), d| (n + 1, d.max(deepest)))
     }
 
     /// Contact energy, J, without friction.

@@ -25,6 +25,7 @@ pub mod field;
 pub mod friction;
 pub mod gravity;
 mod hessian;
+mod inside;
 mod known;
 mod layout;
 pub mod membrane;

@@ -127,7 +127,7 @@ fn settle(
         }
         if !soft && descent.residual < options.tolerance {
             if descent.contacts.penetration(&descent.x).0 > 0 {
-                descent.contacts.stiffen(4.0);
+                descent.contacts.keep_out(&descent.x);
             } else {
                 let Descent { contacts, x, .. } = &mut descent;
                 let covered = if options.self_contact { contacts.cover(cloth, x) } else { Covered::Done };
