@@ -37,10 +37,12 @@ impl Contacts<'_> {
         self.inside(x).fold((0, 0.0), |(n, deepest), inside| (n + 1, deepest.max(-inside.exact)))
     }
 
-    /// Keeps out what is inside the body at the positions `x` last updated; takes effect with the next [`update`](Self::update).
-    pub fn keep_out(&mut self, x: &[DVec3]) {
-        let mut pressed = false;
-        for Inside { vertex, rounded, exact } in self.inside(x).collect::<Vec<_>>() {
+    /// Keeps out what is inside the body at the positions `x` last updated, if anything is; takes effect with the next
+    /// [`update`](Self::update).
+    pub fn keep_out(&mut self, x: &[DVec3]) -> bool {
+        let inside: Vec<Inside> = self.inside(x).collect();
+        let (any, mut pressed) = (!inside.is_empty(), false);
+        for Inside { vertex, rounded, exact } in inside {
             let v = vertex as usize;
             self.offsets[v] += (rounded - exact).max(0.0);
             self.keep(v, x[v], rounded);
@@ -49,6 +51,7 @@ impl Contacts<'_> {
         if pressed {
             self.stiffen(STIFFER);
         }
+        any
     }
 
     fn inside(&self, x: &[DVec3]) -> impl Iterator<Item = Inside> {

@@ -126,9 +126,7 @@ fn settle(
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
-            if descent.contacts.penetration(&descent.x).0 > 0 {
-                descent.contacts.keep_out(&descent.x);
-            } else {
+            if !descent.contacts.keep_out(&descent.x) {
                 let Descent { contacts, x, .. } = &mut descent;
                 let covered = if options.self_contact { contacts.cover(cloth, x) } else { Covered::Done };
                 covering = (covered != Covered::Done).then_some(iteration);
