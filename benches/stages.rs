@@ -70,7 +70,7 @@ fn setting_up(bencher: Bencher<'_, '_>, vertices: usize) {
     let (job, loaded) = job(vertices, Refine::Steps(0));
     bencher.bench(|| {
         let cloth = cloth_of(&job, &loaded);
-        Solver::new(cloth.pattern()).unwrap()
+        Solver::new(cloth.pattern())
     });
 }
 
@@ -88,7 +88,7 @@ fn newton_step(bencher: Bencher<'_, '_>, vertices: usize) {
     let cloth = cloth_of(&job, &loaded);
     let x = &loaded.scene.garment.positions;
     let contacts: Contacts<'_> = cloth.contacts(&loaded.scene.body, x);
-    let mut solver = Solver::new(cloth.pattern()).unwrap();
+    let mut solver = Solver::new(cloth.pattern());
     let damped: Vec<f64> = cloth.order().iter().map(|&v| 300.0 * cloth.masses[v as usize]).collect();
     let (mut gradient, mut blocks, mut scratch) = (Vec::new(), Vec::new(), Scratch::default());
     bencher.bench_local(|| {

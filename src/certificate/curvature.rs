@@ -58,7 +58,7 @@ impl Curvature {
         }
         let damped: Vec<f64> = layout.order.iter().map(|&v| cloth.masses[v as usize] * DAMPING).collect();
         let curved = Curved { cloth, layout: &layout, x, held };
-        let mut solver = Solver::new(&layout.pattern)?;
+        let mut solver = Solver::new(&layout.pattern);
         let mut step = curved.gather(&forces.rest);
         step.iter_mut().for_each(|d| *d = -*d);
         solver.solve(&layout.pattern, &blocks, &damped, true, &mut step)?;

@@ -27,12 +27,12 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    pub(super) fn new(cloth: &Cloth, mut motions: Motions) -> Result<Self, SolveError> {
+    pub(super) fn new(cloth: &Cloth, mut motions: Motions) -> Self {
         let layout = Layout::new(cloth, &mut motions);
-        let solver = Solver::new(&layout.pattern)?;
+        let solver = Solver::new(&layout.pattern);
         let undamped = vec![0.0; motions.unknowns()];
         let sums = [Sums::default(), Sums::default()];
-        Ok(Self { motions, layout, solver, blocks: Vec::new(), sums, unknowns: Vec::new(), undamped })
+        Self { motions, layout, solver, blocks: Vec::new(), sums, unknowns: Vec::new(), undamped }
     }
 
     /// Unknown vectors.

@@ -124,7 +124,7 @@ pub fn solve_given(
     }
     let began = Instant::now();
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
-    let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion))?;
+    let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion));
     let loose = cloth.clone().with_slack(slack::shares(mesh, parts, cloth));
     // What is laid flat hangs no less for that: without a height its cloth would be as soft as air, and stretch over any head.
     let height = mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT * (high - low).max_element()));

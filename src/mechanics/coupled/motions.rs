@@ -224,7 +224,7 @@ impl Motions {
         let mut unknowns = Vec::new();
         self.restrict(x, u, &mut unknowns);
         let none = vec![0.0; self.unknowns];
-        Solver::new(&pattern)?.solve(&pattern, &blocks, &none, true, &mut unknowns)?;
+        Solver::new(&pattern).solve(&pattern, &blocks, &none, true, &mut unknowns)?;
         let mut out = Vec::new();
         self.prolong(x, &unknowns, &mut out);
         Ok(out)

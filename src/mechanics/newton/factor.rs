@@ -63,7 +63,7 @@ impl<T: Precision> Factor<T> {
         }
         let unknowns = 3 * forest.order.len();
         let room = || {
-            let failed = |e| SolveError::Analysis { unknowns, reason: format!("{e:?}") };
+            let failed = |e| SolveError::NoRoom { unknowns, reason: format!("{e:?}") };
             MemBuffer::try_new(memory::<T>()).map_err(failed)
         };
         for grove in &forest.groves {

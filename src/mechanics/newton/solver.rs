@@ -22,9 +22,9 @@ use crate::mechanics::energy::pattern::Pattern;
 /// What can go wrong in a solve.
 #[derive(Debug, thiserror::Error)]
 pub enum SolveError {
-    /// The symbolic analysis failed.
-    #[error("the Hessian of {unknowns} unknowns cannot be analysed: {reason}")]
-    Analysis {
+    /// No memory to factorise in.
+    #[error("no memory to factorise the Hessian of {unknowns} unknowns ({reason}): take a garment of fewer vertices")]
+    NoRoom {
         /// Scalar unknowns.
         unknowns: usize,
         /// What faer said.
@@ -68,12 +68,9 @@ impl std::fmt::Debug for Solver {
 
 impl Solver {
     /// Analyses the pattern.
-    ///
-    /// # Errors
-    /// [`SolveError::Analysis`] where memory or index range do not suffice.
-    pub fn new(pattern: &Pattern) -> Result<Self, SolveError> {
-        let forest = Forest::new(pattern);
-        Ok(Self { forest, single: Some(Factor::default()), double: Factor::default() })
+    #[must_use]
+    pub fn new(pattern: &Pattern) -> Self {
+        Self { forest: Forest::new(pattern), single: Some(Factor::default()), double: Factor::default() }
     }
 
     /// Numbers in the factor: a measure of its cost.
@@ -211,7 +208,7 @@ mod tests {
             pull[i].z = [-1e-2, 0.0, 0.0, 0.0, 0.0, 1e-2][row as usize];
         }
         let mut x = pull.clone();
-        let mut solver = Solver::new(pattern).unwrap();
+        let mut solver = Solver::new(pattern);
         let lost = solver.solve(pattern, &blocks, &none, false, &mut x);
         assert!(matches!(lost, Err(SolveError::NotPositive { .. })), "{lost:?}");
         solver.solve(pattern, &blocks, &none, true, &mut x).unwrap();

@@ -36,10 +36,7 @@ impl Whole {
         let State { cloth, x, contacts, gradient, damping } = *here;
         let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
         cloth.hessian_in(layout, bearing, x, contacts, &mut self.blocks);
-        let solver = match &mut self.solver {
-            Some(solver) => solver,
-            none => none.insert(Solver::new(&layout.pattern)?),
-        };
+        let solver = self.solver.get_or_insert_with(|| Solver::new(&layout.pattern));
         self.damped.clear();
         self.damped.extend(layout.order.iter().map(|&v| cloth.masses[v as usize] * damping));
         self.unknowns.clear();

@@ -170,8 +170,8 @@ fn settle(
         }
         if std::mem::take(&mut fresh) {
             let analysed = tangent.solver.take();
-            let analyse = || analysed.map_or_else(|| Solver::new(cloth.pattern()), Ok);
-            tangent.solver = Some(descent.relax(RELAXING, analyse)?);
+            let analyse = || analysed.unwrap_or_else(|| Solver::new(cloth.pattern()));
+            tangent.solver = Some(descent.relax(RELAXING, analyse));
         }
         descent.farthest = if !soft && descent.residual < CLOSE { FARTHEST } else { 1.0 };
         let advance = descent.advance(&mut tangent, pace)?;
