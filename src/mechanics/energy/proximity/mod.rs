@@ -262,8 +262,9 @@ impl Proximity {
 
     /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until no more crosses than does there.
     pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
-        let placed = self.passage.anew(&self.clear);
-        if self.passage.known(x).len() <= placed.len() {
+        let crossing = self.passage.known(x).len();
+        let placed = if crossing > 0 { self.passage.anew(&self.clear) } else { Vec::new() };
+        if crossing <= placed.len() {
             return;
         }
         let end = std::mem::take(x);
