@@ -80,3 +80,41 @@ fn crossing(skin: &Skin, x: &[DVec3], edge: usize, triangle: usize, stiffness: f
     gap.goal = gap.normal.dot(gap.across(x)) + stride;
     (length > 1e-6 && gap.goal.is_finite()).then_some(gap)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::mechanics::energy::Cloth;
+    use crate::mesh::TriMesh;
+    use crate::mesh::samples::sheet;
+
+    /// A sheet folded over, whose upper layer is under the lower one in those rows: it crosses it where it changes sides.
+    fn folded(under: impl Fn(u32) -> bool) -> TriMesh {
+        sheet(14, 14, |i, j| {
+            let upper = if under(j as u32) { -0.4 } else { 0.6 };
+            let height = upper * ((i - 6.0) / 2.0).clamp(0.0, 1.0);
+            DVec3::new(i.min(14.0 - i) + 0.3 * height, j, height) * 0.01
+        })
+    }
+
+    #[test]
+    fn a_start_goes_back_until_no_more_crosses_than_how_it_was_placed() {
+        for rows in [0, 1] {
+            let mesh = folded(|j| j < rows);
+            let cloth = Cloth::sample(&mesh, "jersey", &[]);
+            let there = cloth.proximity().crossings(&mesh.positions);
+            let mut start = folded(|j| j % 4 < 2).positions;
+            let before = cloth.proximity().crossings(&start);
+            assert!(before > there && (there > 0) == (rows > 0), "{before} and {there}");
+            let mut itself = cloth.proximity();
+            itself.clear(&mut start);
+            let after = cloth.proximity().crossings(&start);
+            assert!(after <= there && itself.crossings(&start) == after, "{after} of {before}, {there} as placed");
+            // What crosses no more stays where it is.
+            let stays = start.clone();
+            cloth.proximity().clear(&mut start);
+            assert_eq!(start, stays);
+        }
+    }
+}
