@@ -260,11 +260,10 @@ impl Proximity {
         self.passage.look(from, to)
     }
 
-    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until no more crosses than does there.
+    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses; leaves it as it is
+    /// where something crosses there too.
     pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
-        let crossing = self.passage.known(x).len();
-        let placed = if crossing > 0 { self.passage.anew(&self.clear) } else { Vec::new() };
-        if crossing <= placed.len() {
+        if self.passage.known(x).is_empty() || !self.passage.anew(&self.clear).is_empty() {
             return;
         }
         let end = std::mem::take(x);
@@ -272,15 +271,15 @@ impl Proximity {
         while share > LEAST_SHARE {
             share *= BACK;
             let there: Vec<DVec3> = self.clear.iter().zip(&end).map(|(a, b)| a.lerp(*b, share)).collect();
-            let crossing = self.passage.anew(&there);
-            if crossing.len() <= placed.len() {
+            if self.passage.anew(&there).is_empty() {
                 *x = there;
-                self.passage.begin(crossing);
-                return;
+                break;
             }
         }
-        x.clone_from(&self.clear);
-        self.passage.begin(placed);
+        if x.is_empty() {
+            x.clone_from(&self.clear);
+        }
+        self.passage.begin(Vec::new());
     }
 
     /// Puts the cloth from `x` to another place (m), if it crosses itself no more there; whether it did.
