@@ -27,6 +27,7 @@ mod onward;
 mod record;
 pub(crate) mod relax;
 mod solver;
+mod start;
 mod substitute;
 mod supernodes;
 mod vectors;
@@ -192,16 +193,6 @@ impl<'c, 'b> Descent<'c, 'b> {
         self.contacts.refresh(&self.x);
         self.evaluate();
         out
-    }
-
-    /// Untangles the start: relaxes it, what crosses asked apart, as often as it takes or `rounds` at most.
-    pub(crate) fn untangle(&mut self, rounds: usize, iterations: usize) {
-        for _ in 0..rounds {
-            if self.contacts.proximity.as_mut().is_none_or(|p| p.crossings(&self.x) == 0) {
-                return;
-            }
-            self.relax(iterations, || ());
-        }
     }
 
     /// One iteration. The damping is the caller's to change afterwards.

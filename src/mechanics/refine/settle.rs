@@ -110,7 +110,7 @@ fn settle(
         descent.evaluate();
     }
     if limit > 0 {
-        descent.untangle(UNTANGLING, RELAXING);
+        descent.untangle_or_go_back(UNTANGLING, RELAXING);
     }
     let mut tangent = Whole::default();
     // Whether the energy is new to these positions: at the start, and when the cloth gets its true stiffness.

@@ -17,8 +17,7 @@
 //!
 //! A penalty alone lets cloth through. So every step is looked at before it is taken (`passage.rs`): one that would cross is made shorter
 //! or cut where it does, and there are gaps the next time. A garment without a crossing stays without; one that crosses to begin with goes
-//! back towards where it is known not to (`clear`: how it was placed, or put over what lies below it), or finds its own way out
-//! (`untangle.rs`).
+//! back towards where it is known not to (`start.rs`), or finds its own way out (`untangle.rs`).
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -37,6 +36,7 @@ mod passage;
 mod place;
 mod search;
 mod skin;
+mod start;
 mod untangle;
 
 use std::sync::Arc;
@@ -76,12 +76,6 @@ const STIFFER: f64 = 2.0;
 
 /// At most so many times as stiff as it began.
 const MOST_STIFF: f64 = 64.0;
-
-/// A start that crosses goes back by this factor at a time,
-const BACK: f64 = 0.7;
-
-/// and is as it was placed where this share of the way still crosses.
-const LEAST_SHARE: f64 = 0.02;
 
 /// Refreshes without fewer crossings after which what crosses is left as it is.
 const PATIENCE: usize = 40;
@@ -258,28 +252,6 @@ impl Proximity {
     /// Looks at the step from `from`, where the last one ended, to `to`: see [`Looked`].
     pub(crate) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
         self.passage.look(from, to)
-    }
-
-    /// Takes `x` (m) back towards where the cloth is clear of itself, how it was placed mostly, until nothing crosses; leaves it as it is
-    /// where something crosses there too.
-    pub(crate) fn clear(&mut self, x: &mut Vec<DVec3>) {
-        if self.passage.known(x).is_empty() || !self.passage.anew(&self.clear).is_empty() {
-            return;
-        }
-        let end = std::mem::take(x);
-        let mut share = 1.0;
-        while share > LEAST_SHARE {
-            share *= BACK;
-            let there: Vec<DVec3> = self.clear.iter().zip(&end).map(|(a, b)| a.lerp(*b, share)).collect();
-            if self.passage.anew(&there).is_empty() {
-                *x = there;
-                break;
-            }
-        }
-        if x.is_empty() {
-            x.clone_from(&self.clear);
-        }
-        self.passage.begin(Vec::new());
     }
 
     /// Puts the cloth from `x` to another place (m), if it crosses itself no more there; whether it did.
