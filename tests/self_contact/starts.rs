@@ -59,3 +59,39 @@ fn of_a_hundred_perturbed_starts_four_at_most_fail() {
     // Measured: three, all of those that were moved far.
     assert!(ended.failed.len() <= 4, "{ended:?}");
 }
+
+/// A tube around another, both hung up, with this radius, m, at each (layer, row, column).
+fn tubes(radius: impl Fn(usize, u32, u32) -> f64) -> TriMesh {
+    const AROUND: u32 = 24;
+    const ROWS: u32 = 12;
+    let tube = |layer: usize| {
+        let at = |j: u32, i: u32| {
+            let (s, c) = (TAU * f64::from(i) / f64::from(AROUND)).sin_cos();
+            let r = radius(layer, j, i);
+            DVec3::new(r * c, r * s, -0.01 * f64::from(j))
+        };
+        let positions = (0..=ROWS).flat_map(|j| (0..AROUND).map(move |i| (j, i))).map(|(j, i)| at(j, i)).collect();
+        let corner = |j: u32, i: u32| j * AROUND + i % AROUND;
+        let squares = (0..ROWS).flat_map(|j| (0..AROUND).map(move |i| (j, i)));
+        let triangles = squares.flat_map(|(j, i)| {
+            let [a, b, c, d] = [corner(j, i), corner(j, i + 1), corner(j + 1, i), corner(j + 1, i + 1)];
+            [[a, c, b], [b, c, d]]
+        });
+        TriMesh::new(positions, triangles.collect())
+    };
+    both(tube(0), tube(1))
+}
+
+#[test]
+fn what_no_contour_untangles_begins_where_it_was_placed() {
+    let apart = |layer: usize| [0.05, 0.06][layer];
+    let mesh = tubes(|layer, j, i| if (layer, j, i) == (1, 9, 5) { 0.047 } else { apart(layer) });
+    // From there down the inner tube is outside: the circle along which they cross is as long wherever it is.
+    let start = tubes(|layer, j, _| if layer == 0 && j >= 5 { 0.07 } else { apart(layer) }).positions;
+    let held: Vec<u32> = (0..24).chain(13 * 24..14 * 24).collect();
+    let (placed, began) = (crossings(&mesh, &mesh.positions), crossings(&mesh, &start));
+    assert!(placed > 0 && began > 5 * placed, "{placed} as placed, {began} at the start");
+    let end = rests(&mesh, &held, None, start);
+    // Three; 52 where the circle has to slide off the lower edge.
+    assert!(end.steps <= 10, "{} steps", end.steps);
+}
