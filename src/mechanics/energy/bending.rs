@@ -31,11 +31,15 @@ use rayon::prelude::*;
 use super::fan::Fan;
 use super::plate::Plate;
 use crate::fabric::Fabric;
+use crate::mesh::rest::SLIVER;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
 /// zero; a good ring changes by less than this.
 const RIDGE: f64 = 1e-6;
+
+/// A spoke shorter than this share of its ring's mean tells nothing of curvature: vertices a micrometre apart would be tied 10⁸ times as stiffly.
+const SHORT: f64 = SLIVER;
 
 /// A floor for H as a share of B_u + B_v: a saddle always costs something.
 const LEAST_TWIST: f64 = 0.1;
@@ -202,12 +206,13 @@ fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
 /// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre's is minus their sum.
 fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
     let scale = spokes.iter().map(|p| p.length()).sum::<f64>() / spokes.len() as f64;
-    // f(p) − f(0) = g·p + ½ f_uu p_u² + f_uv p_u p_v + ½ f_vv p_v², near spokes counting more.
+    // f(p) − f(0) = g·p + ½ f_uu p_u² + f_uv p_u p_v + ½ f_vv p_v², near spokes counting more, but not the shortest.
     let rows: Vec<([f64; 5], f64)> = spokes
         .iter()
         .map(|p| {
             let q = *p / scale;
-            ([q.x, q.y, 0.5 * q.x * q.x, q.x * q.y, 0.5 * q.y * q.y], 1.0 / q.length_squared())
+            let weight = if q.length() < SHORT { 0.0 } else { 1.0 / q.length_squared() };
+            ([q.x, q.y, 0.5 * q.x * q.x, q.x * q.y, 0.5 * q.y * q.y], weight)
         })
         .collect();
     let mut normal = [[0.0; 5]; 5];
@@ -261,4 +266,35 @@ fn substitute(l: &[[f64; 5]; 5], mut b: [f64; 5]) -> [f64; 5] {
         b[i] = (b[i] - sum) / l[i][i];
     }
     b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::samples::sheet;
+
+    /// Cuts a triangle in three by a point next to its first side.
+    fn cut(mesh: &mut TriMesh, t: usize) {
+        let ([a, b, c], [at_a, at_b, at_c]) = (mesh.triangles[t], mesh.corners(t));
+        let (middle, m) = (0.5 * (at_a + at_b), mesh.positions.len() as u32);
+        mesh.positions.push(middle.lerp(at_c, 1e-3));
+        mesh.triangles[t] = [a, m, c];
+        mesh.triangles.extend([[m, b, c], [a, b, m]]);
+    }
+
+    #[test]
+    fn a_sliver_cut_again_ties_nothing_stiffer() {
+        let mut mesh = sheet(6, 6, |i, j| DVec3::new(i, 0.0, j) * 0.01);
+        let stiffest = |mesh: &TriMesh| {
+            let rest = RestShape::from_edges(mesh).unwrap();
+            let denim = Fabric::by_name("denim").unwrap();
+            let bending = Bending::new(mesh, &Topology::new(mesh), &rest, &[denim]);
+            bending.elements().flat_map(|(_, w, k)| w.iter().map(move |w| k.dot(*w * *w))).fold(0.0, f64::max)
+        };
+        let plain = stiffest(&mesh);
+        cut(&mut mesh, 30);
+        cut(&mut mesh, 73);
+        let cut = stiffest(&mesh);
+        assert!(cut < 10.0 * plain, "{cut} N/m, without {plain}");
+    }
 }
