@@ -1,7 +1,7 @@
 //! Where a drape starts whose cloth crosses itself there.
 //!
-//! Two places are known: where the drape would start, from a preview that knows nothing of cloth on cloth, and where the cloth is known to
-//! be clear of itself: how it was placed, or put over what lies below it ([`Cloth::clear_at`](crate::mechanics::energy::Cloth)).
+//! Two places are known: where the drape would start, from a preview that knows nothing of cloth on cloth, and where the cloth was
+//! before, mostly clear of itself: how it was placed, or put over what lies below it ([`Cloth::clear_at`](crate::mechanics::energy::Cloth)).
 //!
 //! 1. Where nothing crosses at the second, the start is the farthest point on the straight way from there to the first, of shares 0.7ⁿ,
 //!    at which nothing does ([`clear`](Proximity::clear)).
