@@ -29,13 +29,10 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::fan::Fan;
+use super::fit::second_derivatives;
 use super::plate::Plate;
 use crate::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
-
-/// Ridge of the least squares, relative to the diagonal: a ring of four spokes does not determine x_uv, which then stays
-/// zero; a good ring changes by less than this.
-const RIDGE: f64 = 1e-6;
 
 /// A floor for H as a share of B_u + B_v: a saddle always costs something.
 const LEAST_TWIST: f64 = 0.1;
@@ -199,66 +196,32 @@ fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
     parts.map(|p| p / parts.iter().sum::<f64>())
 }
 
-/// Weights of x_uu, x_uv, x_vv on the spokes' ends; the centre's is minus their sum.
-fn second_derivatives(spokes: &[DVec2]) -> Option<Vec<DVec3>> {
-    let scale = spokes.iter().map(|p| p.length()).sum::<f64>() / spokes.len() as f64;
-    // f(p) − f(0) = g·p + ½ f_uu p_u² + f_uv p_u p_v + ½ f_vv p_v², near spokes counting more.
-    let rows: Vec<([f64; 5], f64)> = spokes
-        .iter()
-        .map(|p| {
-            let q = *p / scale;
-            ([q.x, q.y, 0.5 * q.x * q.x, q.x * q.y, 0.5 * q.y * q.y], 1.0 / q.length_squared())
-        })
-        .collect();
-    let mut normal = [[0.0; 5]; 5];
-    for (row, weight) in &rows {
-        for i in 0..5 {
-            for j in 0..5 {
-                normal[i][j] += weight * row[i] * row[j];
-            }
-        }
-    }
-    let trace: f64 = (0..5).map(|i| normal[i][i]).sum();
-    // None on the gradient, so that a flat cloth, however it lies, has no curvature.
-    for (i, row) in normal.iter_mut().enumerate().skip(2) {
-        row[i] += RIDGE * trace;
-    }
-    let factor = cholesky(normal)?;
-    let per_area = 1.0 / (scale * scale);
-    let fit = |(row, weight): &([f64; 5], f64)| {
-        let [_, _, uu, uv, vv] = substitute(&factor, row.map(|r| r * weight));
-        DVec3::new(uu, uv, vv) * per_area
-    };
-    Some(rows.iter().map(fit).collect())
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::samples::sheet;
 
-/// The lower factor L of a symmetric matrix L Lᵀ; `None` where it is not positive. Too small, and one a vertex, for a library's.
-fn cholesky(mut m: [[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
-    for j in 0..5 {
-        for i in j..5 {
-            let sum: f64 = (0..j).map(|k| m[i][k] * m[j][k]).sum();
-            let left = m[i][j] - sum;
-            if i > j {
-                m[i][j] = left / m[j][j];
-            } else if left > 0.0 {
-                m[j][j] = left.sqrt();
-            } else {
-                return None;
-            }
-        }
+    /// Cuts a triangle in three by a point next to its first side.
+    fn cut(mesh: &mut TriMesh, t: usize) {
+        let ([a, b, c], [at_a, at_b, at_c]) = (mesh.triangles[t], mesh.corners(t));
+        let (middle, m) = (0.5 * (at_a + at_b), mesh.positions.len() as u32);
+        mesh.positions.push(middle.lerp(at_c, 1e-3));
+        mesh.triangles[t] = [a, m, c];
+        mesh.triangles.extend([[m, b, c], [a, b, m]]);
     }
-    Some(m)
-}
 
-/// Solves L Lᵀ x = b.
-fn substitute(l: &[[f64; 5]; 5], mut b: [f64; 5]) -> [f64; 5] {
-    for i in 0..5 {
-        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
+    #[test]
+    fn a_sliver_cut_again_ties_nothing_stiffer() {
+        let mut mesh = sheet(6, 6, |i, j| DVec3::new(i, 0.0, j) * 0.01);
+        let stiffest = |mesh: &TriMesh| {
+            let rest = RestShape::from_edges(mesh).unwrap();
+            let denim = Fabric::by_name("denim").unwrap();
+            let bending = Bending::new(mesh, &Topology::new(mesh), &rest, &[denim]);
+            bending.elements().flat_map(|(_, w, k)| w.iter().map(move |w| k.dot(*w * *w))).fold(0.0, f64::max)
+        };
+        let plain = stiffest(&mesh);
+        cut(&mut mesh, 30);
+        cut(&mut mesh, 73);
+        assert!(stiffest(&mesh) < 100.0 * plain, "{} N/m, without {plain}", stiffest(&mesh));
     }
-    for i in (0..5).rev() {
-        let sum: f64 = (i + 1..5).map(|k| l[k][i] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
-    }
-    b
 }

@@ -22,6 +22,7 @@ mod error;
 mod evaluate;
 pub mod fan;
 pub mod field;
+mod fit;
 pub mod friction;
 pub mod gravity;
 mod hessian;
