@@ -10,10 +10,14 @@ use partwise::record::web::{Served, serve_file};
 use partwise::record::{RecordOptions, Recorder, Sink};
 
 fn served(folder: &tempfile::TempDir) -> Served {
+    served_on(folder, None)
+}
+
+fn served_on(folder: &tempfile::TempDir, port: Option<u16>) -> Served {
     let path = folder.path().join("x.rrd");
     let options = RecordOptions { sinks: vec![Sink::File(path.clone())], ..RecordOptions::default() };
     Recorder::open(options).unwrap().finish().unwrap();
-    serve_file(&path, None, None).unwrap()
+    serve_file(&path, port, None).unwrap()
 }
 
 /// Host of an address, which has nothing else.
@@ -140,7 +144,8 @@ fn the_program_comes_packed_once_it_is() {
 #[test]
 fn a_page_knows_its_server_from_one_that_comes_after_it() {
     let folder = tempfile::tempdir().unwrap();
-    let first = served(&folder);
+    // Not on the usual port, which the tests beside this one take when it is left.
+    let first = served_on(&folder, Some(0));
     let name = |served: &Served| String::from_utf8(get(host(served.url()), "/run").1).unwrap();
     let page = |served: &Served| String::from_utf8(get(host(served.url()), "/").1).unwrap();
     let before = name(&first);
