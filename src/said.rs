@@ -5,30 +5,32 @@
 use std::borrow::Cow;
 use std::error::Error;
 
-/// Characters of one cause, from its start and from its end: parsers quote the line first and say what is wrong last.
+/// Bytes of one cause, from its start and from its end: parsers quote the line first and say what is wrong last.
 const LONGEST: [usize; 2] = [1200, 800];
 
 /// An error and all that caused it, `joint` between them; a cause that an outer message quotes is said once.
 #[must_use]
 pub fn said(error: &(dyn Error + 'static), joint: &str) -> String {
-    let mut text = String::new();
+    let mut causes: Vec<String> = Vec::new();
     let mut next = Some(error);
     while let Some(error) = next {
         let cause = error.to_string();
-        if !text.contains(&cause) {
-            text += if text.is_empty() { "" } else { joint };
-            let place = |n: usize| cause.char_indices().nth(n).map_or(cause.len(), |(place, _)| place);
-            match cause.chars().count().checked_sub(LONGEST[0] + LONGEST[1]) {
-                None | Some(0) => text += &cause,
-                Some(more) => {
-                    let (start, end) = (&cause[..place(LONGEST[0])], &cause[place(LONGEST[0] + more)..]);
-                    text += &format!("{start} ... ({} bytes in all) ... {end}", cause.len());
-                }
-            }
+        // As they are, since what is shortened no longer holds all that it quoted.
+        if !causes.iter().any(|outer| outer.contains(&cause)) {
+            causes.push(cause);
         }
         next = error.source();
     }
-    plain(&text).into_owned()
+    plain(&causes.iter().map(|cause| shortened(cause)).collect::<Vec<_>>().join(joint)).into_owned()
+}
+
+fn shortened(cause: &str) -> Cow<'_, str> {
+    let [start, end] = LONGEST;
+    if cause.len() <= start + end {
+        return cause.into();
+    }
+    let (start, end) = (cause.floor_char_boundary(start), cause.ceil_char_boundary(cause.len() - end));
+    format!("{} ... ({} bytes in all) ... {}", &cause[..start], cause.len(), &cause[end..]).into()
 }
 
 /// A text without control characters but for the ends of its lines and tabs.
@@ -65,7 +67,18 @@ mod tests {
         let long = std::io::Error::other(format!("a\u{1b}]0;title\u{7}b\r{}", "é".repeat(9_000) + "wrong"));
         let short = said(&long, ": ");
         assert!(short.starts_with("a\\u{1b}]0;title\\u{7}b\\ré") && short.ends_with("éwrong"), "{short}");
-        assert!(short.contains("(18018 bytes in all)") && short.len() < 5_000, "{short}");
+        assert!(short.contains("(18018 bytes in all)") && short.len() < 2_200, "{short}");
+    }
+
+    #[test]
+    fn a_long_cause_that_an_outer_message_quotes_is_said_once() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("mine.toml, line 2: {0}")]
+        struct Outer(#[source] std::io::Error);
+        let cause = std::io::Error::other("ü".repeat(2_000) + " is none");
+        let short = said(&Outer(cause), ": ");
+        assert!(short.starts_with("mine.toml, line 2: ü") && short.ends_with("ü is none"), "{short}");
+        assert!(short.matches("bytes in all").count() == 1 && short.len() < 2_200, "{} bytes", short.len());
     }
 
     #[test]

@@ -100,6 +100,15 @@ fn a_group_or_object_is_chosen_by_name_and_a_wrong_name_lists_them() {
 }
 
 #[test]
+fn a_group_line_that_names_no_face_leaves_objects_as_groups() {
+    let text = format!("o sheet\n{SQUARE}f 1 2 3 4\n");
+    for line in ["g\n", "g trailing\n"] {
+        assert_eq!(read(&format!("{text}{line}")).mesh.groups, ["sheet"], "{line}");
+    }
+    assert_eq!(read(&format!("g\n{text}")).mesh.groups, ["sheet"]);
+}
+
+#[test]
 fn hundreds_of_groups_and_components_open() {
     let mut text = String::new();
     for i in 0..154 {

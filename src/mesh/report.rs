@@ -135,18 +135,23 @@ impl MeshReport {
     }
 }
 
+/// "1 group", "2 groups".
+fn counted(n: usize, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
 impl fmt::Display for MeshReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{}: {} vertices, {} triangles from {} faces, {} connected parts, {} groups, {}",
+            "{}: {} vertices, {} triangles from {} faces, {}, {}, {}",
             self.file,
             self.vertices,
             self.triangles,
             self.faces,
-            self.components,
-            self.groups,
-            if self.is_closed() { "closed".to_owned() } else { format!("{} boundary loops", self.boundary_loops) }
+            counted(self.components, "connected part"),
+            counted(self.groups, "group"),
+            if self.is_closed() { "closed".to_owned() } else { counted(self.boundary_loops, "boundary loop") }
         )?;
         writeln!(f, "  {} ({} up): {}", self.frame.unit, self.frame.up, self.frame.reason)?;
         self.repairs.iter().try_for_each(|repair| writeln!(f, "  {repair}"))?;

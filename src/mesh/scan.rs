@@ -73,6 +73,7 @@ pub(super) struct Scan {
     pub(super) first_unknown: Option<(usize, String)>,
     /// Points and lines given as faces.
     pub(super) small_faces: usize,
+    /// Whether any face is in a `g` with a name.
     has_groups: bool,
     number_of_name: BTreeMap<String, u32>,
 }
@@ -111,10 +112,7 @@ impl Scan {
                     let name = words.collect::<Vec<_>>().join(" ");
                     let named = |scan: &mut Self| if name.is_empty() { NONE } else { scan.name(&name) };
                     match keyword {
-                        "g" => {
-                            group = named(&mut scan);
-                            scan.has_groups = true;
-                        }
+                        "g" => group = named(&mut scan),
                         "o" => object = named(&mut scan),
                         _ => {}
                     }
@@ -138,7 +136,7 @@ impl Scan {
         Ok(scan)
     }
 
-    /// Index of the name that groups a face: its `g` where the file has any, else its `o`.
+    /// Index of the name that groups a face: its `g` where any face of the file has one, else its `o`.
     pub(super) fn group_of(&self, face: &Face) -> u32 {
         if self.has_groups { face.group } else { face.object }
     }
@@ -199,6 +197,7 @@ impl Scan {
             self.corners.truncate(first);
         } else {
             let number = self.faces.len() as u32;
+            self.has_groups |= group != NONE;
             self.faces.push(Face { first: first as u32, count: count as u32, number, group, object });
         }
         Ok(())
