@@ -56,6 +56,7 @@ pub(crate) const TELLING: &[&str] = &[
     "are missing",
     "line of its own",
     "recursion limit",
+    "cannot extend",
 ];
 
 pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Said, String> {

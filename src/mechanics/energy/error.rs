@@ -34,7 +34,9 @@ pub enum EnergyError {
         count: usize,
     },
     /// No vertex left to move.
-    #[error("no vertex is free: all {count} are held")]
+    #[error(
+        "no vertex is free: all {count} are held, expected at least one that is not; hold an edge alone (--hold top)"
+    )]
     NothingFree {
         /// Vertices there are.
         count: usize,
