@@ -4,6 +4,7 @@ mod by_method;
 mod painted;
 mod watching;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -144,7 +145,7 @@ impl RunArgs {
         self.stages.dials.cloth.check_used(&loaded)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
-        let mut snapshots = Vec::new();
+        let mut snapshots = BTreeMap::new();
         let drape = refining(name, |progress| {
             job.drape(&loaded.scene, &mut |step| {
                 if step.at_rest {
@@ -152,12 +153,10 @@ impl RunArgs {
                     return progress(step);
                 }
                 let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
-                snapshots.push(Snapshot {
-                    iteration: step.iteration,
-                    energy: step.energy,
-                    residual_over_weight: step.residual_over_weight,
-                    positions,
-                });
+                let snapshot =
+                    Snapshot { energy: step.energy, residual_over_weight: step.residual_over_weight, positions };
+                // Coarser garments that it rests on first, and trials that were taken back, count as the step that follows.
+                snapshots.insert(step.iteration, snapshot);
                 progress(step)
             })
         })?;

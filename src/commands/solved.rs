@@ -1,6 +1,7 @@
 //! A garment through every stage, ready to be told and recorded: a step with all its stages, its fit and folds, and the
 //! solver's steps.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
@@ -21,13 +22,13 @@ pub(super) struct Solved {
     pub(super) loaded: Loaded,
     pub(super) drape: Drape,
     pub(super) measured: Measured,
-    pub(super) snapshots: Vec<Snapshot>,
+    /// By iteration: a plot has one point each.
+    pub(super) snapshots: BTreeMap<usize, Snapshot>,
     pub(super) summary: Summary,
 }
 
 /// The cloth at one of the solver's steps; the mesh every so often.
 pub(super) struct Snapshot {
-    pub(super) iteration: usize,
     pub(super) energy: f64,
     pub(super) residual_over_weight: f64,
     pub(super) positions: Option<Vec<DVec3>>,
@@ -39,7 +40,7 @@ impl Solved {
         let (loaded, drape) = (finished.ground.loaded.clone(), finished.drape.clone());
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.ground.load_ms));
-        Ok(Self { loaded, drape, measured, snapshots: Vec::new(), summary })
+        Ok(Self { loaded, drape, measured, snapshots: BTreeMap::new(), summary })
     }
 
     /// How to record it; `live` where more steps follow, whose meshes may be others.
@@ -139,8 +140,8 @@ impl Solved {
             })?;
         }
         if iterations {
-            for s in &self.snapshots {
-                let iteration = i64::try_from(s.iteration).unwrap_or(i64::MAX);
+            for (iteration, s) in &self.snapshots {
+                let iteration = i64::try_from(*iteration).unwrap_or(i64::MAX);
                 recorder.iteration(iteration, s.energy, s.residual_over_weight, s.positions.as_deref())?;
             }
         }

@@ -250,6 +250,22 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
 }
 
 #[test]
+fn a_garment_that_rests_on_coarser_ones_first_has_one_point_an_iteration() {
+    let folder = Folder::new();
+    let path = folder.file("large.rrd");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_partwise"));
+    command.args(["--garment", "flared-skirt@6000", "--format", "json", "--save"]).arg(&path);
+    let done = command.output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    let steps = told["refine_steps"].as_u64().unwrap();
+    let contents = inspect::read(&path);
+    for plot in [paths::ENERGY, paths::RESIDUAL_LOG10] {
+        assert_eq!(contents.entities[plot].rows as u64, steps + 1, "{plot}");
+    }
+}
+
+#[test]
 fn a_watched_recording_takes_new_steps_and_new_meshes() {
     let folder = Folder::new();
     let (small, large) = (Scene::new(1), Scene::new(2));
