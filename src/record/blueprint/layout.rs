@@ -145,7 +145,8 @@ impl Layout {
         if !self.held {
             views.push(seen("Force per PART", "/force"));
         }
-        views.push(seen("Drape", "/drape"));
+        // What is drawn through the body there is no drape.
+        views.push(seen(if self.held { "What PARTs could hold" } else { "Drape" }, "/drape"));
         if self.error {
             views.push(seen("Error", paths::ERROR));
         }
