@@ -1,6 +1,14 @@
 //! What a name on the command line or in a file stands for: something built in, or a file.
 
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+
+/// Most bytes of a text that is read: tables, fabrics, patterns and sweep files have thousands.
+pub const MOST_TEXT: u64 = 64 << 20;
+
+/// Most bytes of a mesh's file: some twenty million vertices as OBJ.
+pub const MOST_MESH: u64 = 2 << 30;
 
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -60,5 +68,45 @@ pub fn line_of(text: &str, offset: usize) -> usize {
 
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String, Unreadable> {
-    std::fs::read_to_string(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
+    bounded_text(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
+}
+
+/// The text of a file of at most [`MOST_TEXT`] bytes.
+///
+/// # Errors
+/// As [`bounded`]; or that it is not UTF-8.
+pub fn bounded_text(path: &Path) -> io::Result<String> {
+    let utf8 = |e| io::Error::new(io::ErrorKind::InvalidData, format!("found what is no UTF-8 text: {e}"));
+    String::from_utf8(bounded(path, MOST_TEXT)?).map_err(|e| utf8(e.utf8_error()))
+}
+
+/// The bytes of a file of at most `most`: a device may have no end, and would take all memory.
+///
+/// # Errors
+/// That it cannot be read, or is larger.
+pub fn bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most {
+        let larger = format!("found more than {} MB, expected no more than that", most >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, larger));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_read_up_to_its_bound_and_an_endless_one_is_refused() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "four").unwrap();
+        assert_eq!(bounded(file.path(), 4).unwrap(), b"four");
+        assert_eq!(bounded(file.path(), 3).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        std::fs::write(file.path(), b"a\xff").unwrap();
+        assert!(read_text(file.path()).unwrap_err().to_string().contains("no UTF-8 text"));
+        #[cfg(unix)]
+        assert!(read_text(Path::new("/dev/zero")).unwrap_err().to_string().contains("more than 64 MB"));
+    }
 }

@@ -31,7 +31,7 @@ mod work;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use partwise::whole_file;
 
 // What most commands take and say goes by one name in all of them.
@@ -117,7 +117,7 @@ enum Command {
 
 /// Parses the arguments, runs the command, prints what went wrong.
 pub(crate) fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::from_arg_matches(&with_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
     interrupt::listen();
     let outcome = match cli.command {
         None => cli.run.execute(),
@@ -145,4 +145,9 @@ pub(crate) fn main() -> ExitCode {
             failure::exit_code(&error)
         }
     }
+}
+
+/// `--edge-length -1` is a number that will not do, not a flag that nobody knows.
+fn with_negatives(command: clap::Command) -> clap::Command {
+    command.allow_negative_numbers(true).mut_subcommands(with_negatives)
 }

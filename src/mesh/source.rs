@@ -8,7 +8,7 @@ use super::error::MeshError;
 use super::frame::Frame;
 use super::scan::{Corner, Face, Scan};
 use super::topology::NONE;
-use crate::files::Unreadable;
+use crate::files::{MOST_MESH, Unreadable, bounded};
 
 /// What an export needs to give a file back with other positions.
 #[derive(Debug, Clone)]
@@ -58,7 +58,7 @@ pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
     if file.is_dir() {
         return Err(unreadable("it is a folder, expected an OBJ file".to_owned()).into());
     }
-    let bytes = std::fs::read(file).map_err(|e| unreadable(e.to_string()))?;
+    let bytes = bounded(file, MOST_MESH).map_err(|e| unreadable(e.to_string()))?;
     if let Some(found) = other_format(file, &bytes) {
         return Err(MeshError::NotObj { file: file.to_owned(), found });
     }

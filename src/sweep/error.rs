@@ -5,11 +5,16 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::files::Unreadable;
+
 /// A sweep file that cannot be used. The user can mend all of these.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum PlanError {
-    /// A file that cannot be read.
+    /// The sweep file cannot be read.
+    #[error(transparent)]
+    Unreadable(Unreadable),
+    /// A file that it names cannot be read.
     #[error("{place}: {path}: cannot be read: {source}; paths count from the folder of the sweep file")]
     Read { place: String, path: PathBuf, source: io::Error },
     /// Not TOML, or a key that is missing, unknown or of another type.

@@ -1,11 +1,10 @@
 //! The files a sweep names, read once each, and their contents' hashes.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::PlanError;
-use crate::files::names_a_file;
+use crate::files::{MOST_MESH, MOST_TEXT, bounded, bounded_text, names_a_file};
 use crate::scene::SceneSpec;
 
 /// A body or garment, built in by name or a file.
@@ -50,7 +49,7 @@ impl Inputs {
         }
         let path = self.folder.join(label);
         if !self.digests.contains_key(&path) {
-            let bytes = fs::read(&path).map_err(|e| unreadable(&path, place, e))?;
+            let bytes = bounded(&path, MOST_MESH).map_err(|e| unreadable(&path, place, e))?;
             self.digests.insert(path.clone(), blake3::hash(&bytes).to_hex()[..32].to_owned());
         }
         let digest = &self.digests[&path];
@@ -62,7 +61,7 @@ impl Inputs {
         let mut input = self.input(label, place)?;
         for file in SceneSpec::new("", &input.name).files_of_fabrics() {
             // One that cannot be read is the scene's to refuse.
-            let bytes = fs::read(&file).unwrap_or_default();
+            let bytes = bounded(&file, MOST_TEXT).unwrap_or_default();
             input.key += &format!(" {}", &blake3::hash(&bytes).to_hex()[..32]);
         }
         Ok(input)
@@ -71,10 +70,10 @@ impl Inputs {
     /// A text file as written.
     pub(super) fn text(&self, label: &str, place: &str) -> Result<String, PlanError> {
         let path = self.folder.join(label);
-        fs::read_to_string(&path).map_err(|e| unreadable(&path, place, e))
+        bounded_text(&path).map_err(|e| unreadable(&path, place, e))
     }
 }
 
-pub(super) fn unreadable(path: &Path, place: &str, source: std::io::Error) -> PlanError {
+fn unreadable(path: &Path, place: &str, source: std::io::Error) -> PlanError {
     PlanError::Read { place: place.to_owned(), path: path.to_owned(), source }
 }

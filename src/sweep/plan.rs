@@ -7,13 +7,13 @@
 //! [`Plan::notes`] says so.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use super::axes::Axes;
 use super::file::{At, Grid, Source};
-use super::inputs::{Inputs, unreadable};
+use super::inputs::Inputs;
 use super::{PlanError, Point};
+use crate::files::read_text;
 use crate::job::Job;
 
 /// Timed passes, and passes before them, that a point can be asked for: a median of more says nothing more, and takes for ever.
@@ -40,7 +40,7 @@ impl Plan {
     /// Reads a sweep file; the files it names count from its folder, and what it does not say is as in `start`.
     pub fn read(path: &Path, start: &Job) -> Result<Self, PlanError> {
         let name = path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|e| unreadable(path, &name, e))?;
+        let text = read_text(path).map_err(PlanError::Unreadable)?;
         Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")), start)
     }
 

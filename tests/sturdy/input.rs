@@ -60,6 +60,35 @@ fn what_the_user_can_mend_ends_with_two() {
 }
 
 #[test]
+fn an_input_without_end_is_refused_before_it_fills_the_memory() {
+    let bench = Bench::new();
+    for flag in ["--table", "--fabric", "--pattern", "--measurements"] {
+        bench.run(&[flag, "/dev/zero", "--no-save"]).with(2, &["/dev/zero", "more than 64 MB"]);
+    }
+    bench.run(&["sweep", "/dev/zero"]).with(2, &["/dev/zero: cannot be read", "more than 64 MB"]);
+    bench.write("s.toml", "name = \"s\"\n[base]\ngarment = \"flared-skirt@400\"\n[grid]\ntables = [\"/dev/zero\"]\n");
+    bench.run(&["sweep", "s.toml"]).with(2, &["s.toml", "/dev/zero", "more than 64 MB"]);
+}
+
+#[test]
+fn a_number_below_zero_is_told_what_it_may_be() {
+    let bench = Bench::new();
+    let pattern = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/patterns/skirt.json");
+    for (line, expected) in [
+        (vec!["--pattern", pattern, "--edge-length", "-1"], "an edge length of -1 cm, expected 0.2 to 20 cm"),
+        (vec!["--max-extent", "-3"], "expected centimetres"),
+        (vec!["--bust", "-88"], "60 to 150 cm"),
+        (vec!["--threads", "-1"], "--threads"),
+        (vec!["tune", "--max-parts", "0"], "a whole number of PARTs, 1 or more"),
+        (vec!["tune", "--max-parts", "-5"], "found `-5`"),
+    ] {
+        let told = bench.run(&line);
+        told.with(2, &[expected]);
+        assert!(!told.said.contains("unexpected argument"), "{}", told.said);
+    }
+}
+
+#[test]
 fn messages_neither_move_the_cursor_nor_fill_the_screen() {
     let bench = Bench::new();
     bench.write("escape.obj", "v 0 0 0\nv \u{1b}]0;title\u{7} 0 0\n");

@@ -72,7 +72,7 @@ pub(crate) struct TuneArgs {
     cloth: FabricArgs,
     /// Most PARTs a table may make, over all garments tuned together, each its share of Table 3's [default: as many as Table 3
     /// makes of each]
-    #[arg(long, value_name = "N", help_heading = "Search")]
+    #[arg(long, value_name = "N", help_heading = "Search", value_parser = at_least_one)]
     max_parts: Option<usize>,
     /// Widths (along the weft) a level may be cut to [default: 30 from 4 to 80, and not to be cut is open to it too;
     /// for several garments together 11 from 6 to 16]
@@ -250,4 +250,9 @@ impl TuneArgs {
         let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
         written.map_err(unwritable(path, "folder with --out"))
     }
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    let expected = || format!("found `{text}`, expected a whole number of PARTs, 1 or more");
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(expected)
 }
