@@ -21,7 +21,13 @@ pub fn said(error: &(dyn Error + 'static), joint: &str) -> String {
         }
         next = error.source();
     }
-    plain(&causes.iter().map(|cause| shortened(cause)).collect::<Vec<_>>().join(joint)).into_owned()
+    causes.iter().map(|cause| short(cause)).collect::<Vec<_>>().join(joint)
+}
+
+/// A sentence as it may be told: [`plain`], its middle left out where it is long.
+#[must_use]
+pub fn short(sentence: &str) -> String {
+    plain(&shortened(sentence)).into_owned()
 }
 
 fn shortened(cause: &str) -> Cow<'_, str> {

@@ -69,6 +69,9 @@ fn junk_comments_crlf_exponents_continued_lines_and_missing_materials_are_no_obs
         _ => None,
     });
     assert_eq!(unknown, Some((3, 2, "foo bar 1 2".to_owned())));
+    // Lines as old Macintosh programs end them.
+    let old = read(&format!("{SQUARE}f 1 2 3 4\n").replace('\n', "\r"));
+    assert_eq!((old.mesh.vertex_count(), old.mesh.triangles.len()), (4, 2));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use partwise::SceneSpec;
+use partwise::files::has_ending;
 use partwise::mesh::{Axis, Unit};
 use partwise::scene::{DistanceTo, Loaded, SceneError};
 use partwise::shapes::MeshCache;
@@ -23,7 +24,7 @@ pub(crate) struct InputArgs {
     #[arg(long, value_name = "body|below", default_value_t = SceneSpec::default().distance_to)]
     distance_to: DistanceTo,
     /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
-    #[arg(long, value_name = "FILE.json", conflicts_with = "garment")]
+    #[arg(long, value_name = "FILE.json", conflicts_with = "garment", value_parser = pattern_file)]
     pattern: Option<String>,
     /// TOML file that names the fabrics of a garment's panels, or groups: `default = "interlock"`, and under `[panels]` lines such as
     /// `left_cuff = "denim"` or `"sleeve*" = "rib.toml"` (a file beside it) [default: NAME.fabrics.toml beside NAME.json or NAME.obj]
@@ -104,4 +105,12 @@ impl InputArgs {
             other => other.into(),
         })
     }
+}
+
+/// By its ending a garment's file is known for what it is.
+fn pattern_file(name: &str) -> Result<String, String> {
+    if has_ending(name.as_ref(), "json") {
+        return Ok(name.to_owned());
+    }
+    Err(format!("found `{name}`, expected a file that ends in `.json`; a mesh or a description is a --garment"))
 }

@@ -34,7 +34,7 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
         "preview": snapshot.preview.as_deref().map(preview),
         "rest": snapshot.rest.as_deref().map(rest),
         "figures": snapshot.finished.as_deref().map(figures),
-        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": r.sentence, "back_to": r.back_to})),
+        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": crate::said::short(&r.sentence), "back_to": r.back_to})),
         "pins": snapshot.pins.iter().map(|p| pin(p)).collect::<Vec<_>>(),
         "trail_end": snapshot.trail.last(),
         "undo": snapshot.undo,

@@ -63,7 +63,12 @@ pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
         return Err(MeshError::NotObj { file: file.to_owned(), found });
     }
     // Comments and names come in any encoding; numbers are ASCII in all of them.
-    Scan::new(file, &String::from_utf8_lossy(&bytes))
+    let text = String::from_utf8_lossy(&bytes);
+    // As old Macintosh programs end their lines.
+    if text.contains('\r') && !text.contains('\n') {
+        return Scan::new(file, &text.replace('\r', "\n"));
+    }
+    Scan::new(file, &text)
 }
 
 /// What a file is if it's no OBJ; told by its first bytes, not by its name, except where the bytes tell nothing.

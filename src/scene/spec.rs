@@ -148,9 +148,10 @@ impl SceneSpec {
         has_ending(self.garment.as_ref(), "json")
     }
 
-    /// Whether the garment is a mesh from a file.
+    /// Whether the garment is a mesh from a file, as any is that is neither a description nor a pattern: its reader knows other formats
+    /// by what is in them.
     pub(super) fn is_a_mesh(&self) -> bool {
-        has_ending(self.garment.as_ref(), "obj")
+        names_a_file(&self.garment) && !is_toml(&self.garment) && !self.is_a_pattern()
     }
 
     /// The built-in or described garment, and how many vertices are asked of it.
@@ -165,12 +166,12 @@ impl SceneSpec {
 
     /// Whether the body is a mesh from a file.
     pub(super) fn body_is_a_mesh(&self) -> bool {
-        names_a_file(&self.body) && !self.body.ends_with(".toml")
+        names_a_file(&self.body) && !is_toml(&self.body)
     }
 
     /// The form's measurements, where the body is a file of them from there.
     pub fn form(&self) -> Result<BodySpec, SceneError> {
-        if !self.body.ends_with(".toml") {
+        if !is_toml(&self.body) {
             return Ok(self.measurements.clone());
         }
         BodySpec::from_toml(&read_text(self.body.as_ref())?).map_err(SceneError::in_file(&self.body))
@@ -185,4 +186,8 @@ impl SceneSpec {
             open_body: self.open_body,
         }
     }
+}
+
+fn is_toml(name: &str) -> bool {
+    has_ending(name.as_ref(), "toml")
 }

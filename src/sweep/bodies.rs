@@ -6,7 +6,7 @@ use super::axes::{Edit, one};
 use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::{Input, Inputs};
-use crate::files::names_a_file;
+use crate::files::{has_ending, names_a_file};
 use crate::scene::DRESS_FORM;
 use crate::shapes::BodySpec;
 
@@ -58,7 +58,7 @@ fn named_body(
     if !names_a_file(label) {
         return Err(source.wrong(value, "body", expected));
     }
-    if label.ends_with(".toml") {
+    if has_ending(label.as_ref(), "toml") {
         let spec = BodySpec::from_toml(&inputs.text(label, &place)?);
         return Ok((form, spec.map_err(PlanError::input(&place, "body"))?));
     }

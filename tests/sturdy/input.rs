@@ -34,6 +34,9 @@ fn what_the_user_can_mend_ends_with_two() {
     bench.run(&held).with(2, &["no vertex is free"]);
     let tables = ["compare", "table-3", "table-3", "--body", "body.obj", "--garment", "nowhere.obj", "--no-save"];
     bench.run(&tables).with(2, &["nowhere.obj"]);
+    // A garment from another program is told as what it is, whatever the body.
+    bench.write("shirt.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
+    bench.run(&["--body", "body.obj", "--garment", "shirt.ply", "--no-save"]).with(2, &["shirt.ply", "PLY", "OBJ"]);
     bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
     bench.write("large.toml", "bust_cm = 900\n");
     bench.run(&["--no-save", "--measurements", "large.toml"]).with(2, &["large.toml", "900"]);
@@ -62,7 +65,10 @@ fn what_the_user_can_mend_ends_with_two() {
 #[test]
 fn an_input_without_end_is_refused_before_it_fills_the_memory() {
     let bench = Bench::new();
-    for flag in ["--table", "--fabric", "--pattern", "--measurements"] {
+    std::os::unix::fs::symlink("/dev/zero", bench.path("endless.json")).unwrap();
+    bench.run(&["--pattern", "endless.json", "--no-save"]).with(2, &["endless.json", "more than 64 MB"]);
+    bench.run(&["--pattern", "endless.obj", "--no-save"]).with(2, &["endless.obj", "ends in `.json`"]);
+    for flag in ["--table", "--fabric", "--measurements"] {
         bench.run(&[flag, "/dev/zero", "--no-save"]).with(2, &["/dev/zero", "more than 64 MB"]);
     }
     bench.run(&["sweep", "/dev/zero"]).with(2, &["/dev/zero: cannot be read", "more than 64 MB"]);
