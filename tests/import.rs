@@ -139,6 +139,24 @@ fn degenerate_double_and_unused_parts_are_dropped_and_said() {
 }
 
 #[test]
+fn a_part_that_is_there_twice_is_taken_once_and_exported_as_one() {
+    let text = format!("{SQUARE}f 1 2 3 4\nv 9 9 9\n{SQUARE}f -1 -2 -3 -4\n");
+    let imported = read(&text);
+    assert_eq!((imported.mesh.vertex_count(), imported.mesh.triangles.len(), imported.report.components), (4, 2, 1));
+    assert!(imported.report.repairs.contains(&Repair::TwinsDropped { parts: 1, triangles: 2 }));
+    assert!(imported.report.remarks.is_empty(), "{:?}", imported.report.remarks);
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.obj");
+    let moved: Vec<DVec3> = imported.mesh.positions.iter().map(|p| *p + DVec3::Z).collect();
+    write_imported(&out, &imported, &moved).unwrap();
+    let written = fs::read_to_string(&out).unwrap();
+    assert_eq!(written.lines().filter(|line| line.starts_with("v ") && line.ends_with(" 1")).count(), 8, "{written}");
+    // One that goes on beyond what it lies on stays, and that is said.
+    let larger = read(&format!("{SQUARE}f 1 2 3\n{SQUARE}f -4 -3 -2\nf -4 -2 -1\n"));
+    assert_eq!((larger.mesh.triangles.len(), larger.report.components), (3, 2));
+}
+
+#[test]
 fn nothing_is_welded_unless_asked() {
     // Two triangles whose common edge is there twice.
     let text = format!("{SQUARE}v 0 0 0\nv 1 1 -0\nf 1 2 3\nf 5 6 4\n");

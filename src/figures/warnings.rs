@@ -46,6 +46,13 @@ impl Figures {
                 if self.penetrating_vertices == 0 { ", though no vertex is inside" } else { "" }
             ));
         }
+        if self.self_intersecting_pairs > 0 {
+            found.push(format!(
+                "cloth goes through cloth: {} pairs of triangles cross; a preview, a few steps, --no-self-contact and the reference methods \
+                 leave that, and at rest layers that were placed through each other: place them apart (`partwise check` counts them as placed)",
+                self.self_intersecting_pairs
+            ));
+        }
         if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
             found.push(format!(
                 "the cloth is stretched by {:.0} % somewhere, more than fabrics bear: the garment is too small there, or caught{}",

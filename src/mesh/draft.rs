@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::polygon;
 use super::report::Repair;
 use super::scan::{Corner, Face, used};
+use super::twins::twins;
 use super::{renumbered, retain};
 
 /// Triangles that still know where they come from.
@@ -32,8 +33,9 @@ impl Draft {
         repairs: &mut Vec<Repair>,
     ) -> Self {
         let used = used(positions.len(), faces, corners);
-        let (stand_in, coincident) = coincident(positions, &used);
-        let stands_for = |v: u32| if weld { stand_in[v as usize] } else { v };
+        let (place, coincident) = coincident(positions, &used);
+        let mut stand_in: Vec<u32> = if weld { place.clone() } else { (0..positions.len() as u32).collect() };
+        let stands_for = |v: u32| stand_in[v as usize];
         let mut draft = Self { coincident: if weld { 0 } else { coincident }, ..Self::default() };
         let (mut quads, mut larger, mut degenerate) = (0, 0, 0);
         for (number, face) in faces.iter().enumerate() {
@@ -64,8 +66,9 @@ impl Draft {
             }
         }
         let duplicates = draft.drop_duplicates();
+        let (parts, twins) = draft.drop_twins(&place, &mut stand_in);
         let unused = used.iter().filter(|&&used| !used).count();
-        draft.compact(positions, stands_for);
+        draft.compact(positions, &stand_in);
         let mut note = |count: usize, repair: Repair| {
             if count > 0 {
                 repairs.push(repair);
@@ -75,6 +78,7 @@ impl Draft {
         note(if weld { coincident } else { 0 }, Repair::Welded { vertices: coincident });
         note(degenerate, Repair::DegenerateDropped { triangles: degenerate });
         note(duplicates, Repair::DuplicatesDropped { triangles: duplicates });
+        note(twins, Repair::TwinsDropped { parts, triangles: twins });
         note(unused, Repair::UnusedDropped { vertices: unused });
         draft
     }
@@ -88,6 +92,21 @@ impl Draft {
         for pair in keys.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
             keep[pair[1].1 as usize] = false;
         }
+        self.keep(&keep)
+    }
+
+    /// Keeps the first of connected parts that lie on each other, `place` by `place`; the vertices of the others stand for its own. How many
+    /// parts are dropped, and how many triangles.
+    fn drop_twins(&mut self, place: &[u32], stand_in: &mut [u32]) -> (usize, usize) {
+        let found = if self.coincident > 0 { twins(&self.triangles, &self.face, place) } else { None };
+        let Some(found) = found else { return (0, 0) };
+        self.coincident -= found.stand_in.len();
+        found.stand_in.iter().for_each(|(&v, &kept)| stand_in[v as usize] = kept);
+        (found.parts, self.keep(&found.keep))
+    }
+
+    /// Keeps some of the triangles, and says how many it drops.
+    fn keep(&mut self, keep: &[bool]) -> usize {
         let dropped = keep.iter().filter(|&&keep| !keep).count();
         if dropped > 0 {
             retain(&mut self.triangles, |t| keep[t]);
@@ -98,13 +117,13 @@ impl Draft {
     }
 
     /// Numbers the vertices that are left, in the order of the file.
-    fn compact(&mut self, positions: &[DVec3], stands_for: impl Fn(u32) -> u32) {
+    fn compact(&mut self, positions: &[DVec3], stand_in: &[u32]) {
         let mut used = vec![false; positions.len()];
         self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
         let number = renumbered(positions.len(), |v| used[v]);
         self.positions.extend(positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| p));
         self.triangles.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
-        self.mesh_vertex = (0..positions.len() as u32).map(|v| number[stands_for(v) as usize]).collect();
+        self.mesh_vertex = stand_in.iter().map(|&v| number[v as usize]).collect();
     }
 }
 

@@ -34,6 +34,7 @@ pub mod self_intersection;
 mod source;
 mod topology;
 pub(crate) mod triangle_crossing;
+mod twins;
 pub(crate) mod winding;
 
 use glam::{DMat3, DVec3};

@@ -26,6 +26,11 @@ pub enum Repair {
     /// Triangles of the same three vertices as an earlier one were dropped.
     #[error("dropped {triangles} triangles that were there already")]
     DuplicatesDropped { triangles: usize },
+    /// Connected parts that lie exactly on another were left out.
+    #[error(
+        "left out {parts} connected parts, {triangles} triangles, that lie exactly on another, as if they were there twice; an export moves them with it"
+    )]
+    TwinsDropped { parts: usize, triangles: usize },
     /// Vertices that no face uses were dropped.
     #[error("dropped {vertices} vertices that no face uses")]
     UnusedDropped { vertices: usize },

@@ -172,6 +172,23 @@ fn skin_between_vertices_that_are_outside_is_told() {
 }
 
 #[test]
+fn cloth_that_ends_in_cloth_is_told() {
+    let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
+    let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
+    let moved = |by: DVec3| cape.with_positions(cape.positions.iter().map(|p| *p + by).collect());
+    let over = |by: DVec3| Scene::of_meshes(&sphere(), beside(cape.clone(), &moved(by))).unwrap();
+    let scene = over(DVec3::new(0.02, 0.01, 0.003));
+    let mut bare = Job::default();
+    bare.settings.self_contact = false;
+    let (figures, warnings, _) = draped_by(&scene, &bare);
+    let said = format!("cloth goes through cloth: {} pairs", figures.self_intersecting_pairs);
+    assert!(figures.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&said)), "{warnings:?}");
+    // Over each other and kept so, nothing is told.
+    let (figures, warnings, _) = draped(&over(DVec3::Z * 0.008));
+    assert_eq!((figures.self_intersecting_pairs, warnings.len()), (0, 0), "{warnings:?}");
+}
+
+#[test]
 fn a_garment_that_falls_off_is_a_failed_row_and_the_sweep_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
