@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod client;
+#[path = "../fuzz/mutate.rs"]
+mod mutate;
+mod mutated;
 mod watching;
 
 use std::io::{BufReader, Write as _};
