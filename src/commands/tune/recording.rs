@@ -81,7 +81,7 @@ fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow
             fact("PARTs", holds.parts.to_string()),
             fact("representable error", format!("{:.2} mm RMS", holds.rms_mm)),
             fact("of Table 3's", format!("{:.2}", holds.rms_mm / garment.table_3.rms_mm)),
-            fact("shown as drape", format!("what {} motions of the PARTs can hold", garment.motion.name())),
+            fact("PARTs at best", format!("what {} motions of the PARTs can hold", garment.motion.name())),
         ],
         command_line: command_line(),
         ..Panel::default()

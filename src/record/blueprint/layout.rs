@@ -146,7 +146,7 @@ impl Layout {
             views.push(seen("Force per PART", "/force"));
         }
         // What is drawn through the body there is no drape.
-        views.push(seen(if self.held { "What PARTs could hold" } else { "Drape" }, "/drape"));
+        views.push(seen(if self.held { "PARTs at best" } else { "Drape" }, "/drape"));
         if self.error {
             views.push(seen("Error", paths::ERROR));
         }
