@@ -46,6 +46,18 @@ fn a_part_that_is_there_twice_is_taken_once_and_exported_as_one() {
 }
 
 #[test]
+fn panels_drawn_at_one_place_are_a_rest_shape_of_panels_that_are_apart() {
+    let faces = "f 1 2 3 4\nf 5 6 7 8\n";
+    let garment = read(&format!("{SQUARE}{}{faces}", SQUARE.replace(" 0\n", " 1\n")));
+    assert_eq!((garment.mesh.vertex_count(), garment.report.components), (8, 2));
+    let rest = read(&format!("{SQUARE}{SQUARE}{faces}"));
+    assert_eq!(rest.mesh.vertex_count(), 4);
+    let shaped = garment.in_the_shape_of(&rest).unwrap();
+    assert_eq!(shaped.triangles, garment.mesh.triangles);
+    assert_eq!(shaped.positions[..4], shaped.positions[4..]);
+}
+
+#[test]
 fn nothing_is_welded_unless_asked() {
     // Two triangles whose common edge is there twice.
     let text = format!("{SQUARE}v 0 0 0\nv 1 1 -0\nf 1 2 3\nf 5 6 4\n");
