@@ -9,11 +9,11 @@ use glam::DVec3;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags};
 use partwise::drape::{Refine, unobserved};
-use partwise::job::Job;
 use partwise::mechanics::energy::{Cloth, Contacts, Scratch};
 use partwise::mechanics::refine::Solver;
-use partwise::range_table::RangeTable;
+use partwise::parts::range_table::RangeTable;
 use partwise::scene::Loaded;
+use partwise::study::job::Job;
 use rayon::prelude::*;
 
 const SIZES: [usize; 3] = [1000, 4000, 16_000];

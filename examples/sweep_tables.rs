@@ -6,8 +6,8 @@
 use std::error::Error;
 
 use partwise::drape::unobserved;
-use partwise::job::{Against, Job};
-use partwise::range_table::{RangeTable, TableRule};
+use partwise::parts::range_table::{RangeTable, TableRule};
+use partwise::study::job::{Against, Job};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut job = Job { accuracy: Against::Canonical, ..Job::preview() };

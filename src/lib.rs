@@ -36,44 +36,29 @@
 //! reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the hundred, [`session`]
 //! keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
 
-pub mod accuracy;
-pub mod assess;
-pub mod certificate;
-pub mod contest;
-pub mod distance;
+pub mod base;
+pub mod body;
+#[cfg(feature = "viewer")]
+#[doc(hidden)]
+pub mod commands;
 pub mod drape;
-pub mod fabric;
-pub mod figures;
-pub mod files;
-pub mod job;
-mod lanes;
+pub mod garment;
 #[cfg(feature = "viewer")]
 pub mod live;
 pub mod mechanics;
 pub mod mesh;
 pub mod methods;
 pub mod parts;
-pub mod pattern;
-pub mod quantile;
-pub mod range_table;
 #[cfg(feature = "viewer")]
 pub mod record;
-pub mod said;
 pub mod scene;
-pub mod sealed;
 pub mod session;
-pub mod sewing;
-pub mod shapes;
-pub mod sweep;
-pub mod table_search;
-pub mod whole_file;
-pub mod word;
-pub mod wrinkles;
+pub mod study;
 
 pub use drape::Settings;
 pub use glam::DVec3;
-pub use job::Job;
 pub use scene::{Scene, SceneSpec};
+pub use study::job::Job;
 
 /// Gravitational acceleration, m/s². The paper's value ("g (= 9.8 N/kg)", section 2.2).
 pub const GRAVITY: f64 = 9.8;

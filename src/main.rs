@@ -1,7 +1,5 @@
 //! The `partwise` command line.
 
-mod commands;
-
 fn main() -> std::process::ExitCode {
-    commands::main()
+    partwise::commands::main()
 }

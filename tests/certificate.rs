@@ -6,12 +6,12 @@ use std::ops::ControlFlow;
 
 use glam::{DMat3, DVec3};
 use partwise::Scene;
-use partwise::certificate::{Certificate, CertifyError, Forces, certify};
-use partwise::distance::Body;
-use partwise::fabric::Fabric;
+use partwise::body::distance::Body;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts};
 use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine_with};
 use partwise::mesh::{RestShape, TriMesh};
+use partwise::study::certificate::{Certificate, CertifyError, Forces, certify};
 
 /// Squares along each side of the cloth, and the length of one, m.
 const SQUARES: u32 = 8;

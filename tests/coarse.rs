@@ -7,11 +7,11 @@ use std::ops::ControlFlow;
 
 use glam::{DMat3, DQuat, DVec3};
 use partwise::drape::unobserved;
-use partwise::job::{Against, Job};
 use partwise::mechanics::refine::Stop;
 use partwise::mesh::coarse::Coarse;
 use partwise::mesh::{RestShape, Topology, TriMesh};
-use partwise::range_table::TableRule;
+use partwise::parts::range_table::TableRule;
+use partwise::study::job::{Against, Job};
 
 /// An open tube of this radius and height, m, its rows shifted against each other.
 fn tube(radius: f64, height: f64, around: usize, rows: usize) -> TriMesh {

@@ -4,15 +4,15 @@
 
 use glam::DVec3;
 use partwise::GRAVITY;
-use partwise::distance::Body;
-use partwise::fabric::Fabric;
+use partwise::body::distance::Body;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::coupled::{
     CoupledError, CoupledOptions, CoupledResult, Garment, Motion, Motions, Weights, push_out, solve,
 };
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::range_table::RangeTable;
 use partwise::parts::{Parts, segment};
-use partwise::range_table::RangeTable;
 
 /// An upright sheet of `columns` × `rows` squares of `h` metres in the plane y = 0, its top edge at z = 0.
 fn sheet(columns: u32, rows: u32, h: f64) -> TriMesh {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use partwise::range_table::RangeTable;
+use partwise::parts::range_table::RangeTable;
 use tempfile::TempDir;
 
 const SWEEP: &str = r#"

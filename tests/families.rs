@@ -9,12 +9,12 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use glam::DVec3;
+use partwise::body::{BodySpec, dress_form};
 use partwise::drape::drape;
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::refine::Stop;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::{Axis, TriMesh, Unit};
-use partwise::shapes::{BodySpec, dress_form};
 use partwise::{SceneSpec, Settings};
 
 /// SplitMix64, for garments that are the same everywhere.

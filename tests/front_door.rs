@@ -6,11 +6,11 @@ use std::fs;
 use std::path::Path;
 
 use partwise::drape::{Refine, unobserved};
-use partwise::job::{Against, Job};
 use partwise::mesh::TriMesh;
-use partwise::range_table::TableRule;
+use partwise::parts::range_table::TableRule;
 use partwise::scene::SceneError;
-use partwise::sweep::result_hash;
+use partwise::study::job::{Against, Job};
+use partwise::study::sweep::result_hash;
 use partwise::{DVec3, Scene, SceneSpec, Settings, drape};
 
 /// A cube of half a metre around (0, 0, 1).

@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use partwise::distance::Body;
+use partwise::body::distance::Body;
 use partwise::mesh::TriMesh;
 use partwise::mesh::health::health;
 use partwise::scene::{Placement, Scene, SceneError, facing_body, push_out};

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use glam::DVec3;
-use partwise::distance::Body;
+use partwise::body::distance::Body;
 use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::range_table::{Extent, GapRule, RangeTable};
 use partwise::parts::{Part, Parts, UNASSIGNED, segment};
-use partwise::range_table::{Extent, GapRule, RangeTable};
 use proptest::prelude::*;
 
 /// Ericson's closest point on a triangle ("Real-Time Collision Detection", 5.1.5), written for this test.

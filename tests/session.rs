@@ -6,9 +6,9 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use partwise::accuracy::rms_mm;
+use partwise::garment::MeshCache;
 use partwise::session::{Edit, Session, Snapshot, Workshop};
-use partwise::shapes::MeshCache;
+use partwise::study::accuracy::rms_mm;
 use partwise::{Job, SceneSpec, Settings, drape};
 
 /// A small garment, so that a whole drape takes a moment.
@@ -169,7 +169,7 @@ fn without_warm_starts_a_session_is_a_run_bit_for_bit() {
         assert_eq!(finished.drape.preview, run.preview, "{change}");
         assert_eq!(finished.drape.positions, run.positions, "{change}");
         assert_eq!(finished.drape.parts, run.parts, "{change}");
-        assert_eq!(finished.figures, partwise::figures::Figures::of(scene, &run), "{change}");
+        assert_eq!(finished.figures, partwise::study::metrics::Figures::of(scene, &run), "{change}");
     }
 }
 

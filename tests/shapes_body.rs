@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use partwise::DVec3;
+use partwise::body::dress_form::{BodySpec, DressForm, dress_form};
+use partwise::body::girth::{Plane, loop_around, section};
 use partwise::mesh::self_intersection::self_intersecting_pairs;
 use partwise::mesh::{Topology, TriMesh};
-use partwise::shapes::body::{BodySpec, DressForm, dress_form};
-use partwise::shapes::girth::{Plane, loop_around, section};
 
 fn assert_girths(form: &DressForm, mesh: &TriMesh, what: &str) {
     for mark in form.girths() {

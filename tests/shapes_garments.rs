@@ -6,13 +6,13 @@ use std::sync::LazyLock;
 
 use glam::DVec2;
 use partwise::DVec3;
-use partwise::distance::Body;
+use partwise::body::distance::Body;
+use partwise::body::dress_form::{BodySpec, DressForm};
+use partwise::body::girth::{Plane, section};
+use partwise::garment::builtin::{TABLE_4_SIZES, garment_on};
+use partwise::garment::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment};
 use partwise::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use partwise::mesh::{Topology, TriMesh};
-use partwise::shapes::body::{BodySpec, DressForm};
-use partwise::shapes::garment::{TABLE_4_SIZES, garment_on};
-use partwise::shapes::girth::{Plane, section};
-use partwise::shapes::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment};
 
 static FORM: LazyLock<DressForm> = LazyLock::new(|| DressForm::new(&BodySpec::default()).unwrap());
 static BODY: LazyLock<TriMesh> = LazyLock::new(|| FORM.mesh(15_000).unwrap());

@@ -2,21 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::base::atomic_file::WholeFile;
+use crate::body::dress_form::DressForm;
+use crate::garment::builtin::{BUILT_IN, GarmentSpec, garment_on};
+use crate::garment::fabric;
+use crate::mesh::export::write_mesh;
+use crate::parts::range_table::RangeTable;
 use anyhow::Context as _;
 use clap::Args;
-use partwise::fabric;
-use partwise::mesh::export::write_mesh;
-use partwise::range_table::RangeTable;
-use partwise::shapes::body::DressForm;
-use partwise::shapes::garment::{BUILT_IN, GarmentSpec, garment_on};
-use partwise::whole_file::WholeFile;
 use rayon::prelude::*;
 
-use super::work::make_folder;
+use super::runtime::make_folder;
 use super::{MeasurementArgs, console};
 
 /// Triangles of the form as `run` makes it.
-const FORM_TRIANGLES: usize = partwise::shapes::body::DEFAULT_TRIANGLES;
+const FORM_TRIANGLES: usize = crate::body::dress_form::DEFAULT_TRIANGLES;
 
 /// Sewing patterns of our own, by name.
 const PATTERNS: [(&str, &str); 2] = [

@@ -1,6 +1,6 @@
 //! A certificate, printed, and what it means for the exit code.
 
-use partwise::certificate::Certificate;
+use crate::study::certificate::Certificate;
 
 use super::console;
 

@@ -1,11 +1,11 @@
 //! `partwise check`: the health of a body and a garment, and how they lie about each other, without draping; on request whether the
 //! garment, a draped one, is at rest.
 
+use crate::mesh::health::{Health, health};
+use crate::scene::Placement;
+use crate::study::certificate::{Certificate, CertifyError, certify};
+use crate::{Scene, SceneSpec};
 use clap::Args;
-use partwise::certificate::{Certificate, CertifyError, certify};
-use partwise::mesh::health::{Health, health};
-use partwise::scene::Placement;
-use partwise::{Scene, SceneSpec};
 use serde::Serialize;
 
 use super::run::Format;
@@ -103,7 +103,7 @@ impl CheckArgs {
         let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, scene, draped)).transpose()?;
         let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
         if self.format == Format::Json {
-            console::result(&partwise::said::json(&report)?);
+            console::result(&crate::base::error_text::json(&report)?);
             return certified::verified(report.certificate.as_ref());
         }
         console::notes(&report.notes);

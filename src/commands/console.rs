@@ -6,9 +6,9 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::base::error_text::{plain, said};
 use comfy_table::{CellAlignment, ContentArrangement, Row, Table};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use partwise::said::{plain, said};
 
 /// Whether a result could not be printed.
 static UNPRINTED: AtomicBool = AtomicBool::new(false);

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::garment::fabric::{BUILT_IN, Fabric};
+use crate::study::drape_test::results_csv;
 use clap::Args;
-use partwise::fabric::{BUILT_IN, Fabric};
-use partwise::mechanics::cusick::results_csv;
 
 use super::console;
-use super::work::write_csv;
+use super::runtime::write_csv;
 
 /// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
 const MOST_ROWS: u64 = 100;

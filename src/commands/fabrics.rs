@@ -1,9 +1,9 @@
 //! `--fabric`: what garments are cut from, one for all or one for each.
 
+use crate::SceneSpec;
+use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
+use crate::scene::{CutError, Loaded, SceneError};
 use clap::Args;
-use partwise::SceneSpec;
-use partwise::fabric::{DEFAULT_FABRIC, Fabric};
-use partwise::scene::{CutError, Loaded, SceneError};
 
 use super::UserError;
 

@@ -3,22 +3,22 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use partwise::assess::AssessError;
-use partwise::drape::DrapeError;
-use partwise::fabric::FabricError;
-use partwise::files::Unreadable;
-use partwise::live::LiveError;
-use partwise::mechanics::energy::EnergyError;
-use partwise::mechanics::paper::PaperError;
-use partwise::mesh::MeshError;
-use partwise::pattern::PatternError;
-use partwise::range_table::TableError;
-use partwise::record::RecordError;
-use partwise::scene::SceneError;
-use partwise::session::EditError;
-use partwise::shapes::ShapeError;
-use partwise::sweep::{MergeError, PlanError, StoreError};
-use partwise::table_search::SearchError;
+use crate::base::files::Unreadable;
+use crate::body::ShapeError;
+use crate::drape::DrapeError;
+use crate::garment::fabric::FabricError;
+use crate::garment::pattern::PatternError;
+use crate::live::LiveError;
+use crate::mechanics::energy::EnergyError;
+use crate::mechanics::paper::PaperError;
+use crate::mesh::MeshError;
+use crate::parts::range_table::TableError;
+use crate::record::RecordError;
+use crate::scene::SceneError;
+use crate::session::EditError;
+use crate::study::evaluate::AssessError;
+use crate::study::sweep::{MergeError, PlanError, StoreError};
+use crate::study::table_search::SearchError;
 
 /// A mistake in what the user gave that no library error describes.
 #[derive(Debug, thiserror::Error)]

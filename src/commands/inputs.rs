@@ -1,11 +1,11 @@
 //! Body and garment: the arguments shared by every command that needs them.
 
+use crate::SceneSpec;
+use crate::base::files::has_ending;
+use crate::garment::MeshCache;
+use crate::mesh::{Axis, Unit};
+use crate::scene::{DistanceTo, Loaded, SceneError};
 use clap::Args;
-use partwise::SceneSpec;
-use partwise::files::has_ending;
-use partwise::mesh::{Axis, Unit};
-use partwise::scene::{DistanceTo, Loaded, SceneError};
-use partwise::shapes::MeshCache;
 
 use super::MeasurementArgs;
 

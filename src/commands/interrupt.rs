@@ -19,7 +19,7 @@ pub(crate) fn listen() {
         let since = FIRST.get_or_init(Instant::now).elapsed();
         let again = REQUESTED.swap(true, Ordering::SeqCst);
         if !KEEPING.load(Ordering::SeqCst) || (again && since > ONE_PRESS) {
-            partwise::whole_file::abandon_all();
+            crate::base::atomic_file::abandon_all();
             std::process::exit(130);
         }
         if !again {

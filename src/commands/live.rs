@@ -4,16 +4,16 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
+use crate::Job;
+use crate::live::{LiveError, LiveOptions, LiveServer, random_token};
+use crate::record::RecordSummary;
+use crate::session::{Session, Workshop};
 use clap::Args;
-use partwise::Job;
-use partwise::live::{LiveError, LiveOptions, LiveServer, random_token};
-use partwise::record::RecordSummary;
-use partwise::session::{Session, Workshop};
 
-use super::followed::GLANCE;
+use super::runtime::use_threads;
+use super::session_recorder::GLANCE;
 use super::sinks::SeenFrom;
-use super::work::use_threads;
-use super::{InputArgs, SinkArgs, StageArgs, browser, console, followed, interrupt};
+use super::{InputArgs, SinkArgs, StageArgs, browser, console, interrupt, session_recorder};
 
 /// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again.
 const PORT: u16 = 7279;
@@ -159,7 +159,7 @@ impl LiveArgs {
         let file = self.record.clone()?;
         let sinks = SinkArgs { save: Some(file), seen_from: self.seen_from, ..SinkArgs::default() };
         let session = session.clone();
-        Some(std::thread::spawn(move || followed::keep(&session, &sinks)))
+        Some(std::thread::spawn(move || session_recorder::keep(&session, &sinks)))
     }
 
     /// Shows them to a viewer elsewhere, on another: one that is slow, silent or gone keeps nobody waiting.
@@ -167,6 +167,6 @@ impl LiveArgs {
         let connect = Some(self.connect.clone()?);
         let sinks = SinkArgs { no_save: true, connect, seen_from: self.seen_from, ..SinkArgs::default() };
         let session = session.clone();
-        Some(std::thread::spawn(move || followed::show(&session, &sinks)))
+        Some(std::thread::spawn(move || session_recorder::show(&session, &sinks)))
     }
 }

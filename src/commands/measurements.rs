@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::base::files::read_text;
+use crate::body::BodySpec;
 use anyhow::Context as _;
 use clap::Args;
-use partwise::files::read_text;
-use partwise::shapes::BodySpec;
 
 /// Measurements of the built-in dress form, in centimetres. What is left out is European size 38.
 #[derive(Debug, Clone, Args)]

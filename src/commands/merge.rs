@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use crate::record::Tab;
+use crate::study::sweep::{Outcome, Status, merge, store};
 use anyhow::Context as _;
 use clap::Args;
-use partwise::record::Tab;
-use partwise::sweep::{Outcome, Status, merge, store};
 
 use super::sweep::record_all;
 use super::sweep::report::{Format, Report};

@@ -10,7 +10,6 @@ mod console;
 mod cusick;
 mod fabrics;
 mod failure;
-mod followed;
 mod inputs;
 mod interrupt;
 mod live;
@@ -19,6 +18,8 @@ mod merge;
 mod pattern;
 mod readings;
 mod run;
+mod runtime;
+mod session_recorder;
 mod sinks;
 mod solved;
 mod stages;
@@ -27,12 +28,11 @@ mod sweep;
 mod tune;
 mod view;
 mod watch;
-mod work;
 
 use std::process::ExitCode;
 
+use crate::base::atomic_file;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
-use partwise::whole_file;
 
 // What most commands take and say goes by one name in all of them.
 use fabrics::FabricArgs;
@@ -116,7 +116,7 @@ enum Command {
 }
 
 /// Parses the arguments, runs the command, prints what went wrong.
-pub(crate) fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let cli = Cli::from_arg_matches(&with_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
     interrupt::listen();
     let outcome = match cli.command {
@@ -135,7 +135,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::View(args)) => args.execute(),
     };
     // A thread that still writes dies with the program.
-    whole_file::abandon_all();
+    atomic_file::abandon_all();
     match outcome {
         Ok(()) if interrupt::requested() => ExitCode::from(130),
         Ok(()) if !console::all_printed() => ExitCode::FAILURE,

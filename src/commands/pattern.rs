@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::SceneSpec;
+use crate::base::atomic_file::WholeFile;
+use crate::garment::pattern::SewingPattern;
 use clap::Args;
-use partwise::SceneSpec;
-use partwise::pattern::SewingPattern;
-use partwise::whole_file::WholeFile;
 use serde::Serialize;
 
 use super::console;
@@ -95,7 +95,7 @@ impl PatternArgs {
                 .map_err(|e| anyhow::anyhow!("{}: cannot be written: {e}", path.display()))?;
         }
         if self.format == Format::Json {
-            console::result(&partwise::said::json(&report)?);
+            console::result(&crate::base::error_text::json(&report)?);
             return Ok(());
         }
         console::notes(&report.notes);

@@ -1,6 +1,6 @@
 //! `--reading`: the readings of the paper's equations by name, so that the literal ones can be run and seen to fail.
 
-use partwise::mechanics::paper::PaperOptions;
+use crate::mechanics::paper::PaperOptions;
 use serde_json::{Value, json};
 
 /// What `--help` says of them.
@@ -34,7 +34,7 @@ pub(crate) fn options(readings: &[Reading]) -> serde_json::Result<PaperOptions> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use partwise::mechanics::paper::{BodyForce, Cosine, Volume};
+    use crate::mechanics::paper::{BodyForce, Cosine, Volume};
 
     #[test]
     fn readings_are_read_and_others_refused() {

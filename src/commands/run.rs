@@ -1,28 +1,28 @@
 //! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
 
 mod by_method;
-mod painted;
+mod coloured_export;
 mod watching;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use crate::Job;
+use crate::drape::{self, LetGo};
+use crate::record::Recorder;
+use crate::study::certificate::certify;
+use crate::study::evaluate::AssessError;
+use crate::study::job::Against;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
-use partwise::Job;
-use partwise::assess::AssessError;
-use partwise::certificate::certify;
-use partwise::drape::{self, LetGo};
-use partwise::job::Against;
-use partwise::record::Recorder;
 
+use super::runtime::{cache, refining, use_threads};
 use super::sinks::mesh_file;
 use super::solved::{Snapshot, Solved};
 use super::summary::Summary;
-use super::work::{cache, refining, use_threads};
 use super::{InputArgs, SinkArgs, StageArgs, certified, console, interrupt};
-use painted::ExportColours;
+use coloured_export::ExportColours;
 
 /// What stdout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -97,7 +97,7 @@ impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
-        painted::refuse(self.export.as_deref(), self.export_colours)?;
+        coloured_export::refuse(self.export.as_deref(), self.export_colours)?;
         if self.method != by_method::TWO_STAGE {
             return self.run_by_method();
         }
@@ -125,7 +125,7 @@ impl RunArgs {
 
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
         if let Some(path) = &self.export {
-            painted::write(solved, path, self.export_colours)?;
+            coloured_export::write(solved, path, self.export_colours)?;
             solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
         }
         Ok(())

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::base::atomic_file::{WholeFile, same_place};
+use crate::mesh::MeshError;
+use crate::record::Sink;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use partwise::mesh::MeshError;
-use partwise::record::Sink;
-use partwise::whole_file::{WholeFile, same_place};
 
 use super::UserError;
 

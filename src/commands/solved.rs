@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
-use partwise::Job;
-use partwise::drape::Drape;
-use partwise::job::Measured;
-use partwise::record::{
+use crate::Job;
+use crate::drape::Drape;
+use crate::record::{
     FoldView, Layout, OutfitView, Overlay, PatternView, RecordOptions, Recorder, StepView, Tab, WrinkleView,
 };
-use partwise::scene::{Loaded, Tailored};
-use partwise::session::Finished;
+use crate::scene::{Loaded, Tailored};
+use crate::session::Finished;
+use crate::study::job::Measured;
+use glam::DVec3;
 
 use super::SinkArgs;
 use super::summary::Summary;

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use crate::base::files::names_a_file;
+use crate::base::serde_name::word;
+use crate::drape::{Model, Refine, Settings};
+use crate::mechanics::coupled::Motion;
+use crate::parts::range_table::{GapRule, RangeTable, TABLE_3};
 use clap::Args;
-use partwise::drape::{Model, Refine, Settings};
-use partwise::files::names_a_file;
-use partwise::mechanics::coupled::Motion;
-use partwise::range_table::{GapRule, RangeTable, TABLE_3};
-use partwise::word::word;
 
 use super::readings::{self, Reading};
 use super::{FabricArgs, UserError};

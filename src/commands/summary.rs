@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::Settings;
+use crate::base::files::listed;
+use crate::drape::Drape;
+use crate::garment::fabric::Fabric;
+use crate::record::Panel;
+use crate::scene::{Loaded, Swatch};
+use crate::study::accuracy::Accuracy;
+use crate::study::certificate::Certificate;
+use crate::study::job::Measured;
+use crate::study::metrics::{Figures, GirthEase, LevelCount};
 use comfy_table::Table;
-use partwise::Settings;
-use partwise::accuracy::Accuracy;
-use partwise::certificate::Certificate;
-use partwise::drape::Drape;
-use partwise::fabric::Fabric;
-use partwise::figures::{Figures, GirthEase, LevelCount};
-use partwise::files::listed;
-use partwise::job::Measured;
-use partwise::record::Panel;
-use partwise::scene::{Loaded, Swatch};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -120,7 +120,7 @@ impl Summary {
     }
 
     pub(crate) fn json(&self) -> anyhow::Result<String> {
-        Ok(partwise::said::json(self)?)
+        Ok(crate::base::error_text::json(self)?)
     }
 
     /// For the terminal.

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
+use crate::record::web;
 use clap::Args;
-use partwise::record::web;
 
 use super::{UserError, browser, console, interrupt};
 

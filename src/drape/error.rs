@@ -4,7 +4,7 @@ use crate::mechanics::coupled::CoupledError;
 use crate::mechanics::energy::EnergyError;
 use crate::mechanics::paper::PaperError;
 use crate::mechanics::refine::SolveError;
-use crate::range_table::TableError;
+use crate::parts::range_table::TableError;
 use crate::scene::SceneError;
 
 /// Why nothing came out.

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::levels::Levels;
 use super::parts::stage_one;
-use super::pieces::{Distances, Made, refine_from, settled};
+use super::stages::{Distances, Made, refine_from, settled};
 use super::{
     Drape, DrapeError, Moved, PartOutcome, Settings, StageTimes, StageTwo, StartsFrom, moved, needs_cloth, timed,
 };

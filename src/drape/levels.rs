@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::Garment;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::coarse::Coarse;

@@ -3,35 +3,35 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. What it is given ([`Scene`], [`Settings`])
 //! is plain data, and so is what it returns ([`Drape`]): recording, printing and comparing are other people's work.
 
-mod approach;
 mod error;
 mod layers;
-mod let_go;
 mod levels;
+mod nested_iteration;
 mod parts;
-mod pieces;
+mod release;
 mod settings;
+mod stages;
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::distance::SurfacePoint;
+use crate::body::distance::SurfacePoint;
 use crate::mechanics::fit::Fit;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{self, Observer, Stop};
 use crate::parts::Parts;
-use crate::range_table::RangeTable;
+use crate::parts::range_table::RangeTable;
 pub use crate::scene::Scene;
-pub(crate) use approach::approach;
 pub use error::DrapeError;
-pub use let_go::LetGo;
-pub(crate) use let_go::{Released, let_go};
 pub(crate) use levels::Levels;
+pub(crate) use nested_iteration::approach;
 pub(crate) use parts::{ENOUGH, StageTwo, stage_one, stage_two, told};
-pub(crate) use pieces::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
+pub use release::LetGo;
+pub(crate) use release::{Released, let_go};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
+pub(crate) use stages::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
 
 /// How long each stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -6,11 +6,11 @@ use glam::DVec3;
 
 use super::levels::{Level, Levels};
 use super::{DrapeError, Model, PartOutcome, Settings};
-use crate::distance::SurfacePoint;
+use crate::body::distance::SurfacePoint;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Given};
 use crate::mechanics::paper::{self, Cut, PartForces};
+use crate::parts::range_table::RangeTable;
 use crate::parts::{Parts, segment};
-use crate::range_table::RangeTable;
 use crate::scene::Scene;
 
 /// What stage two leaves.

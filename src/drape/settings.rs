@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::{CoupledOptions, Motion};
 use crate::mechanics::paper::PaperOptions;
-use crate::range_table::{METRES_PER_CM, RangeTable, TableError, TableRule};
+use crate::parts::range_table::{METRES_PER_CM, RangeTable, TableError, TableRule};
 
 /// Extents PARTs are cut to unless asked otherwise, cm: none, so that the table alone makes them.
 pub const DEFAULT_EXTENTS_CM: &[f64] = &[];

@@ -17,12 +17,12 @@ use super::body::{Answer, flowing, refusal, whole};
 use super::events::{MOST_FLOWS, events, stream};
 use super::pieces::Pieces;
 use super::{garment, report};
-use crate::files::names_a_file;
-use crate::job::Job;
-use crate::range_table::RangeTable;
+use crate::base::files::names_a_file;
+use crate::parts::range_table::RangeTable;
 use crate::record::{bundled, takes_gzip};
 use crate::session::{Edit, EditError, Session, TableEdit};
-use crate::sweep::sweep_file;
+use crate::study::job::Job;
+use crate::study::sweep::sweep_file;
 
 /// Bytes of the longest request.
 const LONGEST: usize = 1 << 20;

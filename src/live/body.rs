@@ -39,6 +39,6 @@ pub(super) fn flowing(kind: &'static str, pieces: Receiver<Bytes>) -> Response<A
 
 /// A refusal, as JSON: `{"error": sentence}`.
 pub(super) fn refusal(status: StatusCode, sentence: &str) -> Response<Answer> {
-    let text = serde_json::json!({ "error": crate::said::short(sentence) }).to_string();
+    let text = serde_json::json!({ "error": crate::base::error_text::short(sentence) }).to_string();
     whole(status, "application/json", text + "\n")
 }

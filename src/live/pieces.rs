@@ -9,11 +9,11 @@ use hyper::body::Bytes;
 use tokio::sync::watch;
 
 use super::access::random_token;
-use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
 use crate::parts::Parts;
 use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
 use crate::session::{Session, Snapshot};
+use crate::study::metrics::LevelCount;
 
 /// How often is looked whether somebody has come.
 const GLANCE: Duration = Duration::from_millis(50);

@@ -3,13 +3,13 @@
 use serde_json::{Map, Value, json};
 
 use crate::drape::{Model, Settings};
-use crate::fabric;
-use crate::figures::LevelCount;
-use crate::job::Job;
-use crate::range_table::TableRule;
+use crate::garment::builtin;
+use crate::garment::fabric;
+use crate::parts::range_table::TableRule;
 use crate::record::level_colours;
 use crate::session::{AtRest, Finished, Ground, Pin, Preview, Sectioned, Snapshot, preset_names};
-use crate::shapes;
+use crate::study::job::Job;
+use crate::study::metrics::LevelCount;
 
 /// Bars of the histogram of distances.
 const BARS: usize = 80;
@@ -34,7 +34,7 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
         "preview": snapshot.preview.as_deref().map(preview),
         "rest": snapshot.rest.as_deref().map(rest),
         "figures": snapshot.finished.as_deref().map(figures),
-        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": crate::said::short(&r.sentence), "back_to": r.back_to})),
+        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": crate::base::error_text::short(&r.sentence), "back_to": r.back_to})),
         "pins": snapshot.pins.iter().map(|p| pin(p)).collect::<Vec<_>>(),
         "trail_end": snapshot.trail.last(),
         "undo": snapshot.undo,
@@ -48,8 +48,8 @@ pub(super) fn choices() -> Value {
     json!({
         "tables": preset_names(),
         "fabrics": fabric::BUILT_IN,
-        "garments": shapes::garment::BUILT_IN,
-        "sizes": shapes::garment::TABLE_4_SIZES,
+        "garments": builtin::BUILT_IN,
+        "sizes": builtin::TABLE_4_SIZES,
     })
 }
 

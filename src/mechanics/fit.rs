@@ -16,7 +16,7 @@
 use glam::DVec3;
 
 use super::energy::{Cloth, Contacts};
-use crate::quantile::nearest_rank;
+use crate::base::quantiles::nearest_rank;
 
 /// Principal strain above which a result is no garment that could be worn, %: more than fabrics bear.
 pub const TORN_PERCENT: f64 = 50.0;
@@ -77,7 +77,7 @@ pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::distance::Body;
+    use crate::body::distance::Body;
     use crate::mesh::TriMesh;
     use crate::mesh::samples::cuboid;
 

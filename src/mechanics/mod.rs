@@ -3,7 +3,6 @@
 mod columns;
 pub mod coupled;
 pub(crate) mod curvature;
-pub mod cusick;
 pub mod energy;
 pub mod fit;
 pub mod folds;

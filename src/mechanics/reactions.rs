@@ -25,7 +25,7 @@ use super::energy::contact::Touch;
 use super::energy::proximity::touching_between;
 use super::energy::{Cloth, Contacts, Friction};
 use super::newton::norm;
-use crate::distance::Body;
+use crate::body::distance::Body;
 
 /// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
 /// tenth of a millimetre.

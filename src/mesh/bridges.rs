@@ -13,7 +13,7 @@ use glam::DVec2;
 use super::import::Imported;
 use super::report::Repair;
 use super::{RestShape, TriMesh, sides};
-use crate::quantile::nearest_rank;
+use crate::base::quantiles::nearest_rank;
 
 /// A mesh has bridges where a side is longer than so many times the usual, and than this, m: no remesher leaves such.
 const BRIDGE: f64 = 5.0;

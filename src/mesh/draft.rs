@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use super::duplicates::twins;
 use super::polygon;
 use super::report::Repair;
 use super::scan::{Corner, Face, used};
-use super::twins::twins;
 use super::{renumbered, retain};
 
 /// Triangles that still know where they come from.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::files::{Unreadable, listed};
+use crate::base::files::{Unreadable, listed};
 
 /// Why a mesh was refused.
 #[derive(Debug, thiserror::Error)]

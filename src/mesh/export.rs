@@ -13,7 +13,7 @@ use super::TriMesh;
 use super::error::MeshError;
 use super::import::Imported;
 use super::topology::NONE;
-use crate::whole_file::WholeFile;
+use crate::base::atomic_file::WholeFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
 pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> Result<(), MeshError> {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::error::MeshError;
-use crate::word::word;
+use crate::base::serde_name::word;
 
 /// Length of one unit in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

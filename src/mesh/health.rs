@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::self_intersection::self_intersecting_pairs;
 use super::{Topology, TriMesh, winding};
-use crate::quantile::Percentiles;
+use crate::base::quantiles::Percentiles;
 
 /// A triangle lower than this share of its longest edge has no area worth the name: with coordinates written to seven
 /// digits, its normal would be noise.

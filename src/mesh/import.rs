@@ -10,9 +10,9 @@ use glam::{DVec2, DVec3};
 
 use super::draft::Draft;
 use super::error::MeshError;
-use super::facing::face_outward;
 use super::frame::{Axis, Frame, Unit};
 use super::frame_guess::{guess_frame, guess_frame_around};
+use super::orientation::face_outward;
 use super::report::{MeshReport, Remark, Repair};
 use super::scan::{Face, Scan, used};
 use super::source::{ObjSource, read};

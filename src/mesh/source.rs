@@ -8,7 +8,7 @@ use super::error::MeshError;
 use super::frame::Frame;
 use super::scan::{Corner, Face, Scan};
 use super::topology::NONE;
-use crate::files::{MOST_MESH, Unreadable, bounded};
+use crate::base::files::{MOST_MESH, Unreadable, bounded};
 
 /// What an export needs to give a file back with other positions.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 //! Edges are sorted by (smaller vertex, larger vertex); neighbours are sorted by index; so everything that iterates over
 //! them sums in the same order on any number of threads.
 
-use super::lists::Lists;
+use super::csr::Lists;
 use super::{TriMesh, pieces};
 
 /// None there: no triangle on that side of an edge, no further vertex in a list of fixed length, no parent in a tree.

@@ -13,10 +13,10 @@
 //!
 //! A method that cannot run on a scene says why ([`MethodError`]); none falls back to another.
 
-pub mod grip;
+pub mod friction;
 pub mod gross2003;
+pub mod implicit_euler;
 pub mod linear;
-pub mod march;
 pub mod rest;
 pub mod segment;
 pub mod spring_list;
@@ -28,10 +28,10 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
+use crate::garment::pattern::SewnGarment;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::TriMesh;
-use crate::pattern::SewnGarment;
 use crate::scene::Scene;
 pub use rest::{Ended, RestRule};
 

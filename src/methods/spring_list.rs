@@ -17,7 +17,7 @@
 //! | L | rest length | m |
 //! | Y | membrane stiffness along the edge | N/m |
 
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, Topology};
 
 /// Radius at which bending springs hold what the fabric does, m.

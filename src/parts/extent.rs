@@ -12,7 +12,7 @@
 //! smaller than asked, never larger. Non-positive extents make every vertex a PART; an infinite one or NaN cuts nothing.
 
 use crate::mesh::{RestShape, Topology, TriMesh};
-use crate::range_table::RangeTable;
+use crate::parts::range_table::RangeTable;
 
 use super::grain::{Grain, Ruler};
 use super::seeding::nearest_seeds;

@@ -16,6 +16,7 @@
 mod extent;
 mod grain;
 mod join;
+pub mod range_table;
 mod seams;
 mod seeding;
 
@@ -27,7 +28,7 @@ pub(crate) use seeding::spread_seeds;
 use rayon::prelude::*;
 
 use crate::mesh::{Topology, pieces};
-use crate::range_table::RangeTable;
+use crate::parts::range_table::RangeTable;
 
 /// The PART number of a vertex outside every level.
 pub const UNASSIGNED: u32 = u32::MAX;

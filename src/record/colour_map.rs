@@ -6,7 +6,7 @@
 //!
 //! Limits: a colour outside sRGB is clipped channel by channel.
 
-use crate::quantile::nearest_rank;
+use crate::base::quantiles::nearest_rank;
 
 /// An sRGB colour.
 pub(super) type Rgb = [u8; 3];

@@ -9,8 +9,8 @@
 //! two next to each other differ by fifteen degrees of hue.
 
 use super::colour_map::{Rgb, oklch};
-use crate::figures::LevelCount;
 use crate::mesh::{Topology, TriMesh};
+use crate::study::metrics::LevelCount;
 
 /// The body: darker than any cloth and than the pale end of the colour maps, lighter than the ground.
 pub(super) const BODY: Rgb = [118, 109, 103];

@@ -6,8 +6,8 @@ use super::colour_map::ColourMap;
 use super::legend::{Legend, caption};
 use super::step::covering;
 use super::{Open, Overlay, Range, RecordError, colours, meshes, paths};
-use crate::figures::LevelCount;
 use crate::parts::UNASSIGNED;
+use crate::study::metrics::LevelCount;
 
 /// One of two to six results shown side by side, each in a view of its own with the same eye.
 #[derive(Debug, Clone, Copy)]

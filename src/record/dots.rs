@@ -76,8 +76,8 @@ pub(super) fn log(open: &Open, step: &StepView<'_>, told: Vec<String>) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::LevelCount;
     use crate::record::Panel;
+    use crate::study::metrics::LevelCount;
 
     #[test]
     fn a_part_is_told_by_number_level_size_and_force() {

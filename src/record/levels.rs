@@ -3,7 +3,7 @@
 use rerun::{BarChart, Clear};
 
 use super::{Open, Range, RecordError, StepView, colours, meshes, paths};
-use crate::figures::LevelCount;
+use crate::study::metrics::LevelCount;
 
 /// Bars of the distance histogram, about.
 const BINS: usize = 80;

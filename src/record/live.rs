@@ -26,8 +26,8 @@ use super::meshes::{self, CellMesh};
 use super::open::application;
 use super::step::{FORCE_QUANTILE, covering, part_arrows};
 use super::{Range, RecordError, paths};
-use crate::figures::LevelCount;
 use crate::mesh::TriMesh;
+use crate::study::metrics::LevelCount;
 
 const PARTS: &str = "/parts";
 /// Width over height of the room for all views of a page of 1280 by 800 pixels.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::legend::number;
-use crate::figures::LevelCount;
+use crate::study::metrics::LevelCount;
 
 /// Version of the viewer the recording is made for.
 pub(super) const RERUN_VERSION: &str = "0.36.3";
@@ -108,7 +108,7 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::range_table::Extent;
+    use crate::parts::range_table::Extent;
 
     #[test]
     fn the_panel_holds_what_it_is_given_and_no_empty_tables() {

@@ -19,7 +19,7 @@ use super::remote::Remote;
 use super::web::WebViewer;
 use super::writer::RrdWriter;
 use super::{RecordError, native};
-use crate::whole_file::{WholeFile, folder_of};
+use crate::base::atomic_file::{WholeFile, folder_of};
 
 /// How long a viewer has to answer.
 const ANSWER: Duration = Duration::from_secs(3);

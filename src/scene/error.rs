@@ -1,12 +1,12 @@
 //! Why there is no scene. The user can mend all of these.
 
 use super::CutError;
-use crate::distance::DistanceError;
-use crate::files::{Unreadable, listed};
+use crate::base::files::{Unreadable, listed};
+use crate::body::ShapeError;
+use crate::body::distance::DistanceError;
+use crate::garment::pattern::PatternError;
 use crate::mesh::MeshError;
 use crate::mesh::rest::RestError;
-use crate::pattern::PatternError;
-use crate::shapes::ShapeError;
 
 /// A body or garment that cannot be used.
 #[derive(Debug, thiserror::Error)]

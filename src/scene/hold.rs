@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use super::{Scene, SceneError};
-use crate::files::first_of;
+use crate::base::files::first_of;
 
 /// Connected parts that are named in one message; of more their number is told.
 const NAMED: usize = 5;

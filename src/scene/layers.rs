@@ -23,10 +23,10 @@ use parry3d_f64::shape::{FeatureId, TriMesh as ParryMesh};
 use serde::{Deserialize, Serialize};
 
 use super::{Scene, SceneError};
-use crate::distance::{Body, DistanceError, SurfacePoint};
+use crate::base::serde_name::word;
+use crate::body::distance::{Body, DistanceError, SurfacePoint};
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{RestShape, Topology, TriMesh};
-use crate::word::word;
 
 /// An outer garment begins so far outside the inner one, m: the sag of triangles of both, and some thicknesses.
 const CLEARANCE: f64 = 6e-3;

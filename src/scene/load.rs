@@ -4,21 +4,21 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::cut::{Cut, Swatch};
 use super::layers::join;
+use super::materials::{Cut, Swatch};
 use super::spec::REST_AUTO;
 use super::{Layer, PushOutReport, Scene, SceneError, SceneSpec, facing_body};
-use crate::distance::Body;
-use crate::files::{has_ending, names_a_file, stem};
+use crate::base::files::{has_ending, names_a_file, stem};
+use crate::body::distance::Body;
+use crate::garment::MeshCache;
+use crate::garment::pattern::{SewingPattern, SewnGarment};
+use crate::garment::sewing::{PutOn, draw_shut, put_on};
 use crate::mesh::export::{write_imported, write_mesh, write_textured};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::glb::write_glb;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use crate::mesh::report::MeshReport;
 use crate::mesh::{MeshError, RestShape, TriMesh, retain};
-use crate::pattern::{SewingPattern, SewnGarment};
-use crate::sewing::{PutOn, draw_shut, put_on};
-use crate::shapes::MeshCache;
 
 /// A scene with its origin.
 #[derive(Debug, Clone)]
@@ -192,7 +192,7 @@ impl SceneSpec {
         let beside = match (of_body, body.mesh().bounds()) {
             (Some(body), _) => Beside::File(body.frame()),
             (None, Some((low, high))) => Beside::Bounds(low, high),
-            (None, None) => return Err(crate::distance::DistanceError::Empty.into()),
+            (None, None) => return Err(crate::body::distance::DistanceError::Empty.into()),
         };
         let options = self.import_options(self.garment_group.as_ref());
         let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;

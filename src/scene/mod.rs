@@ -4,26 +4,26 @@
 //! the garment is turned to face away from the body, its rest shape is taken before anything moves, it must be near the
 //! body, and what starts inside is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
-mod cut;
 mod error;
 mod hold;
 mod layers;
 mod load;
+mod materials;
 mod placement;
 mod push_out;
 mod spec;
 
-pub use cut::{CutError, PanelFabrics, Swatch};
 pub use error::SceneError;
 pub use hold::Fallen;
 pub use layers::{DistanceTo, Layer};
 pub use load::{Loaded, Tailored};
+pub use materials::{CutError, PanelFabrics, Swatch};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
 pub use spec::{DRESS_FORM, SceneSpec};
 
-use crate::distance::{Body, SurfacePoint};
-use crate::fabric::Fabric;
+use crate::body::distance::{Body, SurfacePoint};
+use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 use placement::check_near;
 

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::SceneError;
-use crate::distance::Body;
+use crate::base::quantiles::Percentiles;
+use crate::body::distance::Body;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{Topology, TriMesh};
-use crate::quantile::Percentiles;
 
 /// A garment whose nearest vertex is farther than this from the body (m) is not worn: the loosest gown hangs from a shoulder
 /// or a waist.

@@ -18,7 +18,7 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::distance::Body;
+use crate::body::distance::Body;
 use crate::mesh::{Topology, TriMesh};
 
 /// Deeper than this (m) the nearest surface may be that of the far side: half the thickness of a slender forearm.

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::{DistanceTo, SceneError};
-use crate::files::{has_ending, names_a_file, read_text, stem};
+use crate::base::files::{has_ending, names_a_file, read_text, stem};
+use crate::body::BodySpec;
+use crate::garment::pattern::DEFAULT_EDGE_M;
+use crate::garment::{GarmentRequest, GarmentSpec};
 use crate::mesh::import::ImportOptions;
 use crate::mesh::{Axis, Unit};
-use crate::pattern::DEFAULT_EDGE_M;
-use crate::shapes::{BodySpec, GarmentRequest, GarmentSpec};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";

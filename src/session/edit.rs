@@ -7,13 +7,13 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use super::presets;
+use crate::body::ShapeError;
 use crate::drape::{DrapeError, Model, Refine};
-use crate::fabric::{Fabric, FabricError};
-use crate::job::Job;
+use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::coupled::Motion;
-use crate::range_table::{GapRule, RangeTable, TableError, TableRule};
+use crate::parts::range_table::{GapRule, RangeTable, TableError, TableRule};
 use crate::scene::SceneError;
-use crate::shapes::ShapeError;
+use crate::study::job::Job;
 
 /// Why an edit was refused: the session stays as it was.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::job::Job;
+use crate::study::job::Job;
 
 /// Jobs remembered.
 const MOST: usize = 200;

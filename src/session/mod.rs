@@ -19,25 +19,25 @@
 //! An edit that cannot be is refused with a sentence, at once or when it turns out, and the last good state stands.
 //! No socket, no viewer and no file is known here. Limits: measurements and another garment begin cold, as their meshes differ.
 
-mod desk;
 mod edit;
 mod history;
 mod pins;
 mod presets;
 mod results;
-mod workshop;
+mod state;
+mod worker;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use desk::Desk;
 pub use edit::{Edit, EditError, FabricEdit, TableEdit};
 pub use presets::preset_names;
 pub use results::{AtRest, Finished, Ground, Pin, Preview, Refusal, Sectioned, Snapshot, TrailPoint};
-pub use workshop::Workshop;
+use state::Desk;
+pub use worker::Workshop;
 
-use crate::job::Job;
+use crate::study::job::Job;
 
 /// Called with the serial number of what became known.
 type Listener = Arc<dyn Fn(u64) + Send + Sync>;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::EditError;
-use super::desk::Desk;
 use super::results::Pin;
+use super::state::Desk;
 
 /// States that can be pinned.
 const MOST_PINS: usize = 8;

@@ -1,7 +1,7 @@
 //! The range tables a session offers by name: the paper's, and those that were searched for.
 
-use crate::files::names_a_file;
-use crate::range_table::{RangeTable, TABLE_3, TableError};
+use crate::base::files::names_a_file;
+use crate::parts::range_table::{RangeTable, TABLE_3, TableError};
 
 /// The tables of `assets/tuned/`, inside the binary.
 const TUNED: [(&str, &str); 10] = [

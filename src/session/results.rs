@@ -14,12 +14,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::drape::{ClothState, Distances, Drape, LetGo, PartOutcome, Refine};
-use crate::fabric::Fabric;
-use crate::figures::Figures;
-use crate::job::Job;
+use crate::garment::fabric::Fabric;
 use crate::parts::Parts;
-use crate::range_table::RangeTable;
+use crate::parts::range_table::RangeTable;
 use crate::scene::{Loaded, SceneSpec};
+use crate::study::job::Job;
+use crate::study::metrics::Figures;
 
 /// Body and garment, and how far apart they are: what stays while tables and fabrics change.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! Specimens and what they are laid on.
 
 use glam::{DQuat, DVec3};
-use partwise::distance::Body;
-use partwise::fabric::Fabric;
+use partwise::body::distance::Body;
+use partwise::garment::fabric::Fabric;
 use partwise::mesh::TriMesh;
 
 /// A rectangle of nu × nv cells in the plane of `u` and `v` (m), split in alternating diagonals.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use partwise::distance::Body;
+use partwise::body::distance::Body;
 use partwise::mechanics::energy::Cloth;
 use partwise::mechanics::refine::{RefineOptions, Stop, refine};
 use partwise::mesh::{RestShape, Topology, TriMesh};

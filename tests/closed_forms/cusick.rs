@@ -1,7 +1,7 @@
 //! The drape test on a coarse specimen: in order of stiffness, in folds, and inside the published bands where it is.
 
-use partwise::fabric::Fabric;
-use partwise::mechanics::cusick::{Target, results_csv, run, targets};
+use partwise::garment::fabric::Fabric;
+use partwise::study::drape_test::{Target, results_csv, run, targets};
 
 fn falls_inside(band: &Target) {
     let result = run(&Fabric::by_name(&band.fabric).unwrap(), 8).unwrap();
@@ -57,5 +57,5 @@ fn the_results_beside_the_code_are_what_the_code_gives() {
         kept.lines().any(|line| line == row),
         "assets/cusick/results.csv lacks `{row}`: `partwise cusick --rows 10 --csv` writes it again"
     );
-    assert_eq!(kept.lines().count(), 1 + partwise::fabric::BUILT_IN.len());
+    assert_eq!(kept.lines().count(), 1 + partwise::garment::fabric::BUILT_IN.len());
 }

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use glam::{DQuat, DVec3};
-use partwise::distance::Body;
-use partwise::fabric::Fabric;
+use partwise::body::distance::Body;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine};
 use partwise::mesh::{RestShape, Topology, TriMesh};

@@ -1,8 +1,8 @@
 //! Gradient and Hessian of each term by central differences.
 
 use glam::DVec3;
-use partwise::distance::Body;
-use partwise::fabric::Fabric;
+use partwise::body::distance::Body;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts, Friction, gravity, membrane::Stiffness};
 use partwise::mesh::TriMesh;
 

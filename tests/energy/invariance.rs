@@ -1,9 +1,9 @@
 //! Rigid motion, hand-worked values, and sums that must balance.
 
 use glam::{DQuat, DVec3};
-use partwise::mechanics::energy::{Contacts, EnergyError, membrane::Stiffness};
-use partwise::mesh::RestShape;
-use partwise::{GRAVITY, mechanics::energy::Cloth, mesh::Topology};
+use partwise::GRAVITY;
+use partwise::mechanics::energy::{Cloth, Contacts, EnergyError, membrane::Stiffness};
+use partwise::mesh::{RestShape, Topology};
 
 use crate::patch::{cloth, deformed, fabric, sheet};
 

@@ -1,7 +1,7 @@
 //! A small cloth away from kinks: uneven, curved, stretched and sheared by known amounts.
 
 use glam::DVec3;
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::{RestShape, Topology, TriMesh};
 

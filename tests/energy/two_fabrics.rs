@@ -1,7 +1,7 @@
 //! A cloth of two fabrics: each triangle, ring and vertex has its own constants.
 
 use glam::DVec3;
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts, EnergyError};
 use partwise::mesh::{RestShape, Topology, TriMesh};
 

@@ -4,15 +4,15 @@
 
 use glam::{DQuat, DVec3};
 use partwise::GRAVITY;
-use partwise::distance::{Body, SurfacePoint};
-use partwise::fabric::Fabric;
+use partwise::body::distance::{Body, SurfacePoint};
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::paper::{
     BodyForce, Clearance, Contactless, Cosine, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning,
     Untouched, Volume, solve,
 };
 use partwise::mesh::{Topology, TriMesh};
+use partwise::parts::range_table::RangeTable;
 use partwise::parts::{Parts, segment};
-use partwise::range_table::RangeTable;
 
 mod balance;
 mod fabrics;

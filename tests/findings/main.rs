@@ -10,11 +10,11 @@ use std::sync::atomic::AtomicBool;
 use glam::DVec3;
 use partwise::Job;
 use partwise::drape::{Scene, drape, unobserved};
-use partwise::figures::Figures;
 use partwise::mesh::TriMesh;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::self_intersection::crossing_pairs;
-use partwise::sweep::{Bench, Plan, Status};
+use partwise::study::metrics::Figures;
+use partwise::study::sweep::{Bench, Plan, Status};
 
 /// Rings of `around` points from the top down, closed by a point at each end where `ends` are given.
 fn turned(profile: &[(f64, f64)], around: u32, ends: Option<[f64; 2]>) -> TriMesh {
@@ -137,7 +137,7 @@ fn two_ponchos_laid_flat_over_each_other_stay_on() {
         |z: f64| turned(&(0..28).map(|j| (0.08 + 0.42 * f64::from(j) / 27.0, z)).collect::<Vec<_>>(), 71, None);
     let scene = Scene::of_meshes(&post, beside(poncho(1.53), &poncho(1.536))).unwrap();
     let mut job = Job::preview();
-    job.settings.fabric = partwise::fabric::Fabric::by_name("denim").unwrap();
+    job.settings.fabric = partwise::garment::fabric::Fabric::by_name("denim").unwrap();
     let (figures, warnings, x) = draped_by(&scene, &job);
     let necks = [0..71, 28 * 71..29 * 71].map(|ring| ring.map(|v| x[v].z).fold(f64::INFINITY, f64::min));
     assert!(necks.iter().all(|z| *z > 1.35), "{necks:?}");

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec2, DVec3};
 use partwise::drape::{Refine, Scene, drape, unobserved};
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::{Axis, RestShape, Topology, TriMesh, Unit};

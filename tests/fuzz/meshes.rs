@@ -4,11 +4,11 @@ use std::fs;
 
 use glam::DVec3;
 use partwise::drape::{drape, unobserved};
-use partwise::figures::Figures;
 use partwise::mesh::export::write_imported;
 use partwise::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use partwise::mesh::{Axis, Frame, TriMesh, Unit};
-use partwise::sweep::{Existing, Manifest, Plan, Row, Store, Timing, csv_text, join};
+use partwise::study::metrics::Figures;
+use partwise::study::sweep::{Existing, Manifest, Plan, Row, Store, Timing, csv_text, join};
 use partwise::{Job, SceneSpec};
 
 use super::fuzz;

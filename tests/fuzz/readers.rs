@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use partwise::base::error_text::said;
+use partwise::body::BodySpec;
 use partwise::drape::Refine;
-use partwise::fabric::{self, Fabric};
-use partwise::pattern::SewingPattern;
-use partwise::range_table::RangeTable;
-use partwise::said::said;
+use partwise::garment::fabric::{self, Fabric};
+use partwise::garment::pattern::SewingPattern;
+use partwise::garment::{BUILT_IN, GarmentSpec};
+use partwise::parts::range_table::RangeTable;
 use partwise::scene::PanelFabrics;
-use partwise::shapes::{BUILT_IN, BodySpec, GarmentSpec};
-use partwise::sweep::Plan;
+use partwise::study::sweep::Plan;
 use partwise::{Job, SceneSpec};
 
 use super::fuzz;
@@ -179,7 +180,7 @@ fn made_garments_on_made_bodies() {
         let (garment, body) = text.split_once("\n=====\n").unwrap_or((text, ""));
         let made = GarmentSpec::from_toml(garment).and_then(|spec| {
             let body = BodySpec::from_toml(body)?;
-            partwise::shapes::garment(&spec, &body, Some(600))
+            partwise::garment::garment(&spec, &body, Some(600))
         });
         match made {
             Err(e) => refused(&e),
@@ -210,7 +211,7 @@ fn sweep_files() {
 fn jobs() {
     let mut other = Job::preview();
     other.settings.refine = Refine::Converged;
-    other.settings.table = partwise::range_table::TableRule::Quantile { name: "q".to_owned(), levels: 5 };
+    other.settings.table = partwise::parts::range_table::TableRule::Quantile { name: "q".to_owned(), levels: 5 };
     let seeds = [Job::default(), Job::preview(), other].map(|job| serde_json::to_string_pretty(&job).unwrap());
     fuzz("job", 1.0, seeds.to_vec(), |text| match serde_json::from_str::<Job>(text) {
         Err(e) => refused(&e),

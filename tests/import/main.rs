@@ -147,7 +147,7 @@ fn a_closed_body_faces_outward_and_an_open_one_is_refused_unless_allowed() {
     assert_eq!(body.frame().unit, Unit::Dm);
     let (lo, hi) = body.mesh.bounds().unwrap();
     assert!((hi - lo - DVec3::new(0.4, 0.3, 1.7)).length() < 1e-12);
-    let distance = partwise::distance::Body::new(&body.mesh).unwrap();
+    let distance = partwise::body::distance::Body::new(&body.mesh).unwrap();
     assert!(distance.nearest((lo + hi) / 2.0).signed_distance < 0.0);
 
     let lines: Vec<String> = inward_box().lines().map(str::to_owned).collect();
@@ -187,7 +187,7 @@ fn a_body_of_loose_faces_is_told_to_be_welded_and_a_scene_to_be_chosen_from() {
 fn a_garment_inside_out_is_turned_to_face_away_from_the_body() {
     let (_folder, path) = file(&inward_box());
     let body = import_body(&path, &ImportOptions { up: Some(Axis::Y), ..ImportOptions::default() }).unwrap();
-    let distance = partwise::distance::Body::new(&body.mesh).unwrap();
+    let distance = partwise::body::distance::Body::new(&body.mesh).unwrap();
     // A square before the body (outward is towards -y there) that faces it, and one behind that faces away.
     let text = "v 1 0.2 2\nv 2 0.2 2\nv 2 0.2 4\nv 1 0.2 4\nv 1 -4 2\nv 2 -4 2\nv 2 -4 4\nv 1 -4 4\n\
                 f 1 2 3 4\nf 5 6 7 8\n";

@@ -5,9 +5,9 @@ use std::net::{SocketAddr, TcpStream};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use partwise::garment::MeshCache;
 use partwise::live::{LiveOptions, LiveServer};
 use partwise::session::{Session, Workshop};
-use partwise::shapes::MeshCache;
 use partwise::{DVec3, Job, SceneSpec};
 use serde_json::Value;
 

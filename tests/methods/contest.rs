@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use partwise::SceneSpec;
-use partwise::contest::{ContestError, ContestOptions, Contested, ENTRANTS, row};
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
+use partwise::study::table4::{ContestError, ContestOptions, Contested, ENTRANTS, row};
 
 const SMALL: ContestOptions = ContestOptions {
     rounds: 2,
@@ -25,13 +25,13 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
     let vertices = scene.garment.vertex_count();
     assert!(canonical.len() == vertices && draped.len() == ENTRANTS.len());
     for (entry, x) in made.entries.iter().zip(&draped) {
-        let apart = partwise::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
+        let apart = partwise::study::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
         assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.entrant);
     }
     assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
     let names: Vec<&str> = made.entries.iter().map(|e| e.entrant.as_str()).collect();
-    assert_eq!(names, ENTRANTS.map(partwise::contest::Entrant::name));
+    assert_eq!(names, ENTRANTS.map(partwise::study::table4::Entrant::name));
     for entry in &made.entries {
         assert_eq!(entry.error, None);
         assert_eq!(entry.times_ms.len(), 2);
@@ -55,7 +55,7 @@ fn who_cannot_run_says_why_and_the_others_go_on() {
     let mut scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
-    scene.body = partwise::distance::Body::new_open(&open).unwrap();
+    scene.body = partwise::body::distance::Body::new_open(&open).unwrap();
     let options = ContestOptions { rounds: 1, starts: 0, ..SMALL };
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &options, &mut |_, _, _| ControlFlow::Continue(()));
     let Contested { row: made, draped, .. } = made.unwrap();

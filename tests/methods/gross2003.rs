@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::methods::gross2003::cut::cut;
 use partwise::methods::gross2003::developable::Developable;

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::{RestShape, TriMesh};
 use partwise::methods::{Dressing, MethodDrape, MethodError, ReferenceMethod, RestRule};
@@ -30,7 +30,7 @@ fn elsewhere() -> TriMesh {
 /// Cloth that hangs free, held at `held`.
 pub(crate) fn hanging(garment: TriMesh, held: Vec<u32>) -> Scene {
     let rest = RestShape::from_edges(&garment).unwrap();
-    let body = partwise::distance::Body::new(&elsewhere()).unwrap();
+    let body = partwise::body::distance::Body::new(&elsewhere()).unwrap();
     Scene { held, ..Scene::new(body, garment, rest) }
 }
 

@@ -3,8 +3,8 @@
 use glam::{DMat3, Vec3A};
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::TriMesh;
+use partwise::methods::implicit_euler::Elastic;
 use partwise::methods::linear::Operator;
-use partwise::methods::march::Elastic;
 use partwise::methods::thomaszewski2006::{Thomaszewski2006, elements_of_garment};
 use partwise::methods::{Dressing, Ended, MethodError};
 use partwise::{DVec3, GRAVITY};
@@ -159,7 +159,7 @@ fn a_mesh_without_a_limit_surface_is_refused_in_one_line() {
 #[test]
 fn however_strained_nothing_pulls_or_turns_by_itself() {
     let scene = hanging(uneven(), vec![0]);
-    let fabric = partwise::fabric::Fabric::default();
+    let fabric = partwise::garment::fabric::Fabric::default();
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
     let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
     // Sheared, stretched unevenly and bent sharply, in a fabric of three stiffnesses.

@@ -1,7 +1,7 @@
 //! Springs, units, quadrics and the hierarchy.
 
 use partwise::mechanics::energy::Cloth;
-use partwise::methods::march::Obstacle;
+use partwise::methods::implicit_euler::Obstacle;
 use partwise::methods::zhu2016::Zhu2016;
 use partwise::methods::zhu2016::hierarchy::Hierarchy;
 use partwise::methods::{Dressing, Ended, MethodError};
@@ -100,7 +100,7 @@ fn the_hierarchy_finds_what_an_exact_search_finds() {
 #[test]
 fn a_skirt_comes_to_rest_outside_the_body_with_the_same_bits_every_time() {
     let scene = dressed();
-    let fabric = partwise::fabric::Fabric::default();
+    let fabric = partwise::garment::fabric::Fabric::default();
     let rule = partwise::methods::RestRule::default();
     let made = drape(&Zhu2016::default(), &scene, &fabric, &rule).unwrap();
     assert_eq!(made.ended, Ended::AtRest);
@@ -117,8 +117,8 @@ fn an_open_body_is_refused_in_one_line() {
     let mut scene = dressed();
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
-    scene.body = partwise::distance::Body::new_open(&open).unwrap();
-    let error = drape(&Zhu2016::default(), &scene, &partwise::fabric::Fabric::default(), &STILL).unwrap_err();
+    scene.body = partwise::body::distance::Body::new_open(&open).unwrap();
+    let error = drape(&Zhu2016::default(), &scene, &partwise::garment::fabric::Fabric::default(), &STILL).unwrap_err();
     assert!(matches!(error, MethodError::Unfit { .. }));
     assert!(error.to_string().contains("3 boundary edges") && !error.to_string().contains('\n'), "{error}");
 }
@@ -128,7 +128,7 @@ fn the_quadrics_can_be_shown() {
     let scene = dressed();
     let rule = partwise::methods::RestRule { limit_s: 0.1, ..partwise::methods::RestRule::default() };
     let method = Zhu2016 { exhibit: true, ..Zhu2016::default() };
-    let made = drape(&method, &scene, &partwise::fabric::Fabric::default(), &rule).unwrap();
+    let made = drape(&method, &scene, &partwise::garment::fabric::Fabric::default(), &rule).unwrap();
     assert_eq!(made.ended, Ended::TimeOver);
     let [("units and quadrics", partwise::methods::Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
     let quadrics = made.counts.iter().find(|c| c.0 == "quadrics").unwrap().1;

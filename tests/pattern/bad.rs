@@ -1,6 +1,6 @@
 //! Patterns that cannot be used, and what is said of them.
 
-use partwise::pattern::SewingPattern;
+use partwise::garment::pattern::SewingPattern;
 use serde_json::{Value, json};
 
 use crate::{pattern, stitch, straight};

@@ -2,11 +2,11 @@
 //! paper would make.
 
 use glam::DVec3;
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
+use partwise::garment::pattern::{SewingPattern, SewnGarment};
 use partwise::mechanics::energy::{Cloth, Contacts};
 use partwise::mechanics::refine::{RefineOptions, refine_with};
 use partwise::mesh::Topology;
-use partwise::pattern::{SewingPattern, SewnGarment};
 use serde_json::{Value, json};
 
 use crate::{parse, pattern, stitch, straight};

@@ -3,14 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use partwise::certificate::{Certificate, certify};
 use partwise::drape::{Drape, Settings, drape, unobserved};
-use partwise::fabric::Fabric;
-use partwise::job::Job;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mechanics::energy::membrane::Triangle;
 use partwise::scene::Loaded;
-use partwise::sweep::Plan;
+use partwise::study::certificate::{Certificate, certify};
+use partwise::study::job::Job;
+use partwise::study::sweep::Plan;
 use partwise::{GRAVITY, Scene, SceneSpec};
 use tempfile::TempDir;
 

@@ -9,7 +9,7 @@ mod cut;
 mod seams;
 mod worn;
 
-use partwise::pattern::SewingPattern;
+use partwise::garment::pattern::SewingPattern;
 use serde_json::{Value, json};
 
 /// A pattern of these panels and stitches, lengths in cm.

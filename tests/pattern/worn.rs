@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
+use partwise::body::{BodySpec, dress_form};
+use partwise::garment::pattern::SewingPattern;
+use partwise::garment::sewing::Landmarks;
 use partwise::mesh::import::{Beside, ImportOptions, import_garment};
 use partwise::mesh::self_intersection::self_intersecting_pairs;
 use partwise::mesh::{Axis, Unit};
-use partwise::pattern::SewingPattern;
 use partwise::scene::Loaded;
-use partwise::sewing::Landmarks;
-use partwise::shapes::{BodySpec, dress_form};
 use partwise::{DVec3, SceneSpec};
 
 fn asset(name: &str) -> String {

@@ -2,10 +2,10 @@
 //! see a recording, independent of the solver.
 
 use glam::DVec3;
-use partwise::distance::Body;
-use partwise::figures::LevelCount;
+use partwise::body::distance::Body;
 use partwise::mesh::{Topology, TriMesh};
 use partwise::record::Panel;
+use partwise::study::metrics::LevelCount;
 
 /// Height, half width and half depth of the form, m.
 const FORM: [[f64; 3]; 19] = [

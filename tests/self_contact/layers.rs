@@ -1,11 +1,11 @@
 //! Garments over each other, and what self-contact and cover are for.
 
 use partwise::Scene;
-use partwise::certificate::certify;
 use partwise::drape::{Drape, Refine, Settings, drape, unobserved};
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mesh::self_intersection::crossing_pairs;
 use partwise::scene::{DistanceTo, SceneSpec};
+use partwise::study::certificate::certify;
 
 fn outfit(distance_to: DistanceTo) -> Scene {
     let over = vec!["pullover-1@900".to_owned()];

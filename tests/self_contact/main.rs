@@ -17,9 +17,9 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
 use partwise::GRAVITY;
-use partwise::distance::Body;
+use partwise::body::distance::Body;
 use partwise::drape::{Settings, drape, unobserved};
-use partwise::fabric::Fabric;
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts};
 use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine, refine_with};
 use partwise::mesh::self_intersection::self_intersecting_pairs;

@@ -1,10 +1,10 @@
 //! Skin through cloth: bodies rounder than the cloth's mesh is fine, and ends of a body that stick through.
 
 use partwise::Scene;
-use partwise::certificate::certify;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::self_intersection::crossing_pairs;
 use partwise::mesh::{Axis, Unit};
+use partwise::study::certificate::certify;
 
 use super::*;
 

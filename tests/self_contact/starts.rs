@@ -1,7 +1,7 @@
 //! Perturbed starts, every other one moved so far that it may cross itself: which end at rest without a crossing.
 
 use partwise::Scene;
-use partwise::assess::perturbed;
+use partwise::study::evaluate::perturbed;
 
 use super::*;
 

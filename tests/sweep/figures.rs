@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use partwise::drape::StageTimes;
-use partwise::figures::Figures;
-use partwise::sweep::{Row, Status, Timing, columns};
+use partwise::study::metrics::Figures;
+use partwise::study::sweep::{Row, Status, Timing, columns};
 use proptest::prelude::*;
 
 use super::{plan, uninterrupted};

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use partwise::sweep::{
+use partwise::study::sweep::{
     Append, Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, SweepProgress, store, sweep,
 };
 use proptest::prelude::*;
@@ -164,9 +164,9 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
     let mut held = open(&whole, Existing::Refuse).unwrap();
     assert!(matches!(open(&whole, Existing::RESUME), Err(StoreError::Locked { .. })));
     for point in &whole.points[..10] {
-        held.append(partwise::sweep::Row::failed(point, "x")).unwrap();
+        held.append(partwise::study::sweep::Row::failed(point, "x")).unwrap();
     }
-    let twice = held.append(partwise::sweep::Row::failed(&whole.points[3], "x"));
+    let twice = held.append(partwise::study::sweep::Row::failed(&whole.points[3], "x"));
     assert!(matches!(twice, Err(StoreError::Damaged { .. })));
     drop(held);
     let error = open(&whole, Existing::Refuse).unwrap_err().to_string();

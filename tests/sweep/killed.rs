@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use partwise::sweep::{Existing, Point, Run, store, sweep};
+use partwise::study::sweep::{Existing, Point, Run, store, sweep};
 
 use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 

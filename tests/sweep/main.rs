@@ -18,8 +18,8 @@ use std::time::Duration;
 use glam::DVec3;
 use partwise::Job;
 use partwise::drape::StageTimes;
-use partwise::figures::Figures;
-use partwise::sweep::{
+use partwise::study::metrics::Figures;
+use partwise::study::sweep::{
     Append, Existing, Manifest, Medium, Outcome, Pass, Plan, Point, PointError, Row, Run, Store, StoreError,
     SweepProgress, result_hash, row_of, run_missing, sweep,
 };

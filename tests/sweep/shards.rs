@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use partwise::Job;
-use partwise::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
+use partwise::study::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
 
 use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 

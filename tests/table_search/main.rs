@@ -7,12 +7,12 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
-use partwise::accuracy::representable::unblended_rms_m;
 use partwise::mechanics::coupled::Motion;
 use partwise::mesh::{RestShape, Topology, TriMesh};
+use partwise::parts::range_table::RangeTable;
 use partwise::parts::{Grain, Parts, segment};
-use partwise::range_table::RangeTable;
-use partwise::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
+use partwise::study::accuracy::representable::unblended_rms_m;
+use partwise::study::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
 fn sheet(w: usize, h: usize) -> TriMesh {

@@ -178,7 +178,7 @@ impl Seeds {
             ("spec.toml", asset("garments/flared-skirt.toml")),
             ("skirt.json", asset("patterns/skirt.json")),
             ("cut.toml", CUT.into()),
-            ("body.toml", toml::to_string(&partwise::shapes::BodySpec::default()).unwrap().into_bytes()),
+            ("body.toml", toml::to_string(&partwise::body::BodySpec::default()).unwrap().into_bytes()),
         ]);
         for (name, bytes) in &files {
             fs::write(folder.path().join(name), bytes).unwrap();

@@ -4,15 +4,15 @@ mod recorded;
 
 use std::path::PathBuf;
 
+use crate::SceneSpec;
+use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
+use crate::garment::{GarmentRequest, MeshCache};
+use crate::study::table4::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
 use clap::{Args, Subcommand};
-use partwise::SceneSpec;
-use partwise::contest::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
-use partwise::fabric::{DEFAULT_FABRIC, Fabric};
-use partwise::shapes::{GarmentRequest, MeshCache};
 use serde_json::json;
 
+use crate::commands::runtime::{make_folder, unwritable, use_threads, write_csv};
 use crate::commands::sweep::report::Format;
-use crate::commands::work::{make_folder, unwritable, use_threads, write_csv};
 use crate::commands::{UserError, console, interrupt};
 
 const LONG_ABOUT: &str = "\
@@ -127,7 +127,7 @@ impl TableFourArgs {
             };
             let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
             let loaded = spec.load_with(&MeshCache::in_user_cache())?;
-            match contest::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
+            match table4::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
                 Ok(contested) => {
                     journal.rows.push(contested.row.clone());
                     // Kept before it is recorded: a disk that is full then costs a picture and no row.
@@ -194,7 +194,7 @@ impl TableFourArgs {
         let find =
             |(name, n): &(String, usize)| journal.rows.iter().find(|row| row.garment == *name && row.asked == *n);
         let rows: Vec<ContestRow> = asked.iter().filter_map(find).cloned().collect();
-        let csv = contest::csv_lines(&rows)?;
+        let csv = table4::csv_lines(&rows)?;
         if let Some(path) = &self.csv {
             write_csv(path, &csv)?;
         }
@@ -209,7 +209,7 @@ impl TableFourArgs {
             Format::Csv => console::result(&csv),
             Format::Json => {
                 let json = json!({ "conditions": journal.conditions, "rows": rows, "missing_rows": missing });
-                console::result(&partwise::said::json(&json)?);
+                console::result(&crate::base::error_text::json(&json)?);
             }
             Format::Text => console::result(&text(journal, &rows)),
         }
@@ -223,7 +223,7 @@ impl TableFourArgs {
 /// For people.
 fn text(journal: &Journal, rows: &[ContestRow]) -> String {
     let mut out = journal.conditions.said();
-    for cells in contest::tables(rows).into_iter().chain(contest::exponents(rows)) {
+    for cells in table4::tables(rows).into_iter().chain(table4::exponents(rows)) {
         let mut table = console::table(console::RULED, &cells.header, 1..);
         table.add_rows(&cells.rows);
         out += &format!("\n\n{}\n{table}", cells.title);

@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use partwise::accuracy::vertex_errors;
-use partwise::contest::{ContestRow, Contested, ENTRANTS, Entrant, Entry};
-use partwise::record::{Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
-use partwise::scene::Scene;
+use crate::record::{Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
+use crate::scene::Scene;
+use crate::study::accuracy::vertex_errors;
+use crate::study::table4::{ContestRow, Contested, ENTRANTS, Entrant, Entry};
 
 /// Share of the distances that the colours tell apart; what is beyond takes the last.
 const TOLD_APART: f64 = 0.75;

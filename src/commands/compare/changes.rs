@@ -1,6 +1,6 @@
 //! What becomes of PARTs from one range table to another.
 
-use partwise::parts::{Parts, UNASSIGNED};
+use crate::parts::{Parts, UNASSIGNED};
 
 /// PARTs of one table seen from another's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
@@ -35,10 +35,10 @@ impl Changes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use partwise::DVec3;
-    use partwise::mesh::{Topology, TriMesh};
-    use partwise::parts::segment;
-    use partwise::range_table::RangeTable;
+    use crate::DVec3;
+    use crate::mesh::{Topology, TriMesh};
+    use crate::parts::range_table::RangeTable;
+    use crate::parts::segment;
 
     /// A strip of vertices at 0, 1, 2, ... cm from the body.
     fn cut(bounds_cm: &[f64]) -> Parts {

@@ -5,19 +5,20 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
+use crate::drape::{Refine, Settings};
+use crate::parts::range_table::{RangeTable, TableRule};
+use crate::parts::{Parts, segment};
+use crate::record::Tab;
+use crate::study::job::Against;
+use crate::study::metrics::LevelCount;
+use crate::study::sweep::{Bench, MOST_PASSES, Plan, Row, Status};
+use crate::{Job, SceneSpec};
 use clap::Args;
-use partwise::drape::{Refine, Settings};
-use partwise::figures::LevelCount;
-use partwise::job::Against;
-use partwise::parts::{Parts, segment};
-use partwise::range_table::{RangeTable, TableRule};
-use partwise::record::Tab;
-use partwise::sweep::{Bench, MOST_PASSES, Plan, Row, Status};
-use partwise::{Job, SceneSpec};
 
 use self::changes::Changes;
 use self::table::Compared;
 use super::failure::UserError;
+use super::runtime::{cache, use_threads, write_csv};
 use super::sinks::SinkArgs;
 use super::stages::DialArgs;
 use super::sweep::chosen::MOST;
@@ -25,7 +26,6 @@ use super::sweep::points::KeepingBench;
 use super::sweep::record_all;
 use super::sweep::report::{Format, line};
 use super::sweep::store::PointStore;
-use super::work::{cache, use_threads, write_csv};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -119,7 +119,7 @@ impl CompareArgs {
         let lines: String = recordings.iter().map(line).collect();
         match self.format {
             Format::Text => console::result(&format!("{}{lines}", table::text(&compared))),
-            Format::Json => console::result(&partwise::said::json(&compared)?),
+            Format::Json => console::result(&crate::base::error_text::json(&compared)?),
             Format::Csv => console::result(&table::csv(&compared)?),
         }
         let failed = rows.iter().filter(|row| row.status == Status::Error).count();

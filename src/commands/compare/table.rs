@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use partwise::figures::LevelCount;
-use partwise::range_table::Extent;
-use partwise::sweep::{Row, Status, cell};
+use crate::parts::range_table::Extent;
+use crate::study::metrics::LevelCount;
+use crate::study::sweep::{Row, Status, cell};
 use serde::Serialize;
 use serde_json::{Map, Value};
 

@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
+use crate::DVec3;
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::fit::Fit;
+use crate::methods::{self, Dressing, METHODS, MethodDrape, RestRule};
+use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
+use crate::scene::Loaded;
+use crate::study::certificate::{Certificate, certify};
+use crate::study::metrics::MethodFigures;
 use anyhow::Context as _;
-use partwise::DVec3;
-use partwise::certificate::{Certificate, certify};
-use partwise::fabric::Fabric;
-use partwise::figures::MethodFigures;
-use partwise::mechanics::energy::Cloth;
-use partwise::mechanics::fit::Fit;
-use partwise::methods::{self, Dressing, METHODS, MethodDrape, RestRule};
-use partwise::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
-use partwise::scene::Loaded;
 use serde::Serialize;
 
 use super::{Format, RunArgs, show};
@@ -164,7 +164,7 @@ impl RunArgs {
             outputs,
         };
         match self.format {
-            Format::Json => console::result(&partwise::said::json(&report)?),
+            Format::Json => console::result(&crate::base::error_text::json(&report)?),
             Format::Text => {
                 console::result(&report.text(drape, &timings));
                 certified::print(certificate.as_ref());

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use partwise::Job;
-use partwise::accuracy::rms_mm;
-use partwise::job::{Against, Measured};
-use partwise::record::Recorder;
-use partwise::session::{Finished, Session, Snapshot, Workshop};
+use crate::Job;
+use crate::record::Recorder;
+use crate::session::{Finished, Session, Snapshot, Workshop};
+use crate::study::accuracy::rms_mm;
+use crate::study::job::{Against, Measured};
 
 use super::{RunArgs, Solved};
+use crate::commands::runtime::cache;
 use crate::commands::watch::FileWatch;
-use crate::commands::work::cache;
 use crate::commands::{UserError, console, interrupt};
 
 /// How often files and Ctrl-C are looked at.
@@ -135,18 +135,18 @@ impl RunArgs {
     /// What is asked to be measured; none where a newer edit came in between.
     fn measure(&self, session: &Session, job: &Job, finished: &Finished) -> anyhow::Result<Option<Measured>> {
         let state = finished.state;
-        let mut go_on = |_: &partwise::mechanics::refine::Step<'_>| {
+        let mut go_on = |_: &crate::mechanics::refine::Step<'_>| {
             let stale = interrupt::requested() || session.snapshot().state != state;
             if stale { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let scene = &finished.ground.loaded.scene;
         match job.measure(scene, &finished.drape, cache(self.cache.as_ref()).as_ref(), &mut go_on) {
             Ok(measured) => Ok(Some(measured)),
-            Err(partwise::assess::AssessError::Interrupted) if interrupt::requested() => {
+            Err(crate::study::evaluate::AssessError::Interrupted) if interrupt::requested() => {
                 let plain = Job { accuracy: Against::None, ..job.clone() };
                 Ok(Some(plain.measure(scene, &finished.drape, None, &mut go_on)?))
             }
-            Err(partwise::assess::AssessError::Interrupted) => Ok(None),
+            Err(crate::study::evaluate::AssessError::Interrupted) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }

@@ -1,6 +1,6 @@
 //! What tells the points of one garment apart, and which few of them stand side by side.
 
-use partwise::sweep::Row;
+use crate::study::sweep::Row;
 
 /// Views side by side at most: more are too narrow to see a garment in.
 pub(crate) const MOST: usize = 6;
@@ -89,7 +89,7 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use partwise::figures::Figures;
+    use crate::study::metrics::Figures;
 
     fn row(table: &str, parts: usize, error: f64) -> Row {
         Row {

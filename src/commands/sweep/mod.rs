@@ -11,19 +11,19 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::Job;
+use crate::record::{RecordSummary, Tab};
+use crate::study::job::Against;
+use crate::study::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
 use anyhow::Context as _;
 use clap::Args;
-use partwise::Job;
-use partwise::job::Against;
-use partwise::record::{RecordSummary, Tab};
-use partwise::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
 
 use self::points::KeepingBench;
 use self::report::{Format, Report};
 use self::store::PointStore;
 use super::failure::UserError;
+use super::runtime::{MOST_THREADS, cache, use_threads};
 use super::sinks::SinkArgs;
-use super::work::{MOST_THREADS, cache, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\

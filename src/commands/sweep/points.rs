@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use partwise::accuracy::reference::ReferenceCache;
-use partwise::shapes::MeshCache;
-use partwise::sweep::{Bench, Point, PointError, Row};
+use crate::garment::MeshCache;
+use crate::study::accuracy::reference::ReferenceCache;
+use crate::study::sweep::{Bench, Point, PointError, Row};
 
 use super::store::{KeptPoint, PointStore};
 use crate::commands::interrupt;

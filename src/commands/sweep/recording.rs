@@ -6,13 +6,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use partwise::figures::Figures;
-use partwise::quantile::nearest_rank;
-use partwise::record::{
+use crate::base::quantiles::nearest_rank;
+use crate::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
     Sink, StepView, Tab,
 };
-use partwise::sweep::{Row, Status, Timing};
+use crate::study::metrics::Figures;
+use crate::study::sweep::{Row, Status, Timing};
 
 use super::chosen::{choose, error_mm, labels, total_ms};
 use super::store::{KeptPoint, PointStore};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use crate::record::RecordSummary;
+use crate::study::sweep::{Outcome, Row, Status, csv_text};
 use clap::ValueEnum;
 use comfy_table::Table;
-use partwise::record::RecordSummary;
-use partwise::sweep::{Outcome, Row, Status, csv_text};
 use serde_json::json;
 
 use super::chosen::{labels, total_ms};
@@ -39,7 +39,7 @@ impl Report<'_> {
     pub(crate) fn text(&self, format: Format) -> anyhow::Result<String> {
         match format {
             Format::Text => Ok(self.table()),
-            Format::Json => Ok(partwise::said::json(&self.json())?),
+            Format::Json => Ok(crate::base::error_text::json(&self.json())?),
             Format::Csv => Ok(String::from_utf8(csv_text(&self.outcome.rows))?),
         }
     }

@@ -1,7 +1,7 @@
 //! Meshes and points in single precision, which is what a recording holds: `#[serde(with = "single::points")]`.
 
+use crate::mesh::TriMesh;
 use glam::{DVec3, Vec3};
-use partwise::mesh::TriMesh;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 fn rounded(points: &[DVec3]) -> Vec<Vec3> {

@@ -14,14 +14,14 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::base::checksum::{self, Kind, write};
+use crate::drape::Drape;
+use crate::mesh::TriMesh;
+use crate::parts::UNASSIGNED;
+use crate::scene::Scene;
+use crate::study::metrics::LevelCount;
+use crate::study::sweep::is_id;
 use glam::DVec3;
-use partwise::drape::Drape;
-use partwise::figures::LevelCount;
-use partwise::mesh::TriMesh;
-use partwise::parts::UNASSIGNED;
-use partwise::scene::Scene;
-use partwise::sealed::{self, Kind, write};
-use partwise::sweep::is_id;
 use serde::{Deserialize, Serialize};
 
 use super::single;
@@ -172,7 +172,7 @@ impl PointStore {
     pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
         match self {
             Self::Folder(folder, _) => {
-                sealed::open(POINT, &fs::read(point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+                checksum::open(POINT, &fs::read(point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
             }
             Self::Memory(kept) => open(kept).1.get(id).cloned(),
         }
@@ -184,7 +184,7 @@ impl PointStore {
             Self::Folder(folder, _) => {
                 let mut head = Vec::new();
                 fs::File::open(point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
-                sealed::peek(POINT, &head).filter(|scene: &String| is_id(scene))
+                checksum::peek(POINT, &head).filter(|scene: &String| is_id(scene))
             }
             Self::Memory(kept) => Some(open(kept).1.get(id)?.scene.clone()),
         }
@@ -194,7 +194,7 @@ impl PointStore {
     pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
         match self {
             Self::Folder(folder, _) => {
-                sealed::open(SCENE, &fs::read(scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+                checksum::open(SCENE, &fs::read(scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
             }
             Self::Memory(kept) => open(kept).0.get(id).cloned(),
         }

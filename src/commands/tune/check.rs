@@ -7,9 +7,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use partwise::mechanics::coupled::Motion;
-use partwise::range_table::RangeTable;
-use partwise::table_search::{Front, FrontPoint};
+use crate::mechanics::coupled::Motion;
+use crate::parts::range_table::RangeTable;
+use crate::study::table_search::{Front, FrontPoint};
 use rayon::prelude::*;
 
 use super::garment::{Garment, Holds, Worth};

@@ -1,6 +1,6 @@
 //! The search itself: levels alone, then levels and extents; what was best after each iteration.
 
-use partwise::table_search::{Front, Progress, Search, SearchError, SearchOptions, search};
+use crate::study::table_search::{Front, Progress, Search, SearchError, SearchOptions, search};
 
 use super::garment::Garment;
 use crate::commands::{console, interrupt};

@@ -3,7 +3,7 @@
 //! A garment of another size has other PARTs at the same extents. The factor is found by counting PARTs, which takes the garment
 //! and its distances but no drape of it.
 
-use partwise::range_table::{Extent, RangeTable};
+use crate::parts::range_table::{Extent, RangeTable};
 use rayon::prelude::*;
 
 use super::garment::Garment;

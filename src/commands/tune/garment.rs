@@ -1,18 +1,18 @@
 //! A garment to tune a table on, or to try one on: its distances, its reference drape, and what a table can hold of it.
 
+use crate::drape::{Drape, DrapeError, Refine, Settings, drape, unobserved};
+use crate::garment::fabric::Fabric;
+use crate::mechanics::coupled::Motion;
+use crate::mechanics::refine::SolveError;
+use crate::parts::range_table::RangeTable;
+use crate::parts::{Grain, Parts, segment};
+use crate::study::accuracy::{self, representable};
+use crate::study::evaluate::{AssessError, AssessOptions, assess, canonical};
+use crate::study::table_search::Sample;
+use crate::{Scene, SceneSpec};
 use glam::DVec3;
-use partwise::accuracy::{self, representable};
-use partwise::assess::{AssessError, AssessOptions, assess, canonical};
-use partwise::drape::{Drape, DrapeError, Refine, Settings, drape, unobserved};
-use partwise::fabric::Fabric;
-use partwise::mechanics::coupled::Motion;
-use partwise::mechanics::refine::SolveError;
-use partwise::parts::{Grain, Parts, segment};
-use partwise::range_table::RangeTable;
-use partwise::table_search::Sample;
-use partwise::{Scene, SceneSpec};
 
-use crate::commands::work::refining;
+use crate::commands::runtime::refining;
 use crate::commands::{FabricArgs, UserError, console};
 
 /// PARTs of a table on a garment, and the error that guides the search.

@@ -9,16 +9,16 @@ mod report;
 
 use std::path::{Path, PathBuf};
 
+use crate::base::atomic_file::WholeFile;
+use crate::base::files::stem;
+use crate::garment::BUILT_IN;
+use crate::mechanics::coupled::Motion;
+use crate::parts::range_table::RangeTable;
+use crate::record::RecordSummary;
+use crate::scene::DRESS_FORM;
+use crate::study::evaluate::AssessOptions;
+use crate::study::table_search::Front;
 use clap::Args;
-use partwise::assess::AssessOptions;
-use partwise::files::stem;
-use partwise::mechanics::coupled::Motion;
-use partwise::range_table::RangeTable;
-use partwise::record::RecordSummary;
-use partwise::scene::DRESS_FORM;
-use partwise::shapes::BUILT_IN;
-use partwise::table_search::Front;
-use partwise::whole_file::WholeFile;
 
 use self::check::{Taken, check};
 use self::find::{SHAPES, SHAPES_TOGETHER, WIDTHS_CM, WIDTHS_TOGETHER_CM, find, limits};
@@ -26,9 +26,9 @@ use self::garment::Garment;
 use self::report::Verdict;
 use super::fabrics::FabricArgs;
 use super::failure::UserError;
+use super::runtime::{cache, unwritable, use_threads};
 use super::sinks::SinkArgs;
 use super::sweep::report::{Format, line};
-use super::work::{cache, unwritable, use_threads};
 use super::{console, interrupt};
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -155,7 +155,7 @@ impl TuneArgs {
         let name = |path: &PathBuf| path.display().to_string();
         match self.format {
             Format::Csv => console::result(&front),
-            Format::Json => console::result(&partwise::said::json(&serde_json::json!({
+            Format::Json => console::result(&crate::base::error_text::json(&serde_json::json!({
                 "verdicts": results.verdicts,
                 "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
                 "front": name(&self.out.join("front.csv")),

@@ -2,16 +2,16 @@
 //! by side. No forces and times of stages are shown: what is shown as the drape is the best these PARTs can hold, blended over the
 //! seams, and what the model makes of the tables taken is said beside it.
 
-use glam::DVec3;
-use partwise::accuracy::vertex_errors;
-use partwise::figures::LevelCount;
-use partwise::parts::Parts;
-use partwise::range_table::RangeTable;
-use partwise::record::{
+use crate::parts::Parts;
+use crate::parts::range_table::RangeTable;
+use crate::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
     StepView,
 };
-use partwise::table_search::Front;
+use crate::study::accuracy::vertex_errors;
+use crate::study::metrics::LevelCount;
+use crate::study::table_search::Front;
+use glam::DVec3;
 
 use super::check::Taken;
 use super::find::Found;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use crate::parts::range_table::{Extent, RangeTable};
+use crate::study::table_search::Front;
 use comfy_table::Table;
-use partwise::range_table::{Extent, RangeTable};
-use partwise::table_search::Front;
 use serde::Serialize;
 
 use super::check::Taken;

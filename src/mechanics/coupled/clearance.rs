@@ -5,7 +5,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::distance::Body;
+use crate::body::distance::Body;
 
 /// Times a vertex is moved at most: the second is for narrow places (an armpit), the rest for luck.
 const ROUNDS: usize = 4;

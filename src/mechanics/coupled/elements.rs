@@ -6,7 +6,7 @@
 
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
-use crate::mechanics::energy::pattern::Pattern;
+use crate::mechanics::energy::sparsity::Pattern;
 use crate::mesh::Lists;
 
 use super::motions::Motions;

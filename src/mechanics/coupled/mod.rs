@@ -42,7 +42,7 @@ pub use weights::Weights;
 use super::energy::{Cloth, Contacts, gravity};
 use super::newton::{Descent, Pace};
 use super::refine::Record;
-use crate::distance::Body;
+use crate::body::distance::Body;
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
 use hessian::Reduced;

@@ -20,8 +20,8 @@ use glam::{DMat3, DVec3};
 
 use super::options::Motion;
 use super::weights::Weights;
-use crate::lanes::{Four, Lanes, Pack, Vectors};
-use crate::mechanics::energy::pattern::Pattern;
+use crate::base::simd::{Four, Lanes, Pack, Vectors};
+use crate::mechanics::energy::sparsity::Pattern;
 use crate::mechanics::newton::{SolveError, Solver};
 use crate::mechanics::principal::principal;
 use crate::mesh::{each_once, outer};

@@ -5,10 +5,10 @@ use std::time::Duration;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::base::serde_name::word;
 use crate::mechanics::energy::EnergyError;
 use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::Record;
-use crate::word::word;
 
 /// Why PARTs could not be solved together.
 #[derive(Debug, thiserror::Error)]

@@ -29,7 +29,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::GRAVITY;
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::membrane::{SLACK, Triangle};
 use crate::mesh::TriMesh;

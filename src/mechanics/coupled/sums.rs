@@ -7,7 +7,7 @@
 //! - a vertex: m ε f_a g_b on the diagonal, and K f_a g_b with K the Hessian of its contact and friction.
 //!
 //! The four f_a are one register. What comes on the diagonal alone is kept by itself, a ninth of the work. Same bits on every machine
-//! ([`lanes`](crate::lanes)).
+//! ([`lanes`](crate::base::simd)).
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 
 use super::elements::Elements;
 use super::motions::Functions;
-use crate::lanes::{Four, Lanes, Pack, Work, run};
+use crate::base::simd::{Four, Lanes, Pack, Work, run};
 use crate::mechanics::newton::State;
 
 /// What is summed.

@@ -28,10 +28,10 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::fan::Fan;
+use super::bending_matrix::Plate;
 use super::fit::second_derivatives;
-use super::plate::Plate;
-use crate::fabric::Fabric;
+use super::vertex_ring::Fan;
+use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// A floor for H as a share of B_u + B_v: a saddle always costs something.

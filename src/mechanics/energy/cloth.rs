@@ -17,13 +17,13 @@ use super::contact::Contacts;
 use super::friction::Friction;
 use super::layout::HessianLayout;
 use super::membrane::{Stiffness, Triangle};
-use super::packs::{TrianglePack, packed};
-use super::pattern::Pattern;
+use super::membrane_simd::{TrianglePack, packed};
 use super::proximity::{Proximity, Skin};
+use super::sparsity::Pattern;
 use crate::GRAVITY;
-use crate::distance::Body;
-use crate::fabric::{Fabric, at_vertices};
-use crate::lanes::Four;
+use crate::base::simd::Four;
+use crate::body::distance::Body;
+use crate::garment::fabric::{Fabric, at_vertices};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with

@@ -21,12 +21,12 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::cover::Cover;
+use super::face_contacts::Cover;
 use super::field::{Field, SIDE};
 use super::friction::Friction;
 use super::membrane::outer;
 use super::proximity::Proximity;
-use crate::distance::Body;
+use crate::body::distance::Body;
 
 /// A vertex nearer to the body than the offset.
 #[derive(Debug, Clone, Copy, PartialEq)]

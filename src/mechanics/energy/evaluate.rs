@@ -9,10 +9,10 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::packs::{self, TrianglePack};
+use super::membrane_simd::{self, TrianglePack};
 use super::{Cloth, Contacts};
 use crate::GRAVITY;
-use crate::lanes::{Four, Lanes, Work, run};
+use crate::base::simd::{Four, Lanes, Work, run};
 
 /// Vertices that a thread passes over at a time where nothing but memory is waited for; fewer are passed over by one.
 const STRETCH: usize = 16_384;
@@ -95,6 +95,6 @@ impl Work for Half<'_> {
         self.gradient.clear();
         self.gradient.resize(self.x.len(), Four::ZERO);
         let bending = self.cloth.bending.plate.add_gradient(l, self.vertices, self.x, self.gradient);
-        bending + packs::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
+        bending + membrane_simd::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
     }
 }

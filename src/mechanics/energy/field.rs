@@ -21,7 +21,7 @@
 
 use glam::{DVec3, IVec3};
 
-use crate::distance::{Body, LATTICE_SIDE};
+use crate::body::distance::{Body, LATTICE_SIDE};
 
 /// h, m. A surface of 5 cm radius is off by 0.06 mm for each of its curvatures; two planes that meet at 10 degrees by 0.1 to 0.2 mm
 /// in the crease.

@@ -4,7 +4,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::pattern::HELD;
+use super::sparsity::HELD;
 use super::{Cloth, Contacts, HessianLayout};
 
 /// What contact adds to the Hessian: unknowns with their shares, and the matrix between them, N/m.

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 use super::bending::Bending;
 use super::membrane::Triangle;
 use super::ordering::{Adjacency, nested_dissection};
-use super::pattern::{HELD, Pattern, Slot};
+use super::sparsity::{HELD, Pattern, Slot};
 
 /// Order, pattern and slots of one cloth.
 #[derive(Debug, Clone)]

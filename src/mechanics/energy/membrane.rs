@@ -41,7 +41,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 pub(crate) use crate::mesh::outer;
 use crate::mesh::rest::raised;
 

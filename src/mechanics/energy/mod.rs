@@ -15,32 +15,32 @@
 //! | cloth on cloth | [`proximity`] | Σ ½ κ A (h − n·Σ w x)², and friction |
 
 pub mod bending;
+mod bending_matrix;
 mod cloth;
 pub mod contact;
-mod cover;
 mod error;
 mod evaluate;
-pub mod fan;
+mod face_contacts;
 pub mod field;
 mod fit;
 pub mod friction;
 pub mod gravity;
 mod hessian;
-mod inside;
-mod known;
 mod layout;
 pub mod membrane;
+mod membrane_simd;
 pub mod ordering;
-mod packs;
-pub mod pattern;
-mod plate;
+mod penetration;
 pub mod proximity;
+mod seeded_contacts;
+pub mod sparsity;
+pub mod vertex_ring;
 
 pub use cloth::Cloth;
 pub use contact::Contacts;
-pub(crate) use cover::Covered;
 pub use error::EnergyError;
 pub use evaluate::Scratch;
+pub(crate) use face_contacts::Covered;
 pub use friction::Friction;
 pub(crate) use hessian::Held;
 pub use layout::HessianLayout;

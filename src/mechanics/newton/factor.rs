@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::SolveError;
 use super::dense::{memory, partial, subtract};
-use super::forest::{Forest, Front, Grove};
+use super::symbolic::{Forest, Front, Grove};
 
 /// The two precisions.
 pub(super) trait Precision: RealField + Copy + Into<f64> + Neg<Output = Self> + AddAssign + SubAssign {}

@@ -19,31 +19,31 @@
 //! | M | lumped masses | kg |
 
 mod dense;
+mod extrapolation;
 mod factor;
-mod flat;
-mod forest;
-mod groves;
-mod onward;
+mod full_space;
 mod record;
 pub(crate) mod relax;
+mod saddle_escape;
+mod soa;
 mod solver;
 mod start;
 mod substitute;
+mod subtrees;
 mod supernodes;
+mod symbolic;
 mod vectors;
-mod ways_out;
-mod whole;
 
 use glam::{DMat3, DVec3};
 
 use super::energy::proximity::Looked;
 use super::energy::{Cloth, Contacts, Scratch};
-use onward::Onward;
+use extrapolation::Onward;
+pub(crate) use full_space::Whole;
 pub use record::Record;
 use relax::Relaxation;
+pub(crate) use saddle_escape::Rest;
 pub use solver::{SolveError, Solver};
-pub(crate) use ways_out::Rest;
-pub(crate) use whole::Whole;
 
 /// Armijo's constant: the share of the predicted decrease that a step must bring.
 const ARMIJO: f64 = 1e-4;

@@ -19,7 +19,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::flat::{Blocks, Flat};
+use super::soa::{Blocks, Flat};
 use super::vectors::{self, MEMORY, Pair};
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};

@@ -15,9 +15,9 @@
 use glam::{DMat3, DVec3};
 
 use super::factor::{Factor, Matrix};
-use super::forest::{Forest, Front};
 use super::norm;
-use crate::mechanics::energy::pattern::Pattern;
+use super::symbolic::{Forest, Front};
+use crate::mechanics::energy::sparsity::Pattern;
 
 /// What can go wrong in a solve.
 #[derive(Debug, thiserror::Error)]

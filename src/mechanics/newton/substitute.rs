@@ -7,7 +7,7 @@ use faer::{Accum, ColMut, ColRef, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use super::factor::{Factor, Planted, Precision};
-use super::forest::{Forest, Front, Grove};
+use super::symbolic::{Forest, Front, Grove};
 
 impl<T: Precision> Factor<T> {
     /// L⁻¹ of what is in `side`, numbered anew.

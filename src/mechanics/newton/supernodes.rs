@@ -8,7 +8,7 @@
 //!
 //! All of it is in blocks of 3 by 3: a ninth of the work that scalars would take.
 
-use crate::mechanics::energy::pattern::Pattern;
+use crate::mechanics::energy::sparsity::Pattern;
 use crate::mesh::{Lists, NONE, renumbered};
 
 /// Up to so many columns may be put together with that share of zeros.

@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
-use super::flat::{Blocks, Flat, STRETCH};
-use crate::lanes::{Four, Lanes, Pack, Vectors, Work, run};
+use super::soa::{Blocks, Flat, STRETCH};
+use crate::base::simd::{Four, Lanes, Pack, Vectors, Work, run};
 
 /// A pair of L-BFGS: s and y, and 1 / sᵀy, 1/J.
 #[derive(Debug, Default)]
@@ -205,7 +205,7 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::super::dot as product;
-    use super::super::flat::STRETCH_VERTICES;
+    use super::super::soa::STRETCH_VERTICES;
     use super::*;
     use crate::mesh::outer;
 

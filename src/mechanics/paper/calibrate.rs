@@ -24,7 +24,7 @@
 //! **q_f** (N/m³). One scalar so that the contact PARTs carry the garment: Σ q_f cos γ_q ΔV = weight.
 
 use super::options::{Clearance, Cosine};
-use crate::distance::SurfacePoint;
+use crate::body::distance::SurfacePoint;
 use crate::mesh::TriMesh;
 use glam::DVec3;
 

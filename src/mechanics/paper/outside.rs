@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::distance::Body;
+use crate::body::distance::Body;
 
 /// In a fold narrower than the thickness, a vertex put off one side can land behind the other; it is put out again at most
 /// this often.

@@ -10,8 +10,8 @@ use super::{
     BodyForce, Clearance, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning, PartForces, Untouched,
 };
 use crate::GRAVITY;
-use crate::distance::{Body, SurfacePoint};
-use crate::fabric::{Fabric, at_vertices};
+use crate::body::distance::{Body, SurfacePoint};
+use crate::garment::fabric::{Fabric, at_vertices};
 use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::{Part, Parts};
 

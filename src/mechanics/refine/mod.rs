@@ -10,8 +10,8 @@
 //! capped at what its own weight strains by [`RefineOptions::soft_strain`]; with a few millimetres left to go, it continues
 //! with its true stiffness. Each of the two energies falls; [`Record::softened`] says which one a step belongs to.
 
+mod cycle_damping;
 mod settle;
-mod to_and_fro;
 
 use std::ops::ControlFlow;
 

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::to_and_fro::ToAndFro;
+use super::cycle_damping::ToAndFro;
 use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
-use crate::distance::Body;
+use crate::body::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts, Covered};
 use crate::mechanics::newton::{Descent, Pace, Rest, SolveError, Solver, Tangent, Whole};
 use crate::mesh::box_about;

@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::pieces::{Piece, unfit};
+use crate::garment::sewing::laid_flat;
 use crate::mesh::{Lists, RestShape, Topology, TriMesh, each_once, pieces};
 use crate::methods::{Dressing, MethodError};
-use crate::sewing::laid_flat;
 
 /// A piece of fewer triangles than this share of the garment's is joined to its neighbour.
 const LEAST_SHARE: f64 = 0.02;

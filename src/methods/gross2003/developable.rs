@@ -17,8 +17,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::quantile::extremes;
-use crate::shapes::girth::hull;
+use crate::base::quantiles::extremes;
+use crate::body::girth::hull;
 
 /// A taper under this makes a cylinder, 1/m: its apex would be ten kilometres away.
 const STRAIGHT: f64 = 1e-4;

@@ -31,9 +31,9 @@ use super::spring_list::springs;
 use super::{
     Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, Moment, ReferenceMethod, RestRule, Spectator, Stopwatch,
 };
+use crate::garment::pattern::SewnGarment;
 use crate::mechanics::energy::Cloth;
 use crate::mesh::{RestShape, Topology, TriMesh};
-use crate::pattern::SewnGarment;
 use crate::scene::Scene;
 use developable::Developable;
 use pieces::{Piece, distortion, parts, unfit};

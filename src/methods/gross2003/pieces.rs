@@ -8,11 +8,11 @@
 use glam::{DVec2, DVec3};
 
 use super::NAME;
+use crate::base::quantiles::{extremes, nearest_rank};
+use crate::garment::pattern::SewnGarment;
 use crate::mesh::{RestShape, TriMesh};
 use crate::methods::segment::{Segments, longest};
 use crate::methods::{Dressing, MethodError};
-use crate::pattern::SewnGarment;
-use crate::quantile::{extremes, nearest_rank};
 
 /// A piece is a limb's if that is nearest to so many of its vertices.
 const OF_LIMB: f64 = 0.5;

@@ -31,12 +31,12 @@ use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use super::strain::{Frame, polar, positive_part, pulls};
-use crate::fabric::Fabric;
+use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::bending::bending_stiffness;
 use crate::mechanics::energy::membrane::Stiffness;
 use crate::mesh::Lists;
+use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::Operator;
-use crate::methods::march::Elastic;
 
 /// Elements, or vertices, of one task.
 const CHUNK: usize = 256;

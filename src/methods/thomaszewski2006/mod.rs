@@ -7,7 +7,7 @@
 //!
 //! Our reading: where valences are not six, one subdivision step in place of Stam's eigenvectors, which at the one
 //! quadrature point gives the same (`patch.rs`); boundaries by mirrored vertices; the fabric's orthotropic constants
-//! ([`elements`]); backward Euler and block Jacobi ([`march`](super::march)); lumped masses; penalty contact with
+//! ([`elements`]); backward Euler and block Jacobi ([`march`](super::implicit_euler)); lumped masses; penalty contact with
 //! Coulomb friction at the control vertices, through this project's own body queries; damping by the air; the stiffness
 //! of tension across the plane.
 //!
@@ -29,7 +29,7 @@ mod strain;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::march::{Course, Pacing, march};
+use super::implicit_euler::{Course, Pacing, march};
 use super::{
     Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
 };

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::closest::closest;
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
-use crate::methods::march::Obstacle;
+use crate::methods::implicit_euler::Obstacle;
 use crate::methods::segment::Segments;
 use crate::methods::{Dressing, MethodError};
 

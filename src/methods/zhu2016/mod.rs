@@ -8,7 +8,7 @@
 //!
 //! Our reading: how the body is segmented ([`units`]); ε from the fit itself, so that nothing within the cloth's offset
 //! of the body is missed ([`quadric`]); the leaf's triangles by sectors ([`hierarchy`]); the springs' constants from
-//! the fabric's, Provot's strain limiting at 10 % ([`springs`]); backward Euler ([`march`](super::march)), as its
+//! the fabric's, Provot's strain limiting at 10 % ([`springs`]); backward Euler ([`march`](super::implicit_euler)), as its
 //! integrator is not confirmed; penalty contact with Coulomb friction; steps of 20 ms (of 33 ms a pullover of 900
 //! vertices flew off) and damping by the air of 6 1/s (of 2, 4, 6 and 8 the time to rest was least at 6 and 8).
 //!
@@ -21,7 +21,7 @@ pub mod quadric;
 pub mod springs;
 pub mod units;
 
-use super::march::{Course, Pacing, march};
+use super::implicit_euler::{Course, Pacing, march};
 use super::{Dressing, Exhibit, MethodDrape, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use hierarchy::Hierarchy;
 use springs::Springs;

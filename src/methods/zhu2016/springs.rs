@@ -17,8 +17,8 @@ use rayon::prelude::*;
 
 use crate::mesh::Lists;
 use crate::methods::Dressing;
+use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::{BlockRows, Operator};
-use crate::methods::march::Elastic;
 use crate::methods::spring_list::{Spring, springs};
 
 /// Sweeps of Provot's limiting after a step.

@@ -9,9 +9,9 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
+use crate::base::quantiles::extremes;
 use crate::mesh::{TriMesh, box_about};
 use crate::methods::segment::longest;
-use crate::quantile::extremes;
 
 /// Height of a slice h, m.
 const HEIGHT: f64 = 0.04;

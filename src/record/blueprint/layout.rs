@@ -9,7 +9,7 @@ use super::super::{paths, pattern};
 use super::rows::{grid, in_rows};
 use super::view::{View, on_the_body};
 use super::{Node, TimePanel};
-use super::{closer, contest};
+use super::{detail_tabs, table4};
 use crate::scene::Layer;
 
 /// Width over height of a tab in a window of 16:10, below the bars of the viewer.
@@ -88,7 +88,7 @@ impl Layout {
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
         if self.contest {
-            return Node::Tabs(0, vec![self.side_by_side(eye), contest::numbers()]);
+            return Node::Tabs(0, vec![self.side_by_side(eye), table4::numbers()]);
         }
         let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));
         let further: [(Tab, bool, &dyn Fn() -> Node); 7] = [
@@ -97,8 +97,10 @@ impl Layout {
             (Tab::Fit, !self.fit.is_empty(), &|| self.fit(eye)),
             (Tab::Pattern, self.pattern, &|| self.panels(eye)),
             (Tab::Outfit, !self.outfit.is_empty(), &|| self.wardrobe(eye)),
-            (Tab::Wrinkles, self.wrinkles, &|| closer::wrinkles(&self.eye(Tab::Wrinkles, eye))),
-            (Tab::Solver, self.iterations && self.method.is_none(), &|| closer::solver(&self.eye(Tab::Solver, eye))),
+            (Tab::Wrinkles, self.wrinkles, &|| detail_tabs::wrinkles(&self.eye(Tab::Wrinkles, eye))),
+            (Tab::Solver, self.iterations && self.method.is_none(), &|| {
+                detail_tabs::solver(&self.eye(Tab::Solver, eye))
+            }),
         ];
         let there = further.into_iter().filter(|(_, there, _)| *there);
         let (mut tabs, mut nodes) = (vec![Tab::Stages], vec![first]);

@@ -4,10 +4,10 @@
 //! written by hand: `view/{id}` and its properties, `container/{id}`, `viewport`, and the panels, on the sequence timeline
 //! `blueprint` at 0; then one activation command. `layout` says which views there are, `view` what each holds.
 
-mod closer;
-mod contest;
+mod detail_tabs;
 pub(crate) mod layout;
 mod rows;
+mod table4;
 pub(crate) mod view;
 
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};

@@ -30,25 +30,25 @@
 //! Between two fabrics thickness and friction are their mean, and less offset is kept where the garment was placed nearer to itself. Limits: a
 //! gap that closes for lack of stiffness grows stiffer only from refresh to refresh.
 
+mod collision_filter;
 mod gap;
-mod near;
-mod passage;
 mod place;
 mod search;
-mod skin;
 mod start;
+mod surface;
 mod untangle;
+mod verlet_list;
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
+pub(crate) use collision_filter::Looked;
+use collision_filter::Passage;
 pub use gap::Gap;
-pub(crate) use passage::Looked;
-use passage::Passage;
 pub(in crate::mechanics) use place::touching_between;
 pub(super) use place::{Place, offset};
-pub(crate) use skin::Skin;
+pub(crate) use surface::Skin;
 
 use crate::mesh::NONE;
 

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind};
-use crate::distance::{Body, OUTWARD, SurfacePoint};
+use crate::body::distance::{Body, OUTWARD, SurfacePoint};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::membrane::Triangle;
 use crate::mesh::{NONE, lattice};

@@ -1,6 +1,6 @@
 //! Which places of a cloth are near each other.
 //!
-//! Candidates are the triangles that are near each other ([`near`](super::near)). A vertex faces the nearest point of a triangle; where
+//! Candidates are the triangles that are near each other ([`near`](super::verlet_list)). A vertex faces the nearest point of a triangle; where
 //! that lies on an edge or a corner, it faces the edge or the corner, and only if it does so from every triangle there: else another
 //! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
 //! each other between their ends alone; at the ends a vertex faces something.
@@ -18,8 +18,8 @@ use rayon::prelude::*;
 
 use super::Apart;
 use super::gap::{Gap, Key, Kind};
-use super::near::Near;
-use super::skin::Skin;
+use super::surface::Skin;
+use super::verlet_list::Near;
 use crate::mesh::NONE;
 
 /// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.

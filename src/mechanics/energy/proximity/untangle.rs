@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind};
-use super::skin::Skin;
+use super::surface::Skin;
 use crate::mesh::NONE;
 
 /// How far a crossing edge is asked to go between two looks, in edges.

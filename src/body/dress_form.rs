@@ -1,0 +1,125 @@
+//! The dress form as a mesh.
+//!
+//! The solid of `anatomy` is contoured, remeshed to triangles of even shape that are smaller where
+//! limbs are thin, and its girths are corrected until those of the mesh, measured by slicing it, are what was asked.
+//! The figure stands on z = 0, looks along −y, its left is +x. Lengths in metres.
+
+use glam::DVec3;
+
+use super::ShapeError;
+use super::anatomy::{Anatomy, Factors};
+use super::contour::contour;
+use super::cut::onto_surface;
+pub use super::fitting::GirthMark;
+use super::fitting::{fit, girth_marks};
+use super::girth::loop_around;
+pub use super::measures::{BodySpec, Measures};
+use crate::mesh::TriMesh;
+use crate::mesh::remesh::{Density, Surface, remesh};
+
+/// Triangles of the form unless asked otherwise.
+pub const DEFAULT_TRIANGLES: usize = 15_000;
+/// Spacing of the first contour, m: a quarter of the thinnest part, a hand.
+const SPACING: f64 = 0.012;
+/// A Newton step onto the surface this short, m, is the last.
+const CLOSE: f64 = 1e-7;
+/// Corrections with girths measured on the mesh.
+const MESH_ROUNDS: usize = 2;
+
+/// A form ready to be meshed, or dressed.
+#[derive(Debug, Clone)]
+pub struct DressForm {
+    /// Its measurements.
+    pub measures: Measures,
+    /// Its solid.
+    pub(crate) anatomy: Anatomy,
+}
+
+impl DressForm {
+    /// The solid whose girths are those of `spec`.
+    pub fn new(spec: &BodySpec) -> Result<Self, ShapeError> {
+        let measures = spec.measures()?;
+        let factors: Factors = fit(&measures, &[1.0; 11]);
+        Ok(Self { measures, anatomy: Anatomy::new(&measures, &factors) })
+    }
+
+    /// Where each girth is taken and what was asked.
+    #[must_use]
+    pub fn girths(&self) -> [GirthMark; 11] {
+        girth_marks(&self.measures, &self.anatomy)
+    }
+
+    /// A closed mesh of about `triangles` triangles (an even number).
+    ///
+    /// # Errors
+    /// [`ShapeError::TooFew`] under 2,000 triangles, [`ShapeError::NotManifold`] if the surface cannot be meshed.
+    pub fn mesh(&self, triangles: usize) -> Result<TriMesh, ShapeError> {
+        if triangles < 2_000 {
+            return Err(ShapeError::TooFew { what: "triangles of the body", found: triangles, least: 2_000 });
+        }
+        let m = &self.measures;
+        let reach = self.anatomy.arm.centre(self.anatomy.wrist_at + 0.25 * m.scale()).x;
+        let depth = 0.18 * m.scale() + 0.3 * m.bust.max(m.waist).max(m.hip) / 2.0;
+        let (low, high) = (DVec3::new(-reach, -depth, -0.03), DVec3::new(reach, depth, m.stature + 0.04));
+        let rough = contour(&self.anatomy, low, high, SPACING);
+        let tags = vec![0; rough.positions.len()];
+        // A closed surface of genus 0 has two triangles for each vertex but two.
+        let density = Density::Vertices(triangles / 2 + 2);
+        let (mut mesh, _) = remesh(&rough, tags, self, density).ok_or(ShapeError::NotManifold { what: "body" })?;
+        self.correct(&mut mesh);
+        Ok(mesh)
+    }
+
+    /// Moves the vertices to a solid corrected by the girths found on the mesh.
+    fn correct(&self, mesh: &mut TriMesh) {
+        let mut bias = [1.0; 11];
+        for _ in 0..MESH_ROUNDS {
+            for (bias, mark) in bias.iter_mut().zip(self.girths()) {
+                if let Some(found) = loop_around(mesh, mark.plane) {
+                    *bias *= (mark.asked / found.tape_length()).clamp(0.95, 1.05);
+                }
+            }
+            let corrected = Anatomy::new(&self.measures, &fit(&self.measures, &bias));
+            for p in &mut mesh.positions {
+                *p = onto_surface(&corrected, *p, CLOSE);
+            }
+        }
+    }
+}
+
+/// Finer at wrists, hands, ankles, head, crotch and armpits than on the trunk.
+impl Surface for DressForm {
+    fn project(&self, p: DVec3, _tag: u8) -> DVec3 {
+        onto_surface(&self.anatomy, p, CLOSE)
+    }
+
+    fn relative_size(&self, p: DVec3) -> f64 {
+        let (m, Anatomy { arm, leg, trunk, wrist_at, .. }) = (&self.measures, &self.anatomy);
+        let scale = m.scale();
+        // Along the arm from the shoulder to the wrist the radius halves, and so do the triangles; the same towards the feet.
+        let mirrored = DVec3::new(p.x.abs(), p.y, p.z);
+        let t = arm.along(mirrored) / wrist_at;
+        let off_axis = (mirrored - arm.centre(t * wrist_at)).length();
+        let on_arm = 1.0 - smooth_step(0.10, 0.16, off_axis / scale);
+        let arm = 1.0 - 0.52 * on_arm * smooth_step(0.1, 0.95, t);
+        let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / scale));
+        let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - (m.stature - 0.2 * scale));
+        // Crotch and armpits are saddles narrower than an edge of the trunk's.
+        let crotch = DVec3::new(0.0, leg.centre(m.crotch).y, m.crotch);
+        let pit = trunk.centre(m.axilla) + trunk.section(m.axilla)[2] * DVec3::X;
+        let saddle =
+            |at: DVec3, finer: f64| 1.0 - finer * (1.0 - smooth_step(0.03, 0.12, mirrored.distance(at) / scale));
+        let saddle = saddle(crotch, 0.55).min(saddle(pit, 0.4));
+        arm.min(ankle).min(head).min(saddle)
+    }
+}
+
+fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
+pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
+    DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
+}

@@ -1,0 +1,179 @@
+//! The pieces that a drape is made of, for [`drape()`](super::drape) and for whoever makes them one at a time.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::{ClothState, Drape, DrapeError, LetGo, Levels, Model, Refine, Settings, StageTimes, StageTwo};
+use crate::body::distance::SurfacePoint;
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::fit::fit;
+use crate::mechanics::folds::{Folds, folds};
+use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
+use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::parts::Parts;
+use crate::parts::range_table::RangeTable;
+use crate::scene::{Scene, SceneError};
+
+/// How far the garment as placed is from what it is over.
+#[derive(Debug, Clone)]
+pub(crate) struct Distances {
+    /// Closest points on it.
+    pub(crate) surface: Vec<SurfacePoint>,
+    /// Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
+    pub(crate) unsigned_m: Vec<f64>,
+}
+
+impl Distances {
+    pub(crate) fn of(scene: &Scene) -> Result<Self, SceneError> {
+        Ok(Self::from_surface(scene.surface()?))
+    }
+
+    /// To the body, and what it wears.
+    pub(super) fn to_body(scene: &Scene) -> Self {
+        Self::from_surface(scene.body.nearest_all(&scene.garment.positions))
+    }
+
+    fn from_surface(surface: Vec<SurfacePoint>) -> Self {
+        Self { unsigned_m: surface.iter().map(|s| s.signed_distance.abs()).collect(), surface }
+    }
+}
+
+/// Cloth that the PARTs have no room for; the coupled model's alone.
+pub(crate) fn folds_of(settings: &Settings, levels: Option<&Levels>, stage: &StageTwo) -> Option<Folds> {
+    match settings.model {
+        Model::Coupled(_) => levels.map(|levels| folds(&levels.cloth, &stage.positions)),
+        Model::Paper(_) => None,
+    }
+}
+
+/// What steps at full resolution begin with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StartsFrom {
+    /// What PARTs made of the garment as placed.
+    Parts,
+    /// A drape of the same garment that rested, in another fabric or by another table.
+    Rest,
+}
+
+/// Damping from a drape that rested, 1/s². Nine changes between four knits took a long dress 41 steps
+/// until its forces balanced, with the 300 of a preview 51.
+const DAMPING_FROM_REST: f64 = 10.0;
+
+/// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
+pub(crate) fn refine_from(
+    scene: &Scene,
+    settings: &Settings,
+    cloth: &Cloth,
+    ground: Option<&Distances>,
+    (start, from): (Vec<DVec3>, StartsFrom),
+    observer: Observer<'_>,
+) -> Result<Refined, DrapeError> {
+    let max_steps = match settings.refine {
+        Refine::Steps(n) => Some(n),
+        Refine::Converged => None,
+    };
+    let damping = if from == StartsFrom::Rest { DAMPING_FROM_REST } else { RefineOptions::default().damping };
+    let options = RefineOptions { max_steps, damping, self_contact: settings.self_contact, ..RefineOptions::default() };
+    let contacts = met(cloth, scene, settings.refine, ground, &start);
+    let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
+        if scene.fallen(step.positions).is_some() { ControlFlow::Break(()) } else { observer(step) }
+    })?;
+    Ok(refined)
+}
+
+/// Where the steps ended, and how the cloth fits there.
+pub(crate) fn settled(
+    scene: &Scene,
+    settings: &Settings,
+    cloth: &Cloth,
+    ground: Option<&Distances>,
+    refined: Refined,
+) -> (Vec<DVec3>, ClothState) {
+    let contacts = met(cloth, scene, settings.refine, ground, &refined.positions);
+    let fit = fit(cloth, contacts, &refined.positions, refined.contact_stiffness);
+    let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
+    (positions, ClothState { energy, residual_over_weight, steps, stop, history, fit })
+}
+
+/// All that a drape is made of.
+pub(crate) struct Made {
+    pub(crate) ground: Distances,
+    pub(crate) table: RangeTable,
+    pub(crate) level_part_count: usize,
+    pub(crate) stage: StageTwo,
+    pub(crate) folds: Option<Folds>,
+    pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
+    pub(crate) let_go: Option<LetGo>,
+}
+
+impl Made {
+    /// The drape, with what must be looked for in it.
+    pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
+        let Self { ground, table, level_part_count, stage, folds, state, let_go } = self;
+        let mut warnings = unassigned_warning(&stage.parts);
+        warnings.extend(stage.warnings);
+        let (positions, state) = match state {
+            None => (stage.positions.clone(), None),
+            Some((positions, state)) => (positions, Some(state)),
+        };
+        warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
+        if let Some(slides @ LetGo::Slides { .. }) = &let_go {
+            warnings.push(format!("the garment {slides}"));
+        }
+        warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)).map(|fallen| fallen.to_string()));
+        let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
+        let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
+        let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
+        Drape {
+            surface: ground.surface,
+            distance: ground.unsigned_m,
+            table,
+            parts: stage.parts,
+            level_part_count,
+            outcomes: stage.outcomes,
+            preview: stage.positions,
+            folds,
+            state,
+            let_go,
+            self_intersecting_pairs,
+            positions,
+            penetrating_vertices,
+            penetration,
+            times,
+            warnings,
+        }
+    }
+}
+
+/// What the cloth meets at `x`: by planes where no step is taken, which need no more. `ground` are distances of the garment as placed.
+fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, ground: Option<&Distances>, x: &[DVec3]) -> Contacts<'b> {
+    let known = ground.into_iter().flat_map(|ground| &ground.surface).map(|s| s.signed_distance);
+    cloth.contacts_knowing(&scene.body, x, refine == Refine::Steps(0), &scene.garment.positions, known)
+}
+
+/// How deep those vertices at `x` are in the body, m, that can have come to it since they were placed.
+fn depths(scene: &Scene, ground: &Distances, x: &[DVec3]) -> Vec<f64> {
+    let placed = scene.garment.positions.iter().zip(&ground.surface);
+    let near =
+        |(x, (placed, surface)): &(&DVec3, (&DVec3, &SurfacePoint))| surface.signed_distance <= x.distance(**placed);
+    let near: Vec<DVec3> = x.iter().zip(placed).filter(near).map(|(x, _)| *x).collect();
+    scene.body.nearest_all(&near).into_iter().map(|s| -s.signed_distance).collect()
+}
+
+fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
+    let unsettled = asked == Refine::Converged && matches!(state.stop, Stop::Stalled | Stop::StepsDone);
+    unsettled.then(|| {
+        format!(
+            "the drape has not settled: after {} steps the residual is {:.1e} of the weight, expected under 1e-3",
+            state.steps, state.residual_over_weight
+        )
+    })
+}
+
+fn unassigned_warning(parts: &Parts) -> Vec<String> {
+    if parts.unassigned == 0 {
+        return Vec::new();
+    }
+    vec![format!("{} vertices lie in no level of the range table: widen its first or last row", parts.unassigned)]
+}

@@ -1,0 +1,10 @@
+//! Garments before they are worn: fabrics, the five built-in garments, sewing patterns, and sewing a pattern around a body.
+
+pub mod builtin;
+mod cache;
+pub mod fabric;
+pub mod pattern;
+pub mod sewing;
+
+pub use builtin::{BUILT_IN, GarmentRequest, GarmentSpec, PlacedGarment, garment};
+pub use cache::MeshCache;

@@ -1,0 +1,281 @@
+//! Seams drawn shut: from panels held about the body to a garment on it, by geometry alone.
+//!
+//! What is sewn has one vertex for both sides of a seam, at the mean of two places that may be half a metre apart. The cloth is given
+//! back its shape by as-rigid-as-possible steps (Sorkine, Alexa: "As-rigid-as-possible surface modeling", SGP 2007; its planar
+//! form by Liu, Zhang, Xu, Gotsman, Gortler, SGP 2008): with F_t the 3×2 map from the flat triangle t to its place,
+//!
+//! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²,
+//!
+//! in turn for the isometries R_t nearest to F_t, which is a polar decomposition each, and for x, which is one sparse
+//! solve for three right sides. A vertex nearer to the body than the gap is drawn to y_c, the point at the gap above
+//! the nearest of the body, and is free again when the cloth draws it away; no vertex goes farther in a step than a limb is thick, so
+//! that none passes through one. There is no friction and no bending, and gravity only where a skirt is to hang from its held waist inside the
+//! arms (− Σ γ A_i z_i, added to E): it is a placement, not a drape.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | A_t | rest area | m² |
+//! | w | weight of a contact | – |
+//! | m | weight of staying, for what nothing holds | – |
+//! | x' | positions before the step | m |
+//! | γ | weight over stiffness, [`HANGING`] | 1/m |
+//!
+//! Source: the two papers; contacts are ours. Limits: cloth may pass through cloth.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side};
+use glam::{DMat2, DVec2, DVec3};
+
+use crate::body::distance::Body;
+use crate::mesh::{RestShape, TriMesh};
+
+/// Weight of a contact against a vertex's own of some 3.5: a step closes most of its gap, and cloth still slides along the body.
+const CONTACT: f64 = 3.0;
+
+/// Weight of staying.
+const STAY: f64 = 1e-3;
+
+/// Longest way of a vertex in one step, m: a wrist is 5 cm thick.
+const LONGEST_STEP: f64 = 0.02;
+
+/// γ, 1/m: half a metre of cloth stretches by a fortieth where it hangs by its weight.
+const HANGING: f64 = 0.1;
+
+/// Weight of staying of what is held.
+const HELD: f64 = 1e3;
+
+/// Steps of laying flat at most, and how far none goes any more, m.
+const FLATTENING: (usize, f64) = (100, 2e-5);
+
+/// How a garment is drawn shut.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Closing<'a> {
+    /// What is held while the rest hangs; nothing hangs where there is none.
+    pub(super) held: &'a [u32],
+    /// Distance kept from the body, m.
+    pub(super) gap: f64,
+    /// At most so many steps.
+    pub(super) steps: usize,
+    /// Steps end where no vertex goes farther than this, m.
+    pub(super) still: f64,
+}
+
+/// What stays the same from step to step: triangles, their maps, and the matrix's places.
+struct Shape {
+    triangles: Vec<[u32; 3]>,
+    /// Columns: weights of the corners in the two columns of F.
+    gradients: Vec<[DVec2; 3]>,
+    areas: Vec<f64>,
+    /// Lower half of Σ A ∇ᵀ∇, sorted by column.
+    entries: Vec<Triplet<u32, u32, f64>>,
+}
+
+impl Shape {
+    fn new(mesh: &TriMesh, rest: &RestShape, held: &[u32]) -> Self {
+        let (mut gradients, mut areas) = (Vec::new(), Vec::new());
+        let mut terms: Vec<((u32, u32), f64)> = (0..mesh.vertex_count() as u32).map(|v| ((v, v), STAY)).collect();
+        for (triangle, &[a, b, c]) in mesh.triangles.iter().zip(&rest.corners) {
+            let inverse = DMat2::from_cols(b - a, c - a).inverse();
+            let (of_b, of_c) = (inverse.row(0), inverse.row(1));
+            let of = [-of_b - of_c, of_b, of_c];
+            let area = 0.5 * (b - a).perp_dot(c - a);
+            for i in 0..3 {
+                for j in 0..3 {
+                    if triangle[i] >= triangle[j] {
+                        terms.push(((triangle[j], triangle[i]), area * of[i].dot(of[j])));
+                    }
+                }
+            }
+            gradients.push(of);
+            areas.push(area);
+        }
+        terms.extend(held.iter().map(|&v| ((v, v), HELD)));
+        // A stable sort keeps the order of the sums.
+        terms.sort_by_key(|term| term.0);
+        let mut entries: Vec<Triplet<u32, u32, f64>> = Vec::new();
+        for ((column, row), value) in terms {
+            match entries.last_mut() {
+                Some(last) if (last.col, last.row) == (column, row) => last.val += value,
+                _ => entries.push(Triplet::new(row, column, value)),
+            }
+        }
+        Self { triangles: mesh.triangles.clone(), gradients, areas, entries }
+    }
+
+    /// Adds the weight.
+    fn hang(&self, side: &mut [DVec3]) {
+        for (triangle, area) in self.triangles.iter().zip(&self.areas) {
+            triangle.iter().for_each(|&v| side[v as usize].z -= HANGING * area / 3.0);
+        }
+    }
+
+    /// Right side: Σ A ∇ᵀ R + m x'.
+    fn right_side(&self, x: &[DVec3], nearest: fn(DVec3, DVec3) -> [DVec3; 2]) -> Vec<DVec3> {
+        let mut side: Vec<DVec3> = x.iter().map(|x| STAY * *x).collect();
+        for ((triangle, of), area) in self.triangles.iter().zip(&self.gradients).zip(&self.areas) {
+            let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
+            for (&i, of) in triangle.iter().zip(of) {
+                u += x[i as usize] * of.x;
+                v += x[i as usize] * of.y;
+            }
+            let [u, v] = nearest(u, v);
+            for (&i, of) in triangle.iter().zip(of) {
+                side[i as usize] += *area * (u * of.x + v * of.y);
+            }
+        }
+        side
+    }
+}
+
+/// R of F = R S, S = (FᵀF)^½ by Cayley and Hamilton.
+fn nearest_isometry(u: DVec3, v: DVec3) -> [DVec3; 2] {
+    let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
+    let root = (a * c - b * b).max(0.0).sqrt();
+    let trace = (a + c + 2.0 * root).sqrt();
+    // S⁻¹ = (FᵀF + √det)⁻¹ · trace; a triangle folded to a line takes the nearest there is.
+    let (p, q) = (a + root, c + root);
+    let determinant = p * q - b * b;
+    if determinant <= 1e-18 * (p * q).max(1e-300) {
+        return [u.normalize_or(DVec3::X), v.normalize_or(DVec3::Y)];
+    }
+    let scale = trace / determinant;
+    [(u * q - v * b) * scale, (v * p - u * b) * scale]
+}
+
+/// Draws a garment at `start` (m) shut; returns where its vertices come to lie and how many steps that took.
+pub(super) fn close(
+    mesh: &TriMesh,
+    rest: &RestShape,
+    body: &Body,
+    start: &[DVec3],
+    how: Closing<'_>,
+) -> (Vec<DVec3>, usize) {
+    let n = start.len();
+    let mut shape = Shape::new(mesh, rest, how.held);
+    let diagonal: Vec<usize> =
+        (shape.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
+    let own: Vec<f64> = diagonal.iter().map(|&i| shape.entries[i].val).collect();
+    let mut x = start.to_vec();
+    let mut symbolic: Option<SymbolicLlt<u32>> = None;
+    for step in 0..how.steps {
+        let mut side = shape.right_side(&x, nearest_isometry);
+        how.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
+        if !how.held.is_empty() {
+            shape.hang(&mut side);
+        }
+        for (v, near) in body.nearest_all(&x).iter().enumerate() {
+            let touches = near.signed_distance < how.gap;
+            shape.entries[diagonal[v]].val = own[v] + if touches { CONTACT } else { 0.0 };
+            if touches {
+                side[v] += CONTACT * (near.point + how.gap * near.normal);
+            }
+        }
+        let Some(solved) = solve(&shape.entries, n, &side, &mut symbolic) else { return (x, step) };
+        let mut farthest = 0.0_f64;
+        for (x, to) in x.iter_mut().zip(solved) {
+            let way = (to - *x).clamp_length_max(LONGEST_STEP);
+            farthest = farthest.max(way.length());
+            *x += way;
+        }
+        if farthest < how.still {
+            return (x, step + 1);
+        }
+    }
+    (x, how.steps)
+}
+
+/// A surface laid flat as isometrically as possible: E without contacts, from places in the plane z = 0 (m), with the nearest turns
+/// in the plane for R, which open out what the start has turned over.
+#[must_use]
+pub fn laid_flat(mesh: &TriMesh, rest: &RestShape, start: &[DVec3]) -> Vec<DVec3> {
+    let shape = Shape::new(mesh, rest, &[]);
+    let mut x = start.to_vec();
+    let mut symbolic = None;
+    for _ in 0..FLATTENING.0 {
+        let side = shape.right_side(&x, nearest_turn);
+        let Some(next) = solve(&shape.entries, x.len(), &side, &mut symbolic) else { return x };
+        let farthest = x.iter().zip(&next).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        x = next;
+        if farthest < FLATTENING.1 {
+            break;
+        }
+    }
+    x
+}
+
+/// The turn in the plane nearest to F: its angle is that of (tr F, F₂₁ − F₁₂).
+fn nearest_turn(u: DVec3, v: DVec3) -> [DVec3; 2] {
+    let turn = DVec2::new(u.x + v.y, u.y - v.x).normalize_or(DVec2::X);
+    [turn.extend(0.0), turn.perp().extend(0.0)]
+}
+
+/// A surface with less of its waves: (M + ℓ² L) y = M x, one implicit step of its heat, with areas M and stiffness L of the rest shape; ℓ (m)
+/// is what waves are worn down under.
+pub(super) fn faired(mesh: &TriMesh, rest: &RestShape, x: &[DVec3], length: f64) -> Vec<DVec3> {
+    let mut shape = Shape::new(mesh, rest, &[]);
+    let mut mass = vec![0.0; x.len()];
+    for (triangle, area) in mesh.triangles.iter().zip(&shape.areas) {
+        triangle.iter().for_each(|&v| mass[v as usize] += area / (3.0 * length * length));
+    }
+    let diagonal = shape.entries.iter_mut().filter(|e| e.row == e.col);
+    diagonal.zip(&mass).for_each(|(entry, mass)| entry.val += mass);
+    let side: Vec<DVec3> = x.iter().zip(&mass).map(|(x, mass)| (STAY + mass) * *x).collect();
+    solve(&shape.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
+}
+
+/// One solve for three right sides; `None` where the matrix is not positive.
+fn solve(
+    entries: &[Triplet<u32, u32, f64>],
+    n: usize,
+    side: &[DVec3],
+    symbolic: &mut Option<SymbolicLlt<u32>>,
+) -> Option<Vec<DVec3>> {
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, entries).ok()?;
+    if symbolic.is_none() {
+        *symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok();
+    }
+    let factor = Llt::try_new_with_symbolic(symbolic.clone()?, matrix.as_ref(), Side::Lower).ok()?;
+    let right = Mat::from_fn(n, 3, |i, k| side[i][k]);
+    let solved = factor.solve(&right);
+    Some((0..n).map(|i| DVec3::new(solved[(i, 0)], solved[(i, 1)], solved[(i, 2)])).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::samples::sheet;
+
+    #[test]
+    fn a_strip_of_a_cylinder_lies_flat_at_its_own_lengths() {
+        // A third of a cylinder of 10 cm, as the eye sees it from the front, a few triangles turned over.
+        let flat = sheet(12, 8, |i, j| DVec3::new(0.2 * (i / 12.0 - 0.5), 0.02 * j, 0.0));
+        let rest = RestShape::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
+        let around = |p: &DVec3| DVec3::new(0.1 * (p.x / 0.1).sin(), -0.1 * (p.x / 0.1).cos(), p.y);
+        let mesh = flat.with_positions(flat.positions.iter().map(around).collect());
+        let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
+        seen.swap(30, 31);
+        let flat = laid_flat(&mesh, &rest, &seen);
+        for (t, own) in mesh.triangles.iter().zip(&rest.corners) {
+            for k in 0..3 {
+                let (a, b) = (t[k] as usize, t[(k + 1) % 3] as usize);
+                let off = flat[a].distance(flat[b]) / own[k].distance(own[(k + 1) % 3]) - 1.0;
+                assert!(off.abs() < 2e-3, "{off}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_isometry_is_one_and_leaves_rotations_alone() {
+        let turned = [DVec3::new(0.0, 0.6, 0.8), DVec3::new(1.0, 0.0, 0.0)];
+        let [u, v] = nearest_isometry(turned[0], turned[1]);
+        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-14);
+        // R S with S symmetric and positive gives R back.
+        let s = [[1.3, 0.2], [0.2, 0.4]];
+        let [u, v] = [0, 1].map(|k| turned[0] * s[0][k] + turned[1] * s[1][k]);
+        let [u, v] = nearest_isometry(u, v);
+        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-12, "{u} {v}");
+        assert!(nearest_isometry(DVec3::X, DVec3::X).iter().all(|c| c.is_finite()));
+    }
+}

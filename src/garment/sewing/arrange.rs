@@ -1,0 +1,155 @@
+//! Panels moved from where the file has them to where this body is.
+//!
+//! A pattern is placed for one body. On another one the garment goes up or down until its shoulder seams (or its waist, where it has
+//! none) lie as they would there, sleeves turn to the slope of the arms, and everything turns to where the toes point.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::landmarks::Landmarks;
+use crate::garment::pattern::SewingPattern;
+
+/// Shoulder seams are placed this far above the shoulder's neck end, m: high, and the garment comes down on its shoulders. GarmentCode's own
+/// placement on its own body is 3.8 cm lower, and six patterns drawn shut from there are stretched half as much again.
+const ABOVE_SHOULDER: f64 = 0.0;
+/// A waist is placed this far above the body's smallest girth, m: where GarmentCode's are on its own body.
+const ABOVE_WAIST: f64 = -0.022;
+
+/// Shoulder seams are not farther below the armpits than this, m: what is, is a circle skirt's side.
+const BELOW_ARMPITS: f64 = 0.1;
+
+/// Less than this is let be, m and radians: the file's own placement is better than our landmarks are.
+const LEAST_SHIFT: f64 = 0.02;
+const LEAST_TURN: f64 = 0.05;
+
+/// A panel is a sleeve's if its plane is turned by at least this about the front axis, radians.
+const SLEEVE: f64 = 0.15;
+
+/// What was done.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Arranged {
+    /// Upwards, m.
+    pub raised: f64,
+    /// Sleeves, downwards, radians.
+    pub sleeves: f64,
+    /// All of it about the vertical, radians.
+    pub turned: f64,
+}
+
+/// Where a pattern expects a body's marks, m.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Expected {
+    /// Height of the neck end of the shoulder seams.
+    pub(super) shoulder_z: Option<f64>,
+    /// Height of the waist: edges labelled `lower_interface`, or the top of what has no shoulders.
+    pub(super) waist_z: f64,
+    /// How far the sleeves point below the horizontal, radians.
+    pub(super) arm_fall: Option<f64>,
+}
+
+/// Which panels are sleeves, and how far each points below the horizontal, radians.
+fn sleeves(pattern: &SewingPattern) -> Vec<Option<f64>> {
+    let of = |panel: &crate::garment::pattern::PatternPanel| {
+        let along = panel.rotation * DVec3::X;
+        let fall = along.z.abs().atan2(along.x.hypot(along.y));
+        // A hood's panels are turned about the vertical, which leaves their x level.
+        (fall > SLEEVE).then_some(fall)
+    };
+    pattern.panels.iter().map(of).collect()
+}
+
+/// Mean of the placed points of an edge, and its highest.
+fn placed(pattern: &SewingPattern, at: crate::garment::pattern::EdgeAt) -> (DVec3, f64) {
+    let points = pattern.edge(at).curve.divided(8);
+    let placed: Vec<DVec3> = points.iter().map(|p| pattern.panels[at.panel].place(*p)).collect();
+    let top = placed.iter().fold(f64::NEG_INFINITY, |top, p| top.max(p.z));
+    (placed.iter().sum::<DVec3>() / placed.len() as f64, top)
+}
+
+pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
+    let sleeves = sleeves(pattern);
+    let falls: Vec<f64> = sleeves.iter().flatten().copied().collect();
+    let arm_fall = (!falls.is_empty()).then(|| falls.iter().sum::<f64>() / falls.len() as f64);
+    // Shoulder seams join front and back, neither of them a sleeve, and run across the body more than down it.
+    let mut shoulder_z: Option<f64> = None;
+    for stitch in &pattern.stitches {
+        let [a, b] = stitch.sides;
+        let (front, back) = (placed(pattern, a), placed(pattern, b));
+        let faces = |i: usize| sleeves[i].is_none() && (pattern.panels[i].rotation * DVec3::Z).y.abs() > 0.9;
+        let span = pattern.edge(a).curve.end() - pattern.edge(a).curve.start();
+        if faces(a.panel) && faces(b.panel) && front.0.y * back.0.y < 0.0 && span.x.abs() > span.y.abs() {
+            let top = 0.5 * (front.1 + back.1);
+            shoulder_z = Some(shoulder_z.map_or(top, |z| z.max(top)));
+        }
+    }
+    shoulder_z = shoulder_z.filter(|z| *z > armpit_z - BELOW_ARMPITS);
+    let mut waist = Vec::new();
+    let mut top = f64::NEG_INFINITY;
+    for (panel, of) in pattern.panels.iter().enumerate() {
+        for (edge, e) in of.edges.iter().enumerate() {
+            let (mean, highest) = placed(pattern, crate::garment::pattern::EdgeAt { panel, edge });
+            top = top.max(highest);
+            if e.label.as_deref() == Some("lower_interface") {
+                waist.push(mean.z);
+            }
+        }
+    }
+    let waist_z = if waist.is_empty() { top } else { waist.iter().sum::<f64>() / waist.len() as f64 };
+    Expected { shoulder_z, waist_z, arm_fall }
+}
+
+/// Moves the panels to a body; returns how, and whether the garment has shoulder seams.
+pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arranged, bool) {
+    let armpit_z = body.armpit_z.or(body.shoulder_z).unwrap_or(f64::INFINITY);
+    let expected = expected(pattern, armpit_z);
+    let mut done = Arranged::default();
+    let raised = match (expected.shoulder_z, body.shoulder_z, body.waist_z) {
+        (Some(own), Some(shoulder), _) => shoulder + ABOVE_SHOULDER - own,
+        (None, _, Some(waist)) => waist + ABOVE_WAIST - expected.waist_z,
+        _ => 0.0,
+    };
+    if raised.abs() > LEAST_SHIFT {
+        done.raised = raised;
+    }
+    if let (Some(own), Some(arms)) = (expected.arm_fall, body.arm_fall)
+        && (arms - own).abs() > LEAST_TURN
+    {
+        done.sleeves = arms - own;
+        turn_sleeves(pattern, done.sleeves);
+    }
+    done.turned = body.facing;
+    let turn = DMat3::from_rotation_z(body.facing);
+    for panel in &mut pattern.panels {
+        panel.rotation = turn * panel.rotation;
+        panel.translation = turn * panel.translation + body.middle.extend(done.raised);
+    }
+    (done, expected.shoulder_z.is_some())
+}
+
+/// Turns each side's sleeves by this much downwards about the middle of the edges that hold them.
+fn turn_sleeves(pattern: &mut SewingPattern, down: f64) {
+    let is_sleeve: Vec<bool> = sleeves(pattern).iter().map(Option::is_some).collect();
+    let mut pivots = [(DVec2::ZERO, 0.0); 2];
+    let side = |x: f64| usize::from(x > 0.0);
+    for stitch in &pattern.stitches {
+        let [a, b] = stitch.sides;
+        if is_sleeve[a.panel] == is_sleeve[b.panel] {
+            continue;
+        }
+        let at = if is_sleeve[a.panel] { a } else { b };
+        let (mean, _) = placed(pattern, at);
+        let pivot = &mut pivots[side(mean.x)];
+        pivot.0 += DVec2::new(mean.x, mean.z);
+        pivot.1 += 1.0;
+    }
+    for (panel, _) in pattern.panels.iter_mut().zip(is_sleeve).filter(|(_, sleeve)| *sleeve) {
+        let (sum, count) = pivots[side(panel.translation.x)];
+        if count == 0.0 {
+            continue;
+        }
+        let pivot = DVec3::new(sum.x / count, 0.0, sum.y / count);
+        // About y: the left arm (+x) goes down by a positive turn.
+        let turn = DMat3::from_rotation_y(if panel.translation.x > 0.0 { down } else { -down });
+        panel.rotation = turn * panel.rotation;
+        panel.translation = turn * (panel.translation - pivot) + pivot;
+    }
+}

@@ -1,0 +1,201 @@
+//! Where a standing body has its middle, neck, bust, waist, hip, crotch, armpits and arms, found from its shape.
+//!
+//! The body is cut by level planes a centimetre apart. The curve that goes round the middle is the trunk (or the neck, or the head),
+//! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck
+//! end the first height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between
+//! crotch and armpit, hip and bust the largest below and above it; arms are straight lines through the middles of their curves. Toes tell the front.
+//!
+//! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk; what is not found is `None`, and then
+//! nothing is moved to it.
+
+use glam::{DVec2, DVec3};
+
+use crate::base::quantiles::extremes;
+use crate::body::girth::{Plane, SectionLoop, section};
+use crate::mesh::{TriMesh, box_about};
+
+/// Between two planes, m.
+const STEP: f64 = 0.01;
+/// What is taller is nobody's body, and would be cut for hours, m.
+const TALLEST: f64 = 5.0;
+/// How much wider than the neck a curve is where the shoulder begins.
+const SPREAD: f64 = 1.5;
+/// Arms are told from fingers by their girth, m.
+const LEAST_ARM: f64 = 0.1;
+/// What is farther beside the trunk than this is an arm's, m.
+const BESIDE: f64 = 0.01;
+/// So many curves make an arm.
+const LEAST_CURVES: usize = 6;
+
+/// Heights and places of a standing body, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Landmarks {
+    /// Middle of the trunk in x and y.
+    pub middle: DVec2,
+    /// Angle from −y to where the toes point, radians, a multiple of a right angle.
+    pub facing: f64,
+    /// Height of the shoulder's neck end.
+    pub shoulder_z: Option<f64>,
+    /// Height of the smallest girth of the trunk.
+    pub waist_z: Option<f64>,
+    /// Height of the largest girth between crotch and waist.
+    pub hip_z: Option<f64>,
+    /// Height of the largest girth between waist and armpits.
+    pub bust_z: Option<f64>,
+    /// Height of the armpits: where the arms' curves join the trunk's.
+    pub armpit_z: Option<f64>,
+    /// How far the arms point below the horizontal, radians.
+    pub arm_fall: Option<f64>,
+    /// Heights, and half the width of the trunk there.
+    trunk: Vec<(f64, f64)>,
+}
+
+/// One level.
+struct Level {
+    z: f64,
+    /// The curve round the middle.
+    trunk: Option<SectionLoop>,
+    /// Middles of the largest curve on each side, if it is an arm's.
+    beside: [Option<DVec3>; 2],
+}
+
+impl Landmarks {
+    /// Finds them.
+    #[must_use]
+    pub fn of(body: &TriMesh) -> Self {
+        let (low, high) = body.bounds().unwrap_or_default();
+        let height = high.z - low.z;
+        let middle = middle(body, low.z, height);
+        let facing = facing(body, low.z, height);
+        // Left and right as the body has them.
+        let across = DVec2::from_angle(facing);
+        let count = if height <= TALLEST { (height / STEP) as usize } else { 0 };
+        let levels: Vec<Level> = (1..count)
+            .map(|i| {
+                let z = low.z + STEP * i as f64;
+                level(body, z, middle, across)
+            })
+            .collect();
+        let between = |from: f64, to: f64| {
+            levels.iter().filter(move |l| l.z >= low.z + from * height && l.z <= low.z + to * height)
+        };
+        let girths = |from: f64, to: f64| between(from, to).filter_map(|l| Some((l.trunk.as_ref()?.tape_length(), l)));
+        let narrowest = |from: f64, to: f64| girths(from, to).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l);
+        let widest_z = |from: f64, to: f64| girths(from, to).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l.z);
+        let crotch = between(0.25, 0.7).find(|l| l.trunk.is_some()).map(|l| (l.z - low.z) / height);
+        let width = |l: &Level| l.trunk.as_ref().map_or(0.0, |c| extent(c, across));
+        let neck = narrowest(0.78, 0.95);
+        let shoulder_z = neck.and_then(|neck| {
+            let wide = SPREAD * width(neck);
+            levels.iter().rev().find(|l| l.z < neck.z && width(l) > wide).map(|l| l.z)
+        });
+        let top = shoulder_z.unwrap_or(low.z + 0.8 * height);
+        let from = crotch.unwrap_or(0.45);
+        let arms: Vec<&Level> =
+            between(from, 1.0).filter(|l| l.z < top && l.beside.iter().all(Option::is_some)).collect();
+        let armpit_z = arms.last().filter(|_| arms.len() >= LEAST_CURVES).map(|l| l.z);
+        let arm_fall = armpit_z.and_then(|_| arm_fall(&arms, across));
+        let waist_to = armpit_z.map_or(0.7, |z| (z - low.z) / height - 0.03);
+        let waist_z = narrowest(from + 0.06, waist_to).map(|l| l.z);
+        let share = |z: f64| (z - low.z) / height;
+        let hip_z = waist_z.and_then(|waist| widest_z(from, share(waist)));
+        let bust_z = waist_z.zip(armpit_z).and_then(|(waist, armpit)| widest_z(share(waist), share(armpit)));
+        let half = |l: &Level| Some((l.z, extent_from(l.trunk.as_ref()?, middle, across)));
+        let trunk = levels.iter().filter(|l| l.z < armpit_z.unwrap_or(top)).filter_map(half).collect();
+        Self { middle, facing, shoulder_z, waist_z, hip_z, bust_z, armpit_z, arm_fall, trunk }
+    }
+
+    /// The body without its arms, open where they were: what is worn below them hangs inside of them. `None` for a body without arms that
+    /// were found.
+    pub(super) fn without_arms(&self, body: &TriMesh) -> Option<TriMesh> {
+        let armpit = self.armpit_z?;
+        let across = DVec2::from_angle(self.facing);
+        let (lowest, at_crotch) = *self.trunk.first()?;
+        let hips = self.trunk.iter().fold(at_crotch, |w, (_, half)| w.max(*half));
+        let of_arm = |p: &DVec3| {
+            let aside = (p.truncate() - self.middle).dot(across).abs();
+            let trunk = self.trunk.get(((p.z - lowest) / STEP).round() as usize);
+            let half = if p.z < lowest { hips } else { trunk.map_or(hips, |t| t.1) };
+            p.z < armpit && aside > half + BESIDE
+        };
+        let arm: Vec<bool> = body.positions.iter().map(of_arm).collect();
+        let kept = |t: &&[u32; 3]| !t.iter().any(|&v| arm[v as usize]);
+        Some(TriMesh::new(body.positions.clone(), body.triangles.iter().filter(kept).copied().collect()))
+    }
+}
+
+/// Of the largest curve a little above the middle of the height.
+fn middle(body: &TriMesh, low: f64, height: f64) -> DVec2 {
+    let curves = section(body, Plane::horizontal(low + 0.6 * height));
+    let largest = curves.into_iter().filter(|c| c.closed).max_by(|a, b| a.length().total_cmp(&b.length()));
+    let box_of = |c: SectionLoop| {
+        let (low, high) = box_about(c.points);
+        (0.5 * (low + high)).truncate()
+    };
+    largest.map_or(DVec2::ZERO, box_of)
+}
+
+/// From the ankles to the feet, as the nearest quarter turn from −y.
+fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
+    let mean = |from: f64, to: f64| {
+        let inside = |p: &&DVec3| p.z >= low + from * height && p.z <= low + to * height;
+        let (sum, count) = body.positions.iter().filter(inside).fold((DVec3::ZERO, 0.0), |(s, n), p| (s + p, n + 1.0));
+        (count > 0.0).then(|| (sum / count).truncate())
+    };
+    let (Some(feet), Some(ankles)) = (mean(0.0, 0.025), mean(0.05, 0.08)) else { return 0.0 };
+    let ahead = feet - ankles;
+    if ahead.length() < 0.005 * height {
+        return 0.0;
+    }
+    let angle = DVec2::NEG_Y.angle_to(ahead);
+    (angle / std::f64::consts::FRAC_PI_2).round() * std::f64::consts::FRAC_PI_2
+}
+
+fn extent(curve: &SectionLoop, across: DVec2) -> f64 {
+    let (low, high) = extremes(curve.points.iter().map(|p| p.truncate().dot(across)));
+    high - low
+}
+
+/// How far a curve reaches to the farther side of the middle.
+fn extent_from(curve: &SectionLoop, middle: DVec2, across: DVec2) -> f64 {
+    curve.points.iter().fold(0.0, |most: f64, p| most.max((p.truncate() - middle).dot(across).abs()))
+}
+
+fn level(body: &TriMesh, z: f64, middle: DVec2, across: DVec2) -> Level {
+    let mut found = Level { z, trunk: None, beside: [None, None] };
+    let mut girths = [LEAST_ARM; 2];
+    for curve in section(body, Plane::horizontal(z)).into_iter().filter(|c| c.closed) {
+        let along = |p: &DVec3| (p.truncate() - middle).dot(across);
+        let (low, high) = extremes(curve.points.iter().map(along));
+        let length = curve.length();
+        if low < 0.0 && high > 0.0 {
+            if found.trunk.as_ref().is_none_or(|t| t.length() < length) {
+                found.trunk = Some(curve);
+            }
+        } else {
+            let side = usize::from(low > 0.0);
+            if length > girths[side] {
+                girths[side] = length;
+                found.beside[side] = Some(curve.centre());
+            }
+        }
+    }
+    found
+}
+
+/// Mean slope of both arms: how fast their middles go outward as the level falls, by least squares.
+fn arm_fall(arms: &[&Level], across: DVec2) -> Option<f64> {
+    let n = arms.len() as f64;
+    let out = |l: &Level| {
+        let [right, left] = l.beside;
+        Some(0.5 * (left?.truncate().dot(across) - right?.truncate().dot(across)))
+    };
+    let points: Vec<(f64, f64)> = arms.iter().filter_map(|l| Some((out(l)?, l.z))).collect();
+    let mean = points.iter().fold((0.0, 0.0), |(x, z), p| (x + p.0 / n, z + p.1 / n));
+    let (mut square, mut mixed) = (0.0, 0.0);
+    for (x, z) in points {
+        square += (z - mean.1) * (z - mean.1);
+        mixed += (x - mean.0) * (z - mean.1);
+    }
+    (square > 0.0).then(|| 1.0_f64.atan2(-mixed / square))
+}

@@ -1,0 +1,161 @@
+//! Accuracy: a drape measured against a reference, and as a state of its own.
+//!
+//! A garment has several equilibria of nearly the same energy, so one distance to one reference misleads. A result is
+//! compared with its *own continuation*, refined to convergence from that very result ([`Accuracy::vertices`], `rms_mm`); with the
+//! *canonical drape*, refined from the undraped start (`canonical_rms_mm`); and the spread of canonical drapes from perturbed
+//! starts stands beside both (`canonical_spread_mm`). The vertex error e_i = |x_i − x'_i| is split by zone: contact, where the
+//! reference is within [`CONTACT_ZONE`] of the body, and free. [`mod@shape`] compares shapes, [`state`] tells how settled and how
+//! strained, [`representable`] what the PARTs could hold at best, [`mod@reference`] keeps references on disk.
+//!
+//! Limits: no figure tells whether either drape is *the* drape of a real cloth; that is what the drape tests are for.
+
+pub(crate) mod moments;
+pub mod reference;
+pub mod representable;
+pub mod shape;
+pub mod state;
+pub mod summary;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+pub use representable::Representable;
+pub use shape::SectionGirth;
+pub use state::State;
+pub use summary::ErrorSummary;
+
+use crate::body::distance::{Body, DistanceError};
+use crate::mechanics::energy::Cloth;
+use crate::mesh::{Topology, TriMesh};
+use crate::parts::Parts;
+use summary::MM_PER_M;
+
+/// A vertex whose reference is nearer than this to the body (m) is in the contact zone: the contact distance of the paper's
+/// model, the upper value of Table 3's level 7.
+pub const CONTACT_ZONE: f64 = 0.005;
+
+/// Why two drapes cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
+pub enum AccuracyError {
+    /// Lists of different meshes.
+    #[error("{what} has {found} vertices and the garment {expected}: both drapes must be of one mesh")]
+    Count { what: &'static str, found: usize, expected: usize },
+    /// A coordinate that is not finite.
+    #[error("vertex number {} of {what} is not finite: the solve that made it has failed", .vertex + 1)]
+    NotFinite { what: &'static str, vertex: usize },
+    /// No surface to measure to.
+    #[error("the drapes cannot be searched: {0}")]
+    Distance(#[from] DistanceError),
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy)]
+pub struct Comparison<'a> {
+    /// The garment; its positions are not used.
+    pub mesh: &'a TriMesh,
+    /// Its connectivity.
+    pub topology: &'a Topology,
+    /// Its energy.
+    pub cloth: &'a Cloth,
+    /// The body.
+    pub body: &'a Body,
+    /// PARTs to judge by what they could hold, if any.
+    pub parts: Option<&'a Parts>,
+    /// Undraped vertices, m: where the PARTs' displacements start.
+    pub start: &'a [DVec3],
+    /// The drape to judge, m.
+    pub result: &'a [DVec3],
+    /// What it is judged by, m.
+    pub reference: &'a [DVec3],
+}
+
+/// A drape's errors. Serialised names carry their units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Accuracy {
+    /// Vertex error over the whole garment; its fields are written on this level (`rms_mm`, ...).
+    #[serde(flatten)]
+    pub vertices: ErrorSummary,
+    /// The same where the reference touches the body.
+    pub contact: ErrorSummary,
+    /// The same where it hangs free.
+    pub free: ErrorSummary,
+    /// RMS to the canonical drape, mm; `None` until somebody has one.
+    pub canonical_rms_mm: Option<f64>,
+    /// RMS between canonical drapes from perturbed starts, mm.
+    pub canonical_spread_mm: Option<f64>,
+    /// Symmetric Hausdorff distance, mm.
+    pub hausdorff_mm: f64,
+    /// Mean angle between vertex normals, degrees.
+    pub normal_angle_deg: f64,
+    /// Height of the hem, m; `None` without an edge.
+    pub hem_height_m: Option<f64>,
+    /// Height of the reference's hem, m.
+    pub reference_hem_height_m: Option<f64>,
+    /// Horizontal sections, low to high.
+    pub girths: Vec<SectionGirth>,
+    /// (E − E_ref)/|E_ref|.
+    pub energy_gap: f64,
+    /// The result as a state; its fields are written on this level (`residual_over_weight`, `strain_p95`, ...).
+    #[serde(flatten)]
+    pub state: State,
+    /// RMS left with one translation a PART, mm; `None` without PARTs.
+    pub representable_rms_mm: Option<f64>,
+    /// All three representable errors.
+    pub representable: Option<Representable>,
+}
+
+/// Distance of each vertex of `a` to the same vertex of `b`, m.
+#[must_use]
+pub fn vertex_errors(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x.distance(*y)).collect()
+}
+
+/// RMS vertex distance, mm.
+#[must_use]
+pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
+    ErrorSummary::of(&vertex_errors(a, b)).rms_mm
+}
+
+/// Measures a result against a reference. `canonical_*` stay empty: they need a second one, see [`rms_mm`].
+pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
+    let expected = c.mesh.vertex_count();
+    for (what, list) in [("the start", c.start), ("the result", c.result), ("the reference", c.reference)] {
+        if list.len() != expected {
+            return Err(AccuracyError::Count { what, found: list.len(), expected });
+        }
+        if let Some(vertex) = list.iter().position(|x| !x.is_finite()) {
+            return Err(AccuracyError::NotFinite { what, vertex });
+        }
+    }
+    let errors = vertex_errors(c.result, c.reference);
+    let near = c.body.nearest_all(c.reference);
+    let zone = |contact: bool| {
+        let inside = |d: f64| (d < CONTACT_ZONE) == contact;
+        let of_zone: Vec<f64> =
+            errors.iter().zip(&near).filter(|(_, p)| inside(p.signed_distance)).map(|(&e, _)| e).collect();
+        ErrorSummary::of(&of_zone)
+    };
+    let (result, reference) = (c.mesh.with_positions(c.result.to_vec()), c.mesh.with_positions(c.reference.to_vec()));
+    let state = State::of(c.cloth, c.body, c.result);
+    let reference_energy = State::of(c.cloth, c.body, c.reference).energy_j;
+    let hem = shape::hem_heights(c.topology, c.result, c.reference);
+    let representable =
+        c.parts.map(|p| representable::representable(c.topology, p, &c.cloth.held, c.start, c.reference));
+    Ok(Accuracy {
+        vertices: ErrorSummary::of(&errors),
+        contact: zone(true),
+        free: zone(false),
+        canonical_rms_mm: None,
+        canonical_spread_mm: None,
+        hausdorff_mm: MM_PER_M * shape::hausdorff(c.mesh, c.result, c.reference)?,
+        normal_angle_deg: shape::mean_normal_angle_deg(&result, &reference),
+        hem_height_m: hem.map(|h| h.0),
+        reference_hem_height_m: hem.map(|h| h.1),
+        girths: shape::section_girths(&result, &reference),
+        energy_gap: (state.energy_j - reference_energy) / reference_energy.abs().max(f64::MIN_POSITIVE),
+        state,
+        representable_rms_mm: representable.map(|r| r.translation_rms_mm),
+        representable,
+    })
+}

@@ -1,0 +1,87 @@
+//! How settled, how strained and how deep in the body a drape is: figures of one state, no reference needed.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | E | energy without friction | J |
+//! | r | residual force ‖∇E‖₂ over the free vertices, over the weight | – |
+//! | ε | largest principal strain of a triangle, positive in elongation | – |
+//!
+//! Friction holds any tangential force up to μ_f N (Coulomb), and what it holds depends on how the cloth came to rest. A
+//! state by itself has no history, so at a touching vertex friction is taken to hold as much as it can: the tangential part of
+//! the force is shortened by μ_f N, to zero at most. A solver that follows its anchors may report a larger residual.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::summary::MM_PER_M;
+use crate::base::quantiles::nearest_rank;
+use crate::body::distance::Body;
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::fit::principal_strain;
+use crate::mechanics::reactions::grant_beside;
+
+/// Figures of one drape.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// E, J.
+    pub energy_j: f64,
+    /// r.
+    pub residual_over_weight: f64,
+    /// 95th percentile over the triangles of ε.
+    pub strain_p95: f64,
+    /// Largest ε.
+    pub strain_max: f64,
+    /// Free vertices inside the body.
+    pub penetrating_vertices: usize,
+    /// Depth of the deepest, mm.
+    pub penetration_mm: f64,
+}
+
+impl State {
+    /// Figures of `cloth` on `body` at `x`.
+    #[must_use]
+    pub fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
+        let contacts = cloth.contacts(body, x);
+        let mut gradient = Vec::new();
+        // Fresh contacts have fresh anchors: no friction force yet.
+        let energy_j = cloth.gradient(x, &contacts, &mut gradient);
+        hold(cloth, &contacts, &mut gradient);
+        grant_beside(cloth, body, &contacts, x, &mut gradient);
+        let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
+        let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
+        let (penetrating_vertices, depth) = contacts.penetration(x);
+        Self {
+            energy_j,
+            residual_over_weight: residual / cloth.weight,
+            strain_p95: nearest_rank(&strains, 0.95),
+            strain_max: strains.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            penetrating_vertices,
+            penetration_mm: MM_PER_M * depth,
+        }
+    }
+}
+
+/// Takes from the gradient what friction can hold.
+fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
+    for touch in contacts.touches() {
+        let g = &mut gradient[touch.vertex as usize];
+        // Flatter in a crease than a distance, where the body pushes less.
+        let (normal, slope) = (touch.normal.normalize_or_zero(), touch.normal.length().min(1.0));
+        let tangential = *g - normal * normal.dot(*g);
+        *g -= tangential.clamp_length_max(cloth.friction[touch.vertex as usize] * touch.force() * slope);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strains_of_a_stretch_a_turn_and_a_shear() {
+        assert!((principal_strain([DVec3::X * 1.1, DVec3::Y]) - 0.1).abs() < 1e-15);
+        assert!(principal_strain([DVec3::Y, DVec3::Z]).abs() < 1e-15);
+        // Simple shear γ: σ = γ/2 + √(1 + γ²/4).
+        let sheared = principal_strain([DVec3::X, DVec3::new(0.2, 1.0, 0.0)]);
+        assert!((sheared - (0.1 + 1.01f64.sqrt() - 1.0)).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,216 @@
+//! A certificate of rest: whether a garment, given by where its vertices are and nothing else, is a drape one can rely on.
+//!
+//! Nothing that the solver remembers is used, neither its contact forces nor its friction anchors, so a drape can be certified from its
+//! files by whoever doubts it. Forces are taken anew from the positions, and the body is granted whatever reaction it could give
+//! ([`Forces`]: Coulomb's cone at every vertex that touches); what no reaction balances is the residual. Whether the rest is one that
+//! would last is asked of the energy's curvature ([`Curvature`]).
+//!
+//! | line | what is asked | limit from |
+//! |---|---|---|
+//! | residual | ‖r‖₂ over the weight, r what nothing balances | the solver's own tolerance |
+//! | forces add up | \|Σ reactions − weight\| over the weight | one percent |
+//! | friction | tangential force beyond μN, and pull towards the body, over the weight | the same |
+//! | still moving | share of vertices that the next Newton step moves by over a millimetre | GarmentCode's simulator calls 1.5 % static |
+//! | distance to rest | RMS of that step, mm | thickness of a garment's cloth |
+//! | lowest curvature | ω² of the softest way out, 1/s²: negative where the rest is none that lasts | rounding |
+//! | inside the body | vertices, by the exact distance | none |
+//! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
+//! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
+//! | largest strain | principal strain of a triangle, % | [`TORN_PERCENT`]: more than fabrics bear |
+//!
+//! Limits: a reaction that could be given need not be the one that history left; of the curvature, contacts are taken as they are.
+
+mod curvature;
+
+use glam::DVec3;
+use serde::Serialize;
+
+pub use crate::mechanics::reactions::Forces;
+pub use curvature::Curvature;
+
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::fit::{TORN_PERCENT, principal_strain};
+use crate::mechanics::refine::SolveError;
+use crate::mesh::self_intersection::self_intersecting_pairs;
+use crate::scene::{Placement, Scene};
+
+/// Residual over weight that counts as rest: [`RefineOptions::default`](crate::mechanics::refine::RefineOptions)'s tolerance.
+const REST: f64 = 1e-3;
+
+/// Share of the weight that reactions may miss or exceed: residual forces of a thousandth each, leaning to one side, add up to more.
+const BALANCE: f64 = 1e-2;
+
+/// Move of a vertex that counts as moving, m.
+const MOVES: f64 = 1e-3;
+
+/// Share of the vertices that may still move: what the field's simulator calls static (GarmentCode, 2024).
+const STILL_MOVING: f64 = 0.015;
+
+/// RMS of the next step that may be left, mm: a thick cloth's thickness.
+const NEAR_REST_MM: f64 = 1.0;
+
+/// ω² below which a rest does not last, 1/s²: what is softer takes over ten seconds to leave, and is not told from rounding.
+const LASTS: f64 = -1e-2;
+
+/// Why nothing could be certified.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
+pub enum CertifyError {
+    /// Positions for another mesh.
+    #[error("{found} positions for a garment of {expected} vertices: give those of this very garment")]
+    Count { found: usize, expected: usize },
+    /// A position that is not a number.
+    #[error("the position of vertex number {} is not finite", .vertex + 1)]
+    NotFinite { vertex: usize },
+    /// The cloth cannot be set up.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The curvature cannot be found.
+    #[error("the curvature of the energy: {0}")]
+    Solve(#[from] SolveError),
+}
+
+/// One line of a certificate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What was asked.
+    pub name: &'static str,
+    /// What was found.
+    pub value: f64,
+    /// Its unit; empty for counts and shares.
+    pub unit: &'static str,
+    /// The most it may be; of the curvature the least.
+    pub limit: f64,
+    /// Whether it is within the limit.
+    pub passes: bool,
+    /// Where, or how it comes about.
+    pub remark: String,
+}
+
+/// What was found of a drape.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Certificate {
+    /// Whether every line passes.
+    pub passes: bool,
+    /// Line by line.
+    pub findings: Vec<Finding>,
+}
+
+impl Certificate {
+    fn new(findings: Vec<Finding>) -> Self {
+        Self { passes: findings.iter().all(|f| f.passes), findings }
+    }
+
+    /// The line of this name.
+    #[must_use]
+    pub fn finding(&self, name: &str) -> Option<&Finding> {
+        self.findings.iter().find(|f| f.name == name)
+    }
+}
+
+/// Certifies the garment of `scene` with its vertices at `x` (m): its rest shape and held vertices are the scene's.
+///
+/// # Errors
+/// [`CertifyError`] where positions and scene do not belong together, or are none.
+pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificate, CertifyError> {
+    let expected = scene.garment.vertex_count();
+    if x.len() != expected {
+        return Err(CertifyError::Count { found: x.len(), expected });
+    }
+    if let Some(vertex) = x.iter().position(|p| !p.is_finite()) {
+        return Err(CertifyError::NotFinite { vertex });
+    }
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
+    let forces = Forces::new(&cloth, &scene.body, x);
+    let curvature = Curvature::new(&cloth, &forces, x)?;
+    let mut findings = of_forces(&forces, &cloth).to_vec();
+    findings.extend(of_motion(&curvature));
+    findings.extend(of_surfaces(scene, x));
+    findings.push(of_strain(&cloth, x));
+    Ok(Certificate::new(findings))
+}
+
+/// A line that passes up to a limit.
+fn at_most(name: &'static str, value: f64, unit: &'static str, limit: f64, remark: String) -> Finding {
+    Finding { name, value, unit, limit, passes: value <= limit, remark }
+}
+
+fn of_forces(forces: &Forces, cloth: &Cloth) -> [Finding; 3] {
+    let of_weight = |force: DVec3| 100.0 * force.z / cloth.weight;
+    let carried = format!(
+        "the body carries {:.1} % of {:.2} N, held edges {:.1} %",
+        of_weight(forces.carried),
+        cloth.weight,
+        of_weight(forces.held)
+    );
+    let friction = format!("{} of {} touching vertices slip or are pulled", forces.beyond_count, forces.touching.len());
+    [
+        at_most("residual", forces.residual / cloth.weight, "of the weight", REST, worst(forces)),
+        at_most("forces add up", forces.unbalanced.length() / cloth.weight, "of the weight", BALANCE, carried),
+        at_most("friction", forces.beyond / cloth.weight, "of the weight", REST, friction),
+    ]
+}
+
+/// Where the largest unbalanced force is.
+fn worst(forces: &Forces) -> String {
+    let (vertex, force) = forces
+        .rest
+        .iter()
+        .map(|r| r.length())
+        .enumerate()
+        .fold((0, 0.0), |worst, (v, f)| if f > worst.1 { (v, f) } else { worst });
+    format!("most at vertex {}, {:.2} mN", vertex + 1, 1e3 * force)
+}
+
+fn of_motion(curvature: &Curvature) -> [Finding; 3] {
+    let moves = curvature.step.iter().filter(|d| d.length() > MOVES).count() as f64;
+    let n = curvature.step.len().max(1) as f64;
+    let longest = curvature.step.iter().map(|d| d.length()).fold(0.0, f64::max);
+    let rms = (curvature.step.iter().map(|d| d.length_squared()).sum::<f64>() / n).sqrt();
+    let ways = match curvature.ways_out {
+        0 => "a minimum".to_owned(),
+        n => format!("{n} ways out, the softest about vertex {}", curvature.at + 1),
+    };
+    [
+        at_most(
+            "still moving",
+            moves / n,
+            "of the vertices",
+            STILL_MOVING,
+            format!("by up to {:.2} mm", 1e3 * longest),
+        ),
+        at_most("distance to rest", 1e3 * rms, "mm", NEAR_REST_MM, "RMS of the next Newton step".to_owned()),
+        Finding {
+            name: "lowest curvature",
+            value: curvature.lowest,
+            unit: "1/s²",
+            limit: LASTS,
+            passes: curvature.lowest >= LASTS,
+            remark: ways,
+        },
+    ]
+}
+
+fn of_surfaces(scene: &Scene, x: &[DVec3]) -> [Finding; 3] {
+    let garment = scene.garment.with_positions(x.to_vec());
+    let placed = Placement::new(&garment, &scene.body);
+    let crossing = self_intersecting_pairs(&garment);
+    let pairs = |first: Option<[u32; 2]>| match first {
+        Some([t, u]) => format!("pairs of triangles, the first {} and {}", t + 1, u + 1),
+        None => "pairs of triangles".to_owned(),
+    };
+    let deep = format!("vertices, up to {:.2} mm deep", 1e3 * placed.deepest_m);
+    [
+        at_most("inside the body", placed.penetrating_vertices as f64, "", 0.0, deep),
+        at_most("skin through cloth", placed.crossing_pairs as f64, "", 0.0, pairs(None)),
+        at_most("cloth through cloth", crossing.len() as f64, "", 0.0, pairs(crossing.first().copied())),
+    ]
+}
+
+fn of_strain(cloth: &Cloth, x: &[DVec3]) -> Finding {
+    let strains = cloth.triangles.iter().map(|t| 100.0 * principal_strain(t.deformation(x)));
+    let (t, most) =
+        strains.enumerate().fold((0, f64::NEG_INFINITY), |most, (t, s)| if s > most.1 { (t, s) } else { most });
+    at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}", t + 1))
+}

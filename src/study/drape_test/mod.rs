@@ -1,0 +1,208 @@
+//! The Cusick drape test, simulated: how far a fabric's folds let it fall.
+//!
+//! A disc of cloth 30 cm across lies between two plates of 18 cm; its rim hangs free and folds. The drape coefficient is
+//!
+//! DC = (A_p − A_d)/(A_s − A_d), the areas of the drape's shadow, of the plates and of the flat specimen
+//!
+//! (BS 5058; Cusick: "The measurement of fabric drape", J. Text. Inst. 59, 1968): 0 hangs straight down, 1 is a board. The
+//! plates clamp the cloth, so its rim alone is computed, without contact.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | A_p, A_d, A_s | shadow, disc, specimen | m² |
+//! | DC | drape coefficient | – |
+//!
+//! Limits: no contact between folds, nor with the plates' edge from below; a fabric of several equilibria gives the one nearest a flat
+//! start with millimetre waves of two to nine folds, where a laboratory takes the mean of six drapes.
+
+mod shadow;
+mod specimen;
+
+use std::ops::ControlFlow;
+
+use serde::Deserialize;
+
+use crate::garment::fabric::{Fabric, FabricError};
+use crate::mechanics::energy::{Cloth, Contacts, EnergyError};
+use crate::mechanics::refine::{RefineOptions, SolveError, Stop, refine_with};
+use crate::mesh::rest::RestError;
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+pub use shadow::shadow_area;
+pub use specimen::{Specimen, specimen};
+
+/// Radius of the specimen, m.
+pub const SPECIMEN_RADIUS: f64 = 0.15;
+
+/// Radius of the plates, m.
+pub const PLATE_RADIUS: f64 = 0.09;
+
+/// Published bands, by fabric.
+const TARGETS: &str = include_str!("../../../assets/cusick/targets.csv");
+
+/// Why a drape test failed.
+#[derive(Debug, thiserror::Error)]
+pub enum CusickError {
+    /// Too coarse to fold.
+    #[error("{rows} rows of cells across the rim cannot fold; expected at least 4")]
+    TooCoarse {
+        /// Rows asked for.
+        rows: usize,
+    },
+    /// No such fabric.
+    #[error(transparent)]
+    Fabric(#[from] FabricError),
+    /// The specimen has no rest shape.
+    #[error(transparent)]
+    Rest(#[from] RestError),
+    /// The energy cannot be set up.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The solver failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The table cannot be read or written.
+    #[error("assets/cusick/targets.csv: {0}")]
+    Csv(#[from] csv::Error),
+}
+
+/// One simulated drape test.
+#[derive(Debug, Clone)]
+pub struct CusickResult {
+    /// Name of the fabric.
+    pub fabric: String,
+    /// Drape coefficient DC, 0 to 1.
+    pub coefficient: f64,
+    /// Folds: maxima of the rim's distance from the axis.
+    pub folds: usize,
+    /// ‖∇E‖₂ over the weight of the rim.
+    pub residual_over_weight: f64,
+    /// Newton steps.
+    pub steps: usize,
+    /// Whether the residual got under the tolerance.
+    pub converged: bool,
+    /// The drape; the part between the plates is left out but for its outermost rows.
+    pub drape: TriMesh,
+}
+
+/// Drapes `fabric` with `rows` rows of cells from the plates' edge to the rim.
+///
+/// # Errors
+/// [`CusickError`] says what could not be set up.
+pub fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
+    if rows < 4 {
+        return Err(CusickError::TooCoarse { rows });
+    }
+    let flat = specimen(rows);
+    let cloth =
+        Cloth::new(&flat.mesh, &Topology::new(&flat.mesh), &RestShape::from_edges(&flat.mesh)?, fabric, &flat.held)?;
+    // The folds of a specimen hang apart.
+    let options = RefineOptions { self_contact: false, ..RefineOptions::default() };
+    let end =
+        refine_with(&cloth, Contacts::none(), specimen::waved(&flat), &options, &mut |_| ControlFlow::Continue(()))?;
+    let drape = flat.mesh.with_positions(end.positions);
+    let circle = |r: f64| std::f64::consts::PI * r * r;
+    let (plate, whole) = (circle(PLATE_RADIUS), circle(SPECIMEN_RADIUS));
+    let rim: Vec<f64> = drape.positions[flat.rim].iter().map(|p| p.truncate().length()).collect();
+    Ok(CusickResult {
+        fabric: fabric.name.clone(),
+        coefficient: (shadow_area(&drape, PLATE_RADIUS) - plate) / (whole - plate),
+        folds: maxima(&rim),
+        residual_over_weight: end.residual_over_weight,
+        steps: end.steps,
+        converged: end.stop == Stop::Converged,
+        drape,
+    })
+}
+
+/// A published band.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Target {
+    /// Name of a built-in fabric.
+    pub fabric: String,
+    /// Least published coefficient, percent.
+    pub low_percent: f64,
+    /// Greatest published coefficient, percent.
+    pub high_percent: f64,
+    /// Whether a constant of the fabric was set so that it falls inside: no check of the model then.
+    pub calibrated_to: bool,
+    /// Where it was published.
+    pub source: String,
+}
+
+/// The published bands.
+///
+/// # Errors
+/// [`CusickError::Csv`] if the table does not parse.
+pub fn targets() -> Result<Vec<Target>, CusickError> {
+    Ok(csv::Reader::from_reader(TARGETS.as_bytes()).deserialize().collect::<Result<_, _>>()?)
+}
+
+/// Drapes fabrics, built in by name or from files, and sets the results beside the published bands, as CSV.
+///
+/// # Errors
+/// As [`run`], and [`FabricError`] for an unknown name or a file that is none of a fabric.
+pub fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
+    let targets = targets()?;
+    let mut csv = String::from(
+        "fabric,coefficient_percent,low_percent,high_percent,calibrated_to,verdict,folds,residual_over_weight,steps\n",
+    );
+    for name in fabrics {
+        let result = run(&Fabric::by_name(name)?, rows)?;
+        let percent = 100.0 * result.coefficient;
+        let target = targets.iter().find(|t| t.fabric == *name);
+        let band = target
+            .map_or_else(|| ",,".to_owned(), |t| format!("{},{},{}", t.low_percent, t.high_percent, t.calibrated_to));
+        let verdict = target.map_or_else(|| "no published band".to_owned(), |t| verdict(percent, t));
+        let quoted = || format!("\"{}\"", name.replace('"', "\"\""));
+        let label = if name.contains([',', '"', '\n', '\r']) { quoted() } else { (*name).to_owned() };
+        csv += &format!(
+            "{label},{percent:.1},{band},{verdict},{},{:.1e},{}\n",
+            result.folds, result.residual_over_weight, result.steps
+        );
+    }
+    Ok(csv)
+}
+
+fn verdict(percent: f64, target: &Target) -> String {
+    if percent < target.low_percent {
+        format!("{:.1} below", target.low_percent - percent)
+    } else if percent > target.high_percent {
+        format!("{:.1} above", percent - target.high_percent)
+    } else {
+        "inside".to_owned()
+    }
+}
+
+/// Maxima of a closed sequence that stand out by more than a millimetre from the minima beside them.
+fn maxima(radii: &[f64]) -> usize {
+    const STANDS_OUT: f64 = 1e-3;
+    let (mut count, mut rising) = (0, false);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    // Twice around: the first round finds a place to start counting from.
+    for (i, &r) in radii.iter().chain(radii).enumerate() {
+        (low, high) = (low.min(r), high.max(r));
+        if rising && r < high - STANDS_OUT {
+            (rising, low) = (false, r);
+            count += usize::from(i >= radii.len());
+        } else if !rising && r > low + STANDS_OUT {
+            (rising, high) = (true, r);
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folds_are_counted_once_around() {
+        let wave = |n: f64| {
+            (0..200).map(|i| 0.12 + 0.01 * (n * std::f64::consts::TAU * f64::from(i) / 200.0).cos()).collect::<Vec<_>>()
+        };
+        assert_eq!(maxima(&wave(6.0)), 6);
+        assert_eq!(maxima(&wave(1.0)), 1);
+        assert_eq!(maxima(&[0.12; 50]), 0);
+    }
+}

@@ -1,0 +1,269 @@
+//! A drape against its references: how far it is from where it would settle, and from the canonical drape.
+//!
+//! The *own continuation* is the drape refined to convergence from the very result (`accuracy.rms_mm`); the *canonical drape*
+//! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it and
+//! drapes from starts put on a little differently (`accuracy.canonical_spread_mm`, [`perturbed`]): a garment has several
+//! equilibria, and an error under the spread says nothing. References are kept on disk under their content hash; see
+//! [`reference`](crate::study::accuracy::reference).
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::drape::{Drape, Scene, Settings};
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mechanics::refine::{Observer, RefineOptions, SolveError, Stop, refine};
+use crate::study::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
+use crate::study::accuracy::{self, Accuracy, AccuracyError, Comparison};
+use crate::study::wrinkles::{self, Wrinkles};
+
+/// RMS of a perturbation, m: what previews by different range tables differ by, and less than two hands would.
+const PERTURBATION: f64 = 5e-3;
+
+/// Wave numbers of a perturbation along each axis, 1/m, are up to this: waves of 20 cm and more, a fold's length.
+const WAVE_NUMBER: f64 = 30.0;
+
+/// Plane waves in a perturbation.
+const WAVES: usize = 8;
+
+/// Why a drape could not be assessed.
+#[derive(Debug, thiserror::Error)]
+pub enum AssessError {
+    /// The cloth cannot be set up.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// The reference cannot be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The two cannot be compared.
+    #[error(transparent)]
+    Accuracy(#[from] AccuracyError),
+    /// No drape is everybody's reference.
+    #[error(
+        "garments worn over each other have no canonical drape, as each waits for what is below it: found {garments} of them, expected \
+         one; leave --accuracy out, or measure each by itself"
+    )]
+    #[allow(missing_docs, reason = "the message says what it is")]
+    Layers { garments: usize },
+    /// Nothing keeps the garment on the body.
+    #[error(
+        "the garment falls off the body where it goes on to rest, so it has no reference; hold an edge of it (--hold)"
+    )]
+    Fallen,
+    /// The caller stopped it.
+    #[error("interrupted while a reference was refined")]
+    Interrupted,
+}
+
+/// What is asked of an assessment.
+#[derive(Debug, Clone, Default)]
+pub struct AssessOptions {
+    /// Where references are kept; `None` computes them anew.
+    pub cache: Option<ReferenceCache>,
+    /// Perturbed starts for the spread of the canonical drape.
+    pub spread_starts: u64,
+}
+
+/// A drape, assessed.
+#[derive(Debug, Clone)]
+pub struct Assessment {
+    /// All figures.
+    pub accuracy: Accuracy,
+    /// Distance of each vertex to its own continuation, mm.
+    pub error_mm: Vec<f64>,
+    /// The canonical drape.
+    pub canonical: Reference,
+    /// Both measures of the folds.
+    pub wrinkles: Wrinkles,
+    /// Spearman's rank correlation, over the vertices, of the excess length in the preview with the mean curvature of where it settles;
+    /// `None` where the model has no excess.
+    pub fold_rank_correlation: Option<f64>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Finds or makes the references of `drape` and measures it against them.
+///
+/// # Errors
+/// [`AssessError`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
+pub fn assess(
+    scene: &Scene,
+    settings: &Settings,
+    drape: &Drape,
+    options: &AssessOptions,
+    observer: Observer<'_>,
+) -> Result<Assessment, AssessError> {
+    of_one_garment(scene)?;
+    let cloth =
+        Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)?;
+    let self_contact = settings.self_contact;
+    let solver = RefineOptions { self_contact, ..RefineOptions::default() };
+    let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
+    let own = references.from(&drape.positions, observer)?;
+    let canonical = references.from(&scene.garment.positions, observer)?;
+    let mut spread = Vec::new();
+    for seed in 1..=options.spread_starts {
+        let start = perturbed(&scene.garment.positions, &scene.held, seed);
+        spread.push(accuracy::rms_mm(&references.from(&start, observer)?.positions, &canonical.positions));
+    }
+    let warnings = references.warnings;
+    let mut measured = accuracy::compare(&Comparison {
+        mesh: &scene.garment,
+        topology: &scene.topology,
+        cloth: &cloth,
+        body: &scene.body,
+        parts: Some(&drape.parts),
+        start: &scene.garment.positions,
+        result: &drape.positions,
+        reference: &own.positions,
+    })?;
+    measured.canonical_rms_mm = Some(accuracy::rms_mm(&drape.positions, &canonical.positions));
+    measured.canonical_spread_mm =
+        (!spread.is_empty()).then(|| (spread.iter().map(|s| s * s).sum::<f64>() / spread.len() as f64).sqrt());
+    let settled = scene.garment.with_positions(own.positions.clone());
+    let fold_rank_correlation = drape.folds.as_ref().and_then(|folds| {
+        wrinkles::rank_correlation(&folds.excess_percent, &wrinkles::mean_curvature(&settled, &scene.topology))
+    });
+    let moved: Vec<DVec3> = drape.outcomes.iter().map(|o| o.displacement).collect();
+    Ok(Assessment {
+        error_mm: accuracy::vertex_errors(&drape.positions, &own.positions).iter().map(|e| 1e3 * e).collect(),
+        wrinkles: wrinkles::measure(&scene.garment, &scene.topology, &drape.parts, &moved, &drape.positions),
+        fold_rank_correlation,
+        accuracy: measured,
+        canonical,
+        warnings,
+    })
+}
+
+/// The canonical drape of a scene alone, found or made, and what the user should know about it: what a range table can hold
+/// at best is measured on it.
+pub fn canonical(
+    scene: &Scene,
+    fabric: &Fabric,
+    options: &AssessOptions,
+    observer: Observer<'_>,
+) -> Result<(Reference, Vec<String>), AssessError> {
+    of_one_garment(scene)?;
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
+    let solver = RefineOptions::default();
+    let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
+    let reference = references.from(&scene.garment.positions, observer)?;
+    Ok((reference, references.warnings))
+}
+
+fn of_one_garment(scene: &Scene) -> Result<(), AssessError> {
+    match scene.layers.len() {
+        garments @ 2.. => Err(AssessError::Layers { garments }),
+        _ => Ok(()),
+    }
+}
+
+/// Start positions moved as if the garment had been put on a little differently: by a smooth random field of 5 mm RMS, the same
+/// for the same seed. Noise at single vertices would say nothing: the first relaxation takes it off.
+#[must_use]
+pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
+    let mut state = seed;
+    let mut random = || {
+        // SplitMix64 (Steele, Lea, Flood 2014): three lines, the same bits everywhere.
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut vector = || DVec3::new(random(), random(), random());
+    let waves: [(DVec3, DVec3, DVec3); WAVES] =
+        std::array::from_fn(|_| (WAVE_NUMBER * vector(), std::f64::consts::PI * vector(), vector()));
+    let field = |p: DVec3| -> DVec3 { waves.iter().map(|(k, phase, along)| *along * (k.dot(p) + phase.x).sin()).sum() };
+    let moves: Vec<DVec3> = positions.iter().map(|&p| field(p)).collect();
+    let rms = (moves.iter().map(|m| m.length_squared()).sum::<f64>() / moves.len().max(1) as f64).sqrt();
+    let mut moved: Vec<DVec3> =
+        positions.iter().zip(moves).map(|(p, m)| *p + m * (PERTURBATION / rms.max(f64::MIN_POSITIVE))).collect();
+    for &v in held {
+        moved[v as usize] = positions[v as usize];
+    }
+    moved
+}
+
+struct References<'a> {
+    scene: &'a Scene,
+    cloth: &'a Cloth,
+    solver: RefineOptions,
+    options: &'a AssessOptions,
+    warnings: Vec<String>,
+}
+
+impl References<'_> {
+    fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, AssessError> {
+        let solver = self.solver.clone();
+        let key = ReferenceKey::new(&ReferenceInput {
+            garment: &self.scene.garment,
+            rest: &self.scene.rest,
+            fabrics: &self.cloth.fabrics,
+            body: self.scene.body.mesh(),
+            held: &self.scene.held,
+            start,
+            options: &format!("{solver:?}"),
+        });
+        let mut compute = || {
+            let began = Instant::now();
+            let mut stopped = false;
+            let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, &mut |step| {
+                if self.scene.fallen(step.positions).is_some() {
+                    return ControlFlow::Break(());
+                }
+                let answer = observer(step);
+                stopped |= answer.is_break();
+                answer
+            })?;
+            if refined.stop == Stop::Interrupted {
+                return Err(if stopped { AssessError::Interrupted } else { AssessError::Fallen });
+            }
+            Ok(Reference {
+                energy_j: refined.energy,
+                residual_over_weight: refined.residual_over_weight,
+                steps: refined.steps as u64,
+                seconds: began.elapsed().as_secs_f64(),
+                positions: refined.positions,
+            })
+        };
+        let reference = match &self.options.cache {
+            None => compute()?,
+            Some(cache) => {
+                let found = cache.get_or_compute(&key, start.len(), &mut compute)?;
+                self.warnings.extend(found.warnings);
+                found.reference
+            }
+        };
+        if reference.residual_over_weight >= solver.tolerance {
+            self.warnings.push(format!(
+                "a reference stopped at a residual of {:.1e} of the weight, expected under {:.0e}: errors against it are rough",
+                reference.residual_over_weight, solver.tolerance
+            ));
+        }
+        Ok(reference)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_perturbation_is_smooth_of_5_mm_and_the_same_for_its_seed() {
+        let sheet: Vec<DVec3> =
+            (0..400).map(|i| DVec3::new(f64::from(i % 20), 0.0, f64::from(i / 20)) * 0.01).collect();
+        let moved = perturbed(&sheet, &[7], 3);
+        assert_eq!(moved, perturbed(&sheet, &[7], 3));
+        assert_ne!(moved, perturbed(&sheet, &[7], 4));
+        assert_eq!(moved[7], sheet[7]);
+        let moves: Vec<DVec3> = moved.iter().zip(&sheet).map(|(m, s)| *m - *s).collect();
+        let rms = (moves.iter().map(|m| m.length_squared()).sum::<f64>() / 400.0).sqrt();
+        assert!((rms - PERTURBATION).abs() < 1e-4, "{rms}");
+        let steepest = (0..399).filter(|i| i % 20 != 19 && ![6, 7].contains(i));
+        let steepest = steepest.map(|i| moves[i].distance(moves[i + 1]) / 0.01).fold(0.0, f64::max);
+        assert!(steepest < 0.5, "neighbours are strained by {steepest}");
+    }
+}

@@ -1,0 +1,195 @@
+//! One job: what is draped over what, by which dials, from which start, and what is measured of it.
+//!
+//! A [`Job`] is plain data, and the same for everybody who fills one: the flags of `run`, the points of a sweep,
+//! `compare`, a script that sends JSON. `Job::default()` is `partwise run` without a flag.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::base::serde_name::word;
+use crate::drape::{Drape, DrapeError, Refine, Settings, drape};
+use crate::mechanics::refine::Observer;
+use crate::parts::range_table::TABLE_3;
+use crate::scene::{Scene, SceneSpec};
+use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
+use crate::study::evaluate::{AssessError, AssessOptions, Assessment, assess, canonical, perturbed};
+use crate::study::metrics::Figures;
+
+/// What a drape is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// Nothing: no error.
+    #[default]
+    None,
+    /// The canonical drape: one reference for each body, garment and fabric.
+    Canonical,
+    /// Its own continuation too: a converged drape for every result, seconds each.
+    Own,
+}
+
+impl fmt::Display for Against {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
+impl FromStr for Against {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        word(text).ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
+    }
+}
+
+/// All that determines a result, and what is measured of it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Job {
+    /// What is draped over what.
+    pub scene: SceneSpec,
+    /// By which dials.
+    #[serde(deserialize_with = "checked")]
+    pub settings: Settings,
+    /// Seed of a start put on a little differently ([`perturbed`]); 0 is the undisturbed one.
+    pub seed: u64,
+    /// What the result is measured against.
+    pub accuracy: Against,
+    /// Canonical drapes from this many perturbed starts, for the spread between equilibria; where measured against its
+    /// own.
+    pub spread_starts: u64,
+}
+
+/// Settings whose extents can cut something: no range table checks those of the model.
+fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
+    let settings = Settings::deserialize(from)?;
+    let extents = settings.model.extents_cm();
+    let falls = extents.is_sorted_by(|a, b| a > b);
+    if falls && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
+        return Ok(settings);
+    }
+    let expected = "finite extents above 0, from coarse to fine, or none for PARTs as the table makes them";
+    Err(D::Error::custom(format!("settings.model: found extents of {extents:?} cm, expected {expected}")))
+}
+
+/// What was measured of a drape.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// Its figures.
+    pub figures: Figures,
+    /// Distance of each vertex to the reference it is judged by, mm; empty where none was asked for.
+    pub error_mm: Vec<f64>,
+    /// The whole comparison with its own continuation, where it was asked for.
+    pub assessment: Option<Assessment>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Job {
+    /// A job that ends after the two stages, which is where range tables differ: what sweeps and comparisons start
+    /// from. Its table goes by the name it would be asked for, as all do there.
+    #[must_use]
+    pub fn preview() -> Self {
+        let Settings { table, .. } = Settings::default();
+        let settings = Settings { refine: Refine::Steps(0), table: table.named(TABLE_3), ..Settings::default() };
+        Self { settings, ..Self::default() }
+    }
+
+    /// Drapes `scene`, which [`SceneSpec::load`] made of the job's own: points of a sweep share it.
+    pub fn drape(&self, scene: &Scene, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+        if self.seed == 0 {
+            return drape(scene, &self.settings, observer);
+        }
+        // A table by rule is the undisturbed garment's, so that starts are compared by one table.
+        let settings = self.settings.resolved(&scene.distances_m()?)?;
+        let positions = perturbed(&scene.garment.positions, &scene.held, self.seed);
+        let moved = Scene { garment: scene.garment.with_positions(positions), ..scene.clone() };
+        drape(&moved, &settings, observer)
+    }
+
+    /// Measures a drape of `scene`; references are kept in `cache`, if there is one.
+    ///
+    /// # Errors
+    /// As [`assess`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
+    pub fn measure(
+        &self,
+        scene: &Scene,
+        drape: &Drape,
+        cache: Option<&ReferenceCache>,
+        observer: Observer<'_>,
+    ) -> Result<Measured, AssessError> {
+        let figures = Figures::of(scene, drape);
+        let warnings = figures.warnings(scene);
+        let options = AssessOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
+        let (reference, assessment, of_reference) = match self.accuracy {
+            Against::None => {
+                return Ok(Measured { figures, error_mm: Vec::new(), assessment: None, warnings });
+            }
+            Against::Canonical => {
+                let (reference, warnings) = canonical(scene, &self.settings.fabric, &options, observer)?;
+                (reference.positions, None, warnings)
+            }
+            Against::Own => {
+                let found = assess(scene, &self.settings, drape, &options, observer)?;
+                (found.canonical.positions.clone(), Some(found.clone()), found.warnings)
+            }
+        };
+        let best = representable(&scene.topology, &drape.parts, &scene.is_held(), &scene.garment.positions, &reference);
+        let affine = Some(best.blended_affine_rms_mm).filter(|mm| mm.is_finite());
+        let mut figures = Figures {
+            canonical_rms_mm: Some(accuracy::rms_mm(&drape.positions, &reference)),
+            representable_rms_mm: Some(best.translation_rms_mm),
+            representable_affine_rms_mm: affine,
+            ..figures
+        };
+        let error_mm = match &assessment {
+            Some(found) => {
+                figures = figures.assessed(found);
+                found.error_mm.clone()
+            }
+            None => accuracy::vertex_errors(&drape.positions, &reference).iter().map(|e| 1e3 * e).collect(),
+        };
+        Ok(Measured { figures, error_mm, assessment, warnings: [warnings, of_reference].concat() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drape::{DEFAULT_EXTENTS_CM, Model};
+
+    #[test]
+    fn a_job_is_json_and_what_is_left_out_is_the_default() {
+        let mut job = Job { seed: 3, accuracy: Against::Own, ..Job::default() };
+        job.settings.refine = Refine::Steps(2);
+        job.settings.model = Model::default().with_extents_cm(&[12.0, 6.0]);
+        let text = serde_json::to_string(&job).unwrap();
+        assert_eq!(serde_json::from_str::<Job>(&text).unwrap(), job);
+        let short = r#"{"scene": {"garment": "flared-skirt@900"}, "settings": {"refine": {"steps": 2}}}"#;
+        let short: Job = serde_json::from_str(short).unwrap();
+        assert_eq!(short.settings.model.extents_cm(), DEFAULT_EXTENTS_CM);
+        assert_eq!((short.scene.body.as_str(), short.accuracy), ("form", Against::None));
+        let said = serde_json::from_str::<Job>(r#"{"scene": {"colour": 3}}"#).unwrap_err().to_string();
+        assert!(said.contains("colour"), "{said}");
+    }
+
+    #[test]
+    fn extents_that_cut_nothing_are_refused() {
+        let with = |extents: &str| {
+            let text = format!("[settings.model.coupled]\nextents_m = {extents}\n");
+            toml::from_str::<Job>(&text).map_err(|e| e.to_string())
+        };
+        assert_eq!(with("[0.12, 0.06]").unwrap().settings.model.extents_cm(), [12.0, 6.0]);
+        assert!(with("[]").is_ok());
+        for wrong in ["[-0.1]", "[nan]", "[0.0]", "[inf]", "[0.06, 0.12]", "[0.12, -0.06]"] {
+            let said = with(wrong).unwrap_err();
+            assert!(said.contains("above 0") && said.contains("coarse to fine"), "{wrong}: {said}");
+        }
+        let json = r#"{"settings": {"model": {"coupled": {"extents_m": [-0.06]}}}}"#;
+        let said = serde_json::from_str::<Job>(json).unwrap_err().to_string();
+        assert!(said.contains("-6"), "{said}");
+    }
+}

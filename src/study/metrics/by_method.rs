@@ -1,0 +1,123 @@
+//! The figures of a garment draped by a reference method: those of [`Figures`] that need no PARTs, taken from where the cloth
+//! lies, and how the run in time ended.
+
+use serde::Serialize;
+
+use super::Figures;
+use super::warnings::{Slid, sank};
+use crate::mechanics::fit::{Fit, fit};
+use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
+use crate::methods::{Dressing, Ended, MethodDrape};
+use crate::study::accuracy::{self, state::State};
+
+/// The figures of one such drape. Those named as in [`Figures`] mean the same, energy and pressure by this project's own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "named as in `Figures`; what is of runs in time alone is said")]
+pub struct MethodFigures {
+    pub vertices: usize,
+    pub triangles: usize,
+    /// Why the run in time ended.
+    pub ended: Ended,
+    /// Steps in time.
+    pub steps: usize,
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// RMS speed of the free vertices at the end, m/s.
+    pub rms_speed_m_per_s: f64,
+    pub displacement_rms_mm: f64,
+    pub penetrating_vertices: usize,
+    pub penetration_mm: f64,
+    pub body_crossing_pairs: usize,
+    /// No reference method keeps cloth off cloth.
+    pub self_intersecting_pairs: usize,
+    pub top_sank_mm: f64,
+    #[serde(skip)]
+    pub slid: Vec<Slid>,
+    pub energy_j: f64,
+    pub residual_at_rest_over_weight: f64,
+    pub strain_p95: f64,
+    pub strain_max: f64,
+    pub pressure_max_kpa: f64,
+}
+
+impl MethodFigures {
+    /// What a drape says by itself, and strain and pressure at its vertices.
+    #[must_use]
+    pub fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
+        let Dressing { scene, cloth, .. } = dressing;
+        let x = &drape.positions;
+        let garment = scene.garment.with_positions(x.clone());
+        let state = State::of(cloth, &scene.body, x);
+        let fit = fit(cloth, cloth.contacts(&scene.body, x), x, cloth.contact_stiffness());
+        let (top_sank_mm, slid) = sank(scene, x);
+        let figures = Self {
+            vertices: scene.garment.vertex_count(),
+            triangles: scene.garment.triangles.len(),
+            ended: drape.ended,
+            steps: drape.steps,
+            simulated_s: drape.simulated_s,
+            rms_speed_m_per_s: drape.rms_speed_m_per_s,
+            displacement_rms_mm: accuracy::rms_mm(x, &scene.garment.positions),
+            penetrating_vertices: state.penetrating_vertices,
+            penetration_mm: state.penetration_mm,
+            body_crossing_pairs: crossing_pairs(&garment, scene.body.mesh()).len(),
+            self_intersecting_pairs: self_intersecting_pairs(&garment).len(),
+            top_sank_mm,
+            slid,
+            energy_j: state.energy_j,
+            residual_at_rest_over_weight: state.residual_over_weight,
+            strain_p95: state.strain_p95,
+            strain_max: state.strain_max,
+            pressure_max_kpa: fit.pressure_max_kpa,
+        };
+        (figures, fit)
+    }
+
+    /// How it ended, strain and what else was measured, in words: name and value.
+    #[must_use]
+    pub fn findings(&self) -> Vec<(&'static str, String)> {
+        let how = match self.ended {
+            Ended::AtRest => "at rest",
+            Ended::TimeOver => "given up, still moving",
+            Ended::Interrupted => "interrupted",
+        };
+        let (time, speed) = (self.simulated_s, 100.0 * self.rms_speed_m_per_s);
+        let mut found = vec![
+            ("ended", format!("{how} after {} steps, {time:.2} s, at {speed:.2} cm/s RMS", self.steps)),
+            ("moved", format!("{:.1} mm RMS", self.displacement_rms_mm)),
+            ("residual", format!("{:.1e} of the weight, by the common energy", self.residual_at_rest_over_weight)),
+        ];
+        found.extend(self.shared().findings());
+        found
+    }
+
+    /// What of them a user should act upon.
+    #[must_use]
+    pub fn warnings(&self, dressing: &Dressing<'_>) -> Vec<String> {
+        let mut found = self.shared().warnings(dressing.scene);
+        if self.ended == Ended::TimeOver {
+            found.push(format!(
+                "it does not come to rest: still {:.1} cm/s RMS after {:.0} s",
+                100.0 * self.rms_speed_m_per_s,
+                self.simulated_s
+            ));
+        }
+        found
+    }
+
+    /// The same where they are told as a drape's by PARTs.
+    fn shared(&self) -> Figures {
+        Figures {
+            penetrating_vertices: self.penetrating_vertices,
+            penetration_mm: self.penetration_mm,
+            body_crossing_pairs: self.body_crossing_pairs,
+            self_intersecting_pairs: self.self_intersecting_pairs,
+            top_sank_mm: self.top_sank_mm,
+            slid: self.slid.clone(),
+            strain_p95: Some(self.strain_p95),
+            strain_max: Some(self.strain_max),
+            pressure_max_kpa: Some(self.pressure_max_kpa),
+            ..Figures::default()
+        }
+    }
+}

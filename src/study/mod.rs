@@ -1,0 +1,12 @@
+//! Studies of drapes: metrics and accuracy, certificates, drape tests, sweeps, Table 4, and the range-table search.
+
+pub mod accuracy;
+pub mod certificate;
+pub mod drape_test;
+pub mod evaluate;
+pub mod job;
+pub mod metrics;
+pub mod sweep;
+pub mod table4;
+pub mod table_search;
+pub mod wrinkles;

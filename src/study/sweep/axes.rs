@@ -1,0 +1,202 @@
+//! The values of every axis of a sweep, read from its file, and their full grid.
+//!
+//! A value of an axis is an edit of a [`Point`]: what the file does not say stays as the job the sweep starts from has
+//! it.
+
+use toml::Value;
+
+use super::bodies::body;
+use super::file::{At, Grid, Single, Source, number};
+use super::garments::garments;
+use super::inputs::Inputs;
+use super::tables::tables;
+use super::{PlanError, Point};
+use crate::base::files::names_a_file;
+use crate::drape::{Model, Refine};
+use crate::garment::fabric::Fabric;
+use crate::mechanics::coupled::Motion;
+use crate::study::job::Job;
+
+/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and
+/// its points take 200 MB of memory).
+const LIMIT: usize = 100_000;
+
+/// What a value of an axis does to a point.
+pub(super) type Edit = Box<dyn Fn(&mut Point)>;
+
+/// The values of every axis, in the order in which a grid is nested.
+pub(super) struct Axes(Vec<Vec<Edit>>);
+
+impl Axes {
+    /// Reads the axes of a grid; an axis it lacks has the one value of `base`, or none.
+    pub(super) fn read(source: Source<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Self, PlanError> {
+        let axis = Axis { source, base, grid };
+        Ok(Self(vec![
+            axis.edits(["body", "bodies"], |v| body(source, v, inputs))?,
+            garments(axis, inputs)?,
+            axis.edits(["fabric", "fabrics"], |v| fabric(source, v, inputs))?,
+            axis.edits(["model", "models"], |v| {
+                let model = v.get_ref().as_str().and_then(Model::by_name);
+                let model = model.ok_or_else(|| source.wrong(v, "model", "\"paper\" or \"coupled\""))?;
+                Ok(one(move |point| point.job.settings.model = model.clone()))
+            })?,
+            axis.edits(["table", "tables"], |v| tables(source, v, inputs))?,
+            axis.edits(["extent_cm", "extents_cm"], |v| {
+                let extents = extents(source, v)?;
+                Ok(one(move |point| {
+                    let model = std::mem::take(&mut point.job.settings.model);
+                    point.job.settings.model = model.with_extents_cm(&extents);
+                }))
+            })?,
+            axis.edits(["motion", "motions"], |v| {
+                let expected = "\"affine\" or \"translation\"";
+                let motion: Option<Motion> = v.get_ref().as_str().and_then(|text| text.parse().ok());
+                let motion = motion.ok_or_else(|| source.wrong(v, "motion", expected))?;
+                Ok(one(move |point| {
+                    let model = std::mem::take(&mut point.job.settings.model);
+                    point.job.settings.model = model.with_motion(motion);
+                }))
+            })?,
+            axis.edits(["min_part", "min_parts"], |v| {
+                let expected = "a number of vertices, 1 for PARTs as the paper defines them";
+                let least: usize = source.count(v, "min_part", 1, expected)?;
+                Ok(one(move |point| point.job.settings.min_part = least))
+            })?,
+            axis.edits(["refine", "refine"], |v| {
+                let refine = match v.get_ref().as_str() {
+                    Some("converged") => Refine::Converged,
+                    _ => Refine::Steps(source.count(v, "refine", 0, "a number of steps, or \"converged\"")?),
+                };
+                Ok(one(move |point| point.job.settings.refine = refine))
+            })?,
+            axis.edits(["seed", "seeds"], |v| {
+                let seed = source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")?;
+                Ok(one(move |point| point.job.seed = seed))
+            })?,
+            axis.edits(["options", "options"], |v| options(source, v))?,
+        ]))
+    }
+
+    /// How many points the grid has.
+    pub(super) fn count(&self) -> usize {
+        self.0.iter().fold(1, |n: usize, axis| n.saturating_mul(axis.len()))
+    }
+
+    /// Appends every combination, the last axis fastest.
+    pub(super) fn expand(&self, points: &mut Vec<Point>, start: &Job, name: &str) -> Result<(), PlanError> {
+        let count = self.count();
+        let found = count.saturating_add(points.len());
+        if found > LIMIT {
+            return Err(PlanError::TooMany { name: name.to_owned(), found, limit: LIMIT });
+        }
+        for number in 0..count {
+            let mut point = Point::of(start.clone());
+            // The number's digits, one base an axis.
+            let mut block = count;
+            for axis in &self.0 {
+                block /= axis.len();
+                axis[number / block % axis.len()](&mut point);
+            }
+            points.push(point.named());
+        }
+        Ok(())
+    }
+}
+
+/// An axis value that is one edit.
+pub(super) fn one(edit: impl Fn(&mut Point) + 'static) -> Vec<Edit> {
+    vec![Box::new(edit)]
+}
+
+/// Reads one axis after the other.
+#[derive(Clone, Copy)]
+pub(super) struct Axis<'a> {
+    pub(super) source: Source<'a>,
+    pub(super) base: &'a Single,
+    pub(super) grid: &'a Grid,
+}
+
+impl Axis<'_> {
+    /// The edits of an axis, by its key in `[base]` and in `[grid]`; where neither has it, one that changes nothing.
+    fn edits(
+        self,
+        keys: [&'static str; 2],
+        mut read: impl FnMut(&At) -> Result<Vec<Edit>, PlanError>,
+    ) -> Result<Vec<Edit>, PlanError> {
+        let Some(values) = self.values(keys)? else { return Ok(one(|_| ())) };
+        let edits: Vec<Vec<Edit>> = values.iter().map(|v| read(v)).collect::<Result<_, _>>()?;
+        Ok(edits.into_iter().flatten().collect())
+    }
+
+    /// The values of an axis: of the grid's list, or the base's one.
+    pub(super) fn values(self, [single, plural]: [&'static str; 2]) -> Result<Option<Vec<At>>, PlanError> {
+        let Some(list) = self.grid.get(plural) else { return Ok(self.base.get(single).map(|v| vec![v.clone()])) };
+        if list.get_ref().is_empty() {
+            let (place, found) = (self.source.line(list.span().start), "an empty list".to_owned());
+            let expected = "at least one value; leave the key out for the value of [base]".to_owned();
+            return Err(PlanError::Value { place, key: plural, found, expected });
+        }
+        Ok(Some(list.get_ref().clone()))
+    }
+}
+
+fn fabric(source: Source<'_>, value: &At, inputs: &Inputs) -> Result<Vec<Edit>, PlanError> {
+    let place = source.place(value);
+    if let Value::Table(constants) = value.get_ref() {
+        let fabric = Fabric::parse(&constants.to_string(), &place).map_err(PlanError::input(&place, "fabric"))?;
+        return Ok(one(move |point| point.job.settings.fabric = fabric.clone()));
+    }
+    let label = source.text(value, "fabric", "a built-in name, a file, or a table of all constants")?;
+    let fabric = match names_a_file(&label) {
+        true => Fabric::parse(&inputs.text(&label, &place)?, &label),
+        false => Fabric::by_name(&label),
+    };
+    let fabric = Fabric { name: label, ..fabric.map_err(PlanError::input(&place, "fabric"))? };
+    Ok(one(move |point| point.job.settings.fabric = fabric.clone()))
+}
+
+/// No extent, one, or a cascade from coarse to fine.
+fn extents(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
+    let wrong =
+        || source.wrong(value, "extent_cm", "centimetres, 0 or \"none\" for not cut, or a falling list of them");
+    let positive = |v: &Value| number(v).filter(|cm| *cm > 0.0 && cm.is_finite());
+    match value.get_ref() {
+        Value::String(word) if word == "none" => Ok(Vec::new()),
+        Value::Array(list) => {
+            let cascade: Vec<f64> = list.iter().map(positive).collect::<Option<_>>().ok_or_else(wrong)?;
+            if cascade.is_empty() || !cascade.is_sorted_by(|a, b| a > b) {
+                return Err(wrong());
+            }
+            Ok(cascade)
+        }
+        one if number(one) == Some(0.0) => Ok(Vec::new()),
+        one => positive(one).map(|cm| vec![cm]).ok_or_else(wrong),
+    }
+}
+
+/// What a point is measured against, and further keys of its scene that name no file.
+fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
+    let expected = "{ name = value, ... } with accuracy = \"none\", \"canonical\" or \"own\", or a key of the scene such as \
+                    rest = \"texture\", hold, unit, up, weld";
+    let wrong = |what: &str| source.wrong(value, "options", format!("{expected}{what}"));
+    let given = value.get_ref().as_table().ok_or_else(|| wrong(""))?.clone();
+    let set = move |point: &mut Point| -> Result<(), String> {
+        let mut scene = toml::Table::try_from(&point.job.scene).map_err(|e| e.to_string())?;
+        for (key, v) in &given {
+            let text = v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+            match key.as_str() {
+                "accuracy" => point.job.accuracy = text.parse()?,
+                "body" | "garment" => return Err("bodies and garments have axes of their own".to_owned()),
+                "rest" | "fabrics" if names_a_file(&text) => return Err("options name no file".to_owned()),
+                "fabrics_file" => return Err("options name no file; put one beside the garment's".to_owned()),
+                _ => drop(scene.insert(key.clone(), v.clone())),
+            }
+            point.options.insert(key.clone(), text);
+        }
+        point.job.scene = scene.try_into().map_err(|e: toml::de::Error| e.message().replace('\n', ", "))?;
+        Ok(())
+    };
+    set(&mut Point::of(Job::default())).map_err(|e| wrong(&format!("; {e}")))?;
+    // Tried above: what fits one point fits any.
+    Ok(one(move |point| set(point).unwrap_or_default()))
+}

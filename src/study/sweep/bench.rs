@@ -1,0 +1,203 @@
+//! Runs points: the scene of each made once for all that share it, passes timed, figures taken, whatever goes wrong a row.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::DVec3;
+
+use super::{Point, Row, Timing};
+use crate::base::error_text::said;
+use crate::drape::{Drape, StageTimes};
+use crate::garment::MeshCache;
+use crate::mechanics::refine::{Step, Stop};
+use crate::scene::{Fallen, Loaded};
+use crate::study::accuracy::reference::ReferenceCache;
+use crate::study::evaluate::AssessError;
+use crate::study::job::Measured;
+use crate::study::metrics::Figures;
+
+/// Why a point has no result.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PointError {
+    /// It failed: a row says so, and the sweep goes on.
+    #[error("{0}")]
+    Failed(String),
+    /// The user stopped it half-way: no row; it is computed again on resume.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl PointError {
+    /// A failure in the words of an error and of all that caused it.
+    #[must_use]
+    pub fn failed(error: &(dyn Error + 'static)) -> Self {
+        Self::Failed(said(error, ": "))
+    }
+
+    /// A garment of which nothing keeps some or all on the body.
+    fn fallen(what: Option<Fallen>) -> Self {
+        let what = what.map_or_else(|| "the garment has fallen off the body".to_owned(), |fallen| fallen.to_string());
+        Self::Failed(format!("{what}; in a sweep file it is `hold` that holds an edge"))
+    }
+}
+
+/// The outcome of one pass over a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pass<T> {
+    /// What is measured afterwards, untimed.
+    pub value: T,
+    /// How long the stages took.
+    pub times: StageTimes,
+    /// [`result_hash`] of the displaced positions.
+    pub result_hash: String,
+}
+
+/// blake3 over the bits of the positions (x, y, z, little-endian), hexadecimal: equal hashes are equal results, bit for bit.
+#[must_use]
+pub fn result_hash(positions: &[DVec3]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for position in positions {
+        for coordinate in position.to_array() {
+            hasher.update(&coordinate.to_bits().to_le_bytes());
+        }
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// The row of a point: so many passes before, so many timed, the figures of the last; `None` if it was interrupted.
+pub fn row_of<T>(
+    point: &Point,
+    (warm_up, repeats): (usize, usize),
+    pass: impl Fn() -> Result<Pass<T>, PointError>,
+    measure: impl FnOnce(T) -> Result<Figures, PointError>,
+) -> Option<Row> {
+    let work = || {
+        for _ in 0..warm_up {
+            pass()?;
+        }
+        let mut last = pass()?;
+        let mut times = vec![last.times];
+        for repeat in 2..=repeats {
+            let again = pass()?;
+            if again.result_hash != last.result_hash {
+                let (first, other) = (&last.result_hash, &again.result_hash);
+                let text = format!("not deterministic: repeat {repeat} gave {other}, the first {first}");
+                return Err(PointError::Failed(text));
+            }
+            times.push(again.times);
+            last = again;
+        }
+        let Pass { value, result_hash, .. } = last;
+        Ok(Row::solved(point, &measure(value)?, &result_hash, &Timing::of(&times)))
+    };
+    // What the threads share may be left odd by a panic; the next point says so again, as a row.
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(row)) => Some(row),
+        Ok(Err(PointError::Failed(text))) => Some(Row::failed(point, text)),
+        Ok(Err(PointError::Interrupted)) => None,
+        Err(payload) => Some(Row::failed(point, format!("panicked: {}", panic_text(payload.as_ref())))),
+    }
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
+}
+
+/// Drapes and measures points. Called from several threads at once where there are several jobs.
+pub struct Bench<'a> {
+    cache: Option<ReferenceCache>,
+    meshes: MeshCache,
+    stop: &'a AtomicBool,
+    scenes: Mutex<BTreeMap<String, Arc<Loaded>>>,
+}
+
+impl<'a> Bench<'a> {
+    /// A bench that keeps references in `cache`, if there is one, and leaves its work once `stop` is set.
+    #[must_use]
+    pub fn new(cache: Option<ReferenceCache>, stop: &'a AtomicBool) -> Self {
+        Self { cache, meshes: MeshCache::default(), stop, scenes: Mutex::default() }
+    }
+
+    /// The same, with made meshes in `meshes`.
+    #[must_use]
+    pub fn with_meshes(self, meshes: MeshCache) -> Self {
+        Self { meshes, ..self }
+    }
+
+    /// The scene of a point. Others wait while one is made: they most likely want the same.
+    pub fn scene(&self, point: &Point) -> Result<Arc<Loaded>, PointError> {
+        let mut made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        let id = point.scene_id();
+        if let Some(loaded) = made.get(&id) {
+            return Ok(loaded.clone());
+        }
+        let loaded = Arc::new(point.job.scene.load_with(&self.meshes).map_err(|e| PointError::failed(&e))?);
+        made.insert(id, loaded.clone());
+        Ok(loaded)
+    }
+
+    /// What the scenes' makers warned of, garment by garment.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
+        made.values().flat_map(|loaded| loaded.warnings()).collect()
+    }
+
+    /// The row of a point, after so many passes before and so many timed; `keep` sees what it was made from, untimed.
+    pub fn row(
+        &self,
+        point: &Point,
+        passes: (usize, usize),
+        keep: impl FnOnce(&Loaded, &Drape, &Measured) -> Result<(), PointError>,
+    ) -> Option<Row> {
+        let cut_from = Cell::new(None);
+        let measure = |(loaded, drape): (Arc<Loaded>, Drape)| {
+            let measured =
+                point.job.measure(&loaded.scene, &drape, self.cache.as_ref(), &mut |_: &Step<'_>| self.listen());
+            let measured = measured.map_err(|e| match e {
+                AssessError::Interrupted => PointError::Interrupted,
+                other => PointError::failed(&other),
+            })?;
+            keep(&loaded, &drape, &measured)?;
+            cut_from.set(Some(loaded.scene.fabric_names(&point.job.settings.fabric)));
+            Ok(measured.figures)
+        };
+        let row = row_of(point, passes, || self.pass(point), measure)?;
+        // Of what has fabrics of its own, these.
+        let fabric = cut_from.take().unwrap_or(row.fabric);
+        Some(Row { fabric, ..row })
+    }
+
+    fn pass(&self, point: &Point) -> Result<Pass<(Arc<Loaded>, Drape)>, PointError> {
+        if self.listen().is_break() {
+            return Err(PointError::Interrupted);
+        }
+        let loaded = self.scene(point)?;
+        let drape = point.job.drape(&loaded.scene, &mut |_: &Step<'_>| self.listen());
+        let drape = drape.map_err(|e| PointError::failed(&e))?;
+        if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
+            // A garment that falls past the feet ends its own steps, not the sweep.
+            return Err(if self.listen().is_break() {
+                PointError::Interrupted
+            } else {
+                PointError::fallen(loaded.scene.fallen(&drape.positions))
+            });
+        }
+        let (times, result_hash) = (drape.times, result_hash(&drape.positions));
+        Ok(Pass { value: (loaded, drape), times, result_hash })
+    }
+
+    fn listen(&self) -> ControlFlow<()> {
+        if self.stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}

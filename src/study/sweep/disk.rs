@@ -1,0 +1,106 @@
+//! Files that survive a crash: replaced whole or not at all, or grown line by line with nothing half-written kept; and the lock that keeps
+//! others off them.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use super::error::StoreError;
+use crate::base::atomic_file::WholeFile;
+
+/// Where lines are appended: a file, or what a test puts in its place.
+pub trait Append: Send {
+    /// Appends and returns once the bytes are on the disk, not before.
+    ///
+    /// # Errors
+    /// What the system says; part of the bytes may have been written.
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Cuts back to this length, bytes.
+    fn cut(&mut self, length: u64) -> io::Result<()>;
+}
+
+impl Append for File {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.write_all(bytes)?;
+        self.sync_data()
+    }
+
+    fn cut(&mut self, length: u64) -> io::Result<()> {
+        self.set_len(length)?;
+        self.seek(SeekFrom::Start(length)).map(|_| ())
+    }
+}
+
+/// Opens a file to append to, made if it is not there.
+pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
+    let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
+    let at_end = opened.and_then(|mut file| file.seek(SeekFrom::End(0)).map(|_| file));
+    at_end.map_err(StoreError::io(path, "cannot be opened for writing"))
+}
+
+/// The file's bytes, or nothing where there is no file.
+pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(error) => Err(StoreError::io(path, "cannot be read")(error)),
+    }
+}
+
+/// Replaces a file: whoever looks, and whatever breaks, sees the old or the new one.
+pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    WholeFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
+}
+
+/// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
+/// that), replaced otherwise.
+pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
+    let found = read_if_there(path)?;
+    match found {
+        Some(found) if found == text => Ok(()),
+        Some(found) if found.starts_with(text) => {
+            open_end(path)?.cut(text.len() as u64).map_err(StoreError::io(path, "a torn line cannot be cut off"))
+        }
+        _ => replace(path, text),
+    }
+}
+
+/// Makes the media rows are appended to from opened files.
+pub type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;
+
+/// A file that grows by whole lines.
+pub(super) struct Journal {
+    pub(super) path: PathBuf,
+    medium: Box<dyn Append>,
+    length: u64,
+}
+
+impl Journal {
+    pub(super) fn open(path: PathBuf, medium: &Medium<'_>) -> Result<Self, StoreError> {
+        let file = open_end(&path)?;
+        let length = file.metadata().map_err(StoreError::io(&path, "cannot be measured"))?.len();
+        Ok(Self { path, medium: medium(file), length })
+    }
+
+    /// Appends a line after `kept` rows; what was written of it is cut off again if it fails.
+    pub(super) fn append(&mut self, line: &[u8], kept: usize) -> Result<(), StoreError> {
+        if let Err(source) = self.medium.append(line) {
+            // What was written of the line is cut off again; where even that fails, resume drops it.
+            let _ = self.medium.cut(self.length);
+            return Err(StoreError::Write { path: self.path.clone(), kept, source });
+        }
+        self.length += line.len() as u64;
+        Ok(())
+    }
+}
+
+/// Takes the lock; the system lets go of it with the process.
+pub(super) fn take_lock(path: &Path) -> Result<File, StoreError> {
+    let file = open_end(path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path: path.to_owned() }),
+        Err(TryLockError::Error(error)) => Err(StoreError::io(path, "cannot be locked")(error)),
+    }
+}

@@ -1,0 +1,79 @@
+//! The files a sweep names, read once each, and their contents' hashes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::error::PlanError;
+use crate::base::files::{MOST_MESH, MOST_TEXT, bounded, bounded_text, names_a_file};
+use crate::scene::SceneSpec;
+
+/// A body or garment, built in by name or a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Input {
+    /// As written in the sweep file: a built-in name (a garment's with `@vertices`) or a path.
+    pub(super) label: String,
+    /// The name, or the file's path from where the program runs.
+    pub(super) name: String,
+    /// What determines a result: the name, or the hash of the file's contents.
+    pub(super) key: String,
+}
+
+impl Input {
+    /// Something built in.
+    pub(super) fn built_in(label: impl Into<String>) -> Self {
+        let label = label.into();
+        Self { name: label.clone(), key: label.clone(), label }
+    }
+
+    pub(super) fn is_a_file(&self) -> bool {
+        self.key != self.name
+    }
+}
+
+/// Reader of the files a sweep names; paths count from the folder of the sweep file.
+#[derive(Debug)]
+pub(super) struct Inputs {
+    folder: PathBuf,
+    digests: BTreeMap<PathBuf, String>,
+}
+
+impl Inputs {
+    pub(super) fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), digests: BTreeMap::new() }
+    }
+
+    /// A body or garment as written.
+    pub(super) fn input(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
+        if !names_a_file(label) {
+            return Ok(Input::built_in(label));
+        }
+        let path = self.folder.join(label);
+        if !self.digests.contains_key(&path) {
+            let bytes = bounded(&path, MOST_MESH).map_err(|e| unreadable(&path, place, e))?;
+            self.digests.insert(path.clone(), blake3::hash(&bytes).to_hex()[..32].to_owned());
+        }
+        let digest = &self.digests[&path];
+        Ok(Input { label: label.to_owned(), name: path.display().to_string(), key: format!("blake3 {digest}") })
+    }
+
+    /// A garment as written; what says which panel is cut from what determines a result, too.
+    pub(super) fn garment(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
+        let mut input = self.input(label, place)?;
+        for file in SceneSpec::new("", &input.name).files_of_fabrics() {
+            // One that cannot be read is the scene's to refuse.
+            let bytes = bounded(&file, MOST_TEXT).unwrap_or_default();
+            input.key += &format!(" {}", &blake3::hash(&bytes).to_hex()[..32]);
+        }
+        Ok(input)
+    }
+
+    /// A text file as written.
+    pub(super) fn text(&self, label: &str, place: &str) -> Result<String, PlanError> {
+        let path = self.folder.join(label);
+        bounded_text(&path).map_err(|e| unreadable(&path, place, e))
+    }
+}
+
+fn unreadable(path: &Path, place: &str, source: std::io::Error) -> PlanError {
+    PlanError::Read { place: place.to_owned(), path: path.to_owned(), source }
+}

@@ -1,0 +1,119 @@
+//! One point of a sweep: a job, what its body and garment are called, and its name by content.
+//!
+//! A point's id is the blake3 hash of the JSON of all that determines its result: the version of the program and the
+//! [`Job`]. A file counts by its contents, not by its name or place, so that a moved folder or a shard on another
+//! machine has the same ids; a range table counts by its bounds, extents and gap rule, a fabric by its constants. What
+//! changes nothing but timings (repeats, jobs, threads) is no part of it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::inputs::Input;
+use crate::drape::Settings;
+use crate::scene::SceneSpec;
+use crate::study::job::Job;
+
+/// The version that computes; rows of different versions are never mixed.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// One point of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Content hash of all that determines the result, hexadecimal.
+    pub id: String,
+    /// Place in the plan, from 0; the same in every shard.
+    pub index: usize,
+    /// What the reports call the body.
+    pub body: String,
+    /// What they call the garment: as written, `name@vertices` or a path.
+    pub garment: String,
+    /// What the job was given beyond the columns of its own, by name.
+    pub options: BTreeMap<String, String>,
+    /// What is computed.
+    pub job: Job,
+    /// Body and garment by content.
+    keys: [String; 2],
+}
+
+impl Point {
+    /// A point of this job with what is built in, not named yet.
+    pub(super) fn of(job: Job) -> Self {
+        let (body, garment) = (job.scene.body.clone(), job.scene.garment.clone());
+        let keys = [body.clone(), garment.clone()];
+        Self { id: String::new(), index: 0, body, garment, options: BTreeMap::new(), job, keys }
+    }
+
+    pub(super) fn set_body(&mut self, body: &Input) {
+        self.job.scene.body.clone_from(&body.name);
+        self.body.clone_from(&body.label);
+        self.keys[0].clone_from(&body.key);
+    }
+
+    pub(super) fn set_garment(&mut self, garment: &Input) {
+        self.job.scene.garment.clone_from(&garment.name);
+        self.garment.clone_from(&garment.label);
+        self.keys[1].clone_from(&garment.key);
+    }
+
+    /// The extents as the rows have them: `none`, `5`, or `12>6>3` for a cascade.
+    #[must_use]
+    pub fn extent_text(&self) -> String {
+        let extents = self.job.settings.model.extents_cm();
+        if extents.is_empty() {
+            return "none".to_owned();
+        }
+        extents.iter().map(f64::to_string).collect::<Vec<_>>().join(">")
+    }
+
+    /// The options as the rows have them: `a=1 b=2`, what it is measured against always among them.
+    #[must_use]
+    pub fn options_text(&self) -> String {
+        self.options.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
+    }
+
+    /// All that tells this point from others, in one line.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
+        let Settings { model, table, min_part, refine, fabric, .. } = settings;
+        let (fabric, table, extent) = (&fabric.name, table.name(), self.extent_text());
+        let (model, motion) = (model.name(), model.motion().name());
+        let options = self.options.iter().map(|(key, value)| format!(", {key} {value}")).collect::<String>();
+        format!(
+            "body {body}, garment {garment}, fabric {fabric}, {model}, table {table}, extent {extent}, motion {motion}, \
+             min-part {min_part}, refine {refine}, seed {seed}{options}"
+        )
+    }
+
+    /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one
+    /// fabric their references.
+    #[must_use]
+    pub fn scene_id(&self) -> String {
+        content_id(&self.scene_key())
+    }
+
+    fn scene_key(&self) -> SceneSpec {
+        let [body, garment] = self.keys.clone();
+        SceneSpec { body, garment, ..self.job.scene.clone() }
+    }
+
+    /// The point with its id set from everything else.
+    pub(super) fn named(mut self) -> Self {
+        self.options.insert("accuracy".to_owned(), self.job.accuracy.to_string());
+        let mut key = Job { scene: self.scene_key(), ..self.job.clone() };
+        // What table and fabric are called and where they come from changes nothing.
+        key.settings.table = key.settings.table.anonymous();
+        (key.settings.fabric.name, key.settings.fabric.source) = Default::default();
+        self.id = content_id(&(VERSION, key));
+        self
+    }
+}
+
+/// Hash of a value's JSON, 128 bits in hexadecimal: enough that no two points of any sweep meet, and short in a CSV.
+pub(super) fn content_id(value: &impl Serialize) -> String {
+    // Structs keep their order of fields whatever features serde_json is built with; a map might not. Writing plain
+    // data to memory does not fail; if it did, the ids would collide and the plan would drop points, which it reports.
+    let json = serde_json::to_vec(value).unwrap_or_default();
+    blake3::hash(&json).to_hex()[..32].to_owned()
+}

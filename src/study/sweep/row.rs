@@ -1,0 +1,184 @@
+//! One row of a sweep: the point, its [`Figures`], its times; the same columns in JSON lines and in CSV.
+//!
+//! Figures are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
+//! digits every reader's parser gives back the same bits, so that rows that were read and written again do not drift.
+//! The identity of results, bit for bit, is `result_hash`'s task. A point that failed has no figures and no times:
+//! empty cells in the CSV, no keys in its line.
+//!
+//! Columns that are timings, and nothing else, start with `time_`; comparisons drop them.
+
+use indexmap::IndexMap;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Point, Timing};
+use crate::study::metrics::Figures;
+
+/// Whether a point has a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It has.
+    Ok,
+    /// It failed; the column `error` says why.
+    #[default]
+    Error,
+}
+
+/// One point and what came of it. The fields, in order, are the columns.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
+pub struct Row {
+    pub point: String,
+    pub index: usize,
+    pub body: String,
+    /// What the garment is called, with its size.
+    pub garment: String,
+    pub fabric: String,
+    /// `paper` or `coupled`.
+    pub model: String,
+    pub table: String,
+    /// `none`, one extent, or a cascade `12>6>3`, cm.
+    pub extent_cm: String,
+    /// How a PART moves: `affine` or `translation`.
+    pub motion: String,
+    /// PARTs of fewer vertices were joined.
+    pub min_part: usize,
+    /// Steps, or `converged`.
+    pub refine: String,
+    /// 0 is the undisturbed start.
+    pub seed: u64,
+    /// `name=value` of each.
+    pub options: String,
+    pub status: Status,
+    /// Why it failed; empty where it did not.
+    pub error: String,
+    #[serde(flatten)]
+    pub figures: Option<Figures>,
+    /// blake3 over the bits of the displaced positions.
+    pub result_hash: String,
+    #[serde(flatten)]
+    pub timing: Option<Timing>,
+}
+
+impl Row {
+    /// The row of a point that failed.
+    #[must_use]
+    pub fn failed(point: &Point, error: impl Into<String>) -> Self {
+        let settings = &point.job.settings;
+        Self {
+            point: point.id.clone(),
+            index: point.index,
+            body: point.body.clone(),
+            garment: point.garment.clone(),
+            fabric: settings.fabric.name.clone(),
+            model: settings.model.name().to_owned(),
+            table: settings.table.name().to_owned(),
+            extent_cm: point.extent_text(),
+            motion: settings.model.motion().name().to_owned(),
+            min_part: settings.min_part,
+            refine: settings.refine.to_string(),
+            seed: point.job.seed,
+            options: point.options_text(),
+            status: Status::Error,
+            error: error.into(),
+            ..Self::default()
+        }
+    }
+
+    /// The row of a point with a result; a failed one where a figure is not finite.
+    #[must_use]
+    pub fn solved(point: &Point, figures: &Figures, result_hash: &str, timing: &Timing) -> Self {
+        if let Some((name, value)) = not_finite(figures) {
+            return Self::failed(point, format!("{name} is {value}, expected a finite figure: the drape diverged"));
+        }
+        Self {
+            status: Status::Ok,
+            figures: rounded(figures),
+            result_hash: result_hash.to_owned(),
+            timing: rounded(timing),
+            ..Self::failed(point, "")
+        }
+    }
+
+    /// The row without what differs from run to run.
+    #[must_use]
+    pub fn without_times(&self) -> Self {
+        Self { timing: None, ..self.clone() }
+    }
+
+    /// Names of the columns, timings aside, in which two rows differ.
+    #[must_use]
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let (mine, theirs) = (cells(&self.without_times()), cells(&other.without_times()));
+        columns().into_iter().filter(|name| mine.get(name) != theirs.get(name)).collect()
+    }
+}
+
+/// The columns, in order.
+#[must_use]
+pub fn columns() -> Vec<String> {
+    let full = Row { figures: Some(Figures::default()), timing: Some(Timing::default()), ..Row::default() };
+    cells(&full).into_keys().collect()
+}
+
+/// Rows as CSV, the titles first.
+#[must_use]
+pub fn csv_text(rows: &[Row]) -> Vec<u8> {
+    let columns = columns();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // Plain data into memory: nothing can fail.
+    let _ = writer.write_record(&columns);
+    for row in rows {
+        let cells = cells(row);
+        let _ = writer.write_record(columns.iter().map(|name| cell(cells.get(name))));
+    }
+    writer.into_inner().unwrap_or_default()
+}
+
+/// A value of JSON as a cell of a CSV; nothing for null.
+#[must_use]
+pub fn cell(value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null) => String::new(),
+        Some(Value::String(text)) => text.clone(),
+        Some(number) => number.to_string(),
+    }
+}
+
+/// The row as one line of JSON, line end included.
+pub(super) fn json_line(row: &Row) -> Vec<u8> {
+    // Plain data into memory cannot fail; an empty line would be caught as damage on reading.
+    let mut line = serde_json::to_vec(row).unwrap_or_default();
+    line.push(b'\n');
+    line
+}
+
+/// Keys and values of a row, in the order of its fields.
+fn cells(row: &Row) -> IndexMap<String, Value> {
+    serde_json::from_slice(&json_line(row)).unwrap_or_default()
+}
+
+/// The first figure that is no number, and what it is. JSON has nothing for it; a CSV says so.
+fn not_finite(figures: &Figures) -> Option<(String, String)> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.serialize(figures).ok()?;
+    let text = writer.into_inner().ok()?;
+    let mut reader = csv::Reader::from_reader(text.as_slice());
+    let names = reader.headers().ok()?.clone();
+    let record = reader.records().next()?.ok()?;
+    let odd = names.iter().zip(&record).find(|(_, cell)| cell.parse::<f64>().is_ok_and(|x| !x.is_finite()));
+    odd.map(|(name, cell)| (name.to_owned(), cell.to_owned()))
+}
+
+/// The same with every figure to nine significant digits, 0 below 1e-12.
+fn rounded<T: Serialize + DeserializeOwned>(figures: &T) -> Option<T> {
+    let mut value = serde_json::to_value(figures).ok()?;
+    for number in value.as_object_mut()?.values_mut().filter(|v| v.is_f64()) {
+        let x = number.as_f64()?;
+        let digits = format!("{x:.8e}").parse().unwrap_or(x);
+        *number = Value::from(if f64::abs(digits) < 1e-12 { 0.0 } else { digits });
+    }
+    serde_json::from_value(value).ok()
+}

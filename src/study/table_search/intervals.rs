@@ -1,0 +1,243 @@
+//! PARTs and squared error of every level [a, b) between candidate bounds, uncut and cut to each extent.
+//!
+//! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces and the sums
+//! their errors follow from ([`Moments`]). A piece that changed is cut as stage one would cut it: its seeds lie where they lie for
+//! every extent, so one run of them gives all, and from seed to seed only the vertices that change hands are counted anew.
+
+use super::Sample;
+use super::extent_grid::Ladder;
+use crate::mechanics::coupled::Motion;
+use crate::parts::{Ruler, spread_seeds};
+use crate::study::accuracy::moments::Moments;
+
+/// What a level costs.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Cost {
+    pub(super) parts: u32,
+    /// What the PARTs' motions leave, squared, over its vertices, m².
+    pub(super) error: f64,
+}
+
+/// More PARTs than any table may have.
+pub(super) const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
+
+impl Cost {
+    fn plus(self, other: Self) -> Self {
+        Self { parts: self.parts.saturating_add(other.parts), error: self.error + other.error }
+    }
+}
+
+/// What all rows of a garment share.
+pub(super) struct Intervals<'a> {
+    sample: &'a Sample<'a>,
+    /// Sums of each vertex by itself.
+    each: Vec<Moments>,
+    ladder: &'a Ladder,
+    motion: Motion,
+}
+
+impl<'a> Intervals<'a> {
+    pub(super) fn new(sample: &'a Sample<'a>, ladder: &'a Ladder, motion: Motion) -> Self {
+        let all: Vec<u32> = (0..sample.displacement.len() as u32).collect();
+        Self { sample, each: Moments::of_each(&all, &sample.mesh.positions, sample.displacement), ladder, motion }
+    }
+
+    /// The costs of [a, a + 1), [a, a + 2), ... at each step of the ladder, for the vertices of the smallest levels from a on.
+    pub(super) fn row(&self, members: &[Vec<u32>]) -> Vec<Cost> {
+        let mut pieces = Pieces::new(self);
+        let mut row = Vec::with_capacity(members.len() * self.ladder.len());
+        for vertices in members {
+            pieces.grow(vertices);
+            pieces.costs(&mut row);
+        }
+        row
+    }
+}
+
+/// The connected pieces of the vertices so far.
+struct Pieces<'a> {
+    of: &'a Intervals<'a>,
+    /// Union-find; `ABSENT` for vertices not in yet.
+    parent: Vec<u32>,
+    /// Number of pieces and their squared errors, uncut.
+    whole: Cost,
+    /// By root: number of vertices, their sums, and their squared error, 0 until it is known.
+    size: Vec<u32>,
+    sum: Vec<Moments>,
+    error: Vec<f64>,
+    /// Roots that have grown.
+    grown: Vec<u32>,
+    /// By root, only where PARTs are cut: the vertices, and the costs at each step, empty where not known.
+    vertices: Vec<Vec<u32>>,
+    cut: Vec<Vec<Cost>>,
+    roots: Vec<u32>,
+    /// Scratch: the place of a vertex in its piece.
+    place: Vec<u32>,
+}
+
+const ABSENT: u32 = u32::MAX;
+
+impl<'a> Pieces<'a> {
+    fn new(of: &'a Intervals<'a>) -> Self {
+        let n = of.each.len();
+        let cuts = if of.ladder.cuts() { n } else { 0 };
+        Self {
+            of,
+            parent: vec![ABSENT; n],
+            whole: Cost::default(),
+            size: vec![0; n],
+            sum: vec![Moments::default(); n],
+            error: vec![0.0; n],
+            grown: Vec::new(),
+            vertices: vec![Vec::new(); cuts],
+            cut: vec![Vec::new(); cuts],
+            roots: Vec::new(),
+            place: vec![0; cuts],
+        }
+    }
+
+    fn root(&mut self, mut v: u32) -> u32 {
+        while self.parent[v as usize] != v {
+            let up = self.parent[self.parent[v as usize] as usize];
+            self.parent[v as usize] = up;
+            v = up;
+        }
+        v
+    }
+
+    fn grow(&mut self, vertices: &[u32]) {
+        for &v in vertices {
+            let i = v as usize;
+            (self.parent[i], self.size[i], self.sum[i]) = (v, 1, self.of.each[i]);
+            self.whole.parts += 1;
+            if self.of.ladder.cuts() {
+                self.vertices[i] = vec![v];
+                self.roots.push(v);
+            }
+            for &w in self.of.sample.topology.neighbours(v) {
+                if self.parent[w as usize] != ABSENT {
+                    self.join(v, w);
+                }
+            }
+        }
+        for r in std::mem::take(&mut self.grown) {
+            let i = r as usize;
+            if self.parent[i] == r && self.error[i] == 0.0 {
+                let error = self.sum[i].error(self.of.motion);
+                self.error[i] = error;
+                self.whole.error += error;
+            }
+        }
+        let parent = &self.parent;
+        self.roots.retain(|&r| parent[r as usize] == r);
+        for &r in &self.roots {
+            if self.cut[r as usize].is_empty() {
+                self.cut[r as usize] = cut_costs(self.of, &mut self.vertices[r as usize], &mut self.place);
+            }
+        }
+    }
+
+    fn join(&mut self, v: u32, w: u32) {
+        let (p, q) = (self.root(v), self.root(w));
+        if p == q {
+            return;
+        }
+        // The larger stays root; of equals the lower number, so that sums do not depend on anything but the input.
+        let (p, q) = if (self.size[q as usize], p) > (self.size[p as usize], q) { (q, p) } else { (p, q) };
+        let (i, j) = (p as usize, q as usize);
+        self.whole.error -= std::mem::take(&mut self.error[i]) + std::mem::take(&mut self.error[j]);
+        self.whole.parts -= 1;
+        self.parent[j] = p;
+        self.size[i] += self.size[j];
+        let sum = self.sum[j];
+        self.sum[i] += &sum;
+        self.grown.push(p);
+        if self.of.ladder.cuts() {
+            let moved = std::mem::take(&mut self.vertices[j]);
+            self.vertices[i].extend(moved);
+            self.cut[i].clear();
+            self.cut[j].clear();
+        }
+    }
+
+    /// Appends the costs of all vertices so far, uncut and at each further step.
+    fn costs(&self, out: &mut Vec<Cost>) {
+        // Rounding may leave less than nothing of what came and went.
+        out.push(Cost { error: self.whole.error.max(0.0), ..self.whole });
+        let at = |step: usize| self.roots.iter().map(|&r| self.cut[r as usize][step]).fold(Cost::default(), Cost::plus);
+        out.extend((0..self.of.ladder.len() - 1).map(at));
+    }
+}
+
+/// The costs of one connected piece cut to each extent, or [`TOO_MANY`] where no table may have as many PARTs.
+fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec<Cost> {
+    let Intervals { sample, ladder, motion, .. } = of;
+    vertices.sort_unstable();
+    if vertices.len() == 1 {
+        return vec![Cost { parts: 1, error: 0.0 }; ladder.len() - 1];
+    }
+    // `place` keeps entries of other pieces, so an entry counts only if it points back.
+    for (&v, i) in vertices.iter().zip(0..) {
+        place[v as usize] = i;
+    }
+    let local = |w: u32| {
+        let i = place[w as usize] as usize;
+        (vertices.get(i) == Some(&w)).then_some(i)
+    };
+    // About the middle of the piece, so that little is lost where vertices leave.
+    let each = Moments::of_each(vertices, &sample.mesh.positions, sample.displacement);
+    let mut all = Vec::with_capacity(ladder.len() - 1);
+    for shape in ladder.shapes() {
+        let mut left = &shape.extents_m[..];
+        let ruler =
+            Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };
+        let mut seeded = Seeded::new(&each);
+        spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
+            let reached = left.iter().take_while(|&&e| radius_m <= 0.5 * e).count();
+            if reached > 0 {
+                left = &left[reached..];
+                let cost = Cost { parts: seeds as u32, error: seeded.error(seeds, seed_of_vertex, *motion) };
+                all.extend(std::iter::repeat_n(cost, reached));
+            }
+            left.is_empty() || seeds >= sample.max_parts
+        });
+        all.extend(std::iter::repeat_n(TOO_MANY, left.len()));
+    }
+    all
+}
+
+/// Sums and errors by seed, kept from one number of seeds to the next.
+struct Seeded<'a> {
+    each: &'a [Moments],
+    seed_of_vertex: Vec<u32>,
+    sums: Vec<Moments>,
+    /// Negative where a seed's vertices have changed.
+    errors: Vec<f64>,
+}
+
+impl<'a> Seeded<'a> {
+    fn new(each: &'a [Moments]) -> Self {
+        Self { each, seed_of_vertex: vec![u32::MAX; each.len()], sums: Vec::new(), errors: Vec::new() }
+    }
+
+    /// The squared error of all seeds' vertices, m².
+    fn error(&mut self, seeds: usize, seed_of_vertex: &[u32], motion: Motion) -> f64 {
+        self.sums.resize(seeds, Moments::default());
+        self.errors.resize(seeds, -1.0);
+        for ((before, &now), own) in self.seed_of_vertex.iter_mut().zip(seed_of_vertex).zip(self.each) {
+            if *before != now {
+                if let Some(sum) = self.sums.get_mut(*before as usize) {
+                    *sum -= own;
+                    self.errors[*before as usize] = -1.0;
+                }
+                self.sums[now as usize] += own;
+                self.errors[now as usize] = -1.0;
+                *before = now;
+            }
+        }
+        for (error, sum) in self.errors.iter_mut().zip(&self.sums).filter(|(error, _)| **error < 0.0) {
+            *error = sum.error(motion);
+        }
+        self.errors.iter().sum()
+    }
+}

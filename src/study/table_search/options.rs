@@ -1,0 +1,69 @@
+//! What a search tries: bounds, extents, rounds.
+
+use crate::mechanics::coupled::Motion;
+use crate::parts::range_table::RangeTable;
+
+/// What to search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchOptions {
+    /// How a PART moves: by an affine map, as the coupled model moves it, or as in the paper by a translation.
+    pub motion: Motion,
+    /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
+    /// extents means cut.
+    pub candidates: usize,
+    /// With at most so many distinct distances of one garment every bound is a candidate, and one round is exact. Default 12,000
+    /// for levels alone, 0 with extents.
+    pub exact_up_to: usize,
+    /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
+    pub widths_cm: Vec<f64>,
+    /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
+    /// all widths.
+    pub shapes: Vec<f64>,
+    /// Candidate bounds in each round after the first. Default 400, with extents 40.
+    pub candidates_around: usize,
+    /// Rounds: the first over quantiles, the others around the best table so far, with extents finely between the widths and
+    /// shapes given. They end early when two in a row bring less than a thousandth. Default 3, with extents 12.
+    pub rounds: usize,
+    /// Least thickness of a level, cm. A sliver only isolates single vertices of the garments searched on, which another
+    /// garment has elsewhere. Default 0 for levels alone, 0.1 with extents.
+    pub thinnest_cm: f64,
+    /// Whether a level may stay whole. Default yes.
+    pub uncut: bool,
+    /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
+    pub include: Vec<RangeTable>,
+}
+
+impl Default for SearchOptions {
+    /// For levels alone.
+    fn default() -> Self {
+        let include = vec![RangeTable::table_3()];
+        Self {
+            motion: Motion::Affine,
+            candidates: 400,
+            candidates_around: 400,
+            exact_up_to: 12_000,
+            widths_cm: Vec::new(),
+            shapes: vec![0.5, 1.0, 2.0, 4.0],
+            rounds: 3,
+            thinnest_cm: 0.0,
+            uncut: true,
+            include,
+        }
+    }
+}
+
+impl SearchOptions {
+    /// Defaults for levels that may each be cut to one of these widths (cm).
+    #[must_use]
+    pub fn with_extents(widths_cm: &[f64]) -> Self {
+        Self {
+            candidates: 120,
+            candidates_around: 40,
+            exact_up_to: 0,
+            rounds: 12,
+            thinnest_cm: 0.1,
+            widths_cm: widths_cm.to_vec(),
+            ..Self::default()
+        }
+    }
+}
