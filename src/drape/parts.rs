@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::levels::{Level, Levels};
 use super::{DrapeError, Model, PartOutcome, Settings};
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Given};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Hints};
 use crate::mechanics::paper::{self, Cut, PartForces};
 use crate::parts::range_table::RangeTable;
 use crate::parts::{Parts, segment};
@@ -146,14 +146,14 @@ fn through_levels(
         let parts = levels.parts(number, parts);
         let (garment, start) = (level.garment(), levels.restrict(number, &x));
         let distance_m = &levels.restrict(number, &distance);
-        let given = Given { distance_m, least_share: LEAST_SHARE };
+        let given = Hints { distance_m, least_share: LEAST_SHARE };
         let most = if number == coarsest { options.max_steps } else { options.max_steps.min(STEPS_BETWEEN) };
         let options = CoupledOptions { max_steps: most, ..options.clone() };
         let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, given, &options, &mut |_| asked())?;
         x = levels.prolong(number, &x, solved.positions);
     }
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
-    let given = Given { distance_m: &distance, least_share: 0.0 };
+    let given = Hints { distance_m: &distance, least_share: 0.0 };
     if coarsest == 0 {
         return coupled::solve_given(&garment, &scene.body, parts, &x, given, options, &mut |_| asked());
     }

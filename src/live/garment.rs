@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::access::{Refused, query};
 use crate::parts::UNASSIGNED;
-use crate::session::{Ground, Snapshot};
+use crate::session::{LoadedScene, Snapshot};
 
 /// The garment as OBJ: `of=rest` (without it the newest there is), `of=preview`, or `pin=ID`.
 pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Bytes, Refused> {
@@ -39,8 +39,8 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
     let found = snapshot.sectioned.as_ref();
     let found =
         found.ok_or_else(|| (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned()))?;
-    let ground: &Ground = &found.ground;
-    let of_this = |other: &Ground| other.generation == ground.generation;
+    let ground: &LoadedScene = &found.ground;
+    let of_this = |other: &LoadedScene| other.generation == ground.generation;
     let placed = &ground.loaded.scene.garment.positions;
     let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.ground));
     let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.ground)).map(|r| &*r.positions);

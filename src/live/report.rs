@@ -7,7 +7,7 @@ use crate::garment::builtin;
 use crate::garment::fabric;
 use crate::parts::range_table::TableRule;
 use crate::record::level_colours;
-use crate::session::{AtRest, Finished, Ground, Pin, Preview, Sectioned, Snapshot, preset_names};
+use crate::session::{AtRest, Finished, LoadedScene, Pin, Preview, Segmented, Snapshot, preset_names};
 use crate::study::job::Job;
 use crate::study::metrics::LevelCount;
 
@@ -83,7 +83,7 @@ fn measurements(job: &Job) -> Value {
     Value::Object(short.collect::<Map<_, _>>())
 }
 
-fn garment(ground: &Ground) -> Value {
+fn garment(ground: &LoadedScene) -> Value {
     let scene = &ground.loaded.scene;
     json!({
         "generation": ground.generation,
@@ -97,7 +97,7 @@ fn garment(ground: &Ground) -> Value {
     })
 }
 
-fn sectioned(found: &Sectioned) -> Value {
+fn sectioned(found: &Segmented) -> Value {
     let levels = LevelCount::all(&found.table, &found.parts);
     let css = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
     let colours: Vec<String> = level_colours(&levels).into_iter().map(css).collect();

@@ -33,7 +33,7 @@ use std::time::Duration;
 
 pub use edit::{Edit, EditError, FabricEdit, TableEdit};
 pub use presets::preset_names;
-pub use results::{AtRest, Finished, Ground, Pin, Preview, Refusal, Sectioned, Snapshot, TrailPoint};
+pub use results::{AtRest, Finished, LoadedScene, Pin, Preview, Refusal, Segmented, Snapshot, TrailPoint};
 use state::Desk;
 pub use worker::Workshop;
 

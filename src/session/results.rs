@@ -23,7 +23,7 @@ use crate::study::metrics::Figures;
 
 /// Body and garment, and how far apart they are: what stays while tables and fabrics change.
 #[derive(Debug)]
-pub struct Ground {
+pub struct LoadedScene {
     /// Counts bodies and garments up from 1.
     pub generation: u64,
     /// What was loaded.
@@ -36,7 +36,7 @@ pub struct Ground {
     pub(crate) distance_ms: f64,
 }
 
-impl Ground {
+impl LoadedScene {
     /// Unsigned distance of each garment vertex to the body before draping, m.
     #[must_use]
     pub fn distance_m(&self) -> &[f64] {
@@ -46,9 +46,9 @@ impl Ground {
 
 /// Stage one of a state.
 #[derive(Debug, Clone)]
-pub struct Sectioned {
+pub struct Segmented {
     pub state: u64,
-    pub ground: Arc<Ground>,
+    pub ground: Arc<LoadedScene>,
     /// The table, with the rows its rule made.
     pub table: Arc<RangeTable>,
     /// The PARTs.
@@ -65,7 +65,7 @@ pub struct Sectioned {
 #[derive(Debug, Clone)]
 pub struct Preview {
     pub state: u64,
-    pub ground: Arc<Ground>,
+    pub ground: Arc<LoadedScene>,
     /// Whether it went on from the preview before, in which case the two stages from the undraped garment are still to come.
     pub warm: bool,
     /// Whether its steps are done.
@@ -85,7 +85,7 @@ pub struct Preview {
 #[derive(Debug, Clone)]
 pub struct AtRest {
     pub state: u64,
-    pub ground: Arc<Ground>,
+    pub ground: Arc<LoadedScene>,
     /// Whether no step is left to take: where its forces balance, it was looked at that this lasts.
     pub done: bool,
     /// Whether its forces balance; that it lasts may yet be looked at, which moves little.
@@ -115,7 +115,7 @@ pub struct AtRest {
 #[derive(Debug)]
 pub struct Finished {
     pub state: u64,
-    pub ground: Arc<Ground>,
+    pub ground: Arc<LoadedScene>,
     /// All of it.
     pub drape: Drape,
     /// Its figures.
@@ -149,7 +149,7 @@ pub struct Pin {
     pub job: Arc<Job>,
     /// Its drape: at rest where it had come to rest, else as previewed.
     pub positions: Arc<Vec<DVec3>>,
-    pub ground: Arc<Ground>,
+    pub ground: Arc<LoadedScene>,
     /// Its numbers.
     pub numbers: TrailPoint,
 }
@@ -184,9 +184,9 @@ pub struct Snapshot {
     /// Whether there is nothing left to compute for it.
     pub idle: bool,
     /// The newest body and garment.
-    pub ground: Option<Arc<Ground>>,
+    pub ground: Option<Arc<LoadedScene>>,
     /// The newest stage one.
-    pub sectioned: Option<Arc<Sectioned>>,
+    pub sectioned: Option<Arc<Segmented>>,
     /// The newest stage two.
     pub preview: Option<Arc<Preview>>,
     /// The newest drape at full resolution.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::history::History;
-use super::results::{AtRest, Ground, Refusal, Sectioned, Snapshot, TrailPoint};
+use super::results::{AtRest, LoadedScene, Refusal, Segmented, Snapshot, TrailPoint};
 use super::{Edit, EditError};
 use crate::drape::{Refine, Settings, stage_one};
 use crate::parts::{Parts, UNASSIGNED};
@@ -31,7 +31,7 @@ pub(super) struct Desk {
     good_scene: Option<SceneSpec>,
     good_job: Option<Arc<Job>>,
     /// Body and garment while their files are read again.
-    before: Option<Arc<Ground>>,
+    before: Option<Arc<LoadedScene>>,
     pub(super) pins_made: u64,
     /// Drapes of the body and garment at hand that came to rest, the newest last.
     rests: Vec<Arc<AtRest>>,
@@ -116,7 +116,7 @@ impl Desk {
     }
 
     /// Body and garment of `state` are there.
-    pub(super) fn found_ground(&mut self, ground: Arc<Ground>) -> Result<(), EditError> {
+    pub(super) fn found_ground(&mut self, ground: Arc<LoadedScene>) -> Result<(), EditError> {
         let (job, state, accepted) = (Arc::clone(&self.view.job), self.view.state, self.accepted);
         self.view.rest = None;
         self.rests.clear();
@@ -133,7 +133,7 @@ impl Desk {
     pub(super) fn found_rest(&mut self, rest: Arc<AtRest>) {
         if let Some(sectioned) = &mut self.view.sectioned {
             let force_n = Arc::new(sums(&sectioned.parts, &rest.reaction_n));
-            *sectioned = Arc::new(Sectioned { force_n, ..Sectioned::clone(sectioned) });
+            *sectioned = Arc::new(Segmented { force_n, ..Segmented::clone(sectioned) });
         }
         if rest.balanced {
             self.rests.retain(|other| other.of != rest.of);
@@ -143,7 +143,7 @@ impl Desk {
         self.view.rest = Some(rest);
     }
 
-    fn show(&mut self, sectioned: Sectioned) {
+    fn show(&mut self, sectioned: Segmented) {
         let point = TrailPoint {
             state: sectioned.state,
             parts: sectioned.parts.len(),
@@ -165,7 +165,13 @@ impl Desk {
     }
 
     /// Stage one; the PARTs at hand stay where nothing they depend on changed.
-    fn section(&self, ground: &Arc<Ground>, job: &Job, state: u64, since: Instant) -> Result<Sectioned, EditError> {
+    fn section(
+        &self,
+        ground: &Arc<LoadedScene>,
+        job: &Job,
+        state: u64,
+        since: Instant,
+    ) -> Result<Segmented, EditError> {
         let began = Instant::now();
         let settings = &job.settings;
         let table = settings.table.resolve(ground.distance_m())?;
@@ -185,7 +191,7 @@ impl Desk {
         }
         let rest = self.view.rest.as_ref().filter(|rest| rest.ground.generation == ground.generation);
         let force_n = rest.map_or_else(Vec::new, |rest| sums(&parts, &rest.reaction_n));
-        Ok(Sectioned {
+        Ok(Segmented {
             state,
             ground: Arc::clone(ground),
             table,

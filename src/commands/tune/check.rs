@@ -12,7 +12,7 @@ use crate::parts::range_table::RangeTable;
 use crate::study::table_search::{Front, FrontPoint};
 use rayon::prelude::*;
 
-use super::garment::{Garment, Holds, Worth};
+use super::garment::{Garment, TableFit, TableQuality};
 use crate::commands::{console, interrupt};
 
 /// Previews of one search, for several garments no fewer than [`LEAST`] tables of them all.
@@ -27,9 +27,9 @@ const BOUNDS: usize = 3;
 pub(crate) struct Taken {
     pub(crate) table: RangeTable,
     /// What it holds, garment by garment, in the order of the garments it was tuned on.
-    pub(crate) holds: Vec<Holds>,
+    pub(crate) holds: Vec<TableFit>,
     /// What it is worth, in the same order.
-    pub(crate) worth: Vec<Worth>,
+    pub(crate) worth: Vec<TableQuality>,
     /// Tables that were draped to choose it.
     pub(crate) draped: usize,
 }

@@ -17,7 +17,7 @@ use crate::commands::{FabricArgs, UserError, console};
 
 /// PARTs of a table on a garment, and the error that guides the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Holds {
+pub(crate) struct TableFit {
     pub(crate) parts: usize,
     /// What a motion of each PART's own leaves, mm.
     pub(crate) rms_mm: f64,
@@ -25,7 +25,7 @@ pub(crate) struct Holds {
 
 /// What a table is worth on a garment: two bounds, which more freedom makes smaller whatever the table, and what comes of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Worth {
+pub(crate) struct TableQuality {
     /// What a translation of each PART leaves, mm: the paper's bound.
     pub(crate) translation_mm: f64,
     /// What affine maps, blended over the seams, leave, mm: the coupled model's bound.
@@ -57,9 +57,9 @@ pub(crate) struct Garment {
     /// Its grain, which pieces narrow and tall follow.
     grain: Grain,
     /// What Table 3 makes of it.
-    pub(crate) table_3: Holds,
+    pub(crate) table_3: TableFit,
     /// What Table 3 is worth on it.
-    pub(crate) table_3_worth: Worth,
+    pub(crate) table_3_worth: TableQuality,
 }
 
 impl Garment {
@@ -102,8 +102,8 @@ impl Garment {
             fabric,
             options: options.clone(),
             motion,
-            table_3: Holds { parts: 0, rms_mm: 0.0 },
-            table_3_worth: Worth { translation_mm: 0.0, affine_mm: 0.0, model_mm: 0.0, own_mm: None },
+            table_3: TableFit { parts: 0, rms_mm: 0.0 },
+            table_3_worth: TableQuality { translation_mm: 0.0, affine_mm: 0.0, model_mm: 0.0, own_mm: None },
         };
         let table_3 = RangeTable::table_3();
         garment.table_3 = garment.holds(&table_3);
@@ -137,9 +137,9 @@ impl Garment {
     }
 
     /// What a table holds of the reference.
-    pub(crate) fn holds(&self, table: &RangeTable) -> Holds {
+    pub(crate) fn holds(&self, table: &RangeTable) -> TableFit {
         let parts = self.parts(table);
-        Holds { parts: parts.len(), rms_mm: self.unblended_mm(&parts, self.motion) }
+        TableFit { parts: parts.len(), rms_mm: self.unblended_mm(&parts, self.motion) }
     }
 
     fn unblended_mm(&self, parts: &Parts, motion: Motion) -> f64 {
@@ -161,7 +161,7 @@ impl Garment {
     }
 
     /// What a table is worth: takes a preview, and a drape from there until it has settled.
-    pub(crate) fn worth(&self, table: &RangeTable) -> anyhow::Result<Worth> {
+    pub(crate) fn worth(&self, table: &RangeTable) -> anyhow::Result<TableQuality> {
         let (settings, draped) = self.preview(table)?;
         let own = refining(&format!("{}: the rest of a preview", self.name), |observer| {
             assess(&self.scene, &settings, &draped, &self.options, observer)
@@ -172,7 +172,7 @@ impl Garment {
             Err(AssessError::Interrupted | AssessError::Fallen) => None,
             Err(other) => return Err(other.into()),
         };
-        Ok(Worth {
+        Ok(TableQuality {
             translation_mm: self.unblended_mm(&draped.parts, Motion::Translation),
             affine_mm: self.affine_mm(&draped.parts)?,
             model_mm: accuracy::rms_mm(&draped.positions, &self.reference),

@@ -8,7 +8,7 @@ use comfy_table::Table;
 use serde::Serialize;
 
 use super::check::Taken;
-use super::garment::{Garment, Holds, Worth};
+use super::garment::{Garment, TableFit, TableQuality};
 use crate::commands::console;
 use crate::commands::summary::command_line;
 
@@ -47,8 +47,13 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn new((tuned_on, kind): (&str, &'static str), table: &RangeTable, worth: Worth, on: &Garment) -> Self {
-        let Worth { translation_mm, affine_mm, model_mm, own_mm } = worth;
+    pub(super) fn new(
+        (tuned_on, kind): (&str, &'static str),
+        table: &RangeTable,
+        worth: TableQuality,
+        on: &Garment,
+    ) -> Self {
+        let TableQuality { translation_mm, affine_mm, model_mm, own_mm } = worth;
         let three = on.table_3_worth;
         Self {
             tuned_on: tuned_on.to_owned(),
@@ -194,11 +199,11 @@ pub(super) fn lines<'a>((tuned_on, kind, front): &'a (String, &'static str, Fron
 
 /// The table with its provenance: who made it how, from what, and how good it is there.
 pub(super) fn with_provenance(taken: &Taken, garments: &[&Garment]) -> RangeTable {
-    let of = |parts: usize, worth: &Worth| {
-        let Worth { translation_mm, affine_mm, model_mm, .. } = worth;
+    let of = |parts: usize, worth: &TableQuality| {
+        let TableQuality { translation_mm, affine_mm, model_mm, .. } = worth;
         format!("{parts} PARTs, {translation_mm:.2}, {affine_mm:.2} and {model_mm:.2} mm")
     };
-    let figure = |((w, h), worth): ((&&Garment, &Holds), &Worth)| {
+    let figure = |((w, h), worth): ((&&Garment, &TableFit), &TableQuality)| {
         format!("{}: {} (Table 3: {})", w.name, of(h.parts, worth), of(w.table_3.parts, &w.table_3_worth))
     };
     let figures: Vec<String> = garments.iter().zip(&taken.holds).zip(&taken.worth).map(figure).collect();

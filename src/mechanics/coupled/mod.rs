@@ -40,7 +40,7 @@ pub use slack::Folding;
 pub use weights::Weights;
 
 use super::energy::{Cloth, Contacts, gravity};
-use super::newton::{Descent, Pace};
+use super::newton::{NewtonState, StepLimits};
 use super::refine::Record;
 use crate::body::distance::Body;
 use crate::mesh::{Topology, TriMesh};
@@ -85,12 +85,12 @@ pub fn solve(
     start: &[DVec3],
     options: &CoupledOptions,
 ) -> Result<CoupledResult, CoupledError> {
-    solve_given(garment, body, parts, start, Given::default(), options, &mut |_| ControlFlow::Continue(()))
+    solve_given(garment, body, parts, start, Hints::default(), options, &mut |_| ControlFlow::Continue(()))
 }
 
 /// What a solve may take for given, and when it is good enough for what comes after it.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Given<'a> {
+pub struct Hints<'a> {
     /// Signed distances of the garment as placed, m; none where they are not known.
     pub distance_m: &'a [f64],
     /// The solve ends where its last six steps brought less than this share of what all have.
@@ -103,7 +103,7 @@ const FLAT: f64 = 0.25;
 /// Steps by which the end of a solve is told that need not be followed to it.
 const LATE: usize = 6;
 
-/// [`solve`] with something [`Given`], before an onlooker.
+/// [`solve`] with something [`Hints`], before an onlooker.
 ///
 /// # Errors
 /// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
@@ -112,7 +112,7 @@ pub fn solve_given(
     body: &Body,
     parts: &Parts,
     start: &[DVec3],
-    given: Given<'_>,
+    given: Hints<'_>,
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<CoupledResult, CoupledError> {
@@ -133,7 +133,7 @@ pub fn solve_given(
 
     let began = Instant::now();
     let contacts = soft.contacts_knowing(body, start, true, &mesh.positions, given.distance_m.iter().copied());
-    let mut descent = Descent::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
+    let mut descent = NewtonState::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
     let history = settle(&mut descent, &mut tangent, given, options, onlooker)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
@@ -169,14 +169,14 @@ pub fn solve_given(
 
 /// Newton steps until they are short.
 fn settle(
-    descent: &mut Descent<'_, '_>,
+    descent: &mut NewtonState<'_, '_>,
     tangent: &mut Reduced,
-    given: Given<'_>,
+    given: Hints<'_>,
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
     let pace =
-        Pace { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
+        StepLimits { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
     let mut history = vec![descent.record(0, None, true)];
     for iteration in 1..=options.max_steps {
         let advance = descent.advance(tangent, pace)?;
@@ -202,7 +202,7 @@ fn settle(
 }
 
 /// F⁰, F¹ and F² of each PART: sums over its own vertices.
-fn balance(descent: &Descent<'_, '_>, parts: &Parts) -> Vec<PartResult> {
+fn balance(descent: &NewtonState<'_, '_>, parts: &Parts) -> Vec<PartResult> {
     let (cloth, x, contacts) = (descent.cloth, &descent.x, &descent.contacts);
     let mut all = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut all);

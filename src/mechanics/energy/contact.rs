@@ -57,7 +57,7 @@ const STRETCH: usize = 8192;
 
 /// What there is to touch, and by which distance.
 #[derive(Debug, Clone, Default)]
-pub(super) enum Met<'b> {
+pub(super) enum Obstacle<'b> {
     #[default]
     Nothing,
     /// The exact distance's tangent plane where it was last asked.
@@ -68,7 +68,7 @@ pub(super) enum Met<'b> {
 /// What the cloth meets at its current positions, with the memory that makes asking again cheap.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts<'b> {
-    pub(super) met: Met<'b>,
+    pub(super) met: Obstacle<'b>,
     /// h of each vertex, m.
     pub(super) offsets: Vec<f64>,
     areas: Vec<f64>,
@@ -110,7 +110,7 @@ impl<'b> Contacts<'b> {
     ) -> Self {
         let n = areas.len();
         Self {
-            met: Met::Rounded(Field::new(body, n)),
+            met: Obstacle::Rounded(Field::new(body, n)),
             offsets: offsets.to_vec(),
             areas: areas.to_vec(),
             held: held.to_vec(),
@@ -129,7 +129,7 @@ impl<'b> Contacts<'b> {
     /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
     pub fn by_planes(self) -> Self {
-        Self { met: self.body().map_or(Met::Nothing, Met::Planes), ..self }
+        Self { met: self.body().map_or(Obstacle::Nothing, Obstacle::Planes), ..self }
     }
 
     /// κ, N/m³.
@@ -146,12 +146,12 @@ impl<'b> Contacts<'b> {
     /// Finds what touches at `x`. Same bits on any number of threads.
     pub fn update(&mut self, x: &[DVec3]) {
         self.touches.clear();
-        if let Met::Planes(body) = self.met {
+        if let Obstacle::Planes(body) = self.met {
             return self.update_planes(body, x);
         }
         self.bound(x);
         self.find_near(x);
-        let Met::Rounded(field) = &mut self.met else { return };
+        let Obstacle::Rounded(field) = &mut self.met else { return };
         let near = std::mem::take(&mut self.near);
         let found = field.at(&near, x);
         for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
@@ -214,7 +214,7 @@ impl<'b> Contacts<'b> {
     /// Gives every vertex that was never asked a bound by the exact distance: most are far, and a lattice about each would
     /// cost twenty times as much. The rounded distance is less by no more than the lattice's side.
     fn bound(&mut self, x: &[DVec3]) {
-        let Met::Rounded(field) = &self.met else { return };
+        let Obstacle::Rounded(field) = &self.met else { return };
         let body = field.body();
         let fresh = |&v: &usize| !self.held[v] && self.answer[v] == f64::NEG_INFINITY;
         let new: Vec<usize> = (0..x.len()).filter(fresh).collect();
@@ -242,9 +242,9 @@ impl<'b> Contacts<'b> {
     /// The body, if there is one.
     pub(super) fn body(&self) -> Option<&'b Body> {
         match &self.met {
-            Met::Nothing => None,
-            Met::Planes(body) => Some(body),
-            Met::Rounded(field) => Some(field.body()),
+            Obstacle::Nothing => None,
+            Obstacle::Planes(body) => Some(body),
+            Obstacle::Rounded(field) => Some(field.body()),
         }
     }
 

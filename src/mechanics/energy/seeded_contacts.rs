@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::contact::Met;
+use super::contact::Obstacle;
 use super::field::SIDE;
 use super::{Cloth, Contacts};
 use crate::body::distance::Body;
@@ -31,7 +31,7 @@ impl Cloth {
 impl Contacts<'_> {
     fn knowing(mut self, at: &[DVec3], distance_m: impl Iterator<Item = f64>) -> Self {
         // The rounded distance is less by no more than the lattice's side.
-        let less = if matches!(self.met, Met::Rounded(_)) { SIDE } else { 0.0 };
+        let less = if matches!(self.met, Obstacle::Rounded(_)) { SIDE } else { 0.0 };
         for (v, (x, distance)) in at.iter().zip(distance_m).enumerate() {
             if self.held.get(v) == Some(&false) {
                 self.keep(v, *x, distance - less);

@@ -36,7 +36,7 @@ mod vectors;
 
 use glam::{DMat3, DVec3};
 
-use super::energy::proximity::Looked;
+use super::energy::proximity::StepCheck;
 use super::energy::{Cloth, Contacts, Scratch};
 use extrapolation::Onward;
 pub(crate) use full_space::Whole;
@@ -79,7 +79,7 @@ pub(crate) trait Tangent {
 
 /// How boldly to go.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pace {
+pub(crate) struct StepLimits {
     /// Longest move of a vertex in one step, m.
     pub(crate) longest_move_m: f64,
     /// Iterations of a relaxation after a step.
@@ -104,7 +104,7 @@ pub(crate) struct Advance {
 }
 
 /// A cloth on its way down.
-pub(crate) struct Descent<'c, 'b> {
+pub(crate) struct NewtonState<'c, 'b> {
     /// The energy that falls.
     pub(crate) cloth: &'c Cloth,
     /// What is touched at `x`.
@@ -131,7 +131,7 @@ pub(crate) struct Descent<'c, 'b> {
     scratch: Scratch,
 }
 
-impl<'c, 'b> Descent<'c, 'b> {
+impl<'c, 'b> NewtonState<'c, 'b> {
     /// Starts at `x`, where `contacts` are up to date.
     pub(crate) fn new(cloth: &'c Cloth, contacts: Contacts<'b>, x: Vec<DVec3>, damping: f64) -> Self {
         let mut descent = Self {
@@ -183,9 +183,9 @@ impl<'c, 'b> Descent<'c, 'b> {
         trial.clone_from(x);
         let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
         match contacts.proximity.as_mut().map(|p| p.look(trial, x)) {
-            None | Some(Looked::Clear) => {}
-            Some(Looked::Cut) => contacts.update(x),
-            Some(Looked::Crosses) => {
+            None | Some(StepCheck::Clear) => {}
+            Some(StepCheck::Cut) => contacts.update(x),
+            Some(StepCheck::Crosses) => {
                 x.clone_from(trial);
                 contacts.update(x);
             }
@@ -196,7 +196,7 @@ impl<'c, 'b> Descent<'c, 'b> {
     }
 
     /// One iteration. The damping is the caller's to change afterwards.
-    pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: Pace) -> Result<Advance, SolveError> {
+    pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, pace: StepLimits) -> Result<Advance, SolveError> {
         let Self { cloth, x, contacts, gradient, direction, blocks, damping, .. } = self;
         tangent.step(&State { cloth, x, contacts, gradient, damping: *damping }, direction, blocks)?;
         let Self {
@@ -244,12 +244,12 @@ impl<'c, 'b> Descent<'c, 'b> {
                     contacts.update(trial);
                 }
                 match contacts.proximity.as_mut().map(|p| p.look(x, trial)) {
-                    None | Some(Looked::Clear) => break true,
-                    Some(Looked::Cut) => {
+                    None | Some(StepCheck::Clear) => break true,
+                    Some(StepCheck::Cut) => {
                         contacts.update(trial);
                         break true;
                     }
-                    Some(Looked::Crosses) => crossed += 1,
+                    Some(StepCheck::Crosses) => crossed += 1,
                 }
             }
             t = if t > first { first } else { 0.5 * t };

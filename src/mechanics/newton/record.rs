@@ -1,6 +1,6 @@
 //! What is told of a step.
 
-use super::{Advance, Descent};
+use super::{Advance, NewtonState};
 
 /// One line of the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Record {
     pub softened: bool,
 }
 
-impl Descent<'_, '_> {
+impl NewtonState<'_, '_> {
     /// A line of the history, after `advance`.
     pub(crate) fn record(&self, iteration: usize, advance: Option<Advance>, softened: bool) -> Record {
         Record {

@@ -10,9 +10,9 @@
 
 use glam::DVec3;
 
-use super::{Descent, SolveError, State, Whole};
+use super::{NewtonState, SolveError, State, Whole};
 use crate::mechanics::curvature::{Curved, DAMPING, STEPS, Until};
-use crate::mechanics::energy::proximity::Looked;
+use crate::mechanics::energy::proximity::StepCheck;
 
 /// λ under which a way leads out: over a hundred times what single precision makes of none.
 const LEADS_OUT: f64 = -1e-3;
@@ -37,7 +37,7 @@ pub(crate) enum Rest {
     Left,
 }
 
-impl Descent<'_, '_> {
+impl NewtonState<'_, '_> {
     /// Looks at the rest that is reached, for ways out also where it still moves if that is `stubborn`; leaves it if it can, relaxed by so
     /// many iterations.
     pub(crate) fn look(&mut self, tangent: &mut Whole, stubborn: bool, relaxing: usize) -> Result<Rest, SolveError> {
@@ -65,7 +65,7 @@ impl Descent<'_, '_> {
             let (_, t) = if other.0 < one.0 { other } else { one };
             let mut to: Vec<DVec3> = self.x.iter().zip(way).map(|(x, z)| *x + *z * t).collect();
             let itself = self.contacts.proximity.as_mut();
-            if t != 0.0 && itself.is_none_or(|p| p.look(&self.x, &mut to) != Looked::Crosses) {
+            if t != 0.0 && itself.is_none_or(|p| p.look(&self.x, &mut to) != StepCheck::Crosses) {
                 self.x = to;
                 left = true;
             }

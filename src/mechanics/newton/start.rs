@@ -2,9 +2,9 @@
 //!
 //! How: [`proximity`](super::super::energy::proximity), which also knows where else to start from. No factorisation is needed.
 
-use super::Descent;
+use super::NewtonState;
 
-impl Descent<'_, '_> {
+impl NewtonState<'_, '_> {
     /// Relaxes the start, what crosses asked apart, as often as it takes or `rounds` at most; once more from how the cloth was placed where
     /// much more is left than crosses there.
     pub(crate) fn untangle_or_go_back(&mut self, rounds: usize, iterations: usize) {

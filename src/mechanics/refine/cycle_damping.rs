@@ -11,7 +11,7 @@
 use glam::DVec3;
 
 use super::settle::CLOSE;
-use crate::mechanics::newton::Descent;
+use crate::mechanics::newton::NewtonState;
 
 /// So many steps back near rest, or farther from it,
 const NEAR: usize = 3;
@@ -32,7 +32,7 @@ const LEAST_FADE: f64 = 1.0 / 64.0;
 
 /// What the last steps came to.
 #[derive(Debug)]
-pub(super) struct ToAndFro {
+pub(super) struct CycleDamping {
     /// Residual over weight, the least so far.
     least: f64,
     /// Steps back since then.
@@ -46,16 +46,16 @@ pub(super) struct ToAndFro {
     way: f64,
 }
 
-impl Default for ToAndFro {
+impl Default for CycleDamping {
     fn default() -> Self {
         let (from, last) = (Vec::new(), Vec::new());
         Self { least: f64::INFINITY, back: 0, fade: 1.0, from, last, steps: 0, way: 0.0 }
     }
 }
 
-impl ToAndFro {
+impl CycleDamping {
     /// After a step, which went `back` against the one before or not.
-    pub(super) fn after(&mut self, descent: &mut Descent<'_, '_>, back: bool) {
+    pub(super) fn after(&mut self, descent: &mut NewtonState<'_, '_>, back: bool) {
         self.back = if back { self.back + 1 } else { 0 };
         let residual = descent.residual;
         if residual < LESS * self.least || residual > FAR {
@@ -73,7 +73,7 @@ impl ToAndFro {
     }
 
     /// From elsewhere, with whole steps and all gaps there at once.
-    pub(super) fn anew(&mut self, descent: &mut Descent<'_, '_>) {
+    pub(super) fn anew(&mut self, descent: &mut NewtonState<'_, '_>) {
         *self = Self::default();
         descent.stride = 1.0;
         if let Some(itself) = &mut descent.contacts.proximity {
@@ -101,7 +101,7 @@ impl ToAndFro {
     }
 
     /// Shorter steps first, and where that does not end it, gaps that come and go slowly, with whole steps again.
-    fn hold_back(&mut self, descent: &mut Descent<'_, '_>) {
+    fn hold_back(&mut self, descent: &mut NewtonState<'_, '_>) {
         if descent.stride > LEAST_STRIDE && self.fade == 1.0 {
             descent.stride *= 0.5;
         } else if let Some(itself) = &mut descent.contacts.proximity {

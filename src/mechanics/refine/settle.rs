@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::cycle_damping::ToAndFro;
+use super::cycle_damping::CycleDamping;
 use super::{Observer, RefineOptions, Refined, STEP_LIMIT, Step, Stop};
 use crate::GRAVITY;
 use crate::body::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts, Covered};
-use crate::mechanics::newton::{Descent, Pace, Rest, SolveError, Solver, Tangent, Whole};
+use crate::mechanics::newton::{NewtonState, Rest, SolveError, Solver, StepLimits, Tangent, Whole};
 use crate::mesh::box_about;
 
 /// Bounds of the damping ε, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it; at 1e4 a step
@@ -99,9 +99,10 @@ fn settle(
         contacts.update(&start);
         contacts.refresh(&start);
     }
-    let pace = Pace { longest_move_m: options.longest_move_m, relaxing: RELAXING, relaxing_trial: RELAXING_TRIAL };
+    let pace =
+        StepLimits { longest_move_m: options.longest_move_m, relaxing: RELAXING, relaxing_trial: RELAXING_TRIAL };
     let height = extent(&start);
-    let mut descent = Descent::new(cloth, contacts, start, options.damping);
+    let mut descent = NewtonState::new(cloth, contacts, start, options.damping);
     let softened =
         if far_from_rest(cloth, descent.residual) { cloth.softened(height, options.soft_strain) } else { None };
     let mut soft = softened.is_some();
@@ -120,14 +121,14 @@ fn settle(
     let mut looks = 0;
     // The step before which covering asked for something, while it has not come to rest with that.
     let mut covering: Option<usize> = None;
-    let mut swing = ToAndFro::default();
+    let mut swing = CycleDamping::default();
     let stop = loop {
         if observer(&seen(&descent, iteration, false)).is_break() {
             break Stop::Interrupted;
         }
         if !soft && descent.residual < options.tolerance {
             if !descent.contacts.keep_out(&descent.x) {
-                let Descent { contacts, x, .. } = &mut descent;
+                let NewtonState { contacts, x, .. } = &mut descent;
                 let covered = if options.self_contact { contacts.cover(cloth, x) } else { Covered::Done };
                 covering = (covered != Covered::Done).then_some(iteration);
                 match covered {
@@ -218,7 +219,7 @@ pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>
     contacts.proximity = Some(cloth.proximity());
     contacts.update(&x);
     contacts.refresh(&x);
-    let mut descent = Descent::new(cloth, contacts, x, RefineOptions::default().damping);
+    let mut descent = NewtonState::new(cloth, contacts, x, RefineOptions::default().damping);
     descent.untangle(UNTANGLING, RELAXING);
     let left = descent.contacts.proximity.as_mut().map_or(0, |itself| itself.crossings(&descent.x));
     (left == 0).then_some(descent.x)
@@ -231,7 +232,7 @@ fn far_from_rest(cloth: &Cloth, residual: f64) -> bool {
     residual > FAR_FROM_REST * GRAVITY * squares.sqrt() / cloth.weight
 }
 
-fn seen<'a>(descent: &'a Descent<'_, '_>, iteration: usize, at_rest: bool) -> Step<'a> {
+fn seen<'a>(descent: &'a NewtonState<'_, '_>, iteration: usize, at_rest: bool) -> Step<'a> {
     Step {
         iteration,
         energy: descent.energy,

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::results::{AtRest, Ground, Preview, Sectioned};
+use super::results::{AtRest, LoadedScene, Preview, Segmented};
 use super::state::{Desk, ms_since};
 use super::{EditError, Session};
 use crate::base::error_text::said;
@@ -59,7 +59,7 @@ struct Target {
     job: Arc<Job>,
     warm: bool,
     accepted: Instant,
-    sectioned: Option<Arc<Sectioned>>,
+    sectioned: Option<Arc<Segmented>>,
     rest: Option<Arc<AtRest>>,
 }
 
@@ -68,7 +68,7 @@ struct Target {
 struct Piece<'a> {
     session: &'a Session,
     target: &'a Target,
-    sectioned: &'a Sectioned,
+    sectioned: &'a Segmented,
 }
 
 impl<'a> Piece<'a> {
@@ -76,7 +76,7 @@ impl<'a> Piece<'a> {
         &self.target.job.settings
     }
 
-    fn ground(self) -> &'a Arc<Ground> {
+    fn ground(self) -> &'a Arc<LoadedScene> {
         &self.sectioned.ground
     }
 

@@ -8,10 +8,10 @@ use glam::DVec3;
 use super::{Piece, Sewn, Target, Workshop};
 use crate::drape::{Distances, DrapeError, ENOUGH, Levels, stage_two, told};
 use crate::garment::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Given, Onlooker};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Hints, Onlooker};
 use crate::parts::Parts;
 use crate::scene::Scene;
-use crate::session::results::{Ground, Preview, Sectioned};
+use crate::session::results::{LoadedScene, Preview, Segmented};
 use crate::session::state::{ms_since, sums};
 use crate::session::{EditError, Session};
 
@@ -28,7 +28,7 @@ impl Workshop {
         let (load_ms, began) = (ms_since(began), Instant::now());
         let distances = Distances::of(&loaded.scene)?;
         self.generations += 1;
-        let ground = Arc::new(Ground {
+        let ground = Arc::new(LoadedScene {
             generation: self.generations,
             spec: target.job.scene.clone(),
             loaded,
@@ -41,7 +41,7 @@ impl Workshop {
         found
     }
 
-    pub(super) fn sew(&mut self, sectioned: &Sectioned, fabric: &Fabric) -> Result<(), EditError> {
+    pub(super) fn sew(&mut self, sectioned: &Segmented, fabric: &Fabric) -> Result<(), EditError> {
         let began = Instant::now();
         let (scene, generation) = (&sectioned.ground.loaded.scene, sectioned.ground.generation);
         let levels = match self.cloth.take().filter(|sewn| sewn.generation == generation) {
@@ -85,7 +85,7 @@ impl Workshop {
         let start = reached.clone();
         let max_steps = if rest_follows { GLANCE_STEPS } else { WARM_STEPS };
         let few = CoupledOptions { max_steps, ..options.clone() };
-        let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, Given::default(), &few, &mut |x| {
+        let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, Hints::default(), &few, &mut |x| {
             reached.clear();
             reached.extend_from_slice(x);
             let step = Arc::new(preview(x));
@@ -153,6 +153,6 @@ fn glance(
     let two = CoupledOptions { max_steps: GLANCE_STEPS, ..options.clone() };
     let coarse = levels.restrict(1, start);
     let parts = levels.parts(1, parts);
-    let solved = coupled::solve_given(&level.garment(), &scene.body, &parts, &coarse, Given::default(), &two, onlooker);
+    let solved = coupled::solve_given(&level.garment(), &scene.body, &parts, &coarse, Hints::default(), &two, onlooker);
     solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
 }

@@ -37,7 +37,7 @@ const RINGS: usize = 2;
 
 /// What there is to say of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Looked {
+pub(crate) enum StepCheck {
     /// Nothing crosses that did not before.
     Clear,
     /// Vertices went back, so that nothing does.
@@ -125,7 +125,7 @@ impl Passage {
     }
 
     /// Looks at the step from `from`, where the last one ended, to `to`. A short one that crosses where it did not before is cut.
-    pub(super) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
+    pub(super) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
         self.known(from);
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.skin.edge_m;
         let stages = (longest / APART).ceil().clamp(1.0, MOST_STAGES);
@@ -134,14 +134,14 @@ impl Passage {
             let there: Vec<DVec3> = from.iter().zip(&*to).map(|(a, b)| a.lerp(*b, stage / stages)).collect();
             let crossing = self.anew(&there);
             if !self.appeared(&crossing).is_empty() {
-                return Looked::Crosses;
+                return StepCheck::Crosses;
             }
             stage += 1.0;
         }
         let mut crossing = self.anew(to);
         let mut new = self.appeared(&crossing);
         if !new.is_empty() && longest > LONG {
-            return Looked::Crosses;
+            return StepCheck::Crosses;
         }
         let mut share = vec![1.0_f64; from.len()];
         for look in 0..CUTS {
@@ -160,7 +160,7 @@ impl Passage {
             *to = from.lerp(*to, *share);
         }
         self.begin(crossing);
-        if share.iter().any(|s| *s < 1.0) { Looked::Cut } else { Looked::Clear }
+        if share.iter().any(|s| *s < 1.0) { StepCheck::Cut } else { StepCheck::Clear }
     }
 
     /// Triangles of pairs that are not on their way out.

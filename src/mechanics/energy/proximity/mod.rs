@@ -43,8 +43,8 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-pub(crate) use collision_filter::Looked;
 use collision_filter::Passage;
+pub(crate) use collision_filter::StepCheck;
 pub use gap::Gap;
 pub(in crate::mechanics) use place::touching_between;
 pub(super) use place::{Place, offset};
@@ -249,8 +249,8 @@ impl Proximity {
         self.gaps.iter().map(|gap| gap.normal * (gap.stiffness * gap.depth(x).max(0.0)))
     }
 
-    /// Looks at the step from `from`, where the last one ended, to `to`: see [`Looked`].
-    pub(crate) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Looked {
+    /// Looks at the step from `from`, where the last one ended, to `to`: see [`StepCheck`].
+    pub(crate) fn look(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
         self.passage.look(from, to)
     }
 
