@@ -104,7 +104,7 @@ fn tilted(degrees: f64) -> Case {
 }
 
 fn given(q_f: f64, p_f: f64) -> PaperOptions {
-    let (body_force, line_force) = (BodyForce::Hints(q_f), LineForce::Hints(p_f));
+    let (body_force, line_force) = (BodyForce::Given(q_f), LineForce::Given(p_f));
     PaperOptions { body_force, line_force, untouched: Untouched::Contactless, ..PaperOptions::default() }
 }
 
