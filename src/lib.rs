@@ -36,9 +36,11 @@
 //! reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the hundred, [`session`]
 //! keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
 
+#![cfg_attr(not(feature = "cli"), allow(dead_code, reason = "the command line uses what the library does not export"))]
+
 pub mod base;
 pub mod body;
-#[cfg(feature = "viewer")]
+#[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod commands;
 pub mod drape;

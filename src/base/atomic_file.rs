@@ -22,7 +22,7 @@ fn growing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes every file in the making, for a program that ends at once and drops nothing. From then on no file begins or gets its place:
 /// whoever tries waits for the end.
-pub fn abandon_all() {
+pub(crate) fn abandon_all() {
     let growing = growing();
     for path in &*growing {
         // What cannot be removed stays under its hidden name, as it would after a power cut.
@@ -66,7 +66,7 @@ const MOST_LINKS: usize = 40;
 /// A file in the making. Dropped before [`finish`](Self::finish), it removes what it wrote and leaves an older file as
 /// it was.
 #[derive(Debug)]
-pub struct WholeFile {
+pub(crate) struct WholeFile {
     path: PathBuf,
     writer: BufWriter<File>,
     /// Where it grows; none for a device or a pipe.
@@ -79,7 +79,7 @@ impl WholeFile {
     /// # Errors
     /// What the system says where the folder is missing or not writable, where the path is a folder or a circle of
     /// links.
-    pub fn create(path: impl AsRef<Path>) -> io::Result<Self> {
+    pub(crate) fn create(path: impl AsRef<Path>) -> io::Result<Self> {
         let path = place(path.as_ref())?;
         let found = fs::metadata(&path).ok();
         if found.as_ref().is_some_and(fs::Metadata::is_dir) {
@@ -105,7 +105,7 @@ impl WholeFile {
     ///
     /// # Errors
     /// As [`create`](Self::create).
-    pub fn check(path: impl AsRef<Path>) -> io::Result<()> {
+    pub(crate) fn check(path: impl AsRef<Path>) -> io::Result<()> {
         let found = fs::metadata(path.as_ref());
         if found.is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             return Ok(());
@@ -117,7 +117,7 @@ impl WholeFile {
     ///
     /// # Errors
     /// What the system says; `path` is then as it was.
-    pub fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+    pub(crate) fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         let mut file = Self::create(path)?;
         file.write_all(bytes.as_ref())?;
         file.finish().map(|_| ())
@@ -127,7 +127,7 @@ impl WholeFile {
     ///
     /// # Errors
     /// What the system says; the place is then as it was.
-    pub fn finish(self) -> io::Result<u64> {
+    pub(crate) fn finish(self) -> io::Result<u64> {
         let file = self.writer.into_inner().map_err(io::IntoInnerError::into_error)?;
         // A device has no length, and many cannot be synced.
         let Some(beside) = self.beside else { return Ok(0) };
@@ -152,7 +152,7 @@ impl Write for WholeFile {
 
 /// Whether two paths are one place, links followed: what is written to the one would replace the other.
 #[must_use]
-pub fn same_place(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_place(a: &Path, b: &Path) -> bool {
     let known = |path: &Path| {
         let path = place(path).ok()?;
         // The folder is there even where the file is not yet; a device may have several names in it.
@@ -182,7 +182,7 @@ fn place(path: &Path) -> io::Result<PathBuf> {
 
 /// The folder a path lies in.
 #[must_use]
-pub fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -11,10 +11,10 @@ use serde::de::DeserializeOwned;
 use crate::base::atomic_file::{WholeFile, folder_of};
 
 /// First bytes of a sealed value: what it is, and the version of its format.
-pub type Kind = [u8; 8];
+pub(crate) type Kind = [u8; 8];
 
 /// The bytes of `value`.
-pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
+pub(crate) fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
     let mut bytes = postcard::to_extend(value, kind.to_vec()).map_err(std::io::Error::other)?;
     let hash = blake3::hash(&bytes);
     bytes.extend(hash.as_bytes());
@@ -22,14 +22,14 @@ pub fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u8>> {
 }
 
 /// Writes `value` sealed as the whole of `path`, whose folder is made if it is not there.
-pub fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> std::io::Result<()> {
+pub(crate) fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> std::io::Result<()> {
     std::fs::create_dir_all(folder_of(path))?;
     WholeFile::write(path, seal(kind, value)?)
 }
 
 /// A hash of `value` by its bytes, for use as a name.
 #[must_use]
-pub fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
+pub(crate) fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
     // Plain data of known lengths, written to memory: there is nothing that could fail.
     let bytes = postcard::to_extend(value, kind.to_vec()).unwrap_or_else(|e| unreachable!("{e}"));
     blake3::hash(&bytes)
@@ -37,7 +37,7 @@ pub fn hash(kind: &Kind, value: &impl Serialize) -> blake3::Hash {
 
 /// The value of sealed bytes, if they are whole and of this kind.
 #[must_use]
-pub fn open<T: DeserializeOwned>(kind: &Kind, bytes: &[u8]) -> Option<T> {
+pub(crate) fn open<T: DeserializeOwned>(kind: &Kind, bytes: &[u8]) -> Option<T> {
     let (content, hash) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>()?;
     let value = content.strip_prefix(kind).filter(|_| blake3::hash(content).as_bytes() == hash)?;
     postcard::from_bytes(value).ok()
@@ -45,7 +45,7 @@ pub fn open<T: DeserializeOwned>(kind: &Kind, bytes: &[u8]) -> Option<T> {
 
 /// The first field of a sealed value, from its first bytes alone and without a look at the hash.
 #[must_use]
-pub fn peek<T: DeserializeOwned>(kind: &Kind, head: &[u8]) -> Option<T> {
+pub(crate) fn peek<T: DeserializeOwned>(kind: &Kind, head: &[u8]) -> Option<T> {
     Some(postcard::take_from_bytes(head.strip_prefix(kind)?).ok()?.0)
 }
 

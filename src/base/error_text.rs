@@ -26,7 +26,7 @@ pub fn said(error: &(dyn Error + 'static), joint: &str) -> String {
 
 /// A sentence as it may be told: [`plain`], its middle left out where it is long.
 #[must_use]
-pub fn short(sentence: &str) -> String {
+pub(crate) fn short(sentence: &str) -> String {
     plain(&shortened(sentence)).into_owned()
 }
 
@@ -41,7 +41,7 @@ fn shortened(cause: &str) -> Cow<'_, str> {
 
 /// A text without control characters but for the ends of its lines and tabs.
 #[must_use]
-pub fn plain(text: &str) -> Cow<'_, str> {
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     let harmful = |c: char| c.is_control() && c != '\n' && c != '\t';
     if !text.contains(harmful) {
         return text.into();
@@ -54,7 +54,7 @@ pub fn plain(text: &str) -> Cow<'_, str> {
 ///
 /// # Errors
 /// What cannot be written as JSON.
-pub fn json(value: &impl serde::Serialize) -> serde_json::Result<String> {
+pub(crate) fn json(value: &impl serde::Serialize) -> serde_json::Result<String> {
     let text = serde_json::to_string(value)?;
     if !text.contains(char::is_control) {
         return Ok(text);

@@ -5,10 +5,10 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 /// Most bytes of a text that is read: tables, fabrics, patterns and sweep files have thousands.
-pub const MOST_TEXT: u64 = 64 << 20;
+pub(crate) const MOST_TEXT: u64 = 64 << 20;
 
 /// Most bytes of a mesh's file: some twenty million vertices as OBJ.
-pub const MOST_MESH: u64 = 2 << 30;
+pub(crate) const MOST_MESH: u64 = 2 << 30;
 
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -22,37 +22,37 @@ pub struct Unreadable {
 /// A folder in the user's cache (`$XDG_CACHE_HOME/partwise`, or under `~/.cache`, on Linux; where the system keeps caches
 /// elsewhere); `None` where the user has no home.
 #[must_use]
-pub fn user_cache(folder: &str) -> Option<PathBuf> {
+pub(crate) fn user_cache(folder: &str) -> Option<PathBuf> {
     Some(directories::ProjectDirs::from("", "", "partwise")?.cache_dir().join(folder))
 }
 
 /// Whether a name is that of a file rather than of something built in.
 #[must_use]
-pub fn names_a_file(name: &str) -> bool {
+pub(crate) fn names_a_file(name: &str) -> bool {
     name.contains(['/', '\\', '.'])
 }
 
 /// Whether a file's name ends so, in large letters or small; `ending` without its dot.
 #[must_use]
-pub fn has_ending(path: &Path, ending: &str) -> bool {
+pub(crate) fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 /// A file's name without folder and ending; any other name as it is.
 #[must_use]
-pub fn stem(name: &str) -> String {
+pub(crate) fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
 /// Names in a sentence, the first twenty of many.
 #[must_use]
-pub fn listed(names: &[String]) -> String {
+pub(crate) fn listed(names: &[String]) -> String {
     first_of(names, 20)
 }
 
 /// Names in a sentence, the first so many of more.
 #[must_use]
-pub fn first_of(names: &[String], most: usize) -> String {
+pub(crate) fn first_of(names: &[String], most: usize) -> String {
     let shown = names[..names.len().min(most)].join(", ");
     match names.len().saturating_sub(most) {
         0 => shown,
@@ -62,12 +62,12 @@ pub fn first_of(names: &[String], most: usize) -> String {
 
 /// Line number, from 1, of a byte offset in a text.
 #[must_use]
-pub fn line_of(text: &str, offset: usize) -> usize {
+pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
 }
 
 /// Reads a text file.
-pub fn read_text(path: &Path) -> Result<String, Unreadable> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Unreadable> {
     bounded_text(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
 }
 
@@ -75,7 +75,7 @@ pub fn read_text(path: &Path) -> Result<String, Unreadable> {
 ///
 /// # Errors
 /// As [`bounded`]; or that it is not UTF-8.
-pub fn bounded_text(path: &Path) -> io::Result<String> {
+pub(crate) fn bounded_text(path: &Path) -> io::Result<String> {
     let utf8 = |e| io::Error::new(io::ErrorKind::InvalidData, format!("found what is no UTF-8 text: {e}"));
     String::from_utf8(bounded(path, MOST_TEXT)?).map_err(|e| utf8(e.utf8_error()))
 }
@@ -84,7 +84,7 @@ pub fn bounded_text(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// That it cannot be read, or is larger.
-pub fn bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub(crate) fn bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most {

@@ -6,14 +6,14 @@ use serde::Serialize;
 
 /// The smallest value that a `share` of all values do not exceed (nearest rank); zero for an empty list.
 #[must_use]
-pub fn nearest_rank(values: &[f64], share: f64) -> f64 {
+pub(crate) fn nearest_rank(values: &[f64], share: f64) -> f64 {
     let rank = (share * values.len() as f64).ceil() as usize;
     sorted(values).get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 /// The quantile at `share` by linear interpolation; zero for an empty list.
 #[must_use]
-pub fn interpolated(values: &[f64], share: f64) -> f64 {
+pub(crate) fn interpolated(values: &[f64], share: f64) -> f64 {
     let sorted = sorted(values);
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
     let at = share * last as f64;
@@ -49,7 +49,7 @@ pub struct Percentiles {
 impl Percentiles {
     /// Of these values; zeros for none.
     #[must_use]
-    pub fn of(values: &[f64]) -> Self {
+    pub(crate) fn of(values: &[f64]) -> Self {
         let sorted = sorted(values);
         let last = sorted.len().saturating_sub(1);
         let at = |share: f64| sorted.get((share * last as f64).round() as usize).copied().unwrap_or_default();
@@ -58,7 +58,7 @@ impl Percentiles {
 
     /// As words, each value times `scale`, with `digits` behind the point.
     #[must_use]
-    pub fn text(&self, scale: f64, digits: usize) -> String {
+    pub(crate) fn text(&self, scale: f64, digits: usize) -> String {
         let [min, p01, p05, p50, p95, max] =
             [self.min, self.p01, self.p05, self.p50, self.p95, self.max].map(|v| format!("{:.digits$}", v * scale));
         format!("{min} smallest, {p01} (1 %), {p05} (5 %), {p50} median, {p95} (95 %), {max} largest")

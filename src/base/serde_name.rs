@@ -5,6 +5,6 @@ use serde::de::value::{Error, StrDeserializer};
 
 /// The value that a word stands for, if any.
 #[must_use]
-pub fn word<'a, T: Deserialize<'a>>(text: &'a str) -> Option<T> {
+pub(crate) fn word<'a, T: Deserialize<'a>>(text: &'a str) -> Option<T> {
     T::deserialize(StrDeserializer::<Error>::new(text)).ok()
 }

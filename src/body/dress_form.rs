@@ -18,7 +18,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::remesh::{Density, Surface, remesh};
 
 /// Triangles of the form unless asked otherwise.
-pub const DEFAULT_TRIANGLES: usize = 15_000;
+pub(crate) const DEFAULT_TRIANGLES: usize = 15_000;
 /// Spacing of the first contour, m: a quarter of the thinnest part, a hand.
 const SPACING: f64 = 0.012;
 /// A Newton step onto the surface this short, m, is the last.

@@ -29,7 +29,7 @@ impl Plane {
 
     /// Two unit vectors that span the plane.
     #[must_use]
-    pub fn axes(&self) -> [DVec3; 2] {
+    pub(crate) fn axes(&self) -> [DVec3; 2] {
         let (u, v) = self.normal.any_orthonormal_pair();
         [u, v]
     }
@@ -49,7 +49,7 @@ pub struct SectionLoop {
 impl SectionLoop {
     /// Length along the surface, m.
     #[must_use]
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         let inner: f64 = self.points.windows(2).map(|w| w[0].distance(w[1])).sum();
         match (self.closed, self.points.first(), self.points.last()) {
             (true, Some(&first), Some(&last)) => inner + last.distance(first),
@@ -73,7 +73,7 @@ impl SectionLoop {
 
 /// Perimeter of the convex hull of points in a plane, m.
 #[must_use]
-pub fn hull_length(points: Vec<DVec2>) -> f64 {
+pub(crate) fn hull_length(points: Vec<DVec2>) -> f64 {
     let [lower, upper] = chains(points);
     let length = |chain: &[DVec2]| chain.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
     length(&lower) + length(&upper)
@@ -81,7 +81,7 @@ pub fn hull_length(points: Vec<DVec2>) -> f64 {
 
 /// Corners of the convex hull of points in a plane, counter-clockwise.
 #[must_use]
-pub fn hull(points: Vec<DVec2>) -> Vec<DVec2> {
+pub(crate) fn hull(points: Vec<DVec2>) -> Vec<DVec2> {
     // Each chain ends where the other begins.
     let without_last = |chain: &Vec<DVec2>| chain[..chain.len().saturating_sub(1)].to_vec();
     chains(points).iter().flat_map(without_last).collect()
@@ -112,7 +112,7 @@ fn chains(mut points: Vec<DVec2>) -> [Vec<DVec2>; 2] {
 
 /// One curve in which a plane cuts a mesh, by what it crosses.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Cut {
+pub struct Cut {
     /// The crossed edges in order, each with its end above the plane first, and how far from there the crossing is, as a share of the edge.
     pub(crate) crossings: Vec<([u32; 2], f64)>,
     /// The triangle between each crossing and the next; of a closed curve also that from the last to the first.

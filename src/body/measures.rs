@@ -190,7 +190,7 @@ pub struct Measures {
 impl Measures {
     /// Stature relative to the default body's 1.68 m; scales what is not measured (head, hands, feet).
     #[must_use]
-    pub fn scale(&self) -> f64 {
+    pub(crate) fn scale(&self) -> f64 {
         self.stature / 1.68
     }
 

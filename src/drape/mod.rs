@@ -52,7 +52,7 @@ pub struct StageTimes {
 impl StageTimes {
     /// What lies between the stages.
     #[must_use]
-    pub fn other(self) -> Duration {
+    pub(crate) fn other(self) -> Duration {
         self.total.saturating_sub(self.distance + self.segment + self.mechanics + self.refine)
     }
 }

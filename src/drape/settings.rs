@@ -29,7 +29,7 @@ impl Default for Model {
 impl Model {
     /// The name on the command line.
     #[must_use]
-    pub fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Paper(_) => "paper",
             Self::Coupled(_) => "coupled",
@@ -38,7 +38,7 @@ impl Model {
 
     /// The model of this name with its defaults.
     #[must_use]
-    pub fn by_name(name: &str) -> Option<Self> {
+    pub(crate) fn by_name(name: &str) -> Option<Self> {
         match name {
             "paper" => Some(Self::Paper(PaperOptions::default())),
             "coupled" => Some(Self::default()),
@@ -57,7 +57,7 @@ impl Model {
 
     /// The extents, cm.
     #[must_use]
-    pub fn extents_cm(&self) -> Vec<f64> {
+    pub(crate) fn extents_cm(&self) -> Vec<f64> {
         match self {
             Self::Paper(_) => Vec::new(),
             // A hundred times what was centimetres is off by an ulp.
@@ -69,7 +69,7 @@ impl Model {
 
     /// With PARTs that move like this; those of the paper's model have one displacement whatever is asked.
     #[must_use]
-    pub fn with_motion(mut self, motion: Motion) -> Self {
+    pub(crate) fn with_motion(mut self, motion: Motion) -> Self {
         if let Self::Coupled(options) = &mut self {
             options.motion = motion;
         }
@@ -87,7 +87,7 @@ impl Model {
 
     /// How far `run` goes after stage two unless asked otherwise: the paper stops there.
     #[must_use]
-    pub fn default_refine(&self) -> Refine {
+    pub(crate) fn default_refine(&self) -> Refine {
         match self {
             Self::Paper(_) => Refine::Steps(0),
             Self::Coupled(_) => Refine::Converged,
@@ -165,7 +165,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`TableError`] where the distances make no table.
-    pub fn resolved(&self, distances_m: &[f64]) -> Result<Self, TableError> {
+    pub(crate) fn resolved(&self, distances_m: &[f64]) -> Result<Self, TableError> {
         Ok(Self { table: self.table.resolve(distances_m)?.into(), ..self.clone() })
     }
 }

@@ -88,7 +88,7 @@ pub enum FabricError {
 }
 
 /// The fabric unless asked otherwise.
-pub const DEFAULT_FABRIC: &str = BUILT_IN[0];
+pub(crate) const DEFAULT_FABRIC: &str = BUILT_IN[0];
 
 impl Default for Fabric {
     /// The first of the built-in ones, a knit.

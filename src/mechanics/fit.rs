@@ -19,7 +19,7 @@ use super::energy::{Cloth, Contacts};
 use crate::base::quantiles::nearest_rank;
 
 /// Principal strain above which a result is no garment that could be worn, %: more than fabrics bear.
-pub const TORN_PERCENT: f64 = 50.0;
+pub(crate) const TORN_PERCENT: f64 = 50.0;
 
 /// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +69,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
 
 /// Largest singular value of the deformation gradient with these columns, less one.
 #[must_use]
-pub fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
+pub(crate) fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
     (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt() - 1.0
 }

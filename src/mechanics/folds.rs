@@ -31,7 +31,7 @@ pub struct Folds {
 
 /// Reads the folds off `cloth` at `x` (m).
 #[must_use]
-pub fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
+pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut sum = vec![DMat3::ZERO; x.len()];
     let mut area = vec![0.0; x.len()];
     for triangle in cloth.triangles.iter().filter(|t| !t.sliver) {

@@ -31,7 +31,7 @@ const LEG: f64 = 0.75;
 
 /// What bridges a garment's open seams.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bridges {
+pub(crate) struct Bridges {
     /// How many triangles.
     pub triangles: usize,
     /// Longest of their sides, m.
@@ -56,7 +56,7 @@ impl Imported {
 impl Bridges {
     /// Those of `mesh`; `None` where it has none.
     #[must_use]
-    pub fn of(mesh: &TriMesh) -> Option<Self> {
+    pub(crate) fn of(mesh: &TriMesh) -> Option<Self> {
         let all: Vec<[f64; 3]> = (0..mesh.triangles.len()).map(|t| sides(mesh.corners(t))).collect();
         let usual_m = nearest_rank(all.as_flattened(), 0.5);
         let longest_m = all.as_flattened().iter().copied().fold(0.0, f64::max);

@@ -90,7 +90,7 @@ impl Coarse {
 
     /// What the coarse vertices have of a list over the fine ones.
     #[must_use]
-    pub fn restrict<T: Copy>(&self, fine: &[T]) -> Vec<T> {
+    pub(crate) fn restrict<T: Copy>(&self, fine: &[T]) -> Vec<T> {
         self.vertices.iter().map(|&v| fine[v as usize]).collect()
     }
 

@@ -33,7 +33,7 @@ pub struct FlatPattern {
 impl FlatPattern {
     /// Looks for it; `None` where triangles have no texture coordinates or these are no pattern.
     #[must_use]
-    pub fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
+    pub(crate) fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
         let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
         let mut whole = 0.0;
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);

@@ -25,7 +25,7 @@ const ELEMENTS: u32 = 34963;
 ///
 /// # Errors
 /// [`MeshError::WrongCount`] where there are not as many colours as vertices, [`MeshError::Unwritable`].
-pub fn write_glb(path: &Path, mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Result<(), MeshError> {
+pub(crate) fn write_glb(path: &Path, mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Result<(), MeshError> {
     let expected = mesh.vertex_count();
     if let Some(found) = colours.map(<[_]>::len).filter(|&found| found != expected) {
         return Err(MeshError::WrongCount { found, expected });

@@ -74,7 +74,7 @@ pub struct RestShape {
 impl RestShape {
     /// Triangles of these corners (m), all cut from one fabric.
     #[must_use]
-    pub fn new(corners: Vec<[DVec2; 3]>) -> Self {
+    pub(crate) fn new(corners: Vec<[DVec2; 3]>) -> Self {
         Self { corners, cut_from: Vec::new() }
     }
 

@@ -45,7 +45,7 @@ pub struct Face {
 impl Face {
     /// Its own among the corners of all faces.
     #[must_use]
-    pub fn among<'a>(&self, corners: &'a [Corner]) -> &'a [Corner] {
+    pub(crate) fn among<'a>(&self, corners: &'a [Corner]) -> &'a [Corner] {
         &corners[self.first as usize..(self.first + self.count) as usize]
     }
 }

@@ -66,12 +66,12 @@ impl Topology {
 
     /// Index of the edge between two vertices.
     #[must_use]
-    pub fn edge_between(&self, a: u32, b: u32) -> Option<usize> {
+    pub(crate) fn edge_between(&self, a: u32, b: u32) -> Option<usize> {
         self.edges.binary_search(&[a.min(b), a.max(b)]).ok()
     }
 
     /// The edges of one triangle, ascending.
-    pub fn boundary_edges(&self) -> impl Iterator<Item = [u32; 2]> {
+    pub(crate) fn boundary_edges(&self) -> impl Iterator<Item = [u32; 2]> {
         self.edges.iter().zip(&self.edge_valence).filter(|(_, valence)| **valence == 1).map(|(edge, _)| *edge)
     }
 

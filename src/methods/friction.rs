@@ -26,7 +26,7 @@ use crate::mechanics::energy::friction::ELASTIC_SLIP;
 use crate::mesh::outer;
 
 /// Tangential way in a step below which a slipping vertex takes hold, m: in steps of 20 ms an eighth of the speed that counts as rest.
-pub const SLOW: f64 = 2.5e-5;
+pub(crate) const SLOW: f64 = 2.5e-5;
 
 /// What a touching vertex does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +49,7 @@ struct Held {
 
 /// The friction of every touching vertex.
 #[derive(Debug, Clone, Default)]
-pub struct Grip {
+pub(crate) struct Grip {
     coefficient: f64,
     held: Vec<Held>,
 }
@@ -57,12 +57,12 @@ pub struct Grip {
 impl Grip {
     /// With Coulomb's coefficient.
     #[must_use]
-    pub fn new(coefficient: f64) -> Self {
+    pub(crate) fn new(coefficient: f64) -> Self {
         Self { coefficient, held: Vec::new() }
     }
 
     /// Takes what touches at `x` (m), after a step in which the vertices went `way` (m).
-    pub fn refresh(&mut self, touches: &[Touch], x: &[DVec3], way: impl Fn(usize) -> DVec3) {
+    pub(crate) fn refresh(&mut self, touches: &[Touch], x: &[DVec3], way: impl Fn(usize) -> DVec3) {
         if self.coefficient <= 0.0 {
             return;
         }
@@ -86,7 +86,7 @@ impl Grip {
     }
 
     /// Vertex, force (N) where the step begins, and stiffness (N/m) of each.
-    pub fn terms<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DVec3, DMat3)> + 'a {
+    pub(crate) fn terms<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DVec3, DMat3)> + 'a {
         self.held.iter().map(|h| {
             let n = h.normal;
             let tangent = DMat3::IDENTITY - outer(n, n);

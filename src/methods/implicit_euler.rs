@@ -74,7 +74,7 @@ impl Obstacle for Contacts<'_> {
 
 /// What a march goes by: the method's name for errors, how to move, when to stop.
 #[derive(Debug, Clone, Copy)]
-pub struct Course<'a> {
+pub(crate) struct Course<'a> {
     /// The method.
     pub method: &'static str,
     /// How it is moved.

@@ -18,7 +18,7 @@ const CHUNK: usize = 512;
 
 /// A symmetric matrix of 3×3 blocks, all of them, by rows with columns ascending.
 #[derive(Debug, Clone, Default)]
-pub struct BlockRows {
+pub(crate) struct BlockRows {
     /// Columns of the blocks of each row.
     pub(super) columns: Lists<u32>,
     /// Index of each row's diagonal block.
@@ -30,7 +30,7 @@ pub struct BlockRows {
 impl BlockRows {
     /// All zero, with blocks at `pairs` (each once or oftener, in any order), their transposes and the diagonal.
     #[must_use]
-    pub fn new(rows: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
+    pub(crate) fn new(rows: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let mut all: Vec<u64> = (0..rows as u64).map(|i| i << 32 | i).collect();
         all.extend(pairs.flat_map(|(i, j)| [u64::from(i) << 32 | u64::from(j), u64::from(j) << 32 | u64::from(i)]));
         all.par_sort_unstable();
@@ -43,13 +43,13 @@ impl BlockRows {
 
     /// Number of rows.
     #[must_use]
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.columns.len()
     }
 
     /// Index of the block in row `i`, column `j`.
     #[must_use]
-    pub fn at(&self, i: u32, j: u32) -> Option<u32> {
+    pub(crate) fn at(&self, i: u32, j: u32) -> Option<u32> {
         let found = self.columns.of(i as usize).binary_search(&j).ok();
         found.map(|k| (self.columns.range(i as usize).start + k) as u32)
     }
@@ -82,7 +82,7 @@ impl Operator for BlockRows {
 }
 
 /// A linear system (A + B) d = b with block diagonal B.
-pub struct System<'a> {
+pub(crate) struct System<'a> {
     /// A.
     pub matrix: &'a mut dyn Operator,
     /// B.
@@ -109,7 +109,7 @@ impl System<'_> {
 
 /// Conjugate gradients with their memory, which is made once.
 #[derive(Debug, Clone, Default)]
-pub struct ConjugateGradients {
+pub(crate) struct ConjugateGradients {
     inverse: Vec<Mat3A>,
     rest: Vec<Vec3A>,
     direction: Vec<Vec3A>,
@@ -119,7 +119,7 @@ pub struct ConjugateGradients {
 impl ConjugateGradients {
     /// Improves `d` until the residual is under `tolerance` of the right side's, both in the preconditioner's norm, or for
     /// `most` iterations. Returns the number of iterations.
-    pub fn solve(&mut self, mut system: System<'_>, (tolerance, most): (f64, usize), d: &mut [Vec3A]) -> usize {
+    pub(crate) fn solve(&mut self, mut system: System<'_>, (tolerance, most): (f64, usize), d: &mut [Vec3A]) -> usize {
         let n = d.len();
         let Self { inverse, rest, direction, image } = self;
         for list in [&mut *rest, &mut *direction, &mut *image] {

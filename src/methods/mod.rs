@@ -75,7 +75,7 @@ pub struct Moment<'a> {
 }
 
 /// Told of every step; may end the run.
-pub type Spectator<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Send);
+pub(crate) type Spectator<'a> = &'a mut (dyn FnMut(&Moment<'_>) -> ControlFlow<()> + Send);
 
 /// What a method has to show besides the garment.
 #[derive(Debug, Clone)]
@@ -149,7 +149,7 @@ impl MethodError {
 }
 
 /// The drape, or why there is none.
-pub type MethodOutcome = Result<MethodDrape, MethodError>;
+pub(crate) type MethodOutcome = Result<MethodDrape, MethodError>;
 
 /// A way to drape a garment, from the placed start to rest.
 pub trait ReferenceMethod: Sync {
@@ -174,12 +174,12 @@ pub trait ReferenceMethod: Sync {
 }
 
 /// Names of the methods, in the order of the paper's references.
-pub const METHODS: [&str; 3] = [zhu2016::NAME, gross2003::NAME, thomaszewski2006::NAME];
+pub(crate) const METHODS: [&str; 3] = [zhu2016::NAME, gross2003::NAME, thomaszewski2006::NAME];
 
 /// The method of a name, with its defaults; `exhibit` asks for what it has to show besides the garment, and `sewn` are the panels
 /// of a garment that was sewn of any.
 #[must_use]
-pub fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<Box<dyn ReferenceMethod>> {
+pub(crate) fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<Box<dyn ReferenceMethod>> {
     match name {
         gross2003::NAME => Some(Box::new(gross2003::Gross2003 { exhibit, sewn: sewn.cloned(), ..Default::default() })),
         zhu2016::NAME => Some(Box::new(zhu2016::Zhu2016 { exhibit, ..Default::default() })),

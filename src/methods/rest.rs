@@ -52,12 +52,12 @@ pub struct Rest {
 impl Rest {
     /// At the start, nothing is known.
     #[must_use]
-    pub fn new(rule: RestRule) -> Self {
+    pub(crate) fn new(rule: RestRule) -> Self {
         Self { rule, time_s: 0.0, slow_for_s: 0.0 }
     }
 
     /// After a step of `h` seconds at whose end the vertices have this RMS speed, m/s.
-    pub fn after(&mut self, h: f64, rms_speed: f64) -> Option<Ended> {
+    pub(crate) fn after(&mut self, h: f64, rms_speed: f64) -> Option<Ended> {
         self.time_s += h;
         self.slow_for_s = if rms_speed < self.rule.speed_m_per_s { self.slow_for_s + h } else { 0.0 };
         // Sums of steps fall short of the whole by rounding.
@@ -72,7 +72,7 @@ impl Rest {
 
     /// Simulated time so far, s.
     #[must_use]
-    pub fn time_s(&self) -> f64 {
+    pub(crate) fn time_s(&self) -> f64 {
         self.time_s
     }
 }

@@ -25,7 +25,7 @@ const LEAST_SHARE: f64 = 0.02;
 
 /// Which unit each triangle is in, and whether each unit is a limb: one that ends.
 #[derive(Debug, Clone)]
-pub struct Segments {
+pub(crate) struct Segments {
     /// Unit of each triangle.
     pub of_triangle: Vec<u32>,
     /// Whether each unit ends.
@@ -53,7 +53,7 @@ impl Segments {
 
     /// Cuts a connected body; further components are units of their own.
     #[must_use]
-    pub fn new(mesh: &TriMesh, topology: &Topology) -> Self {
+    pub(crate) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let distance = geodesics(mesh, topology);
         let farthest = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
         let edge =
@@ -194,7 +194,7 @@ fn units(rings: &[Ring]) -> Vec<usize> {
 }
 
 /// The direction in which weighted points about the origin spread most, by power iteration on their covariance.
-pub fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
+pub(crate) fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
     let mut covariance = DMat3::ZERO;
     for (p, w) in points {
         covariance += outer(p, p) * w;

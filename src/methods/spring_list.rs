@@ -26,7 +26,7 @@ const FOLD_RADIUS: f64 = 0.02;
 const MEAN_COS_8: f64 = 35.0 / 128.0;
 /// A spring between two vertices.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spring {
+pub(crate) struct Spring {
     /// Its ends.
     pub ends: [u32; 2],
     /// Rest length, m.
@@ -50,7 +50,12 @@ struct Edge {
 
 /// Structural springs, one for each edge in the topology's order, and bending springs.
 #[must_use]
-pub fn springs(triangles: &[[u32; 3]], topology: &Topology, rest: &RestShape, fabric: &Fabric) -> [Vec<Spring>; 2] {
+pub(crate) fn springs(
+    triangles: &[[u32; 3]],
+    topology: &Topology,
+    rest: &RestShape,
+    fabric: &Fabric,
+) -> [Vec<Spring>; 2] {
     let mut edges = vec![Edge::default(); topology.edges.len()];
     let mut bends: Vec<([u32; 2], f64, f64, usize)> = Vec::new();
     for (triangle, corners) in triangles.iter().zip(&rest.corners) {

@@ -84,14 +84,14 @@ impl Range {
     /// From zero to a round number at or above the `share` quantile of the finite values (1.0 = the largest). A few
     /// outliers (a PART of one vertex, say) would else press all others into the first colour.
     #[must_use]
-    pub fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
+    pub(crate) fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
         let finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
         Self { low: 0.0, high: round_up(nearest_rank(&finite, share)) }
     }
 
     /// Where `value` lies: 0 at the low end, 1 at the high end.
     #[must_use]
-    pub fn place(&self, value: f64) -> f64 {
+    pub(crate) fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 }

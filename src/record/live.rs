@@ -78,7 +78,7 @@ pub struct LiveEncoder {
 
 impl LiveEncoder {
     /// An encoder for a session of this name, whose wearer looks along `front`; `id` tells it from other sessions.
-    pub fn new(name: &str, id: &str, front: DVec3) -> Result<Self, RecordError> {
+    pub(crate) fn new(name: &str, id: &str, front: DVec3) -> Result<Self, RecordError> {
         let (name, id) = (name.to_owned(), id.to_owned());
         let builder = move || {
             RecordingStreamBuilder::new(application(&name)).recording_id(id.clone()).recording_name(name.as_str())
@@ -97,7 +97,12 @@ impl LiveEncoder {
     }
 
     /// Body, garment, what is pinned, and the layout: a viewer needs it before anything else, and all else after it again.
-    pub fn base(&mut self, body: &TriMesh, garment: &TriMesh, pins: &[PinnedView<'_>]) -> Result<Vec<u8>, RecordError> {
+    pub(crate) fn base(
+        &mut self,
+        body: &TriMesh,
+        garment: &TriMesh,
+        pins: &[PinnedView<'_>],
+    ) -> Result<Vec<u8>, RecordError> {
         if self.garment != *garment {
             self.garment = garment.clone();
             self.cells = CellMesh::new(garment);
@@ -127,7 +132,7 @@ impl LiveEncoder {
     }
 
     /// Which PART each vertex belongs to, the levels that made them, and the body's reaction on each, N (none: no arrows).
-    pub fn parts(
+    pub(crate) fn parts(
         &mut self,
         part_of_vertex: &[u32],
         levels: &[LevelCount],
@@ -154,7 +159,7 @@ impl LiveEncoder {
     }
 
     /// Where a garment is, m.
-    pub fn shape(&mut self, which: LiveShape, positions: &[DVec3]) -> Result<Vec<u8>, RecordError> {
+    pub(crate) fn shape(&mut self, which: LiveShape, positions: &[DVec3]) -> Result<Vec<u8>, RecordError> {
         RecordError::unless_per_vertex(self.garment.vertex_count(), &[("positions", positions.len())])?;
         let moved = self.garment.with_positions(positions.to_vec());
         self.stream.log_static(which.path(), &meshes::shape(&moved))?;

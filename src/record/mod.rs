@@ -105,7 +105,7 @@ pub struct RecordSummary {
 impl RecordSummary {
     /// Where the file is, in words, where there is one.
     #[must_use]
-    pub fn said(&self) -> Option<String> {
+    pub(crate) fn said(&self) -> Option<String> {
         self.path.as_ref().map(|path| format!("recording: {}", path.display()))
     }
 }
@@ -144,7 +144,7 @@ impl Recorder {
     }
 
     /// Which of several fabrics each vertex of the garment is cut from, so that they are told apart in the drape.
-    pub fn cut_from(&mut self, index: i64, fabric_of_vertex: &[u16]) -> Result<(), RecordError> {
+    pub(crate) fn cut_from(&mut self, index: i64, fabric_of_vertex: &[u16]) -> Result<(), RecordError> {
         self.timed(|open| {
             RecordError::unless_per_vertex(open.garment.positions.len(), &[("fabrics", fabric_of_vertex.len())])?;
             open.at(index, 1);
@@ -154,7 +154,7 @@ impl Recorder {
 
     /// Sets what the ends of a quantity's colour map stand for (`error` in mm, `force` in N), for a recording whose steps are known
     /// beforehand; without it the first step's values do.
-    pub fn scale(&mut self, quantity: &str, range: Range) {
+    pub(crate) fn scale(&mut self, quantity: &str, range: Range) {
         if let Some(open) = &self.open {
             open.scale(quantity, || range);
         }
@@ -200,12 +200,12 @@ impl Recorder {
     }
 
     /// The garment after a step in time of a reference method, m/s and m.
-    pub fn moment(&mut self, step: i64, rms_speed: f64, positions: Option<&[DVec3]>) -> Result<(), RecordError> {
+    pub(crate) fn moment(&mut self, step: i64, rms_speed: f64, positions: Option<&[DVec3]>) -> Result<(), RecordError> {
         self.timed(|open| method::moment(open, step, rms_speed, positions))
     }
 
     /// What a reference method made.
-    pub fn method(&mut self, view: &MethodView<'_>) -> Result<(), RecordError> {
+    pub(crate) fn method(&mut self, view: &MethodView<'_>) -> Result<(), RecordError> {
         self.timed(|open| method::log(open, view))
     }
 
@@ -215,17 +215,17 @@ impl Recorder {
     }
 
     /// Lines along the folds that no PART shows.
-    pub fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
+    pub(crate) fn folds(&mut self, view: &FoldView<'_>) -> Result<(), RecordError> {
         self.timed(|open| folds::log(open, view))
     }
 
     /// Garments worn over each other, in the colours of the step before.
-    pub fn outfit(&mut self, view: &OutfitView<'_>) -> Result<(), RecordError> {
+    pub(crate) fn outfit(&mut self, view: &OutfitView<'_>) -> Result<(), RecordError> {
         self.timed(|open| outfit::log(open, view))
     }
 
     /// The flat panels of a sewing pattern in the colours of the step before.
-    pub fn pattern(&mut self, view: &PatternView<'_>) -> Result<(), RecordError> {
+    pub(crate) fn pattern(&mut self, view: &PatternView<'_>) -> Result<(), RecordError> {
         self.timed(|open| pattern::log(open, view))
     }
 
@@ -248,7 +248,7 @@ impl Recorder {
     ///
     /// # Errors
     /// A file that cannot be written, a viewer that went away.
-    pub fn flush(&mut self) -> Result<(), RecordError> {
+    pub(crate) fn flush(&mut self) -> Result<(), RecordError> {
         self.timed(|open| open.flush_live())
     }
 

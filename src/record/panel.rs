@@ -32,7 +32,7 @@ pub struct Panel {
 impl Panel {
     /// The panel as Markdown.
     #[must_use]
-    pub fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let mut text = String::new();
         if !self.title.is_empty() {
             line(&mut text, format_args!("## {}\n", self.title));

@@ -28,7 +28,7 @@ impl<'a> Picture<'a> {
 
     /// How times grow.
     #[must_use]
-    pub fn of_growth() -> Self {
+    pub(crate) fn of_growth() -> Self {
         Self { path: paths::GROWTH, x: "vertices", y: "time, ms" }
     }
 }

@@ -56,7 +56,7 @@ impl Sink {
     ///
     /// # Errors
     /// As [`Recorder::open`](super::Recorder::open).
-    pub fn check(&self) -> Result<(), RecordError> {
+    pub(crate) fn check(&self) -> Result<(), RecordError> {
         let Self::File(path) = self else { return Ok(()) };
         // Folders that a relative path lacks will be made.
         if path.is_relative() && !folder_of(path).exists() {

@@ -14,7 +14,7 @@ type Rgba = [u8; 4];
 ///
 /// `part_of_vertex`: PART of each vertex of `garment`, or [`UNASSIGNED`](crate::parts::UNASSIGNED), of `parts`; `levels`: what makes them.
 #[must_use]
-pub fn by_parts(garment: &TriMesh, part_of_vertex: &[u32], parts: usize, levels: &[LevelCount]) -> Vec<Rgba> {
+pub(crate) fn by_parts(garment: &TriMesh, part_of_vertex: &[u32], parts: usize, levels: &[LevelCount]) -> Vec<Rgba> {
     let part_of_vertex = covering(part_of_vertex, parts);
     let all = parts + usize::from(part_of_vertex.contains(&(parts as u32)));
     let chosen = colour_parts(&part_of_vertex, all, levels, &garment.triangles, &[]);
@@ -23,7 +23,7 @@ pub fn by_parts(garment: &TriMesh, part_of_vertex: &[u32], parts: usize, levels:
 
 /// Values as in the views of the fit, by a scale of their own.
 #[must_use]
-pub fn by_values(overlay: &Overlay<'_>) -> Vec<Rgba> {
+pub(crate) fn by_values(overlay: &Overlay<'_>) -> Vec<Rgba> {
     ColourMap::ALARM.colours(overlay.values, own_range(overlay)).into_iter().map(opaque).collect()
 }
 

@@ -15,7 +15,7 @@ use super::page::{self, Server};
 use super::sinks::{WHOLE_HISTORY, listen_for_pages, serve};
 
 /// A page that shows a recording; it is served for as long as this lives.
-pub struct WebViewer {
+pub(crate) struct WebViewer {
     _page: Server,
     url: String,
 }
@@ -31,7 +31,7 @@ impl WebViewer {
 
     /// The address to open in a browser.
     #[must_use]
-    pub fn url(&self) -> &str {
+    pub(crate) fn url(&self) -> &str {
         &self.url
     }
 }
@@ -54,7 +54,7 @@ impl Served {
 ///
 /// # Errors
 /// An unreadable file, or one that is no recording.
-pub fn check_file(path: &Path) -> Result<(), RecordError> {
+pub(crate) fn check_file(path: &Path) -> Result<(), RecordError> {
     read(path).map(|_| ())
 }
 

@@ -110,7 +110,7 @@ impl Scene {
     /// What has fallen off the body at `x` (m): connected parts of which nothing is held and all is below the body. They
     /// meet nothing any more, and would fall for ever.
     #[must_use]
-    pub fn fallen(&self, x: &[DVec3]) -> Option<Fallen> {
+    pub(crate) fn fallen(&self, x: &[DVec3]) -> Option<Fallen> {
         let fallen = self.fallen_parts(x);
         let what = format!("{} {}", self.named(&fallen), if fallen.len() > 1 { "have" } else { "has" });
         (!fallen.is_empty()).then(|| Fallen { what, hold: self.how_to_hold(&fallen) })

@@ -99,7 +99,7 @@ impl FromStr for DistanceTo {
 
 impl Scene {
     /// What garment number `k` lies on where the vertices are at `x` (m): the body, and the garments below it.
-    pub fn below(&self, k: usize, x: &[DVec3]) -> Result<Body, SceneError> {
+    pub(crate) fn below(&self, k: usize, x: &[DVec3]) -> Result<Body, SceneError> {
         if k == 0 {
             return Ok(self.body.clone());
         }
@@ -107,7 +107,7 @@ impl Scene {
     }
 
     /// Garment number `k` by itself, put over what lies below it where the vertices are at `x` (m).
-    pub fn alone(&self, k: usize, x: &[DVec3]) -> Result<Self, SceneError> {
+    pub(crate) fn alone(&self, k: usize, x: &[DVec3]) -> Result<Self, SceneError> {
         let layer = self.layers[k].clone();
         let mut garment = self.cut_out(&layer, x);
         if k > 0 {
@@ -133,7 +133,7 @@ impl Scene {
 
     /// Where the vertices are once each garment, at `x` (m), is lifted off those below it where it was through them.
     #[must_use]
-    pub fn lifted_off(&self, mut x: Vec<DVec3>) -> Vec<DVec3> {
+    pub(crate) fn lifted_off(&self, mut x: Vec<DVec3>) -> Vec<DVec3> {
         for k in 1..self.layers.len() {
             let mut outer = self.cut_out(&self.layers[k], &x);
             lift_off(&mut outer, &self.cut_out(&self.all_below(k), &x));

@@ -98,7 +98,7 @@ impl SceneSpec {
     ///
     /// # Errors
     /// As there.
-    pub fn load_with(&self, meshes: &MeshCache) -> Result<Loaded, SceneError> {
+    pub(crate) fn load_with(&self, meshes: &MeshCache) -> Result<Loaded, SceneError> {
         self.check_names()?;
         // What is made is cut for the form's measurements, not for its mesh: both at once.
         let (body, made) = rayon::join(|| self.load_body(meshes), || self.make_garment(meshes));

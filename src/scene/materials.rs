@@ -40,7 +40,7 @@ pub struct Swatch {
 impl Swatch {
     /// The same by the name of its fabric, `of_settings` being that of what names none itself.
     #[must_use]
-    pub fn cut_from(&self, of_settings: &Fabric) -> Self {
+    pub(crate) fn cut_from(&self, of_settings: &Fabric) -> Self {
         Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
     }
 }
@@ -65,7 +65,7 @@ impl SceneSpec {
 
     /// The file that names the fabrics of the garment's panels: the one that is given, or one beside the garment's.
     #[must_use]
-    pub fn names_of_fabrics(&self) -> Option<PathBuf> {
+    pub(crate) fn names_of_fabrics(&self) -> Option<PathBuf> {
         if let Some(file) = &self.fabrics_file {
             return Some(file.into());
         }
@@ -78,7 +78,7 @@ impl SceneSpec {
 
     /// All files that say what the garments are cut from.
     #[must_use]
-    pub fn files_of_fabrics(&self) -> Vec<PathBuf> {
+    pub(crate) fn files_of_fabrics(&self) -> Vec<PathBuf> {
         let mut files: Vec<PathBuf> =
             self.fabrics.iter().filter(|name| names_a_file(name)).map(PathBuf::from).collect();
         for path in self.layers().filter_map(|layer| layer.names_of_fabrics()) {
@@ -170,7 +170,7 @@ impl Scene {
 
     /// The number of the fabric of each vertex, of several the last.
     #[must_use]
-    pub fn fabric_of_vertices(&self) -> Vec<u16> {
+    pub(crate) fn fabric_of_vertices(&self) -> Vec<u16> {
         let mut fabric = vec![0; self.garment.vertex_count()];
         for (t, triangle) in self.garment.triangles.iter().enumerate() {
             let of = self.rest.fabric_of(t) as u16;

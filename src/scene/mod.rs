@@ -95,7 +95,7 @@ impl Scene {
 
     /// Whether each garment vertex is held.
     #[must_use]
-    pub fn is_held(&self) -> Vec<bool> {
+    pub(crate) fn is_held(&self) -> Vec<bool> {
         let mut held = vec![false; self.garment.vertex_count()];
         for &v in &self.held {
             // One that does not exist is the cloth's to refuse.
@@ -110,7 +110,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] where a garment is no surface that a distance can be measured to.
-    pub fn surface(&self) -> Result<Vec<SurfacePoint>, SceneError> {
+    pub(crate) fn surface(&self) -> Result<Vec<SurfacePoint>, SceneError> {
         let mut surface = self.body.nearest_all(&self.garment.positions);
         if self.distance_to == DistanceTo::Below {
             self.nearer_below(&mut surface)?;

@@ -40,7 +40,7 @@ impl Placement {
 
     /// Name and value of each figure, as a table wants them.
     #[must_use]
-    pub fn rows(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn rows(&self) -> Vec<(&'static str, String)> {
         let inside = match self.penetrating_vertices {
             0 => "none".to_owned(),
             n => format!("{n} vertices, up to {:.1} mm deep", 1e3 * self.deepest_m),

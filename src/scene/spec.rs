@@ -104,7 +104,7 @@ impl SceneSpec {
 
     /// What the garment is called where one name will do, a recording's for one.
     #[must_use]
-    pub fn garment_name(&self) -> String {
+    pub(crate) fn garment_name(&self) -> String {
         if !self.over.is_empty() {
             return self.layers().map(|layer| layer.layer_name()).collect::<Vec<_>>().join("-under-");
         }
@@ -145,7 +145,7 @@ impl SceneSpec {
 
     /// Whether the garment is a sewing pattern.
     #[must_use]
-    pub fn is_a_pattern(&self) -> bool {
+    pub(crate) fn is_a_pattern(&self) -> bool {
         has_ending(self.garment.as_ref(), "json")
     }
 
@@ -171,7 +171,7 @@ impl SceneSpec {
     }
 
     /// The form's measurements, where the body is a file of them from there.
-    pub fn form(&self) -> Result<BodySpec, SceneError> {
+    pub(crate) fn form(&self) -> Result<BodySpec, SceneError> {
         if !is_toml(&self.body) {
             return Ok(self.measurements.clone());
         }

@@ -129,7 +129,7 @@ pub struct Edit {
 impl Edit {
     /// The names of files and built-in things in it: whoever takes edits from strangers looks at them first.
     #[must_use]
-    pub fn names(&self) -> Vec<&str> {
+    pub(crate) fn names(&self) -> Vec<&str> {
         let table = self.table.iter().filter_map(|t| if let TableEdit::Name(name) = t { Some(name) } else { None });
         let fabric = self.fabric.iter().filter_map(|f| if let FabricEdit::Name(name) = f { Some(name) } else { None });
         self.body.iter().chain(&self.garment).chain(table).chain(fabric).map(String::as_str).collect()
@@ -139,7 +139,7 @@ impl Edit {
     ///
     /// # Errors
     /// [`EditError`] says what was found and expected.
-    pub fn applied(&self, job: &Job) -> Result<Job, EditError> {
+    pub(crate) fn applied(&self, job: &Job) -> Result<Job, EditError> {
         let mut job = job.clone();
         self.change_scene(&mut job)?;
         let settings = &mut job.settings;

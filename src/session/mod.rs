@@ -85,7 +85,7 @@ impl Session {
     }
 
     /// Hands in a whole job, as [`submit`](Self::submit).
-    pub fn submit_job(&self, job: Job) -> Result<u64, EditError> {
+    pub(crate) fn submit_job(&self, job: Job) -> Result<u64, EditError> {
         check(&job)?;
         self.change(|desk| desk.take(job, None))
     }
@@ -146,7 +146,7 @@ impl Session {
 
     /// Whether it was ended.
     #[must_use]
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         self.0.closed.load(Ordering::SeqCst)
     }
 

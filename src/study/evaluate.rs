@@ -59,7 +59,7 @@ pub enum AssessError {
 
 /// What is asked of an assessment.
 #[derive(Debug, Clone, Default)]
-pub struct AssessOptions {
+pub(crate) struct AssessOptions {
     /// Where references are kept; `None` computes them anew.
     pub cache: Option<ReferenceCache>,
     /// Perturbed starts for the spread of the canonical drape.
@@ -88,7 +88,7 @@ pub struct Assessment {
 ///
 /// # Errors
 /// [`AssessError`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
-pub fn assess(
+pub(crate) fn assess(
     scene: &Scene,
     settings: &Settings,
     drape: &Drape,
@@ -139,7 +139,7 @@ pub fn assess(
 
 /// The canonical drape of a scene alone, found or made, and what the user should know about it: what a range table can hold
 /// at best is measured on it.
-pub fn canonical(
+pub(crate) fn canonical(
     scene: &Scene,
     fabric: &Fabric,
     options: &AssessOptions,

@@ -38,7 +38,7 @@ impl Body {
     ///
     /// # Errors
     /// [`DistanceError`] where the cloth has no triangles.
-    pub fn wearing(&self, cloth: &TriMesh) -> Result<Self, DistanceError> {
+    pub(crate) fn wearing(&self, cloth: &TriMesh) -> Result<Self, DistanceError> {
         let on_edge = Topology::new(cloth).boundary_vertices();
         let worn = Worn { cloth: Box::new(Self::new_open(cloth)?), on_edge };
         Ok(Self { worn: Some(worn), lattice: Arc::default(), ..self.clone() })

@@ -17,7 +17,7 @@ pub(crate) struct Iteration {
 
 /// What a search came to.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(super) struct Found {
     /// Every iteration, levels alone first.
     pub(crate) iterations: Vec<Iteration>,
     /// How many of them are of levels alone.

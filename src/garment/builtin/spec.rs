@@ -126,7 +126,7 @@ impl GarmentSpec {
     }
 
     /// Checks every length.
-    pub fn check(&self) -> Result<(), ShapeError> {
+    pub(crate) fn check(&self) -> Result<(), ShapeError> {
         let (sleeves, neckline) = (self.sleeves.as_ref(), self.neckline.as_ref());
         let lengths = [
             ("length_cm", Some(self.length_cm), 15.0, 160.0),

@@ -43,7 +43,7 @@ impl Curve {
     /// The arc from `a` to `b` of this radius, as in SVG but y up: the longer one if `large`, counter-clockwise (it bulges to the right
     /// of a → b) if `right`. `None` where the radius does not reach.
     #[must_use]
-    pub fn arc(a: DVec2, b: DVec2, radius: f64, large: bool, right: bool) -> Option<Self> {
+    pub(crate) fn arc(a: DVec2, b: DVec2, radius: f64, large: bool, right: bool) -> Option<Self> {
         let half = 0.5 * (b - a);
         // A half circle's radius is rounded in files.
         let short = half.length() - radius;
@@ -66,7 +66,7 @@ impl Curve {
 
     /// Where it begins.
     #[must_use]
-    pub fn start(&self) -> DVec2 {
+    pub(crate) fn start(&self) -> DVec2 {
         match *self {
             Self::Line { a, .. } | Self::Quadratic { a, .. } | Self::Cubic { a, .. } | Self::Arc { a, .. } => a,
         }
@@ -74,7 +74,7 @@ impl Curve {
 
     /// Where it ends.
     #[must_use]
-    pub fn end(&self) -> DVec2 {
+    pub(crate) fn end(&self) -> DVec2 {
         match *self {
             Self::Line { b, .. } | Self::Quadratic { b, .. } | Self::Cubic { b, .. } | Self::Arc { b, .. } => b,
         }
@@ -82,7 +82,7 @@ impl Curve {
 
     /// p(t); the ends are exact.
     #[must_use]
-    pub fn at(&self, t: f64) -> DVec2 {
+    pub(crate) fn at(&self, t: f64) -> DVec2 {
         if t <= 0.0 {
             return self.start();
         }
@@ -119,7 +119,7 @@ impl Curve {
 
     /// Length, m.
     #[must_use]
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match *self {
             Self::Line { a, b } => a.distance(b),
             Self::Arc { radius, turn, .. } => radius * turn.abs(),
@@ -129,7 +129,7 @@ impl Curve {
 
     /// `count` + 1 points at equal lengths along it, both ends among them.
     #[must_use]
-    pub fn divided(&self, count: usize) -> Vec<DVec2> {
+    pub(crate) fn divided(&self, count: usize) -> Vec<DVec2> {
         let share = |i: usize| i as f64 / count as f64;
         if let Self::Line { .. } | Self::Arc { .. } = self {
             return (0..=count).map(|i| self.at(share(i))).collect();
@@ -166,7 +166,7 @@ impl Curve {
 
     /// ½ ∮ p × dp along it: the edges of a loop add up to its area, m², positive counter-clockwise.
     #[must_use]
-    pub fn area(&self) -> f64 {
+    pub(crate) fn area(&self) -> f64 {
         if let Self::Arc { centre, radius, turn, a, b, .. } = *self {
             return 0.5 * (centre.perp_dot(b - a) + radius * radius * turn);
         }

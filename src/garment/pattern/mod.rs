@@ -34,7 +34,7 @@ pub use sew::{SewnGarment, SewnSeam};
 use crate::base::files::{read_text, stem};
 
 /// Edge length of a meshed pattern where none is asked for, m.
-pub const DEFAULT_EDGE_M: f64 = 0.015;
+pub(crate) const DEFAULT_EDGE_M: f64 = 0.015;
 
 /// One edge of a panel.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,7 +134,7 @@ impl SewingPattern {
 
     /// The edge at a place.
     #[must_use]
-    pub fn edge(&self, at: EdgeAt) -> &PanelEdge {
+    pub(crate) fn edge(&self, at: EdgeAt) -> &PanelEdge {
         &self.panels[at.panel].edges[at.edge]
     }
 
@@ -145,7 +145,7 @@ impl SewingPattern {
     }
 
     /// A stitch of which one edge is longer than the other by this is gathered, as a share.
-    pub const GATHERED: f64 = 0.02;
+    pub(crate) const GATHERED: f64 = 0.02;
 
     /// How much longer the longer side of a stitch is than the shorter, 1 and more.
     #[must_use]
@@ -156,7 +156,7 @@ impl SewingPattern {
 
     /// An edge as messages name it.
     #[must_use]
-    pub fn edge_name(&self, at: EdgeAt) -> String {
+    pub(crate) fn edge_name(&self, at: EdgeAt) -> String {
         format!("{}.{}", self.panels[at.panel].name, at.edge)
     }
 }

@@ -214,7 +214,7 @@ impl SewnGarment {
 
     /// The panels beside each other and not sewn, m, x to the right and z up, and the garment's vertex that each of their vertices is.
     #[must_use]
-    pub fn unsewn(&self, pattern: &SewingPattern) -> (TriMesh, Vec<u32>) {
+    pub(crate) fn unsewn(&self, pattern: &SewingPattern) -> (TriMesh, Vec<u32>) {
         let (mut mesh, mut of) = (TriMesh::default(), Vec::new());
         for (panel, offset) in self.panels.iter().zip(laid_out(pattern)) {
             let first = of.len() as u32;
@@ -228,7 +228,7 @@ impl SewnGarment {
     /// This garment laid over `coarse`, the same pattern in longer edges with its vertices at `positions` (m): each vertex goes where
     /// the cloth under it is.
     #[must_use]
-    pub fn over(&self, coarse: &Self, positions: &[DVec3]) -> Vec<DVec3> {
+    pub(crate) fn over(&self, coarse: &Self, positions: &[DVec3]) -> Vec<DVec3> {
         let mut placed = vec![None; self.mesh.vertex_count()];
         for (fine, coarse) in self.panels.iter().zip(&coarse.panels) {
             for (i, &v) in fine.vertices.iter().enumerate() {

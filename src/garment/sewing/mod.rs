@@ -63,7 +63,7 @@ pub struct PutOn {
 ///
 /// # Errors
 /// As [`SewingPattern::sew`].
-pub fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn, PatternError> {
+pub(crate) fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn, PatternError> {
     let began = Instant::now();
     let landmarks = Landmarks::of(body.mesh());
     let mut pattern = pattern.clone();
@@ -129,7 +129,7 @@ fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Opti
 impl PutOn {
     /// What was done, for people.
     #[must_use]
-    pub fn notes(&self) -> Vec<String> {
+    pub(crate) fn notes(&self) -> Vec<String> {
         let mesh = &self.garment.mesh;
         let mut moved = String::new();
         let Arranged { raised, sleeves, turned } = self.arranged;

@@ -72,7 +72,7 @@ pub struct Garment<'a> {
 }
 
 /// Told of the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
-pub type Onlooker<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
+pub(crate) type Onlooker<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
 
 /// Solves the PARTs together from the vertex positions `start`.
 ///
@@ -90,7 +90,7 @@ pub fn solve(
 
 /// What a solve may take for given, and when it is good enough for what comes after it.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Hints<'a> {
+pub(crate) struct Hints<'a> {
     /// Signed distances of the garment as placed, m; none where they are not known.
     pub distance_m: &'a [f64],
     /// The solve ends where its last six steps brought less than this share of what all have.
@@ -107,7 +107,7 @@ const LATE: usize = 6;
 ///
 /// # Errors
 /// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
-pub fn solve_given(
+pub(crate) fn solve_given(
     garment: &Garment<'_>,
     body: &Body,
     parts: &Parts,

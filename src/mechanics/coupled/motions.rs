@@ -110,12 +110,12 @@ impl Motions {
 
     /// Unknown vectors.
     #[must_use]
-    pub fn unknowns(&self) -> usize {
+    pub(crate) fn unknowns(&self) -> usize {
         self.unknowns
     }
 
     /// Takes middles and axes from `x`.
-    pub fn centre_at(&mut self, x: &[DVec3]) {
+    pub(crate) fn centre_at(&mut self, x: &[DVec3]) {
         let n = self.first.len();
         let mut sum = vec![0.0; n];
         self.centre = vec![DVec3::ZERO; n];
@@ -165,7 +165,7 @@ impl Motions {
     }
 
     /// From a force (or any covector) at each vertex to that of each unknown.
-    pub fn restrict(&self, x: &[DVec3], force: &[DVec3], out: &mut Vec<DVec3>) {
+    pub(crate) fn restrict(&self, x: &[DVec3], force: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
         out.resize(self.unknowns, DVec3::ZERO);
         for (v, (x, force)) in x.iter().zip(force).enumerate() {
@@ -180,7 +180,7 @@ impl Motions {
     }
 
     /// From the unknowns to the displacement of each vertex, m.
-    pub fn prolong(&self, x: &[DVec3], unknowns: &[DVec3], out: &mut Vec<DVec3>) {
+    pub(crate) fn prolong(&self, x: &[DVec3], unknowns: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
         out.extend(x.iter().enumerate().map(|(v, x)| {
             let mut d = DVec3::ZERO;

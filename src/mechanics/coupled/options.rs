@@ -148,11 +148,3 @@ pub struct CoupledResult {
     /// What a user should know.
     pub warnings: Vec<String>,
 }
-
-impl CoupledResult {
-    /// Newton steps.
-    #[must_use]
-    pub fn steps(&self) -> usize {
-        self.history.last().map_or(0, |h| h.iteration)
-    }
-}

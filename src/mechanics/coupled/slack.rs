@@ -54,7 +54,7 @@ pub struct Folding {
 impl Folding {
     /// Of these PARTs of a garment.
     #[must_use]
-    pub fn of(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Self {
+    pub(crate) fn of(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Self {
         let folds = fold_widths(mesh, cloth);
         let mut fold_of_vertex = vec![folds[0]; mesh.vertex_count()];
         for t in cloth.triangles.iter().rev() {

@@ -68,7 +68,7 @@ impl Weights {
 
     /// The same with no weight at the vertices that are held.
     #[must_use]
-    pub fn without(&self, held: &[bool]) -> Self {
+    pub(crate) fn without(&self, held: &[bool]) -> Self {
         let mut weights = Self::default();
         for (v, &held) in held.iter().enumerate() {
             weights.0.push(if held { &[] } else { self.of(v) }.iter().copied());

@@ -58,7 +58,7 @@ struct Element {
 impl Bending {
     /// Rings and hinges of a mesh in its rest shape.
     #[must_use]
-    pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabrics: &[Fabric]) -> Self {
+    pub(crate) fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabrics: &[Fabric]) -> Self {
         let stiffness: Vec<DVec3> = fabrics.iter().map(bending_stiffness).collect();
         let fans = Fan::all(mesh, rest);
         let mut bending = Self::default();

@@ -161,7 +161,7 @@ impl Cloth {
 
     /// Unknowns and pattern of the Hessian, made when first asked for.
     #[must_use]
-    pub fn layout(&self) -> &HessianLayout {
+    pub(crate) fn layout(&self) -> &HessianLayout {
         self.layout.get_or_init(|| {
             HessianLayout::new(&self.placed, &self.triangles, &self.bending, &self.held, std::iter::empty())
         })
@@ -182,7 +182,7 @@ impl Cloth {
     /// The same cloth with its membrane no stiffer than what lets a length of `height_m` (m) of it stretch by `strain` where
     /// it hangs by its weight; `None` where it is not that stiff, or no height or strain is given.
     #[must_use]
-    pub fn softened(&self, height_m: f64, strain: f64) -> Option<Self> {
+    pub(crate) fn softened(&self, height_m: f64, strain: f64) -> Option<Self> {
         let most = self.weight / self.areas.iter().sum::<f64>() * height_m / strain;
         let softer: Vec<_> = self.stiffness.iter().map(|stiffness| stiffness.capped(most)).collect();
         if !(most > 0.0 && most.is_finite() && softer.iter().any(Option::is_some)) {
@@ -194,7 +194,7 @@ impl Cloth {
 
     /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle; slivers keep none.
     #[must_use]
-    pub fn with_slack(mut self, mut slack: Vec<f64>) -> Self {
+    pub(crate) fn with_slack(mut self, mut slack: Vec<f64>) -> Self {
         slack.iter_mut().zip(&*self.triangles).filter(|(_, t)| t.sliver).for_each(|(slack, _)| *slack = 0.0);
         self.packed_slack = Arc::new(packed(&self.triangles, &slack));
         self.slack = Arc::new(slack);
@@ -232,7 +232,7 @@ impl Cloth {
 
     /// The same by tangent planes: see [`Contacts::by_planes`].
     #[must_use]
-    pub fn contacts_by_planes<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
+    pub(crate) fn contacts_by_planes<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
         self.found(self.untouched(body).by_planes(), x)
     }
 

@@ -101,7 +101,7 @@ impl<'b> Contacts<'b> {
     /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at their `offsets` (m) with
     /// `stiffness` κ (N/m³). Ask [`update`](Self::update) before use.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         body: &'b Body,
         [areas, offsets]: [&[f64]; 2],
         held: &[bool],
@@ -128,7 +128,7 @@ impl<'b> Contacts<'b> {
     /// The same by tangent planes of the exact distance, asked anew where a vertex has moved by 2 mm: cheap for a cloth that
     /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
     #[must_use]
-    pub fn by_planes(self) -> Self {
+    pub(crate) fn by_planes(self) -> Self {
         Self { met: self.body().map_or(Obstacle::Nothing, Obstacle::Planes), ..self }
     }
 
@@ -262,7 +262,7 @@ impl<'b> Contacts<'b> {
     }
 
     /// Each touching vertex's Hessian block, N/m, without friction.
-    pub fn hessian(&self) -> impl Iterator<Item = (u32, DMat3)> + '_ {
+    pub(crate) fn hessian(&self) -> impl Iterator<Item = (u32, DMat3)> + '_ {
         self.touches.iter().map(|t| (t.vertex, outer(t.normal, t.normal) * t.stiffness))
     }
 }

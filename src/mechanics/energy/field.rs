@@ -25,14 +25,14 @@ use crate::body::distance::{Body, LATTICE_SIDE};
 
 /// h, m. A surface of 5 cm radius is off by 0.06 mm for each of its curvatures; two planes that meet at 10 degrees by 0.1 to 0.2 mm
 /// in the crease.
-pub const SIDE: f64 = LATTICE_SIDE;
+pub(crate) const SIDE: f64 = LATTICE_SIDE;
 
 /// Lattice values about one cell, x slowest.
 type Stencil = [f64; 27];
 
 /// The rounded distance.
 #[derive(Debug, Clone)]
-pub struct Field<'b> {
+pub(crate) struct Field<'b> {
     body: &'b Body,
     /// The cell each vertex was last seen in, and its values: it seldom leaves it in one step.
     kept: Vec<Option<(IVec3, Box<Stencil>)>>,
@@ -41,18 +41,18 @@ pub struct Field<'b> {
 impl<'b> Field<'b> {
     /// Of a body, for so many vertices.
     #[must_use]
-    pub fn new(body: &'b Body, vertices: usize) -> Self {
+    pub(crate) fn new(body: &'b Body, vertices: usize) -> Self {
         Self { body, kept: vec![None; vertices] }
     }
 
     /// The body.
     #[must_use]
-    pub fn body(&self) -> &'b Body {
+    pub(crate) fn body(&self) -> &'b Body {
         self.body
     }
 
     /// q̃ (m) and its gradient at the positions of `vertices`, in their order.
-    pub fn at(&mut self, vertices: &[u32], x: &[DVec3]) -> Vec<(f64, DVec3)> {
+    pub(crate) fn at(&mut self, vertices: &[u32], x: &[DVec3]) -> Vec<(f64, DVec3)> {
         let moved = |&&v: &&u32| self.kept[v as usize].as_ref().is_none_or(|(cell, _)| *cell != cell_of(x[v as usize]));
         let moved: Vec<u32> = vertices.iter().filter(moved).copied().collect();
         let cells: Vec<IVec3> = moved.iter().flat_map(|&v| around(cell_of(x[v as usize]))).collect();

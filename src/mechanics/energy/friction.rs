@@ -28,7 +28,7 @@ use super::membrane::outer;
 
 /// ε, m: how far a vertex moves before friction is full. Smaller is truer to Coulomb and stiffer to solve: at 0.5 mm the
 /// tangential spring of a vertex under its own weight is some hundred times softer than a jersey.
-pub const ELASTIC_SLIP: f64 = 5e-4;
+pub(crate) const ELASTIC_SLIP: f64 = 5e-4;
 
 /// Share of ε from which a hold counts as slipping in the Hessian: a dragged anchor is left at ε exactly, up to rounding,
 /// and as a spring it would let the vertex creep by a fraction of ε a step.
@@ -68,13 +68,13 @@ impl Friction {
 
     /// With each vertex's coefficient of Coulomb.
     #[must_use]
-    pub fn new(coefficients: Arc<Vec<f64>>) -> Self {
+    pub(crate) fn new(coefficients: Arc<Vec<f64>>) -> Self {
         Self { coefficients, holds: Vec::new() }
     }
 
     /// Takes normal forces and normals from `touches` at `x`; keeps the anchors of those that held, drags those that
     /// slipped, lets go of those that left.
-    pub fn refresh(&mut self, touches: &[Touch], x: &[DVec3]) {
+    pub(crate) fn refresh(&mut self, touches: &[Touch], x: &[DVec3]) {
         if self.coefficients.iter().all(|coefficient| *coefficient <= 0.0) {
             return;
         }
@@ -117,7 +117,7 @@ impl Friction {
     }
 
     /// Each hold's Hessian block, N/m.
-    pub fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DMat3)> + 'a {
+    pub(crate) fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DMat3)> + 'a {
         self.holds.iter().map(|h| {
             let tangent = DMat3::IDENTITY - outer(h.normal, h.normal);
             (h.vertex, stiffening(h.limit, tangent, h.slip(x)))

@@ -98,7 +98,7 @@ impl Stiffness {
 
     /// The same with no constant over `most` (N/m); `None` where none is.
     #[must_use]
-    pub fn capped(&self, most: f64) -> Option<Self> {
+    pub(crate) fn capped(&self, most: f64) -> Option<Self> {
         let stiffer = self.weft.max(self.warp).max(self.shear) > most;
         let (weft, warp, shear) = (self.weft.min(most), self.warp.min(most), self.shear.min(most));
         stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.bearing))
@@ -109,7 +109,7 @@ impl Stiffness {
 /// every centimetre buckles between under B π²/ℓ² = 1 N/m, a hundredth of what a woven's k would put up at 2 %
 /// compression, into wrinkles finer than the mesh. A tenth drops most of that and keeps the triangles in shape; with all of
 /// it a stiff woven locks into facets.
-pub const SLACK: f64 = 0.1;
+pub(crate) const SLACK: f64 = 0.1;
 
 /// Share of the buckling stress that the bearing Hessian keeps: at three tenths the whole is not positive every now
 /// and then, at one tenth hardly ever.
@@ -176,7 +176,7 @@ impl Triangle {
 
     /// Length of its longest side at rest, m.
     #[must_use]
-    pub fn longest_side_m(&self) -> f64 {
+    pub(crate) fn longest_side_m(&self) -> f64 {
         2.0 * self.area * self.gradients.iter().map(|b| b.length()).fold(0.0, f64::max)
     }
 
@@ -216,7 +216,7 @@ impl Triangle {
     /// The Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m: its positive part, or the `bearing` one, exact but for
     /// compression past what the triangle bears and not always positive.
     #[must_use]
-    pub fn hessian(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
+    pub(crate) fn hessian(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
         let [huu, huv, hvv] = self.by_gradient(c, r, x, bearing);
         let block = |i: usize, j: usize| {
             let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);

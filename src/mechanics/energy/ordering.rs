@@ -24,12 +24,12 @@ const ALONE: usize = 1000;
 
 /// Neighbours of each vertex, one list after the other.
 #[derive(Debug, Clone, Default)]
-pub struct Adjacency(Lists<u32>);
+pub(crate) struct Adjacency(Lists<u32>);
 
 impl Adjacency {
     /// Of `count` vertices, from pairs, in any order, repeated or not; a vertex is no neighbour of itself.
     #[must_use]
-    pub fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
+    pub(crate) fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
         let both_ways = || pairs().filter(|[a, b]| a != b).flat_map(|[a, b]| [(a, b), (b, a)]);
         let mut all = Lists::gathered(count, both_ways);
         let mut kept = Lists::default();
@@ -43,14 +43,14 @@ impl Adjacency {
 
     /// Neighbours of a vertex, ascending.
     #[must_use]
-    pub fn of(&self, v: u32) -> &[u32] {
+    pub(crate) fn of(&self, v: u32) -> &[u32] {
         self.0.of(v as usize)
     }
 }
 
 /// The vertices of `members` in elimination order. Neighbours are those that share a Hessian block.
 #[must_use]
-pub fn nested_dissection(mut members: Vec<u32>, positions: &[DVec3], neighbours: &Adjacency) -> Vec<u32> {
+pub(crate) fn nested_dissection(mut members: Vec<u32>, positions: &[DVec3], neighbours: &Adjacency) -> Vec<u32> {
     let side: Vec<AtomicU32> = positions.iter().map(|_| AtomicU32::new(0)).collect();
     let cut = Cut { positions, neighbours, side: &side };
     cut.dissect(&mut members, 1);

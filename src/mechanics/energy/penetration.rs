@@ -33,13 +33,13 @@ struct Inside {
 impl Contacts<'_> {
     /// Vertices inside the body at the positions `x` last updated, and the deepest's depth (m), by the exact distance.
     #[must_use]
-    pub fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
+    pub(crate) fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
         self.inside(x).fold((0, 0.0), |(n, deepest), inside| (n + 1, deepest.max(-inside.exact)))
     }
 
     /// Keeps out what is inside the body at the positions `x` last updated, if anything is; takes effect with the next
     /// [`update`](Self::update).
-    pub fn keep_out(&mut self, x: &[DVec3]) -> bool {
+    pub(crate) fn keep_out(&mut self, x: &[DVec3]) -> bool {
         let inside: Vec<Inside> = self.inside(x).collect();
         let (any, mut pressed) = (!inside.is_empty(), false);
         for Inside { vertex, rounded, exact } in inside {

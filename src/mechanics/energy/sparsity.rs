@@ -9,7 +9,7 @@ use super::ordering::Adjacency;
 use crate::mesh::each_once;
 
 /// Marks a vertex that is held, and a block that falls away with it.
-pub const HELD: u32 = u32::MAX;
+pub(crate) const HELD: u32 = u32::MAX;
 
 /// The lower half of a symmetric block pattern, by columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub struct Pattern {
 
 /// A block and whether it is met transposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Slot {
+pub(crate) struct Slot {
     /// Index of the block, [`HELD`] for none.
     pub block: u32,
     /// Whether the pair comes as (column, row).
@@ -32,7 +32,7 @@ pub struct Slot {
 impl Pattern {
     /// From pairs (row, column) of unknowns, in any order, repeated or not; every diagonal block is there.
     #[must_use]
-    pub fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
+    pub(crate) fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let own = (0..unknowns as u32).map(|i| (i, i));
         let all = each_once(pairs.map(|(i, j)| (i.min(j), i.max(j))).chain(own));
         let mut pattern = Self { starts: vec![0], rows: Vec::with_capacity(all.len()) };
@@ -46,7 +46,7 @@ impl Pattern {
 
     /// Of neighbours, with the vertex of each unknown in `order` and the unknown of each vertex.
     #[must_use]
-    pub fn of(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {
+    pub(crate) fn of(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {
         let mut pattern = Self { starts: vec![0], rows: Vec::new() };
         for (j, &v) in (0u32..).zip(order) {
             let start = pattern.rows.len();
@@ -61,18 +61,18 @@ impl Pattern {
 
     /// Number of unknown vertices.
     #[must_use]
-    pub fn unknowns(&self) -> usize {
+    pub(crate) fn unknowns(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
     /// Blocks of a column.
     #[must_use]
-    pub fn column(&self, j: usize) -> std::ops::Range<usize> {
+    pub(crate) fn column(&self, j: usize) -> std::ops::Range<usize> {
         self.starts[j] as usize..self.starts[j + 1] as usize
     }
 
     /// A d for a matrix in `blocks` of this pattern.
-    pub fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
+    pub(crate) fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
         out.resize(d.len(), DVec3::ZERO);
         for (j, &dj) in d.iter().enumerate() {
@@ -92,7 +92,7 @@ impl Pattern {
 
     /// The block of a pair of unknowns.
     #[must_use]
-    pub fn slot(&self, i: u32, j: u32) -> Slot {
+    pub(crate) fn slot(&self, i: u32, j: u32) -> Slot {
         if i == HELD || j == HELD {
             return Slot { block: HELD, transposed: false };
         }

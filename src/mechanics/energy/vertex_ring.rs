@@ -11,7 +11,7 @@ use crate::mesh::{RestShape, TriMesh};
 
 /// The ring of an inner vertex.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fan {
+pub(crate) struct Fan {
     /// The neighbours, counter-clockwise.
     pub ring: Vec<u32>,
     /// Where each lies from the vertex, m: x along the weft, y along the warp.
@@ -30,7 +30,7 @@ struct Slice {
 impl Fan {
     /// The fan of each vertex; `None` at the boundary, at a vertex of no triangle, and where the mesh is not a surface.
     #[must_use]
-    pub fn all(mesh: &TriMesh, rest: &RestShape) -> Vec<Option<Self>> {
+    pub(crate) fn all(mesh: &TriMesh, rest: &RestShape) -> Vec<Option<Self>> {
         let mut slices: Vec<Vec<Slice>> = vec![Vec::new(); mesh.vertex_count()];
         for (triangle, flat) in mesh.triangles.iter().zip(&rest.corners) {
             for i in 0..3 {

@@ -75,7 +75,7 @@ impl Solver {
 
     /// Numbers in the factor: a measure of its cost.
     #[must_use]
-    pub fn factor_len(&self) -> usize {
+    pub(crate) fn factor_len(&self) -> usize {
         self.forest.fronts.iter().map(Front::panel_len).sum()
     }
 

@@ -41,7 +41,7 @@ pub struct RefineOptions {
 }
 
 /// No run takes more steps than this.
-pub const STEP_LIMIT: usize = 2000;
+pub(crate) const STEP_LIMIT: usize = 2000;
 
 impl Default for RefineOptions {
     fn default() -> Self {
@@ -107,4 +107,4 @@ pub struct Refined {
 }
 
 /// Told of every step; may end the run.
-pub type Observer<'a> = &'a mut (dyn FnMut(&Step<'_>) -> ControlFlow<()> + Send);
+pub(crate) type Observer<'a> = &'a mut (dyn FnMut(&Step<'_>) -> ControlFlow<()> + Send);

@@ -73,7 +73,7 @@ impl Developable {
 
     /// The surface of a given taper (1/m) that bounds points given in the frame (m).
     #[must_use]
-    pub fn with_taper(
+    pub(crate) fn with_taper(
         local: &[DVec3],
         taper: f64,
         clearance: f64,
@@ -141,7 +141,7 @@ impl Developable {
 
     /// Ω of the point that a point of the world has before it on the surface.
     #[must_use]
-    pub fn sum_at(&self, x: DVec3) -> f64 {
+    pub(crate) fn sum_at(&self, x: DVec3) -> f64 {
         let p = self.local(x).truncate();
         let (i, b) = self.met(if p.length_squared() > 0.0 { p } else { DVec2::X });
         self.sums[i] + along(self.taper, self.base[i], b)
@@ -150,7 +150,7 @@ impl Developable {
     /// Where the point of the surface before `x` lies when it is unrolled from Ω = `middle` to both sides, m: across to the right as
     /// seen from outside, and up the axis.
     #[must_use]
-    pub fn unrolled(&self, x: DVec3, middle: f64) -> DVec2 {
+    pub(crate) fn unrolled(&self, x: DVec3, middle: f64) -> DVec2 {
         let p = self.local(x);
         let way = self.sum_at(x) - middle;
         let way = way - self.sums[self.base.len()] * (way / self.sums[self.base.len()]).round();
@@ -166,7 +166,7 @@ impl Developable {
 
     /// The point of the world that the flat point `flat` (m) is rolled to.
     #[must_use]
-    pub fn rolled(&self, flat: DVec2, middle: f64) -> DVec3 {
+    pub(crate) fn rolled(&self, flat: DVec2, middle: f64) -> DVec3 {
         let n = self.base.len();
         let height = if self.taper == 0.0 { 0.0 } else { 1.0 / self.taper };
         let from_apex = DVec2::new(flat.x, (height - flat.y) * height.signum());
@@ -188,7 +188,7 @@ impl Developable {
 
     /// The polygon at five heights and lines up the surface, m.
     #[must_use]
-    pub fn outline(&self) -> Vec<Vec<DVec3>> {
+    pub(crate) fn outline(&self) -> Vec<Vec<DVec3>> {
         let back = self.turn.transpose();
         let at = |b: DVec2, z: f64| self.origin + back * (b * (1.0 - self.taper * z)).extend(z);
         let height = |k: i32| self.ends[0] + (self.ends[1] - self.ends[0]) * f64::from(k) / 4.0;

@@ -15,7 +15,7 @@ use super::pieces::{BodyPart, Piece};
 
 /// Where a piece's vertices lie on the surface, m; `worn` is the garment as placed.
 #[must_use]
-pub fn laid(piece: &Piece, surface: &Developable, worn: &[DVec3]) -> Vec<DVec3> {
+pub(crate) fn laid(piece: &Piece, surface: &Developable, worn: &[DVec3]) -> Vec<DVec3> {
     let at = |v: &u32| worn[*v as usize];
     let mean = piece.vertices.iter().map(at).sum::<DVec3>() / piece.vertices.len().max(1) as f64;
     let middle = surface.sum_at(mean);

@@ -40,7 +40,7 @@ use pieces::{Piece, distortion, parts, unfit};
 use verlet::{Sheet, Tempo};
 
 /// The method's name.
-pub const NAME: &str = "gross2003";
+pub(crate) const NAME: &str = "gross2003";
 
 /// Distance that bounding surfaces keep from the body beyond the cloth's, m.
 const CLEARANCE: f64 = 0.005;

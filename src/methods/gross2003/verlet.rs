@@ -38,7 +38,7 @@ pub struct Tempo {
 }
 
 /// Cloth on its way.
-pub struct Sheet<'b> {
+pub(crate) struct Sheet<'b> {
     /// Positions, m.
     pub x: Vec<DVec3>,
     /// Velocities, m/s.
@@ -56,7 +56,7 @@ pub struct Sheet<'b> {
 impl<'b> Sheet<'b> {
     /// Cloth at rest at `x` (m), with `masses` (kg) and springs; no mass moves a held vertex.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         x: Vec<DVec3>,
         (masses, held): (&[f64], &[bool]),
         [edges, bends]: [Vec<Spring>; 2],
@@ -68,7 +68,7 @@ impl<'b> Sheet<'b> {
     }
 
     /// One step; `pull` acts after every sweep, on positions and 1/m.
-    pub fn step(&mut self, tempo: &Tempo, gravity: bool, mut pull: impl FnMut(&mut [DVec3], &[f64])) {
+    pub(crate) fn step(&mut self, tempo: &Tempo, gravity: bool, mut pull: impl FnMut(&mut [DVec3], &[f64])) {
         let h = tempo.step_s;
         let from = self.x.clone();
         let decay = (-tempo.damping_per_s * h).exp();
@@ -151,7 +151,7 @@ impl<'b> Sheet<'b> {
 
     /// RMS speed of what is not held, m/s.
     #[must_use]
-    pub fn rms_speed(&self) -> f64 {
+    pub(crate) fn rms_speed(&self) -> f64 {
         rms_speed(self.v.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(v, _)| v))
     }
 }

@@ -119,7 +119,7 @@ impl Elements {
 
     /// Number of elements.
     #[must_use]
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.areas.len()
     }
 

@@ -38,7 +38,7 @@ use patch::{Around, Irregular, around_all, derivatives, limit_stencil};
 use rest_patch::laid_flat;
 
 /// The method's name.
-pub const NAME: &str = "thomaszewski2006";
+pub(crate) const NAME: &str = "thomaszewski2006";
 
 /// The method with its dials.
 #[derive(Debug, Clone, Default)]

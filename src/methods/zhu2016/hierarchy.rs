@@ -128,13 +128,13 @@ impl Hierarchy {
 
     /// Number of quadrics.
     #[must_use]
-    pub fn slices(&self) -> usize {
+    pub(crate) fn slices(&self) -> usize {
         self.units.iter().flat_map(|u| &u.slices).flatten().count()
     }
 
     /// The quadrics as closed lines, m, each with the index of its unit.
     #[must_use]
-    pub fn outlines(&self) -> Vec<(usize, Vec<DVec3>)> {
+    pub(crate) fn outlines(&self) -> Vec<(usize, Vec<DVec3>)> {
         let of = |(i, unit): (usize, &BodyUnit)| unit.outlines().into_iter().map(move |line| (i, line));
         self.units.iter().enumerate().flat_map(of).collect()
     }

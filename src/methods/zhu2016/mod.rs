@@ -27,7 +27,7 @@ use hierarchy::Hierarchy;
 use springs::Springs;
 
 /// The method's name.
-pub const NAME: &str = "zhu2016";
+pub(crate) const NAME: &str = "zhu2016";
 
 /// The method with its dials.
 #[derive(Debug, Clone)]

@@ -19,7 +19,7 @@ use glam::DVec2;
 
 /// An ellipse in a slice's plane, and how far the slice reaches beyond it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quadric {
+pub(crate) struct Quadric {
     /// Centre, m.
     pub centre: DVec2,
     /// Unit vector along the first half axis.
@@ -36,7 +36,7 @@ impl Quadric {
     /// ρ², which is 1 on the quadric.
     #[inline]
     #[must_use]
-    pub fn level(&self, p: DVec2) -> f64 {
+    pub(crate) fn level(&self, p: DVec2) -> f64 {
         let q = p - self.centre;
         let (x, y) = (q.dot(self.axis) / self.half.x, self.axis.perp_dot(q) / self.half.y);
         x * x + y * y
@@ -44,7 +44,7 @@ impl Quadric {
 
     /// Fits points with weights; `round` for a cylinder. `None` for fewer than three.
     #[must_use]
-    pub fn fit(points: &[(DVec2, f64)], round: bool) -> Option<Self> {
+    pub(crate) fn fit(points: &[(DVec2, f64)], round: bool) -> Option<Self> {
         let weight: f64 = points.iter().map(|p| p.1).sum();
         if points.len() < 3 || weight <= 0.0 {
             return None;
@@ -83,13 +83,13 @@ impl Quadric {
     }
 
     /// Sets ε so that `corners` and what is within `offset` (m) of them lie inside.
-    pub fn enclose(&mut self, corners: impl Iterator<Item = DVec2>, offset: f64) {
+    pub(crate) fn enclose(&mut self, corners: impl Iterator<Item = DVec2>, offset: f64) {
         let farthest = corners.map(|p| self.level(p)).fold(0.0, f64::max).sqrt();
         self.bound = (farthest + offset / self.half.min_element()).powi(2);
     }
 
     /// The ellipse at 1 + ε as a closed line of points in the plane.
-    pub fn outline(&self) -> impl Iterator<Item = DVec2> + '_ {
+    pub(crate) fn outline(&self) -> impl Iterator<Item = DVec2> + '_ {
         let grown = self.half * self.bound.sqrt();
         (0..=32).map(move |i| {
             let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 32.0).sin_cos();

@@ -46,7 +46,7 @@ struct Limit {
 
 /// All springs of a garment.
 #[derive(Debug, Clone)]
-pub struct Springs {
+pub(crate) struct Springs {
     /// Of each vertex.
     arms: Lists<Arm>,
     limits: Vec<Limit>,
@@ -56,7 +56,7 @@ pub struct Springs {
 impl Springs {
     /// Springs of the garment by its rest shape.
     #[must_use]
-    pub fn new(dressing: &Dressing<'_>, strain_limit: f64) -> Self {
+    pub(crate) fn new(dressing: &Dressing<'_>, strain_limit: f64) -> Self {
         let Dressing { scene, fabric, cloth } = dressing;
         let [structural, bending] = springs(&scene.garment.triangles, &scene.topology, &scene.rest, fabric);
         let edges = structural.len();
@@ -84,12 +84,6 @@ impl Springs {
         };
         let arms = Lists::gathered(matrix.rows(), || springs.iter().flat_map(ends).map(arm));
         Self { arms, limits, matrix }
-    }
-
-    /// Number of springs of both kinds.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.arms.entries().len() / 2
     }
 }
 

@@ -16,13 +16,13 @@ use crate::methods::segment::longest;
 /// Height of a slice h, m.
 const HEIGHT: f64 = 0.04;
 /// How far a triangle counts beyond its slice and sector, m.
-pub const REACH: f64 = 0.02;
+pub(crate) const REACH: f64 = 0.02;
 /// Sectors of a slice.
-pub const SECTORS: usize = 24;
+pub(crate) const SECTORS: usize = 24;
 
 /// A slice: its quadric, and for each sector its triangles.
 #[derive(Debug, Clone)]
-pub struct Slice {
+pub(crate) struct Slice {
     /// The fitted (elliptic) cylinder.
     pub quadric: Quadric,
     /// First triangle of each sector in the unit's list, and one past the last.
@@ -31,7 +31,7 @@ pub struct Slice {
 
 /// A unit.
 #[derive(Debug, Clone)]
-pub struct BodyUnit {
+pub(crate) struct BodyUnit {
     /// Whether it ends: a limb or the head, fitted with cylinders.
     pub is_limb: bool,
     /// Its box in the world, with the offset, m.
@@ -53,7 +53,7 @@ pub struct BodyUnit {
 impl BodyUnit {
     /// The unit of these triangles of `mesh`, for cloth that touches within `offset` (m); `None` without triangles.
     #[must_use]
-    pub fn new(mesh: &TriMesh, triangles: &[u32], is_limb: bool, offset: f64) -> Option<Self> {
+    pub(crate) fn new(mesh: &TriMesh, triangles: &[u32], is_limb: bool, offset: f64) -> Option<Self> {
         let corners = |t: u32| mesh.corners(t as usize);
         let weighted: Vec<(DVec3, f64)> = triangles
             .iter()
@@ -126,21 +126,21 @@ impl BodyUnit {
     /// Where a point of the world is in the unit's frame, m.
     #[inline]
     #[must_use]
-    pub fn local(&self, x: DVec3) -> DVec3 {
+    pub(crate) fn local(&self, x: DVec3) -> DVec3 {
         self.turn * (x - self.origin)
     }
 
     /// The slice at this height of the unit's frame: |z| < h/2 in the slice's own.
     #[inline]
     #[must_use]
-    pub fn slice(&self, z: f64) -> Option<&Slice> {
+    pub(crate) fn slice(&self, z: f64) -> Option<&Slice> {
         let k = (z - self.low) / self.height;
         if k >= 0.0 { self.slices.get(k as usize)?.as_ref() } else { None }
     }
 
     /// Each slice's quadric at both its ends, as closed lines in the world, m.
     #[must_use]
-    pub fn outlines(&self) -> Vec<Vec<DVec3>> {
+    pub(crate) fn outlines(&self) -> Vec<Vec<DVec3>> {
         let back = self.turn.transpose();
         let mut lines = Vec::new();
         for (k, slice) in self.slices.iter().enumerate() {
@@ -159,7 +159,7 @@ impl Slice {
     /// The range of the unit's leaves to be tested for a point of the slice's plane.
     #[inline]
     #[must_use]
-    pub fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
+    pub(crate) fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
         let q = p - self.quadric.centre;
         let turns = q.y.atan2(q.x) / std::f64::consts::TAU;
         let s = ((turns - turns.floor()) * SECTORS as f64) as usize % SECTORS;

@@ -34,13 +34,13 @@ impl Extent {
 
     /// Whether both are above 0.
     #[must_use]
-    pub fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         self.width_cm > 0.0 && self.height_cm > 0.0
     }
 
     /// Factors for lengths along weft and warp after which the extent is the same in all directions, and that extent, m.
     #[must_use]
-    pub fn evened(&self) -> ([f64; 2], f64) {
+    pub(crate) fn evened(&self) -> ([f64; 2], f64) {
         let Self { width_cm, height_cm } = *self;
         if width_cm == height_cm {
             ([1.0, 1.0], width_cm * METRES_PER_CM)
@@ -53,19 +53,19 @@ impl Extent {
 
     /// The smaller of two in either direction.
     #[must_use]
-    pub fn smaller(self, other: Self) -> Self {
+    pub(crate) fn smaller(self, other: Self) -> Self {
         Self { width_cm: self.width_cm.min(other.width_cm), height_cm: self.height_cm.min(other.height_cm) }
     }
 
     /// As a row of a table has it: one number where both are the same.
     #[must_use]
-    pub fn numbers_cm(&self) -> Vec<f64> {
+    pub(crate) fn numbers_cm(&self) -> Vec<f64> {
         if self.width_cm == self.height_cm { vec![self.width_cm] } else { vec![self.width_cm, self.height_cm] }
     }
 
     /// The same in a column: `12`, `6x24`, `inf`.
     #[must_use]
-    pub fn in_a_column(&self) -> String {
+    pub(crate) fn in_a_column(&self) -> String {
         self.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
     }
 }

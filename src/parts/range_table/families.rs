@@ -39,7 +39,7 @@ impl RangeTable {
     ///
     /// # Errors
     /// [`TableError::Value`] for none or over ten thousand, or for more than one where no finite level is left to split.
-    pub fn with_level_count(&self, count: usize) -> Result<Self, TableError> {
+    pub(crate) fn with_level_count(&self, count: usize) -> Result<Self, TableError> {
         let levels = self.effective_levels();
         let mut bounds: Vec<f64> = levels.iter().map(|l| l.lower_cm).collect();
         bounds.extend(levels.last().map(|l| l.upper_cm));
@@ -80,7 +80,7 @@ impl RangeTable {
     ///
     /// # Errors
     /// [`TableError::Value`] for no levels or a sample without a finite distance.
-    pub fn quantiles(distances_m: &[f64], count: usize) -> Result<Self, TableError> {
+    pub(crate) fn quantiles(distances_m: &[f64], count: usize) -> Result<Self, TableError> {
         check_count(count, 1)?;
         let inner = quantile_bounds_cm(distances_m, count);
         if !distances_m.iter().any(|d| d.is_finite()) {
@@ -95,7 +95,7 @@ impl RangeTable {
     ///
     /// # Errors
     /// [`TableError::Value`] for fewer than three levels or bounds that do not grow.
-    pub fn geometric(first_cm: f64, last_cm: f64, count: usize) -> Result<Self, TableError> {
+    pub(crate) fn geometric(first_cm: f64, last_cm: f64, count: usize) -> Result<Self, TableError> {
         check_count(count, 3)?;
         if !(first_cm > 0.0 && last_cm > first_cm && last_cm.is_finite()) {
             let found = format!("{first_cm} to {last_cm}");

@@ -31,7 +31,7 @@ impl RangeTable {
     }
 
     /// The table of this name: `table-3`, or a file.
-    pub fn by_name(name: &str) -> Result<Self, TableError> {
+    pub(crate) fn by_name(name: &str) -> Result<Self, TableError> {
         match name {
             super::TABLE_3 => Ok(Self::table_3()),
             file if names_a_file(file) => Self::parse(&read_text(file.as_ref())?, file),

@@ -27,7 +27,7 @@ pub(crate) use families::MOST_LEVELS;
 pub use rule::TableRule;
 
 /// Metres in a centimetre: tables are written in centimetres, everything else is metres.
-pub const METRES_PER_CM: f64 = 0.01;
+pub(crate) const METRES_PER_CM: f64 = 0.01;
 
 /// One row of a range table, in centimetres as printed: `lower ≤ d < upper`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,7 +44,7 @@ pub struct Level {
 impl Level {
     /// A level without an extent of its own.
     #[must_use]
-    pub fn new(lower_cm: f64, upper_cm: f64) -> Self {
+    pub(crate) fn new(lower_cm: f64, upper_cm: f64) -> Self {
         Self { lower_cm, upper_cm, extent: None }
     }
 
@@ -61,7 +61,7 @@ impl Level {
 }
 
 /// The name of the paper's table.
-pub const TABLE_3: &str = "table-3";
+pub(crate) const TABLE_3: &str = "table-3";
 
 /// Who takes the distances between two rows that do not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -104,7 +104,7 @@ impl RangeTable {
     /// # Errors
     /// [`TableError`] names the row that is negative, not a number, empty, out of order or overlapping, or the hole that
     /// [`GapRule::Error`] forbids.
-    pub fn new(name: impl Into<String>, gap: GapRule, levels: Vec<Level>) -> Result<Self, TableError> {
+    pub(crate) fn new(name: impl Into<String>, gap: GapRule, levels: Vec<Level>) -> Result<Self, TableError> {
         let table = Self { name: name.into(), source: String::new(), gap, levels };
         table.validate()?;
         Ok(table)
@@ -133,13 +133,13 @@ impl RangeTable {
 
     /// The same table with its origin told.
     #[must_use]
-    pub fn with_source(mut self, source: impl Into<String>) -> Self {
+    pub(crate) fn with_source(mut self, source: impl Into<String>) -> Self {
         self.source = source.into();
         self
     }
 
     /// Checks rows that were put together by hand.
-    pub fn validate(&self) -> Result<(), TableError> {
+    pub(crate) fn validate(&self) -> Result<(), TableError> {
         match error::first_problem(&self.levels, self.gap) {
             None => Ok(()),
             Some((row, problem)) => Err(TableError::Row { place: format!("table \"{}\"", self.name), row, problem }),
@@ -148,14 +148,14 @@ impl RangeTable {
 
     /// The holes between rows, cm.
     #[must_use]
-    pub fn holes_cm(&self) -> Vec<[f64; 2]> {
+    pub(crate) fn holes_cm(&self) -> Vec<[f64; 2]> {
         let meets = self.levels.windows(2).map(|w| [w[0].upper_cm, w[1].lower_cm]);
         meets.filter(|[from, to]| from < to).collect()
     }
 
     /// The levels after the gap rule, ascending, without holes; PARTs number their level by this list.
     #[must_use]
-    pub fn effective_levels(&self) -> Vec<Level> {
+    pub(crate) fn effective_levels(&self) -> Vec<Level> {
         let mut out: Vec<Level> = Vec::with_capacity(self.levels.len() + 1);
         for level in &self.levels {
             let mut lower_cm = level.lower_cm;

@@ -32,7 +32,7 @@ impl TableRule {
 
     /// The same under another name.
     #[must_use]
-    pub fn named(mut self, new: impl Into<String>) -> Self {
+    pub(crate) fn named(mut self, new: impl Into<String>) -> Self {
         match &mut self {
             Self::Rows(RangeTable { name, .. }) | Self::Quantile { name, .. } => *name = new.into(),
         }

@@ -32,7 +32,7 @@ use summary::MM_PER_M;
 
 /// A vertex whose reference is nearer than this to the body (m) is in the contact zone: the contact distance of the paper's
 /// model, the upper value of Table 3's level 7.
-pub const CONTACT_ZONE: f64 = 0.005;
+pub(crate) const CONTACT_ZONE: f64 = 0.005;
 
 /// Why two drapes cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -107,7 +107,7 @@ pub struct Accuracy {
 
 /// Distance of each vertex of `a` to the same vertex of `b`, m.
 #[must_use]
-pub fn vertex_errors(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
+pub(crate) fn vertex_errors(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
     a.iter().zip(b).map(|(x, y)| x.distance(*y)).collect()
 }
 

@@ -113,7 +113,7 @@ impl ReferenceCache {
 
     /// `references` in the user's cache ([`user_cache`]); `None` where the user has no home.
     #[must_use]
-    pub fn in_user_cache() -> Option<Self> {
+    pub(crate) fn in_user_cache() -> Option<Self> {
         user_cache("references").map(Self::new)
     }
 

@@ -61,7 +61,7 @@ pub fn representable(
 ///
 /// # Errors
 /// [`SolveError`] where positions are not finite.
-pub fn blended(
+pub(crate) fn blended(
     topology: &Topology,
     parts: &Parts,
     held: &[bool],

@@ -41,7 +41,7 @@ pub fn hausdorff(mesh: &TriMesh, a: &[DVec3], b: &[DVec3]) -> Result<f64, Distan
 
 /// Mean angle between matching vertex normals, degrees; vertices without a normal in either are left out.
 #[must_use]
-pub fn mean_normal_angle_deg(result: &TriMesh, reference: &TriMesh) -> f64 {
+pub(crate) fn mean_normal_angle_deg(result: &TriMesh, reference: &TriMesh) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     let normals = result.vertex_normals();
     for ((n, m), area) in normals.iter().zip(reference.vertex_normals()).zip(reference.vertex_areas()) {
@@ -77,7 +77,7 @@ pub fn section_length(mesh: &TriMesh, height: f64) -> f64 {
 
 /// Four sections through both drapes, low to high.
 #[must_use]
-pub fn section_girths(result: &TriMesh, reference: &TriMesh) -> Vec<SectionGirth> {
+pub(crate) fn section_girths(result: &TriMesh, reference: &TriMesh) -> Vec<SectionGirth> {
     let Some((low, high)) = reference.bounds() else { return Vec::new() };
     SECTIONS
         .par_iter()

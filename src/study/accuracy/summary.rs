@@ -21,7 +21,7 @@ pub struct ErrorSummary {
 impl ErrorSummary {
     /// Summary of errors in metres; all zero for an empty list.
     #[must_use]
-    pub fn of(errors_m: &[f64]) -> Self {
+    pub(crate) fn of(errors_m: &[f64]) -> Self {
         if errors_m.is_empty() {
             return Self::default();
         }

@@ -41,7 +41,7 @@ impl Curvature {
     ///
     /// # Errors
     /// [`SolveError`] where B cannot be factorised.
-    pub fn new(cloth: &Cloth, forces: &Forces, x: &[DVec3]) -> Result<Self, SolveError> {
+    pub(crate) fn new(cloth: &Cloth, forces: &Forces, x: &[DVec3]) -> Result<Self, SolveError> {
         let pushing = || forces.touching.iter().filter(|t| t.normal_n > 0.0);
         let pairs = pushing().flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])));
         let layout = cloth.layout_with(x, pairs);

@@ -32,10 +32,10 @@ pub use shadow::shadow_area;
 pub use specimen::{Specimen, specimen};
 
 /// Radius of the specimen, m.
-pub const SPECIMEN_RADIUS: f64 = 0.15;
+pub(crate) const SPECIMEN_RADIUS: f64 = 0.15;
 
 /// Radius of the plates, m.
-pub const PLATE_RADIUS: f64 = 0.09;
+pub(crate) const PLATE_RADIUS: f64 = 0.09;
 
 /// Published bands, by fabric.
 const TARGETS: &str = include_str!("../../../assets/cusick/targets.csv");

@@ -43,7 +43,7 @@ pub struct MethodFigures {
 impl MethodFigures {
     /// What a drape says by itself, and strain and pressure at its vertices.
     #[must_use]
-    pub fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
+    pub(crate) fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
         let Dressing { scene, cloth, .. } = dressing;
         let x = &drape.positions;
         let garment = scene.garment.with_positions(x.clone());
@@ -75,7 +75,7 @@ impl MethodFigures {
 
     /// How it ended, strain and what else was measured, in words: name and value.
     #[must_use]
-    pub fn findings(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn findings(&self) -> Vec<(&'static str, String)> {
         let how = match self.ended {
             Ended::AtRest => "at rest",
             Ended::TimeOver => "given up, still moving",
@@ -93,7 +93,7 @@ impl MethodFigures {
 
     /// What of them a user should act upon.
     #[must_use]
-    pub fn warnings(&self, dressing: &Dressing<'_>) -> Vec<String> {
+    pub(crate) fn warnings(&self, dressing: &Dressing<'_>) -> Vec<String> {
         let mut found = self.shared().warnings(dressing.scene);
         if self.ended == Ended::TimeOver {
             found.push(format!(

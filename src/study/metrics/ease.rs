@@ -38,7 +38,7 @@ pub struct GirthEase {
 impl GirthEase {
     /// Bust, waist and hip of a scene draped to `positions` (m), from the top: at these heights (m), or where the body is found to have them.
     #[must_use]
-    pub fn all(scene: &Scene, heights_m: Option<[f64; 3]>, positions: &[glam::DVec3]) -> Vec<Self> {
+    pub(crate) fn all(scene: &Scene, heights_m: Option<[f64; 3]>, positions: &[glam::DVec3]) -> Vec<Self> {
         let body = scene.body.mesh();
         let Some((low, _)) = body.bounds() else { return Vec::new() };
         let marks = Landmarks::of(body);

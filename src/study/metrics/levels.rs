@@ -26,7 +26,7 @@ pub struct LevelCount {
 impl LevelCount {
     /// The levels of `table`, and what `parts`, made by it, has in each.
     #[must_use]
-    pub fn all(table: &RangeTable, parts: &Parts) -> Vec<Self> {
+    pub(crate) fn all(table: &RangeTable, parts: &Parts) -> Vec<Self> {
         let levels = table.effective_levels();
         let mut counts: Vec<Self> = (levels.iter().enumerate())
             .map(|(index, l)| Self {
@@ -46,13 +46,13 @@ impl LevelCount {
 
     /// Lower value, m.
     #[must_use]
-    pub fn lower_m(&self) -> f64 {
+    pub(crate) fn lower_m(&self) -> f64 {
         self.lower_cm * METRES_PER_CM
     }
 
     /// Upper value, m.
     #[must_use]
-    pub fn upper_m(&self) -> f64 {
+    pub(crate) fn upper_m(&self) -> f64 {
         self.upper_cm * METRES_PER_CM
     }
 }

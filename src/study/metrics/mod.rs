@@ -141,7 +141,7 @@ impl Figures {
 
     /// With what an assessment found. A model without a state of its own gets energy and strain from it.
     #[must_use]
-    pub fn assessed(self, assessment: &Assessment) -> Self {
+    pub(crate) fn assessed(self, assessment: &Assessment) -> Self {
         let Accuracy { vertices, canonical_rms_mm, canonical_spread_mm, state, .. } = assessment.accuracy;
         Self {
             energy_j: self.energy_j.or(Some(state.energy_j)),
@@ -160,7 +160,7 @@ impl Figures {
 
     /// How many PARTs there are, and how many of them the range table alone made where they were cut or joined after it.
     #[must_use]
-    pub fn parts_text(&self) -> String {
+    pub(crate) fn parts_text(&self) -> String {
         match self.level_part_count {
             by_levels if by_levels == self.part_count => format!("{} PARTs", self.part_count),
             by_levels => format!("{} PARTs ({by_levels} by its levels, then cut to extents)", self.part_count),
@@ -169,7 +169,7 @@ impl Figures {
 
     /// The figures in words: name and value.
     #[must_use]
-    pub fn facts(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn facts(&self) -> Vec<(&'static str, String)> {
         let mut facts = vec![
             ("vertices", self.vertices.to_string()),
             ("PARTs", format!("{} ({} single vertices)", self.part_count, self.singletons)),
@@ -182,7 +182,7 @@ impl Figures {
 
     /// Strain, error and what else was measured, in words.
     #[must_use]
-    pub fn findings(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn findings(&self) -> Vec<(&'static str, String)> {
         let mut found = Vec::new();
         let mut add = |name, value: Option<String>| found.extend(value.map(|value| (name, value)));
         let residual = self.refine_steps.zip(self.residual_over_weight);
@@ -230,7 +230,7 @@ impl Figures {
 
     /// What a recording plots over its tables: leaf of `/numbers` and value.
     #[must_use]
-    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
+    pub(crate) fn scalars(&self) -> Vec<(&'static str, f64)> {
         let all = [
             ("error/rms_mm", self.rms_mm),
             ("error/canonical_rms_mm", self.canonical_rms_mm),

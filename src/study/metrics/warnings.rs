@@ -19,7 +19,7 @@ const STRETCHED: f64 = 1.1;
 impl Figures {
     /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
     #[must_use]
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+    pub(crate) fn warnings(&self, scene: &Scene) -> Vec<String> {
         let mut found = Vec::new();
         if let [Slid { sank_mm, .. }, more @ ..] = self.slid.as_slice() {
             let parts: Vec<usize> = self.slid.iter().map(|slid| slid.part).collect();

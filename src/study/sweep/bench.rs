@@ -36,7 +36,7 @@ pub enum PointError {
 impl PointError {
     /// A failure in the words of an error and of all that caused it.
     #[must_use]
-    pub fn failed(error: &(dyn Error + 'static)) -> Self {
+    pub(crate) fn failed(error: &(dyn Error + 'static)) -> Self {
         Self::Failed(said(error, ": "))
     }
 
@@ -130,12 +130,12 @@ impl<'a> Bench<'a> {
 
     /// The same, with made meshes in `meshes`.
     #[must_use]
-    pub fn with_meshes(self, meshes: MeshCache) -> Self {
+    pub(crate) fn with_meshes(self, meshes: MeshCache) -> Self {
         Self { meshes, ..self }
     }
 
     /// The scene of a point. Others wait while one is made: they most likely want the same.
-    pub fn scene(&self, point: &Point) -> Result<Arc<Loaded>, PointError> {
+    pub(crate) fn scene(&self, point: &Point) -> Result<Arc<Loaded>, PointError> {
         let mut made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         let id = point.scene_id();
         if let Some(loaded) = made.get(&id) {
@@ -148,7 +148,7 @@ impl<'a> Bench<'a> {
 
     /// What the scenes' makers warned of, garment by garment.
     #[must_use]
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         made.values().flat_map(|loaded| loaded.warnings()).collect()
     }

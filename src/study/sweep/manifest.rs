@@ -26,7 +26,7 @@ impl Shard {
     ///
     /// # Errors
     /// [`PlanError::Shard`] unless 1 ≤ index ≤ count.
-    pub fn new(index: usize, count: usize) -> Result<Self, PlanError> {
+    pub(crate) fn new(index: usize, count: usize) -> Result<Self, PlanError> {
         if index == 0 || index > count {
             return Err(PlanError::Shard { found: format!("{index}/{count}") });
         }
@@ -113,13 +113,13 @@ impl Manifest {
 
     /// How many points belong here.
     #[must_use]
-    pub fn share(&self) -> usize {
+    pub(crate) fn share(&self) -> usize {
         (0..self.points.len()).filter(|&i| self.holds(i)).count()
     }
 
     /// Whether the point of this number belongs here.
     #[must_use]
-    pub fn holds(&self, point: usize) -> bool {
+    pub(crate) fn holds(&self, point: usize) -> bool {
         self.shard.is_none_or(|s| s.holds(point))
     }
 
@@ -130,7 +130,7 @@ impl Manifest {
 
     /// The sweep in a few words: what two that differ are told apart by.
     #[must_use]
-    pub fn identity(&self) -> String {
+    pub(crate) fn identity(&self) -> String {
         let Self { name, partwise, plan, points, .. } = self;
         let shard = self.shard.map_or(String::new(), |s| format!(", shard {s}"));
         format!(

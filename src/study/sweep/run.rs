@@ -53,7 +53,7 @@ pub struct Outcome {
 impl Outcome {
     /// Of a sweep all of whose rows were there.
     #[must_use]
-    pub fn found(rows: Vec<Row>) -> Self {
+    pub(crate) fn found(rows: Vec<Row>) -> Self {
         let total = rows.len();
         Self { total, skipped: total, failed: count_failed(&rows), stopped: false, rows }
     }

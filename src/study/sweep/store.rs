@@ -21,9 +21,9 @@ use super::row::json_line;
 use super::{Manifest, Medium, Row, Status, StoreError, csv_text};
 
 /// Name of the JSON lines in a sweep's folder.
-pub const JSON_LINES: &str = "rows.jsonl";
+pub(crate) const JSON_LINES: &str = "rows.jsonl";
 /// Name of the CSV in a sweep's folder.
-pub const CSV: &str = "rows.csv";
+pub(crate) const CSV: &str = "rows.csv";
 const LOCK: &str = "lock";
 
 /// How to treat rows that are there already.
@@ -99,7 +99,7 @@ impl Store {
 
     /// Whose rows these are.
     #[must_use]
-    pub fn manifest(&self) -> &Manifest {
+    pub(crate) fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 

@@ -63,7 +63,7 @@ impl Timing {
 
     /// The stages, what is beside them and the whole: medians, ms.
     #[must_use]
-    pub fn stages(&self) -> [(&'static str, f64); 6] {
+    pub(crate) fn stages(&self) -> [(&'static str, f64); 6] {
         [
             ("distance", self.time_distance_ms),
             ("segment", self.time_segment_ms),

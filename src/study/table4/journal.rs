@@ -35,7 +35,7 @@ pub struct Conditions {
 impl Conditions {
     /// Those of a run on this machine.
     #[must_use]
-    pub fn here(fabric: &str, options: &ContestOptions) -> Self {
+    pub(crate) fn here(fabric: &str, options: &ContestOptions) -> Self {
         // Only Linux tells without asking a library; elsewhere the architecture must do.
         let told = std::fs::read_to_string("/proc/cpuinfo").ok();
         let model = told.as_deref().and_then(|text| text.lines().find_map(|line| line.strip_prefix("model name")));
@@ -55,7 +55,7 @@ impl Conditions {
 
     /// In one line.
     #[must_use]
-    pub fn said(&self) -> String {
+    pub(crate) fn said(&self) -> String {
         let Self { machine, threads, fabric, rounds, warm_up, starts, rest: [speed, over], .. } = self;
         let rest = format!("rest: RMS speed under {} cm/s over {over} s", 100.0 * speed);
         let counted = format!("{rounds} counted rounds after {warm_up}; {starts} perturbed starts");
@@ -94,7 +94,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError`] where the file is none, or of other conditions.
-    pub fn open(path: &Path, conditions: Conditions) -> Result<Self, JournalError> {
+    pub(crate) fn open(path: &Path, conditions: Conditions) -> Result<Self, JournalError> {
         if !path.exists() {
             return Ok(Self { conditions, rows: Vec::new() });
         }
@@ -112,7 +112,7 @@ impl Journal {
 
     /// Whether a row is there.
     #[must_use]
-    pub fn has(&self, garment: &str, vertices: usize) -> bool {
+    pub(crate) fn has(&self, garment: &str, vertices: usize) -> bool {
         self.rows.iter().any(|row| row.garment == garment && row.asked == vertices)
     }
 
@@ -120,7 +120,7 @@ impl Journal {
     ///
     /// # Errors
     /// Those of the disk.
-    pub fn write(&self, path: &Path) -> std::io::Result<()> {
+    pub(crate) fn write(&self, path: &Path) -> std::io::Result<()> {
         WholeFile::write(path, serde_json::to_string(self).map_err(std::io::Error::other)?)
     }
 }

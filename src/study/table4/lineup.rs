@@ -29,7 +29,7 @@ impl Entrant {
     }
     /// Its name for people: the paper's number of the reference, first author and year.
     #[must_use]
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Method(zhu2016::NAME) => "[19] Zhu 2016",
             Self::Method(gross2003::NAME) => "[20] Groß 2003",

@@ -151,7 +151,7 @@ pub enum ContestError {
 
 /// Asked between any two steps whether to go on, and told how far a row is: rounds done and of how many, and what is
 /// done now.
-pub type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()> + Send);
+pub(crate) type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> ControlFlow<()> + Send);
 
 /// Runs a row.
 ///

@@ -66,7 +66,7 @@ impl Front {
 
     /// What neither front beats.
     #[must_use]
-    pub fn union(&self, other: &Self) -> Self {
+    pub(crate) fn union(&self, other: &Self) -> Self {
         let mut all: Vec<&FrontPoint> = self.points.iter().chain(&other.points).collect();
         all.sort_by(|a, b| a.parts.cmp(&b.parts).then(a.rms_m.total_cmp(&b.rms_m)));
         let mut points: Vec<FrontPoint> = Vec::new();

@@ -148,7 +148,7 @@ impl Proximity {
     }
 
     /// Looks for gaps at `x` (m); those that were there before go on.
-    pub fn refresh(&mut self, x: &[DVec3]) {
+    pub(crate) fn refresh(&mut self, x: &[DVec3]) {
         self.refresh_with(x, Vec::new());
     }
 
