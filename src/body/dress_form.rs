@@ -14,6 +14,7 @@ pub use super::fitting::GirthMark;
 use super::fitting::{fit, girth_marks};
 use super::girth::loop_around;
 pub use super::measures::{BodySpec, Measures};
+use super::solid::Sweep;
 use crate::mesh::TriMesh;
 use crate::mesh::remesh::{Density, Surface, remesh};
 
@@ -40,7 +41,12 @@ impl DressForm {
     pub fn new(spec: &BodySpec) -> Result<Self, ShapeError> {
         let measures = spec.measures()?;
         let factors: Factors = fit(&measures, &[1.0; 11]);
-        Ok(Self { measures, anatomy: Anatomy::new(&measures, &factors) })
+        let anatomy = Anatomy::new(&measures, &factors);
+        let Anatomy { trunk, neck, arm, leg, .. } = &anatomy;
+        if ![trunk, neck, arm, leg].into_iter().all(Sweep::ascends) {
+            return Err(ShapeError::NotManifold { what: "body" });
+        }
+        Ok(Self { measures, anatomy })
     }
 
     /// Where each girth is taken and what was asked.
@@ -122,4 +128,44 @@ fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
 /// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
 pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
     DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
+}
+
+#[cfg(test)]
+mod tests {
+    use rayon::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn any_value_of_any_measurement_is_meshed_or_refused() {
+        let names = toml::Table::try_from(BodySpec::default()).unwrap().keys().cloned().collect::<Vec<_>>();
+        let optional = ["shoulder_length", "arm_length", "cervicale_height", "acromion_height", "axilla_height"];
+        let heights = ["bust_height", "waist_height", "hip_height", "crotch_height", "knee_height"];
+        let names: Vec<&str> =
+            names.iter().map(|name| name.trim_end_matches("_cm")).chain(optional).chain(heights).collect();
+        assert_eq!(names.len(), 22);
+        // The ends of the ranges come out of the refusals.
+        let ends = |name: &str| match BodySpec::default().with(name, f64::NAN).unwrap().measures() {
+            Err(ShapeError::Measurement { low_cm, high_cm, .. }) => [low_cm, high_cm],
+            other => panic!("{name}: {other:?}"),
+        };
+        let mut cases: Vec<(f64, &str, f64)> =
+            vec![(168.0, "crotch_height", 49.0), (220.0, "arm_length", 28.1), (220.0, "knee_height", 23.3)];
+        for &name in &names {
+            for cm in [0.0, -1.0, 1e-300, 1e300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(BodySpec::default().with(name, cm).unwrap().measures().is_err(), "{name} = {cm}");
+            }
+            let [low, high] = ends(name);
+            cases.extend([low, high].map(|cm| (168.0, name, cm)));
+        }
+        cases.par_iter().for_each(|&(stature, name, cm)| {
+            let spec = BodySpec { stature_cm: stature, ..BodySpec::default() }.with(name, cm).unwrap();
+            let Ok(mesh) = DressForm::new(&spec).and_then(|form| form.mesh(2_000)) else { return };
+            let known = |v: &u32| (*v as usize) < mesh.positions.len();
+            assert!(mesh.triangles.iter().flatten().all(known), "{name} = {cm} at {stature}");
+            assert!(mesh.positions.iter().all(|p| p.is_finite()), "{name} = {cm} at {stature}");
+        });
+        let refused = DressForm::new(&BodySpec::default().with("crotch_height", 49.0).unwrap()).unwrap_err();
+        assert!(refused.to_string().contains("expected 12 cm or more above knee_height"), "{refused}");
+    }
 }

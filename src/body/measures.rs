@@ -194,27 +194,27 @@ impl Measures {
         self.stature / 1.68
     }
 
+    /// Refuses heights whose sections would overlap. The gaps are those at which the stations of trunk and legs (see
+    /// [`anatomy`](super::anatomy)) still ascend; 2 cm is the least that leaves a surface between two levels.
     fn check_order(&self) -> Result<(), ShapeError> {
+        let k = self.scale();
         let ladder = [
-            ("knee_height", self.knee_height),
-            ("crotch_height", self.crotch),
-            ("hip_height", self.hip_height),
-            ("waist_height", self.waist_height),
-            ("bust_height", self.bust_height),
-            ("axilla_height", self.axilla),
-            ("acromion_height", self.acromion),
-            ("cervicale_height", self.cervicale),
-            ("stature", self.stature),
+            ("knee_height", self.knee_height, 0.0),
+            ("crotch_height", self.crotch, 0.12 * k),
+            ("hip_height", self.hip_height, 0.017 * k),
+            ("waist_height", self.waist_height, 0.041 * k),
+            ("bust_height", self.bust_height, 0.0),
+            ("axilla_height", self.axilla, 0.0),
+            ("acromion_height", self.acromion, 0.041 * k),
+            ("cervicale_height", self.cervicale, 0.031 * k),
+            ("stature", self.stature, 0.0),
         ];
         for pair in ladder.windows(2) {
-            // 2 cm is the least that leaves a surface between two levels.
-            if pair[1].1 < pair[0].1 + 0.02 {
-                return Err(ShapeError::Order {
-                    lower: pair[0].0,
-                    lower_cm: 100.0 * pair[0].1,
-                    upper: pair[1].0,
-                    upper_cm: 100.0 * pair[1].1,
-                });
+            let [(lower, below, _), (upper, above, gap)] = [pair[0], pair[1]];
+            let gap = gap.max(0.02);
+            if above < below + gap {
+                let [lower_cm, upper_cm, gap_cm] = [below, above, gap].map(|m| 100.0 * m);
+                return Err(ShapeError::Order { lower, lower_cm, upper, upper_cm, gap_cm });
             }
         }
         Ok(())

@@ -35,9 +35,9 @@ pub enum ShapeError {
     Length { name: &'static str, found: f64, low: f64, high: f64 },
     /// Heights that do not ascend.
     #[error(
-        "{upper} is {upper_cm:.1} cm, which is not 2 cm above {lower} at {lower_cm:.1} cm; give both heights, or neither"
+        "{upper} is {upper_cm:.1} cm, expected {gap_cm:.0} cm or more above {lower} at {lower_cm:.1} cm; give both heights, or neither"
     )]
-    Order { lower: &'static str, lower_cm: f64, upper: &'static str, upper_cm: f64 },
+    Order { lower: &'static str, lower_cm: f64, upper: &'static str, upper_cm: f64, gap_cm: f64 },
     /// Too coarse to be that shape.
     #[error("{found} {what} are too few to make out its shape; ask for {least} or more")]
     TooFew { what: &'static str, found: usize, least: usize },

@@ -54,6 +54,12 @@ impl<const K: usize> Profile<K> {
         Self { segments, first: stations.first().map_or(0.0, |s| s.0), last: stations.last().map_or(0.0, |s| s.0) }
     }
 
+    /// Whether each station's coordinate is above the one before.
+    pub(super) fn ascends(&self) -> bool {
+        let starts = self.segments.iter().map(|segment| segment.start);
+        starts.chain([self.last]).is_sorted_by(|a, b| a < b)
+    }
+
     /// First and last coordinate.
     pub(crate) fn range(&self) -> (f64, f64) {
         (self.first, self.last)

@@ -106,6 +106,11 @@ impl Sweep {
         self.profile.range()
     }
 
+    /// Whether its stations ascend: the curve through them is a function of the coordinate only then.
+    pub(super) fn ascends(&self) -> bool {
+        self.profile.ascends()
+    }
+
     /// Direction of the axis.
     pub(crate) fn direction(&self) -> DVec3 {
         self.axes[2]

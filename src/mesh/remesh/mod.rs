@@ -18,10 +18,10 @@ mod relax;
 
 use glam::DVec3;
 
-use crate::mesh::TriMesh;
 use crate::mesh::flip::{Rule, flip};
 use crate::mesh::half_edge::HalfEdgeMesh;
 use crate::mesh::morton::mesh_along_a_curve;
+use crate::mesh::{NONE, TriMesh};
 
 /// The surface that is meshed.
 pub(crate) trait Surface: Sync {
@@ -52,7 +52,8 @@ const POLISH: usize = 4;
 /// Vertices from which on their order matters: fewer stay in the processor's caches wherever they are.
 const SCATTERED: usize = 32_768;
 
-/// Remeshes `mesh`, whose boundary vertices carry tags, to the wanted density. `None` where it is not a manifold.
+/// Remeshes `mesh`, whose boundary vertices carry tags, to the wanted density. `None` where it is not a manifold, before or
+/// after: a surface folded onto itself loses triangles whose vertices others still name.
 pub(crate) fn remesh(
     mesh: &TriMesh,
     tags: Vec<u8>,
@@ -94,6 +95,9 @@ pub(crate) fn remesh(
     }
     flip(&mut work, Rule::Delaunay);
     let (mesh, tags) = work.compact();
+    if mesh.triangles.iter().flatten().any(|&v| v == NONE) || !mesh.positions.iter().all(|p| p.is_finite()) {
+        return None;
+    }
     Some(if mesh.vertex_count() < SCATTERED { (mesh, tags) } else { mesh_along_a_curve(&mesh, &tags) })
 }
 
