@@ -265,6 +265,35 @@ fn a_bad_edit_is_refused_and_the_last_good_state_stands() {
 }
 
 #[test]
+fn a_panic_in_the_worker_refuses_the_edit_and_the_session_goes_on() {
+    let (session, mut workshop) = settled(true);
+    let armed = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let trap = Arc::clone(&armed);
+    // Listeners run on the worker's thread, in the middle of its work.
+    session.listen(move |_| assert!(!trap.swap(false, Ordering::SeqCst), "the trap of this test"));
+    for (change, state) in [(r#"{"fabric": "denim"}"#, 2), (r#"{"garment": "pullover-1@600"}"#, 4)] {
+        assert_eq!(session.submit(&edit(change), None).unwrap(), state);
+        armed.store(true, Ordering::SeqCst);
+        let done = work(&session, &mut workshop);
+        let refused = done.refused.as_ref().unwrap();
+        assert_eq!((refused.state, refused.back_to), (state, Some(state + 1)), "{}", refused.sentence);
+        assert!(refused.sentence.contains("fault of the program") && !refused.sentence.contains("trap"));
+        assert_eq!((&*done.job, done.finished.as_ref().unwrap().state), (&job(), state + 1));
+    }
+    session.submit(&edit(r#"{"fabric": "denim"}"#), None).unwrap();
+    let done = work(&session, &mut workshop);
+    assert!(done.refused.is_none() && done.finished.as_ref().unwrap().state == 6);
+}
+
+#[test]
+fn an_edit_of_a_measurement_that_makes_no_form_is_refused_at_once() {
+    let (session, _) = settled(true);
+    let refused = session.submit(&edit(r#"{"measurements": {"crotch_height": 49}}"#), None).unwrap_err().to_string();
+    assert!(refused.contains("crotch_height") && refused.contains("knee_height"), "{refused}");
+    assert_eq!(session.snapshot().state, 1);
+}
+
+#[test]
 fn files_that_are_read_again_and_are_broken_leave_what_was_read_before() {
     let folder = tempfile::tempdir().unwrap();
     let form = folder.path().join("me.toml");

@@ -9,10 +9,11 @@ use serde_json::Value;
 use super::presets;
 use crate::body::ShapeError;
 use crate::drape::{DrapeError, Model, Refine};
+use crate::base::files::names_a_file;
 use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::coupled::Motion;
 use crate::parts::range_table::{GapRule, RangeTable, TableError, TableRule};
-use crate::scene::SceneError;
+use crate::scene::{FileRole, SceneError};
 use crate::study::job::Job;
 
 /// Why an edit was refused: the session stays as it was.
@@ -127,12 +128,31 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// The names of files and built-in things in it: whoever takes edits from strangers looks at them first.
+    /// Every value that is opened as a file, with the field it stands in. A new field does not compile until it is listed here.
     #[must_use]
-    pub(crate) fn names(&self) -> Vec<&str> {
-        let table = self.table.iter().filter_map(|t| if let TableEdit::Name(name) = t { Some(name) } else { None });
-        let fabric = self.fabric.iter().filter_map(|f| if let FabricEdit::Name(name) = f { Some(name) } else { None });
-        self.body.iter().chain(&self.garment).chain(table).chain(fabric).map(String::as_str).collect()
+    pub(crate) fn file_names(&self) -> Vec<(FileRole, &str)> {
+        let Self {
+            body,
+            garment,
+            table,
+            fabric,
+            // Numbers and choices.
+            measurements: _,
+            gap: _,
+            min_part: _,
+            max_extent_cm: _,
+            motion: _,
+            model: _,
+            refine: _,
+            self_contact: _,
+        } = self;
+        let table = table.iter().filter_map(|t| if let TableEdit::Name(name) = t { Some(name) } else { None });
+        let fabric = fabric.iter().filter_map(|f| if let FabricEdit::Name(name) = f { Some(name) } else { None });
+        let named = (body.iter().map(|name| (FileRole::Body, name)))
+            .chain(garment.iter().map(|name| (FileRole::Garment, name)))
+            .chain(table.map(|name| (FileRole::Table, name)))
+            .chain(fabric.map(|name| (FileRole::Fabric, name)));
+        named.map(|(role, name)| (role, name.as_str())).filter(|(_, name)| names_a_file(name)).collect()
     }
 
     /// `job` with the edit.

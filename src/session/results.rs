@@ -133,6 +133,8 @@ pub struct Refusal {
     pub state: u64,
     /// Why it cannot be.
     pub sentence: String,
+    /// The first of the files that it read body or garment from, where these are the reason: the sentence may quote it.
+    pub file: Option<String>,
     /// The state that stands instead; none where there was no good one yet.
     pub back_to: Option<u64>,
 }

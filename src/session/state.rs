@@ -252,7 +252,8 @@ impl Desk {
             self.failed = Some(state);
             self.view.idle = true;
         }
-        self.view.refused = Some(Arc::new(Refusal { state, sentence, back_to }));
+        let file = bad.file_names().first().filter(|_| scene).map(|(_, name)| (*name).to_owned());
+        self.view.refused = Some(Arc::new(Refusal { state, sentence, file, back_to }));
     }
 
     /// Nothing is left to compute for the newest state.

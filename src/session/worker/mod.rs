@@ -6,6 +6,7 @@ mod rest;
 mod stages;
 
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,10 @@ use crate::mechanics::refine::Step;
 use crate::parts::Parts;
 use crate::scene::Scene;
 use crate::study::job::Job;
+
+/// The refusal of an edit whose computation panicked. The panic's own message goes to the terminal alone: it may quote a file.
+const PANICKED: &str = "computing this edit failed by a fault of the program, and the last good state stands; please report the edit with the \
+     message that the program printed";
 
 /// What is kept between pieces.
 pub struct Workshop {
@@ -145,14 +150,20 @@ impl Workshop {
             self.done = Done { state: target.state, ..Done::default() };
         }
         // In the pool: hundreds of short joins follow.
-        let outcome = rayon::scope(|_| self.piece(session, &target));
-        if let Err(error) = outcome
+        let outcome = catch_unwind(AssertUnwindSafe(|| rayon::scope(|_| self.piece(session, &target))));
+        let refused = match outcome {
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some((said(&error, "; because "), matches!(error, EditError::Scene(_)))),
+            Err(_) => {
+                // Whatever the panic left half done is computed anew.
+                (self.cloth, self.preview, self.rest, self.done) = (None, None, None, Done::default());
+                Some((PANICKED.to_owned(), target.sectioned.is_none()))
+            }
+        };
+        if let Some((sentence, scene)) = refused
             && !session.overtaken(target.state)
         {
-            let sentence = said(&error, "; because ");
-            session.publish(target.state, |desk| {
-                desk.refuse(target.state, sentence, matches!(error, EditError::Scene(_)));
-            });
+            session.publish(target.state, |desk| desk.refuse(target.state, sentence, scene));
         }
         true
     }
