@@ -1,12 +1,13 @@
 //! `partwise live`: a page with the dial beside the viewer, and the same by HTTP for scripts.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread::JoinHandle;
 
 use crate::Job;
-use crate::live::{LiveError, LiveOptions, LiveServer, random_token};
+use crate::live::{Limits, LiveError, LiveOptions, LiveServer, random_token};
 use crate::record::RecordSummary;
+use crate::scene::FileRole;
 use crate::session::{Session, Workshop};
 use clap::Args;
 
@@ -85,8 +86,16 @@ impl LiveArgs {
             std::thread::spawn(move || session.work(&mut workshop))
         };
         let (recorder, shower) = (self.keep(&session), self.show(&session));
+        let mut shown = None;
         while !interrupt::requested() && !worker.is_finished() {
             std::thread::sleep(GLANCE);
+            // HTTP clients do not get the reason, which may quote the file.
+            let refused =
+                session.snapshot().refused.filter(|refused| refused.file.is_some() && shown != Some(refused.state));
+            if let Some(refused) = refused {
+                console::error(&anyhow::Error::msg(refused.sentence.clone()));
+                shown = Some(refused.state);
+            }
         }
         session.close();
         drop(server);
@@ -119,14 +128,17 @@ impl LiveArgs {
             None => None,
         };
         let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
-        let files =
-            job.scene.files().into_iter().chain(self.stages.files().into_iter().map(Path::to_path_buf)).collect();
+        let mut files: Vec<_> =
+            job.scene.file_names().into_iter().map(|(role, name)| (role, name.to_owned())).collect();
+        files.push((FileRole::Table, self.stages.table.clone()));
+        files.extend(self.stages.dials.cloth.fabric.iter().map(|name| (FileRole::Fabric, name.clone())));
         Ok(LiveOptions {
             address: SocketAddr::new(self.bind, self.port.unwrap_or(PORT)),
             host: self.host.clone(),
             control,
             onlooker,
             files,
+            limits: Limits::default(),
             name: format!("live {}", job.scene.garment_name()),
             front: self.seen_from.direction(),
         })
@@ -139,11 +151,11 @@ impl LiveArgs {
         };
         let page = match &options.control {
             None => format!("http://{name}/"),
-            Some(control) => format!("http://{name}/?token={control}"),
+            Some(control) => with_token(&name, control),
         };
         console::result(&page);
         if let (Some(_), Some(onlooker)) = (&options.control, &options.onlooker) {
-            console::note(&format!("to look on only: http://{name}/?token={onlooker}"));
+            console::note(&format!("to look on only: {}", with_token(&name, onlooker)));
         }
         console::note("open this address in a browser, or see `partwise live --help` for curl; Ctrl-C ends");
         if address.ip().is_unspecified() {
@@ -169,4 +181,10 @@ impl LiveArgs {
         let session = session.clone();
         Some(std::thread::spawn(move || session_recorder::show(&session, &sinks)))
     }
+}
+
+/// The address of the page with a token, which may hold characters that mean something else in an address.
+fn with_token(host: &str, token: &str) -> String {
+    let token: String = form_urlencoded::byte_serialize(token.as_bytes()).collect();
+    format!("http://{host}/?token={token}")
 }

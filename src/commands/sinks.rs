@@ -69,7 +69,7 @@ pub(crate) struct SinkArgs {
     /// Port of the served page; 0 takes any free one [default: 7278, or any where that is taken]
     #[arg(long, visible_alias = "port", value_name = "PORT")]
     pub(crate) web_port: Option<u16>,
-    /// Port the served page reads the data from [default: any free one]
+    /// A further port on which viewers read the recording, as they do on the page's own
     #[arg(long, value_name = "PORT")]
     pub(crate) grpc_port: Option<u16>,
     /// Megabytes of steps kept for pages that open later; beyond it the oldest go first

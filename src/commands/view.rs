@@ -17,7 +17,7 @@ pub(crate) struct ViewArgs {
     /// Port of the page; 0 takes any free one [default: 7278, or any where that is taken]
     #[arg(long, visible_alias = "port", value_name = "PORT")]
     web_port: Option<u16>,
-    /// Port the page reads the recording from [default: any free one]
+    /// A further port on which viewers read the recording, as they do on the page's own
     #[arg(long, value_name = "PORT")]
     grpc_port: Option<u16>,
     /// Open the page in your browser

@@ -1,22 +1,17 @@
-//! Who may do what: tokens, and against pages of others the headers `Host` and `Origin`.
-//!
-//! A page of another site can send requests here, but its browser says so in `Origin`; and a name that was made to point here
-//! (DNS rebinding) stands in `Host`. Both are refused, so that such a page can neither read nor steer.
+//! What a request may do: read, or control as well, by its token.
 
-use std::net::IpAddr;
-
-use hyper::header::{self, HeaderMap};
-use hyper::{Method, StatusCode, Uri};
+use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
 
 use super::{LiveError, LiveOptions};
+use crate::record::{Hosts, Refused, query};
 
 /// Characters of the shortest token.
 const SHORTEST_TOKEN: usize = 16;
 
-/// Whom the server trusts.
+/// The hosts and tokens of a server.
 #[derive(Debug, Clone)]
 pub(super) struct Access {
-    host: Option<String>,
+    pub(super) hosts: Hosts,
     control: Option<String>,
     onlooker: Option<String>,
 }
@@ -24,14 +19,11 @@ pub(super) struct Access {
 /// What a request may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Right {
-    /// Read and steer.
+    /// Read and control.
     Control,
     /// Read.
     Look,
 }
-
-/// A refusal: status and sentence.
-pub(super) type Refused = (StatusCode, String);
 
 impl Access {
     pub(super) fn new(options: &LiveOptions) -> Result<Self, LiveError> {
@@ -43,67 +35,40 @@ impl Access {
         if let Some(found) = short.filter(|count| *count < SHORTEST_TOKEN).min() {
             return Err(LiveError::ShortToken(found));
         }
-        Ok(Self { host, control, onlooker })
+        let hosts = Hosts { name: host, any_address: control.is_some() };
+        Ok(Self { hosts, control, onlooker })
     }
 
-    /// Whether the request names this server, and comes from its own page or from no page.
-    pub(super) fn check_origin(&self, headers: &HeaderMap) -> Result<(), Refused> {
-        let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("(not text)"));
-        let Some(host) = text(header::HOST) else {
-            return Err((StatusCode::BAD_REQUEST, "no Host header, expected one".to_owned()));
-        };
-        if !self.knows(host) {
-            let said = format!("found Host: {host}, expected an address of this server; allow a name with --host");
-            return Err((StatusCode::MISDIRECTED_REQUEST, said));
-        }
-        match text(header::ORIGIN) {
-            None => Ok(()),
-            Some(origin) if ["http://", "https://"].iter().any(|s| origin.strip_prefix(s) == Some(host)) => Ok(()),
-            Some(origin) => {
-                let said = format!("found Origin: {origin}, expected this server's own page or none");
-                Err((StatusCode::FORBIDDEN, said))
-            }
-        }
-    }
-
-    fn knows(&self, host: &str) -> bool {
-        let name = host.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok()).map_or(host, |(name, _)| name);
-        let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
-        // An address was not made to point here by a name; from elsewhere than here only with a token.
-        let near = |ip: IpAddr| self.control.is_some() || ip.is_loopback();
-        address.is_ok_and(near) || name == "localhost" || self.host.as_deref() == Some(name)
-    }
-
-    /// What the token of a request allows: that of `Authorization: Bearer`, or of the address (`?token=`).
+    /// What the request's token allows, from `Authorization: Bearer` or from the address (`?token=`).
     pub(super) fn right(&self, headers: &HeaderMap, uri: &Uri) -> Result<Right, Refused> {
         let Some(control) = &self.control else { return Ok(Right::Control) };
         let bearer = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
         let bearer = bearer.and_then(|value| value.strip_prefix("Bearer "));
-        let given = bearer.or_else(|| query(uri, "token"));
-        match given {
+        let given = bearer.map(str::to_owned).or_else(|| query(uri, "token"));
+        match given.as_deref() {
             Some(token) if same(token, control) => Ok(Right::Control),
             Some(token) if self.onlooker.as_ref().is_some_and(|onlooker| same(token, onlooker)) => Ok(Right::Look),
             found => {
                 let found = if found.is_some() { "found another token" } else { "found no token" };
-                let said = format!("{found}, expected `Authorization: Bearer TOKEN` with the one that was printed");
-                Err((StatusCode::UNAUTHORIZED, said))
+                let refused = format!("{found}, expected `Authorization: Bearer TOKEN` with the printed one");
+                Err((StatusCode::UNAUTHORIZED, refused))
             }
         }
     }
 }
 
-/// Whether it is another site's page that asks, as browsers say of requests without an `Origin` too, a picture's say.
+/// Refuses requests from another site's page, which browsers mark even where they send no `Origin`, for a picture for one.
 pub(super) fn check_site(headers: &HeaderMap) -> Result<(), Refused> {
     match headers.get("sec-fetch-site").map(|value| value.to_str().unwrap_or("(not text)")) {
         None | Some("same-origin" | "none") => Ok(()),
         Some(site) => {
-            let said = format!("found Sec-Fetch-Site: {site}, expected this server's own page or none");
-            Err((StatusCode::FORBIDDEN, said))
+            let refused = format!("found Sec-Fetch-Site: {site}, expected this server's own page or none");
+            Err((StatusCode::FORBIDDEN, refused))
         }
     }
 }
 
-/// Whether a request of this method and right may go on.
+/// Refuses a change by a client that may only read.
 pub(super) fn may(right: Right, method: &Method) -> Result<(), Refused> {
     if right == Right::Control || [Method::GET, Method::HEAD].contains(method) {
         return Ok(());
@@ -111,21 +76,15 @@ pub(super) fn may(right: Right, method: &Method) -> Result<(), Refused> {
     Err((StatusCode::FORBIDDEN, format!("found {method} with an onlooker's token, expected the one for control")))
 }
 
-/// A parameter of the address, as it stands there.
-pub(super) fn query<'a>(uri: &'a Uri, name: &str) -> Option<&'a str> {
-    let pairs = uri.query()?.split('&').filter_map(|pair| pair.split_once('='));
-    pairs.filter(|(key, _)| *key == name).map(|(_, value)| value).next()
-}
-
-/// In a time that tells nothing of where two tokens differ.
+/// Compares two tokens in a time that does not depend on where they differ.
 fn same(a: &str, b: &str) -> bool {
     blake3::hash(a.as_bytes()) == blake3::hash(b.as_bytes())
 }
 
-/// 128 random bits in hexadecimal digits, from the system.
+/// 128 random bits from the system, as hexadecimal digits.
 ///
 /// # Errors
-/// Where the system has none.
+/// The system has no random numbers.
 pub fn random_token() -> std::io::Result<String> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(|e| std::io::Error::other(e.to_string()))?;
@@ -135,6 +94,7 @@ pub fn random_token() -> std::io::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Limits;
 
     fn access(address: &str, control: Option<&str>) -> Result<Access, LiveError> {
         Access::new(&LiveOptions {
@@ -143,37 +103,14 @@ mod tests {
             control: control.map(str::to_owned),
             onlooker: control.map(|_| "o".repeat(20)),
             files: Vec::new(),
+            limits: Limits::default(),
             name: String::new(),
             front: glam::DVec3::NEG_Y,
         })
     }
 
-    fn headers(host: &str, origin: Option<&str>) -> HeaderMap {
-        let mut headers = HeaderMap::new();
-        headers.insert(header::HOST, host.parse().unwrap());
-        if let Some(origin) = origin {
-            headers.insert(header::ORIGIN, origin.parse().unwrap());
-        }
-        headers
-    }
-
     #[test]
-    fn other_hosts_and_origins_are_refused() {
-        let near = access("127.0.0.1:0", None).unwrap();
-        let far = access("0.0.0.0:0", Some(&"c".repeat(20))).unwrap();
-        let ok =
-            |access: &Access, host: &str, origin: Option<&str>| access.check_origin(&headers(host, origin)).is_ok();
-        assert!(ok(&near, "127.0.0.1:8080", None) && ok(&near, "localhost:8080", Some("http://localhost:8080")));
-        assert!(ok(&near, "[::1]:8080", Some("http://[::1]:8080")) && ok(&near, "drape.example", None));
-        assert!(!ok(&near, "evil.example:8080", None), "a name that was made to point here");
-        assert!(!ok(&near, "192.168.0.7:8080", None) && ok(&far, "192.168.0.7:8080", None));
-        for origin in ["http://evil.example", "null", "http://127.0.0.1:9", "https://127.0.0.1:8080.evil.example"] {
-            assert!(!ok(&near, "127.0.0.1:8080", Some(origin)), "{origin}");
-        }
-    }
-
-    #[test]
-    fn tokens_say_who_steers_and_who_looks_on() {
+    fn tokens_tell_control_from_reading() {
         assert!(matches!(access("0.0.0.0:0", None), Err(LiveError::Open(_))));
         assert!(matches!(access("0.0.0.0:0", Some("short")), Err(LiveError::ShortToken(5))));
         let far = access("0.0.0.0:0", Some(&"c".repeat(20))).unwrap();

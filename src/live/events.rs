@@ -1,53 +1,54 @@
-//! What goes on while somebody reads: events of the state, and the viewer's pieces. At most 30 a second, the newest alone.
+//! Responses that go on while their client reads: events of the state, and pieces for the viewer. At most 30 a second, of which
+//! each carries only the newest.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use hyper::body::Bytes;
+use axum::body::Bytes;
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::sync::{OwnedSemaphorePermit, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::answer::Site;
 use super::report;
+use super::routes::Site;
 
-/// Between two that are sent.
+/// Between two events of one client.
 const PACE: Duration = Duration::from_millis(33);
-/// Something is sent at least this often, or nobody would notice that the reader is gone.
+/// The longest pause between two events, so that a lost client is noticed.
 const PULSE: Duration = Duration::from_secs(10);
-/// How long a reader may leave a piece lying.
+/// How long a client may take for one event.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Readers at a time.
+/// Clients that read events or pieces at a time.
 pub(super) const MOST_FLOWS: usize = 64;
 
-/// The state now, and whenever it changes: server-sent events.
-pub(super) fn events(site: &Arc<Site>, place: OwnedSemaphorePermit) -> Receiver<Bytes> {
+/// The state now and after each change, as server-sent events.
+pub(super) fn events(site: &Arc<Site>, permit: OwnedSemaphorePermit) -> Receiver<Bytes> {
     let mut known = None;
-    flow(site, place, site.news.clone(), b": still here\n\n", move |site| {
+    flow(site, permit, site.news.clone(), b": still here\n\n", move |site| {
         let snapshot = site.session.snapshot();
         let generation = Some(snapshot.ground.as_ref().map(|ground| ground.generation));
-        // The histogram and the whole trail only when they are new to this reader.
+        // Histogram and trail are large, and are sent when the garment is new to this client.
         let whole = std::mem::replace(&mut known, generation) != generation;
         let state = if whole { report::state(&snapshot) } else { report::event(&snapshot) };
         vec![format!("event: state\ndata: {state}\n\n").into()]
     })
 }
 
-/// The viewer's pieces, each after its length (four bytes, the least first); an empty one is a sign of life.
-pub(super) fn stream(site: &Arc<Site>, place: OwnedSemaphorePermit) -> Receiver<Bytes> {
+/// The viewer's pieces, each after its length in four little-endian bytes; an empty one keeps the connection alive.
+pub(super) fn stream(site: &Arc<Site>, permit: OwnedSemaphorePermit) -> Receiver<Bytes> {
     let (attached, mut known) = (site.pieces.attach(), [0; 4]);
-    flow(site, place, site.pieces.news(), &[0; 4], move |site| {
-        // Held for as long as somebody reads.
+    flow(site, permit, site.pieces.news(), &[0; 4], move |site| {
+        // Dropped with the client.
         let _attached = &attached;
         let length = |piece: &Bytes| Bytes::copy_from_slice(&(piece.len() as u32).to_le_bytes());
         site.pieces.since(&mut known).into_iter().flat_map(|piece| [length(&piece), piece]).collect()
     })
 }
 
-/// What is newest, now and whenever there are news; `alive` where there are none for a while.
+/// Sends `newest` now and after each change of `news`, and `alive` in longer pauses.
 fn flow(
     site: &Arc<Site>,
-    place: OwnedSemaphorePermit,
+    permit: OwnedSemaphorePermit,
     mut news: watch::Receiver<u64>,
     alive: &'static [u8],
     mut newest: impl FnMut(&Site) -> Vec<Bytes> + Send + 'static,
@@ -55,7 +56,7 @@ fn flow(
     let (sender, receiver) = channel(1);
     let site = Arc::clone(site);
     tokio::spawn(async move {
-        let _place = place;
+        let _permit = permit;
         while !site.session.is_closed() {
             let began = Instant::now();
             news.mark_unchanged();
@@ -73,7 +74,7 @@ fn flow(
     receiver
 }
 
-/// Waits for news, with a sign of life now and then; false where there will be none, or nobody to read them.
+/// Waits for news and sends `alive` meanwhile; false once the session or the client is gone.
 async fn changed(news: &mut watch::Receiver<u64>, sender: &Sender<Bytes>, alive: &'static [u8]) -> bool {
     loop {
         match timeout(PULSE, news.changed()).await {
@@ -84,7 +85,7 @@ async fn changed(news: &mut watch::Receiver<u64>, sender: &Sender<Bytes>, alive:
     }
 }
 
-/// Whether the reader took it in time.
+/// Whether the client took the bytes in time.
 async fn sent(sender: &Sender<Bytes>, bytes: Bytes) -> bool {
     matches!(timeout(PATIENCE, sender.send(bytes)).await, Ok(Ok(())))
 }

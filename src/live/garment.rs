@@ -1,23 +1,23 @@
-//! The garment of a snapshot: as OBJ, and PART by PART.
+//! The garment of a snapshot as OBJ, and each PART of it.
 
+use axum::http::{StatusCode, Uri};
 use glam::DVec3;
-use hyper::body::Bytes;
-use hyper::{StatusCode, Uri};
 use serde_json::{Value, json};
 
-use super::access::{Refused, query};
 use crate::parts::UNASSIGNED;
+use crate::record::{Refused, query};
 use crate::session::{LoadedScene, Snapshot};
 
-/// The garment as OBJ: `of=rest` (without it the newest there is), `of=preview`, or `pin=ID`.
-pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Bytes, Refused> {
-    let none = |what: &str| (StatusCode::CONFLICT, format!("no {what} yet; wait for the event that tells of it"));
+/// The garment as OBJ: `of=rest`, `of=preview`, `pin=ID`, or by default the newest drape.
+pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
+    let none = |what: &str| (StatusCode::CONFLICT, format!("no {what} yet; wait for an event that has one"));
     let rest = snapshot.rest.as_ref().map(|rest| (&rest.ground, &rest.positions));
     let preview = snapshot.preview.as_ref().map(|preview| (&preview.ground, &preview.positions));
-    let (ground, positions) = match (query(uri, "pin"), query(uri, "of")) {
+    let (ground, positions) = match (query(uri, "pin").as_deref(), query(uri, "of").as_deref()) {
         (Some(id), _) => {
             let pin = snapshot.pins.iter().find(|pin| pin.id.to_string() == id);
-            let pin = pin.ok_or_else(|| (StatusCode::NOT_FOUND, format!("found pin={id}, expected a pin there is")))?;
+            let pin =
+                pin.ok_or_else(|| (StatusCode::NOT_FOUND, format!("found pin={id}, expected the number of a pin")))?;
             (&pin.ground, &pin.positions)
         }
         (None, None) => rest.or(preview).ok_or_else(|| none("drape"))?,
@@ -29,13 +29,12 @@ pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Bytes, Refused> {
     let folder = tempfile::tempdir().map_err(|e| failed(&e))?;
     let path = folder.path().join("drape.obj");
     ground.loaded.write(&path, positions).map_err(|e| failed(&e))?;
-    std::fs::read(&path).map(Bytes::from).map_err(|e| failed(&e))
+    std::fs::read(&path).map_err(|e| failed(&e))
 }
 
-/// A PART and what is known of it: `number=N`, or the one nearest a point, `at=x,y,z` on the garment `on=parts`, `preview` or
-/// `rest` (m).
+/// A PART and its results: `number=N`, or the PART nearest the point `at=x,y,z`, m, of the garment `on=parts`, `preview` or `rest`.
 pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
-    let bad = |said: String| (StatusCode::BAD_REQUEST, said);
+    let bad = |sentence: String| (StatusCode::BAD_REQUEST, sentence);
     let found = snapshot.sectioned.as_ref();
     let found =
         found.ok_or_else(|| (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned()))?;
@@ -47,13 +46,13 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
     let number = if let Some(text) = query(uri, "number") {
         text.parse().map_err(|_| bad(format!("found number={text}, expected a PART's number from 0")))?
     } else {
-        let text = query(uri, "at").unwrap_or("");
+        let text = query(uri, "at").unwrap_or_default();
         let numbers: Vec<f64> =
             text.split(',').filter_map(|t| t.parse().ok()).filter(|m: &f64| m.is_finite()).collect();
         let &[x, y, z] = numbers.as_slice() else {
             return Err(bad(format!("found at={text}, expected number=N, or three metres as in at=0.1,0,1.2")));
         };
-        let on = match query(uri, "on") {
+        let on = match query(uri, "on").as_deref() {
             None | Some("parts") => placed,
             Some("preview") => preview.map_or(placed, |preview| &*preview.positions),
             Some("rest") => rest.unwrap_or(placed),
@@ -65,8 +64,8 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
         nearest.map_or(UNASSIGNED, |(vertex, _)| found.parts.part_of_vertex[vertex])
     };
     let Some(part) = found.parts.parts.get(number as usize) else {
-        let said = format!("found no PART there, expected one of 0 to {}", found.parts.len().saturating_sub(1));
-        return Err((StatusCode::NOT_FOUND, said));
+        let none = format!("found no PART there, expected one of 0 to {}", found.parts.len().saturating_sub(1));
+        return Err((StatusCode::NOT_FOUND, none));
     };
     let mean = |to: &[DVec3]| {
         let moved = part.vertices.iter().map(|&v| to[v as usize] - placed[v as usize]).sum::<DVec3>();

@@ -1,44 +1,47 @@
 //! A session over HTTP: a page with the viewer in it, an API for scripts, a stream for pages. `assets/live/http.md` describes it.
 //!
-//! One thread serves, another encodes what viewers are sent; the session never waits for either. Of everything only the newest is kept:
-//! who reads slowly skips states, and who does not read at all holds one piece and is dropped after a while.
+//! One thread serves, another encodes for viewers; the session waits for neither. Only the newest of everything is kept: a client
+//! that reads slowly skips states, and one that does not read holds one piece until its connection is closed.
 //!
-//! Limits: HTTP/1.1 without TLS. On other addresses than this machine's own a token is asked for, but whoever listens on the line reads it: put a
-//! proxy with TLS before it, or a tunnel.
+//! Limits: HTTP without TLS. On addresses that other machines reach, a token is needed, but it crosses the network unencrypted: put
+//! a proxy with TLS in front, or use a tunnel.
 
 mod access;
-mod answer;
-mod body;
 mod events;
 mod garment;
 mod pieces;
 mod report;
+mod routes;
 mod server;
 
 use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
 
 use glam::DVec3;
 
 pub use access::random_token;
 pub use server::LiveServer;
 
+pub use crate::record::Limits;
+use crate::scene::FileRole;
+
 /// How a session is served.
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
-    /// Where to listen.
+    /// The address to listen on.
     pub address: SocketAddr,
-    /// A host's name that browsers may know the server by, besides addresses and `localhost`.
+    /// A host name that requests may use besides addresses and `localhost`.
     pub host: Option<String>,
-    /// Who has it steers. None on this machine's own addresses alone.
+    /// Token for control; may be none on a loopback address.
     pub control: Option<String>,
-    /// Who has it looks on.
+    /// Token for reading alone.
     pub onlooker: Option<String>,
-    /// Files that edits may name: those of the command line. No other file is opened for a request.
-    pub files: Vec<PathBuf>,
+    /// Files that requests may name, each in its field: those of the command line. A request opens no other file.
+    pub files: Vec<(FileRole, String)>,
+    /// Limits of connections.
+    pub limits: Limits,
     /// Name of the session in the viewer.
     pub name: String,
-    /// Where the wearer looks to.
+    /// The direction in which the wearer looks.
     pub front: DVec3,
 }
 

@@ -1,11 +1,11 @@
-//! What viewers are sent, encoded once for all of them on a thread of its own, while anybody looks.
+//! The pieces of a recording that viewers read, encoded once for all of them on a thread of its own while there are any.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use axum::body::Bytes;
 use glam::DVec3;
-use hyper::body::Bytes;
 use tokio::sync::watch;
 
 use super::access::random_token;
@@ -15,7 +15,7 @@ use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
 use crate::session::{Session, Snapshot};
 use crate::study::metrics::LevelCount;
 
-/// How often is looked whether somebody has come.
+/// Between two checks for a first viewer.
 const GLANCE: Duration = Duration::from_millis(50);
 /// Between two encodings.
 const PACE: Duration = Duration::from_millis(33);
@@ -26,14 +26,14 @@ type Slots = [Option<(u64, Bytes)>; 4];
 #[derive(Default)]
 pub(super) struct Pieces {
     slots: Mutex<Slots>,
-    told: watch::Sender<u64>,
-    /// Held by every viewer, and here.
+    newest: watch::Sender<u64>,
+    /// Cloned by each viewer.
     viewers: Arc<()>,
     stopped: AtomicBool,
     broken: Mutex<Option<String>>,
 }
 
-/// What was encoded last; held, so that what is at the same place is the same.
+/// The inputs of the last encoding. They are held, so that equal pointers mean equal inputs.
 #[derive(Default)]
 struct Encoded {
     base: Option<(u64, Vec<u64>)>,
@@ -43,7 +43,7 @@ struct Encoded {
 }
 
 impl Pieces {
-    /// A viewer holds this for as long as it looks.
+    /// Counts a viewer for as long as it holds the result.
     pub(super) fn attach(&self) -> Arc<()> {
         Arc::clone(&self.viewers)
     }
@@ -53,19 +53,19 @@ impl Pieces {
     }
 
     pub(super) fn news(&self) -> watch::Receiver<u64> {
-        self.told.subscribe()
+        self.newest.subscribe()
     }
 
     pub(super) fn stop(&self) {
         self.stopped.store(true, Ordering::SeqCst);
     }
 
-    /// Why there are no pieces, if so.
+    /// The error that ended the encoding, if any.
     pub(super) fn broken(&self) -> Option<String> {
         self.broken.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The pieces that are newer than those `known`; after another layout all of them.
+    /// The pieces that are newer than those `known`; all of them after a new layout.
     pub(super) fn since(&self, known: &mut [u64; 4]) -> Vec<Bytes> {
         let slots = self.slots().clone();
         let number = |slot: &Option<(u64, Bytes)>| slot.as_ref().map_or(0, |(number, _)| *number);
@@ -86,14 +86,14 @@ impl Pieces {
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Encodes what changes until the server stops.
+    /// Encodes changes until the server stops.
     pub(super) fn encode(&self, session: &Session, name: &str, front: DVec3) {
         let made = self.keep_encoding(session, name, front);
         *self.broken.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
     }
 
     fn keep_encoding(&self, session: &Session, name: &str, front: DVec3) -> Result<(), RecordError> {
-        // Pages tell one session from another by it.
+        // Viewers keep one recording for each identifier.
         let id = random_token().unwrap_or_default();
         let mut encoder = LiveEncoder::new(name, &id, front)?;
         let mut encoded = Encoded::default();
@@ -102,7 +102,7 @@ impl Pieces {
             let wait = if self.is_seen() { GLANCE } else { Duration::ZERO };
             let now = session.newer_than(serial, wait);
             if !self.is_seen() {
-                // Nobody looks: what is in the slots stays until somebody does.
+                // The slots keep what they hold until there is a viewer.
                 std::thread::sleep(GLANCE);
                 continue;
             }
@@ -122,14 +122,14 @@ impl Pieces {
                 }
             }
             drop(slots);
-            self.told.send_replace(number);
+            self.newest.send_replace(number);
             std::thread::sleep(PACE);
         }
         Ok(())
     }
 }
 
-/// What is new since `encoded`.
+/// Encodes the changes since `encoded`.
 fn encode(
     encoder: &mut LiveEncoder,
     encoded: &mut Encoded,

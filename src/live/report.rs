@@ -1,13 +1,14 @@
-//! A snapshot of the session as JSON: what `GET /api/state` answers and every event tells.
+//! A snapshot of the session as JSON, for `GET /api/state` and events.
 
 use serde_json::{Map, Value, json};
 
+use crate::base::error_text;
 use crate::drape::{Model, Settings};
 use crate::garment::builtin;
 use crate::garment::fabric;
 use crate::parts::range_table::TableRule;
 use crate::record::level_colours;
-use crate::session::{AtRest, Finished, LoadedScene, Pin, Preview, Segmented, Snapshot, preset_names};
+use crate::session::{AtRest, Finished, LoadedScene, Pin, Preview, Refusal, Segmented, Snapshot, preset_names};
 use crate::study::job::Job;
 use crate::study::metrics::LevelCount;
 
@@ -22,7 +23,7 @@ pub(super) fn state(snapshot: &Snapshot) -> Value {
     all
 }
 
-/// What changes from moment to moment.
+/// The state without histogram and trail.
 pub(super) fn event(snapshot: &Snapshot) -> Value {
     json!({
         "state": snapshot.state,
@@ -34,7 +35,7 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
         "preview": snapshot.preview.as_deref().map(preview),
         "rest": snapshot.rest.as_deref().map(rest),
         "figures": snapshot.finished.as_deref().map(figures),
-        "refused": snapshot.refused.as_ref().map(|r| json!({"state": r.state, "error": crate::base::error_text::short(&r.sentence), "back_to": r.back_to})),
+        "refused": snapshot.refused.as_deref().map(refused),
         "pins": snapshot.pins.iter().map(|p| pin(p)).collect::<Vec<_>>(),
         "trail_end": snapshot.trail.last(),
         "undo": snapshot.undo,
@@ -43,7 +44,7 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
     })
 }
 
-/// What can be chosen by name.
+/// Everything that an edit can name.
 pub(super) fn choices() -> Value {
     json!({
         "tables": preset_names(),
@@ -53,7 +54,7 @@ pub(super) fn choices() -> Value {
     })
 }
 
-/// A job in the words of an edit.
+/// A job in the fields of an edit.
 fn job(job: &Job) -> Value {
     let Settings { table, min_part, model, refine, fabric, self_contact } = &job.settings;
     let table = match table {
@@ -76,11 +77,22 @@ fn job(job: &Job) -> Value {
     })
 }
 
-/// Measurements by the names of an edit.
+/// Measurements by their names in an edit.
 fn measurements(job: &Job) -> Value {
     let Ok(Value::Object(all)) = serde_json::to_value(&job.scene.measurements) else { return Value::Null };
     let short = all.into_iter().map(|(name, cm)| (name.trim_end_matches("_cm").to_owned(), cm));
     Value::Object(short.collect::<Map<_, _>>())
+}
+
+/// A refusal; the reason why a file cannot be used would quote the file, and stays on the terminal.
+fn refused(refusal: &Refusal) -> Value {
+    let error = refusal.file.as_deref().map_or_else(|| error_text::short(&refusal.sentence), unusable_file);
+    json!({ "state": refusal.state, "error": error, "back_to": refusal.back_to })
+}
+
+/// The refusal of an edit that names this file of the command line.
+pub(super) fn unusable_file(file: &str) -> String {
+    format!("{file} cannot be used with this edit; the terminal of the program shows the reason")
 }
 
 fn garment(ground: &LoadedScene) -> Value {
@@ -148,8 +160,7 @@ fn pin(pin: &Pin) -> Value {
     })
 }
 
-/// How many vertices lie how far off, in bars that are equally wide over the root of the distance: near the body levels are
-/// thin.
+/// Vertices by their distance, in bars of equal width over the root of the distance: levels are thin near the body.
 fn histogram(distance_m: &[f64]) -> Value {
     let farthest_cm = 100.0 * distance_m.iter().fold(1e-6_f64, |a, &b| a.max(b));
     let bars = BARS as f64;

@@ -1,33 +1,38 @@
-//! What is asked for and what is answered: the page's files, and the API.
+//! The routes: the page's files, and the API that `assets/live/http.md` describes.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use http_body_util::{BodyExt as _, LengthLimitError, Limited};
-use hyper::body::{Body, Bytes, Incoming};
-use hyper::header::{self, HeaderValue};
-use hyper::{Method, Request, Response, StatusCode, Uri};
+use axum::body::{Body, Bytes, HttpBody as _};
+use axum::extract::{DefaultBodyLimit, FromRequest as _, Request, State};
+use axum::http::header::{self, HeaderValue};
+use axum::http::{Method, StatusCode, Uri};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{delete, get, post};
+use axum::{Extension, Router};
 use serde_json::{Value, json};
 use tokio::sync::mpsc::Receiver;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
 
-use super::access::{Access, Refused, Right, check_site, may, query};
-use super::body::{Answer, flowing, refusal, whole};
+use super::access::{Access, Right, check_site, may};
 use super::events::{MOST_FLOWS, events, stream};
 use super::pieces::Pieces;
 use super::{garment, report};
-use crate::base::files::names_a_file;
+use crate::base::error_text;
 use crate::parts::range_table::RangeTable;
-use crate::record::{bundled, takes_gzip};
+use crate::record::{Connection, Refused, file, query, whole};
+use crate::scene::FileRole;
 use crate::session::{Edit, EditError, Session, TableEdit};
 use crate::study::job::Job;
 use crate::study::sweep::sweep_file;
 
-/// Bytes of the longest request.
+/// Bytes of the longest request body.
 const LONGEST: usize = 1 << 20;
 
-/// How long a request's body may take.
+/// How long a request body may take to arrive.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The page's own files.
@@ -41,133 +46,142 @@ const FILES: [(&str, &str, &str); 7] = [
     ("/viewer.js", "text/javascript; charset=utf-8", include_str!("page/viewer.js")),
 ];
 
-/// What is served, and to whom.
+/// A session and its clients.
 pub(super) struct Site {
     pub(super) session: Session,
     pub(super) access: Access,
-    pub(super) files: Vec<PathBuf>,
+    pub(super) files: Vec<(FileRole, String)>,
     pub(super) pieces: Arc<Pieces>,
     pub(super) news: watch::Receiver<u64>,
-    /// Places of readers of what goes on.
+    /// One permit for each reader of events or the stream.
     pub(super) flows: Arc<Semaphore>,
-    /// By which a page knows this server again.
+    /// A name by which a page recognises this server.
     pub(super) run: String,
 }
 
-/// Answers a request, whatever it is.
-pub(super) async fn respond(site: &Arc<Site>, request: Request<Incoming>) -> Response<Answer> {
-    match decide(site, request).await {
-        Ok(response) => response,
-        Err((status, sentence)) => {
-            let mut response = refusal(status, &sentence);
-            if status == StatusCode::UNAUTHORIZED {
-                response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
-            }
-            response
-        }
+/// A refused request: status and sentence, sent as `{"error": sentence}`.
+struct Refusal(StatusCode, String);
+
+impl From<Refused> for Refusal {
+    fn from((status, sentence): Refused) -> Self {
+        Self(status, sentence)
     }
 }
 
-async fn decide(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<Answer>, Refused> {
-    site.access.check_origin(request.headers())?;
-    // The address as it is printed ends in a slash, and what is put behind it begins with one.
-    let path = format!("/{}", request.uri().path().trim_start_matches('/'));
-    let Some(of_api) = path.strip_prefix("/api/") else { return file(&request, &path) };
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        let text = json!({ "error": error_text::short(&self.1) }).to_string();
+        let mut response = whole(self.0, "application/json", text + "\n");
+        if self.0 == StatusCode::UNAUTHORIZED {
+            response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response
+    }
+}
+
+type Answer = Result<Response, Refusal>;
+
+/// All routes of a site. The page's files hold nothing of the session and need no token.
+pub(super) fn router(site: Arc<Site>) -> Router {
+    let mut router = Router::new()
+        .route("/api/state", get(state).patch(patch))
+        .route("/api/choices", get(async || json_of(&report::choices())))
+        .route("/api/events", get(async |State(site): State<Arc<Site>>| flow(&site, "text/event-stream", events)))
+        .route("/api/stream", get(pieces))
+        .route("/api/undo", post(async |State(site): State<Arc<Site>>| changed(site, Session::undo).await))
+        .route("/api/redo", post(async |State(site): State<Arc<Site>>| changed(site, Session::redo).await))
+        .route("/api/pins", post(pin))
+        .route("/api/pins/{id}", delete(unpin));
+    for path in ["/api/drape.obj", "/api/part", "/api/job.toml", "/api/table.toml", "/api/sweep.toml"] {
+        router = router.route(path, get(read));
+    }
+    router = router.route_layer(from_fn_with_state(Arc::clone(&site), authorise));
+    for (path, kind, text) in FILES {
+        router = router.route(path, get(move || std::future::ready(whole(StatusCode::OK, kind, text))));
+    }
+    router
+        .method_not_allowed_fallback(wrong_method)
+        .fallback(async |request: Request| file(&request).map_err(Refusal::from))
+        .layer(DefaultBodyLimit::max(LONGEST))
+        .layer(from_fn_with_state(Arc::clone(&site), check_host))
+        .with_state(site)
+}
+
+async fn check_host(State(site): State<Arc<Site>>, request: Request, next: Next) -> Answer {
+    site.access.hosts.check(request.headers(), request.uri())?;
+    Ok(next.run(request).await)
+}
+
+async fn authorise(
+    State(site): State<Arc<Site>>,
+    Extension(connection): Extension<Arc<Connection>>,
+    mut request: Request,
+    next: Next,
+) -> Answer {
     check_site(request.headers())?;
     let right = site.access.right(request.headers(), request.uri())?;
     may(right, request.method())?;
-    let method = request.method().clone();
-    match (&method, of_api) {
-        (&Method::GET, "state") => {
-            let mut state = report::state(&site.session.snapshot());
-            state["may_steer"] = json!(right == Right::Control);
-            state["run"] = json!(site.run);
-            Ok(json_of(&state))
-        }
-        (&Method::GET, "choices") => Ok(json_of(&report::choices())),
-        (&Method::GET, "events") => flow(site, "text/event-stream", events),
-        (&Method::GET, "stream") => match site.pieces.broken() {
-            None => flow(site, "application/octet-stream", stream),
-            Some(why) => Err((StatusCode::INTERNAL_SERVER_ERROR, format!("nothing to show: {why}"))),
-        },
-        (&Method::GET, "drape.obj" | "part" | "job.toml" | "table.toml" | "sweep.toml") => {
-            let (site, uri, what) = (Arc::clone(site), request.uri().clone(), of_api.to_owned());
-            apart(move || read(&site.session, &what, &uri)).await
-        }
-        (&Method::PATCH, "state") => patch(site, request).await,
-        (&Method::POST, "undo" | "redo") => {
-            let undo = of_api == "undo";
-            changed(site, move |session| if undo { session.undo() } else { session.redo() }).await
-        }
-        (&Method::POST, "pins") => {
-            let label = label(&body(request).await?)?;
-            changed(site, move |session| session.pin(label)).await
-        }
-        (&Method::DELETE, pin) if pin.starts_with("pins/") => {
-            let id = pin.trim_start_matches("pins/").parse().ok();
-            if id.is_some_and(|id| site.session.unpin(id)) {
-                return Ok(json_of(&report::event(&site.session.snapshot())));
-            }
-            Err((StatusCode::NOT_FOUND, format!("found {path}, expected a pin there is")))
-        }
-        (_, "state" | "choices" | "events" | "stream" | "drape.obj" | "part" | "job.toml" | "table.toml" | "undo")
-        | (_, "redo" | "pins" | "sweep.toml") => {
-            let expected =
-                if of_api == "state" { "GET or PATCH" } else { "another method; see `partwise live --help`" };
-            Err((StatusCode::METHOD_NOT_ALLOWED, format!("found {method} {path}, expected {expected}")))
-        }
-        _ => Err((StatusCode::NOT_FOUND, format!("found {path}, expected what `partwise live --help` lists"))),
+    connection.authorise();
+    request.extensions_mut().insert(right);
+    Ok(next.run(request).await)
+}
+
+async fn wrong_method(method: Method, uri: Uri) -> Refusal {
+    let path = uri.path();
+    let expected = match path {
+        "/api/state" => "GET or PATCH",
+        path if path.starts_with("/api/") => "another method; see `partwise live --help`",
+        _ => "GET",
+    };
+    Refusal(StatusCode::METHOD_NOT_ALLOWED, format!("found {method} {path}, expected {expected}"))
+}
+
+async fn state(State(site): State<Arc<Site>>, Extension(right): Extension<Right>) -> Response {
+    let mut state = report::state(&site.session.snapshot());
+    state["may_steer"] = json!(right == Right::Control);
+    state["run"] = json!(site.run);
+    json_of(&state)
+}
+
+async fn pieces(State(site): State<Arc<Site>>) -> Answer {
+    match site.pieces.broken() {
+        None => flow(&site, "application/octet-stream", stream),
+        Some(why) => Err(Refusal(StatusCode::INTERNAL_SERVER_ERROR, format!("nothing to show: {why}"))),
     }
 }
 
-/// The page's files and the viewer's; they hold nothing of the session, so whoever may reach the server may have them.
-fn file(request: &Request<Incoming>, path: &str) -> Result<Response<Answer>, Refused> {
-    if ![Method::GET, Method::HEAD].contains(request.method()) {
-        return Err((StatusCode::METHOD_NOT_ALLOWED, format!("found {} {path}, expected GET", request.method())));
-    }
-    if let Some((_, kind, text)) = FILES.iter().find(|(known, _, _)| *known == path) {
-        return Ok(whole(StatusCode::OK, kind, Bytes::from_static(text.as_bytes())));
-    }
-    let none = || (StatusCode::NOT_FOUND, format!("found {path}, expected / or what `partwise live --help` lists"));
-    let bundled = bundled(path, takes_gzip(request.headers())).ok_or_else(none)?;
-    Ok(bundled.measured(whole(StatusCode::OK, bundled.kind, bundled.bytes.clone())))
-}
-
-fn flow(
-    site: &Arc<Site>,
-    kind: &'static str,
-    open: fn(&Arc<Site>, OwnedSemaphorePermit) -> Receiver<Bytes>,
-) -> Result<Response<Answer>, Refused> {
-    let full = |_| (StatusCode::SERVICE_UNAVAILABLE, format!("{MOST_FLOWS} readers are there already; close a page"));
-    let place = Arc::clone(&site.flows).try_acquire_owned().map_err(full)?;
-    Ok(flowing(kind, open(site, place)))
+/// A response that goes on while its client reads.
+fn flow(site: &Arc<Site>, kind: &'static str, open: fn(&Arc<Site>, OwnedSemaphorePermit) -> Receiver<Bytes>) -> Answer {
+    let Ok(permit) = Arc::clone(&site.flows).try_acquire_owned() else {
+        let full = format!("found {MOST_FLOWS} readers already; close a page");
+        return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, full));
+    };
+    let pieces = ReceiverStream::new(open(site, permit)).map(Ok::<_, std::convert::Infallible>);
+    Ok(whole(StatusCode::OK, kind, Body::from_stream(pieces)))
 }
 
 /// An edit as JSON, or a range table or a whole job as TOML.
-async fn patch(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<Answer>, Refused> {
+async fn patch(State(site): State<Arc<Site>>, request: Request) -> Answer {
     let gesture = query(request.uri(), "gesture").map(|text| {
-        let wrong = || (StatusCode::BAD_REQUEST, format!("found gesture={text}, expected a whole number"));
-        text.parse::<u64>().map_err(|_| wrong())
+        let wrong = |_| (StatusCode::BAD_REQUEST, format!("found gesture={text}, expected a whole number"));
+        text.parse::<u64>().map_err(wrong)
     });
     let gesture = gesture.transpose()?;
     let kind = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or("");
     let kind = kind.split(';').next().unwrap_or("").trim().to_owned();
-    let files = site.files.clone();
-    let bytes = match kind.as_str() {
-        "application/json" | "application/toml" => body(request).await?,
-        found => {
-            let said = format!("found Content-Type: {found}, expected application/json or application/toml");
-            return Err((StatusCode::UNSUPPORTED_MEDIA_TYPE, said));
-        }
-    };
+    if !["application/json", "application/toml"].contains(&kind.as_str()) {
+        let refused = format!("found Content-Type: {kind}, expected application/json or application/toml");
+        return Err(Refusal(StatusCode::UNSUPPORTED_MEDIA_TYPE, refused));
+    }
+    let bytes = body(request).await?;
     if kind == "application/json" {
-        // A list would do for a structure.
+        // Serde would read a list as a structure.
         if bytes.trim_ascii_start().first() != Some(&b'{') {
-            return Err((StatusCode::BAD_REQUEST, "expected an object such as {\"fabric\": \"denim\"}".to_owned()));
+            return Err(malformed(&"expected an object such as {\"fabric\": \"denim\"}"));
         }
         let edit: Edit = serde_json::from_slice(&bytes).map_err(|e| malformed(&e))?;
-        edit.names().into_iter().try_for_each(|name| known(name, &files))?;
-        return changed(site, move |session| session.submit(&edit, gesture)).await;
+        let named = known(&edit.file_names(), &site.files)?;
+        return changed_by(site, named, move |session| session.submit(&edit, gesture)).await;
     }
     let text = String::from_utf8(bytes.to_vec()).map_err(|e| malformed(&e))?;
     let fields: toml::Table = text.parse().map_err(|e: toml::de::Error| malformed(&e.message()))?;
@@ -177,101 +191,124 @@ async fn patch(site: &Arc<Site>, request: Request<Incoming>) -> Result<Response<
         return changed(site, move |session| session.submit(&edit, gesture)).await;
     }
     let job: Job = toml::from_str(&text).map_err(|e| malformed(&e.message()))?;
-    [&job.scene.body, &job.scene.garment, &job.scene.rest].into_iter().try_for_each(|name| known(name, &files))?;
-    changed(site, move |session| session.submit_job(job)).await
+    let named = known(&job.file_names(), &site.files)?;
+    changed_by(site, named, move |session| session.submit_job(job)).await
 }
 
-/// A request can name what is built in and what the command line named; no other file is opened for it.
-fn known(name: &str, files: &[PathBuf]) -> Result<(), Refused> {
-    if !names_a_file(name) || files.iter().any(|file| file.as_os_str() == name) {
-        return Ok(());
+/// Refuses every file but those that the command line named in the same field, without opening it; returns one that is named.
+fn known(named: &[(FileRole, &str)], files: &[(FileRole, String)]) -> Result<Option<String>, Refusal> {
+    let given = |role: FileRole, name: &str| files.iter().any(|(of, file)| (*of, file.as_str()) == (role, name));
+    match named.iter().find(|(role, name)| !given(*role, name)) {
+        None => Ok(named.first().map(|(_, name)| (*name).to_owned())),
+        Some((role, name)) => {
+            let expected = "a built-in name, or the file of the command line in the same field";
+            Err(Refusal(StatusCode::FORBIDDEN, format!("found the file {name} as {role:?}, expected {expected}")))
+        }
     }
-    let said = format!("found the file {name}, expected something built in, or a file of the command line");
-    Err((StatusCode::FORBIDDEN, said))
 }
 
-/// Changes the session apart from the thread that serves, and answers with the state it is in then.
-async fn changed(
-    site: &Arc<Site>,
+/// Changes the session on another thread, and answers with the state after it.
+async fn changed(site: Arc<Site>, change: impl FnOnce(&Session) -> Result<u64, EditError> + Send + 'static) -> Answer {
+    changed_by(site, None, change).await
+}
+
+/// The same by an edit that may name a `file`: its refusal does not quote the file.
+async fn changed_by(
+    site: Arc<Site>,
+    file: Option<String>,
     change: impl FnOnce(&Session) -> Result<u64, EditError> + Send + 'static,
-) -> Result<Response<Answer>, Refused> {
-    let session = site.session.clone();
+) -> Answer {
     apart(move || {
-        change(&session).map_err(|e| unusable(&e))?;
-        Ok(json_of(&report::event(&session.snapshot())))
+        change(&site.session).map_err(|error| match file {
+            None => unusable(&error),
+            Some(file) => Refusal(StatusCode::UNPROCESSABLE_ENTITY, report::unusable_file(&file)),
+        })?;
+        Ok(json_of(&report::event(&site.session.snapshot())))
     })
     .await
 }
 
-async fn apart(
-    work: impl FnOnce() -> Result<Response<Answer>, Refused> + Send + 'static,
-) -> Result<Response<Answer>, Refused> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|e| Err((StatusCode::INTERNAL_SERVER_ERROR, e.to_string())))
+async fn apart(work: impl FnOnce() -> Answer + Send + 'static) -> Answer {
+    // A panic's message stays on the terminal.
+    let failed =
+        |_| Err(Refusal(StatusCode::INTERNAL_SERVER_ERROR, "this request failed by a fault of the program".into()));
+    tokio::task::spawn_blocking(work).await.unwrap_or_else(failed)
 }
 
-fn read(session: &Session, what: &str, uri: &Uri) -> Result<Response<Answer>, Refused> {
-    let snapshot = session.snapshot();
-    match what {
-        "drape.obj" => garment::obj(&snapshot, uri).map(|bytes| whole(StatusCode::OK, "model/obj", bytes)),
-        "part" => garment::part(&snapshot, uri).map(|found| json_of(&found)),
-        "job.toml" => {
-            let text = toml::to_string(&*snapshot.job).map_err(|e| unusable(&e))?;
-            Ok(whole(StatusCode::OK, "application/toml", text))
-        }
-        "sweep.toml" => {
-            let pins: Vec<(String, Job)> =
-                snapshot.pins.iter().map(|p| (p.label.clone(), Job::clone(&p.job))).collect();
-            if pins.is_empty() {
-                let said =
-                    "nothing is pinned yet: a sweep file has a point for each pinned state; POST /api/pins pins one";
-                return Err((StatusCode::CONFLICT, said.to_owned()));
+/// Results of the newest state: files, and PARTs one by one.
+async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
+    apart(move || {
+        let snapshot = site.session.snapshot();
+        let toml = |text: String| whole(StatusCode::OK, "application/toml", text);
+        match uri.path() {
+            "/api/drape.obj" => Ok(whole(StatusCode::OK, "model/obj", garment::obj(&snapshot, &uri)?)),
+            "/api/part" => Ok(json_of(&garment::part(&snapshot, &uri)?)),
+            "/api/job.toml" => Ok(toml(toml::to_string(&*snapshot.job).map_err(|e| unusable(&e))?)),
+            "/api/sweep.toml" => {
+                let pins: Vec<(String, Job)> =
+                    snapshot.pins.iter().map(|p| (p.label.clone(), Job::clone(&p.job))).collect();
+                if pins.is_empty() {
+                    let none = "found no pinned state, expected one for each point of the sweep; POST /api/pins pins the newest";
+                    return Err(Refusal(StatusCode::CONFLICT, none.to_owned()));
+                }
+                let text = sweep_file("pinned states", &pins);
+                Ok(toml(text.map_err(|e| Refusal(StatusCode::CONFLICT, e.to_string()))?))
             }
-            let text = sweep_file("pinned states", &pins).map_err(|e| (StatusCode::CONFLICT, e.to_string()))?;
-            Ok(whole(StatusCode::OK, "application/toml", text))
+            _ => match &snapshot.sectioned {
+                Some(found) => Ok(toml(found.table.to_toml())),
+                None => Err(Refusal(StatusCode::CONFLICT, "no table yet: the garment is still being made".to_owned())),
+            },
         }
-        _ => match &snapshot.sectioned {
-            Some(found) => Ok(whole(StatusCode::OK, "application/toml", found.table.to_toml())),
-            None => Err((StatusCode::CONFLICT, "no table yet: the garment is still being made".to_owned())),
-        },
-    }
+    })
+    .await
 }
 
-/// A request's body, as long as it may be.
-async fn body(request: Request<Incoming>) -> Result<Bytes, Refused> {
-    let long = || (StatusCode::PAYLOAD_TOO_LARGE, format!("found more than {LONGEST} bytes, expected an edit"));
+/// Pins the newest state under `{"label": "..."}`, or without a body under its number.
+async fn pin(State(site): State<Arc<Site>>, request: Request) -> Answer {
+    let bytes = body(request).await?;
+    let given =
+        if bytes.is_empty() { Value::Null } else { serde_json::from_slice(&bytes).map_err(|e| malformed(&e))? };
+    let label: Option<String> = match given.get("label") {
+        None => None,
+        Some(Value::String(label)) => Some(label.chars().filter(|c| !c.is_control()).take(60).collect()),
+        Some(other) => return Err(malformed(&format!("found label = {other}, expected a text"))),
+    };
+    changed(site, move |session| session.pin(label)).await
+}
+
+async fn unpin(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
+    let id = uri.path().trim_start_matches("/api/pins/");
+    if id.parse().is_ok_and(|id| site.session.unpin(id)) {
+        return Ok(json_of(&report::event(&site.session.snapshot())));
+    }
+    Err(Refusal(StatusCode::NOT_FOUND, format!("found pin {id}, expected the number of a pin of `GET /api/state`")))
+}
+
+/// The body of a request, up to [`LONGEST`] bytes.
+async fn body(request: Request) -> Result<Bytes, Refusal> {
+    let long = || Refusal(StatusCode::PAYLOAD_TOO_LARGE, format!("found more than {LONGEST} bytes, expected an edit"));
     if request.body().size_hint().lower() > LONGEST as u64 {
         return Err(long());
     }
-    match tokio::time::timeout(PATIENCE, Limited::new(request.into_body(), LONGEST).collect()).await {
-        Ok(Ok(all)) => Ok(all.to_bytes()),
-        Ok(Err(error)) if error.is::<LengthLimitError>() => Err(long()),
-        Ok(Err(error)) => Err((StatusCode::BAD_REQUEST, format!("the request broke off: {error}"))),
-        Err(_) => Err((StatusCode::REQUEST_TIMEOUT, format!("the body did not come in {} s", PATIENCE.as_secs()))),
+    match tokio::time::timeout(PATIENCE, Bytes::from_request(request, &())).await {
+        Ok(Ok(bytes)) => Ok(bytes),
+        Ok(Err(error)) if error.status() == StatusCode::PAYLOAD_TOO_LARGE => Err(long()),
+        Ok(Err(error)) => Err(malformed(&format!("the request broke off: {error}"))),
+        Err(_) => {
+            let late = format!("the body did not arrive in {} s", PATIENCE.as_secs());
+            Err(Refusal(StatusCode::REQUEST_TIMEOUT, late))
+        }
     }
 }
 
-/// The label of a pin: `{"label": "..."}` or nothing.
-fn label(bytes: &Bytes) -> Result<Option<String>, Refused> {
-    if bytes.is_empty() {
-        return Ok(None);
-    }
-    let given: Value = serde_json::from_slice(bytes).map_err(|e| malformed(&e))?;
-    match given.get("label") {
-        None => Ok(None),
-        Some(Value::String(label)) => Ok(Some(label.chars().filter(|c| !c.is_control()).take(60).collect())),
-        Some(other) => Err((StatusCode::BAD_REQUEST, format!("found label = {other}, expected a text"))),
-    }
-}
-
-fn json_of(value: &Value) -> Response<Answer> {
+fn json_of(value: &Value) -> Response {
     whole(StatusCode::OK, "application/json", value.to_string() + "\n")
 }
 
-fn malformed(error: &dyn std::fmt::Display) -> Refused {
-    (StatusCode::BAD_REQUEST, format!("{error}"))
+fn malformed(error: &dyn std::fmt::Display) -> Refusal {
+    Refusal(StatusCode::BAD_REQUEST, error.to_string())
 }
 
-fn unusable(error: &dyn std::error::Error) -> Refused {
-    (StatusCode::UNPROCESSABLE_ENTITY, error.to_string())
+fn unusable(error: &dyn std::error::Error) -> Refusal {
+    Refusal(StatusCode::UNPROCESSABLE_ENTITY, error.to_string())
 }

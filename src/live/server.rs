@@ -1,4 +1,4 @@
-//! The server: one thread that listens and answers, and one that encodes for viewers, for as long as it lives.
+//! The server: one thread that answers requests, and one that encodes for viewers.
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -7,9 +7,9 @@ use std::thread::JoinHandle;
 use tokio::sync::{Semaphore, watch};
 
 use super::access::Access;
-use super::answer::{Site, respond};
 use super::events::MOST_FLOWS;
 use super::pieces::Pieces;
+use super::routes::{Site, router};
 use super::{LiveError, LiveOptions};
 use crate::record::{Server, name_of_run};
 use crate::session::Session;
@@ -23,20 +23,19 @@ pub struct LiveServer {
 }
 
 impl LiveServer {
-    /// Listens, and serves `session`.
+    /// Serves `session`.
     ///
     /// # Errors
-    /// [`LiveError`]: an address that cannot be listened on, or that is open to others without a token.
+    /// [`LiveError`]: an address that cannot be bound, or that other machines reach without a token.
     pub fn start(session: &Session, options: &LiveOptions) -> Result<Self, LiveError> {
         let access = Access::new(options)?;
-        let asked = options.address;
-        let refused = |source| LiveError::Address { address: asked, source };
-        let listener = TcpListener::bind(asked).map_err(refused)?;
+        let refused = |source| LiveError::Address { address: options.address, source };
+        let listener = TcpListener::bind(options.address).map_err(refused)?;
         let address = listener.local_addr().map_err(refused)?;
 
         let (serial, news) = watch::channel(0);
         session.listen(move |known| {
-            // The number alone: whoever is told asks for the newest.
+            // Clients then read the newest state.
             serial.send_replace(known);
         });
         let pieces = Arc::new(Pieces::default());
@@ -49,21 +48,18 @@ impl LiveServer {
             flows: Arc::new(Semaphore::new(MOST_FLOWS)),
             run: name_of_run(),
         });
-        let answer = move |request| {
-            let site = Arc::clone(&site);
-            async move { respond(&site, request).await }
-        };
-        let server = Server::start("live", listener, answer).map_err(LiveError::Server)?;
+        let failed = |error: std::io::Error| LiveError::Server(error.to_string());
+        let server = Server::start("live", listener, router(site), options.limits).map_err(failed)?;
         let encode = {
             let (session, pieces, options) = (session.clone(), Arc::clone(&pieces), options.clone());
             move || pieces.encode(&session, &options.name, options.front)
         };
         let encoder = std::thread::Builder::new().name("pieces".to_owned()).spawn(encode);
-        let encoder = encoder.map_err(|e| LiveError::Server(e.to_string()))?;
+        let encoder = encoder.map_err(failed)?;
         Ok(Self { address, encoder: Some(encoder), pieces, _server: server })
     }
 
-    /// Where it listens.
+    /// The address it listens on.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address

@@ -1,18 +1,16 @@
 //! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser; several at once.
 //!
 //! Rerun's own sinks report most failures late or only to the log, so each is tried before the first result is sent: a
-//! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is there whole or not
+//! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is written whole or not
 //! at all.
 
 use std::io::{ErrorKind, Read as _, Write as _};
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rerun::external::re_uri::{ProxyUri, Scheme};
-use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink;
-use rerun::{MemoryLimit, ServerOptions};
 
 use super::panel::RERUN_VERSION;
 use super::remote::Remote;
@@ -25,11 +23,6 @@ use crate::base::atomic_file::{WholeFile, folder_of};
 const ANSWER: Duration = Duration::from_secs(3);
 /// Port of a spawned native viewer: Rerun's own default.
 const VIEWER_PORT: u16 = 9876;
-/// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again: PART on
-/// the keys of a telephone.
-const PAGE_PORT: u16 = 7278;
-/// History a server of a recording from disk keeps: it holds the recording whole.
-pub(super) const WHOLE_HISTORY: u64 = 1 << 30;
 
 /// One place a recording goes to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,13 +33,13 @@ pub enum Sink {
     Spawn,
     /// A viewer elsewhere, `rerun+http://HOST:PORT/proxy`.
     Connect(String),
-    /// The bundled web viewer on 127.0.0.1; `None` takes any free port, for the page 7278 if that is free.
+    /// The bundled web viewer on 127.0.0.1.
     Serve {
-        /// Port of the page.
+        /// Port of the page and of its recording; `None` is 7278 if that is free, or any.
         web_port: Option<u16>,
-        /// Port of the data.
+        /// A further port of the same.
         grpc_port: Option<u16>,
-        /// History kept for viewers that connect late; beyond it the oldest steps go first, static data never.
+        /// History kept for viewers that connect late; beyond it the oldest steps go first, then the oldest static data.
         history_bytes: u64,
     },
 }
@@ -100,11 +93,9 @@ impl OpenSinks {
             Sink::Spawn => self.sinks.push(Box::new(spawn()?)),
             Sink::Connect(url) => self.sinks.push(Box::new(connect(url)?)),
             Sink::Serve { web_port, grpc_port, history_bytes } => {
-                // The page first: its port is checked before a server thread runs.
-                let page = listen_for_pages(*web_port)?;
-                let (sink, grpc_port) = serve(*grpc_port, *history_bytes)?;
-                self.sinks.push(Box::new(sink));
-                self.web = Some(WebViewer::start(page, grpc_port)?);
+                let viewer = WebViewer::start(*web_port, *grpc_port, *history_bytes)?;
+                self.sinks.push(Box::new(viewer.recording.clone()));
+                self.web = Some(viewer);
             }
         }
         Ok(())
@@ -170,32 +161,4 @@ fn greet(mut stream: TcpStream) -> std::io::Result<()> {
         _ => e,
     })?;
     if answer[3] == SETTINGS { Ok(()) } else { Err(std::io::Error::other("it speaks something else")) }
-}
-
-/// Starts the server that viewers fetch the recording from; beyond so many bytes it forgets the oldest.
-pub(crate) fn serve(port: Option<u16>, history_bytes: u64) -> Result<(GrpcServerSink, u16), RecordError> {
-    let port = free_port(port, "--grpc-port")?;
-    let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(history_bytes), ..ServerOptions::default() };
-    let failed = |reason: String| RecordError::Server { what: "the recording", port, reason };
-    let sink = GrpcServerSink::new("127.0.0.1", port, options).map_err(|e| failed(e.to_string()))?;
-    // A server that could not bind ends its thread without a word; the first flush finds out.
-    sink.flush_blocking(ANSWER).map_err(|e| failed(e.to_string()))?;
-    Ok((sink, port))
-}
-
-/// Listens on 127.0.0.1 for the page's readers: on the port asked for; without one on the page's own if that is free, or on any.
-pub(crate) fn listen_for_pages(port: Option<u16>) -> Result<TcpListener, RecordError> {
-    let own = if port.is_none() { listen(PAGE_PORT, "--web-port").ok() } else { None };
-    own.map_or_else(|| listen(port.unwrap_or(0), "--web-port"), Ok)
-}
-
-fn listen(port: u16, option: &'static str) -> Result<TcpListener, RecordError> {
-    TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|source| RecordError::PortInUse { port, option, source })
-}
-
-/// A free port on 127.0.0.1: the one asked for, or any.
-fn free_port(port: Option<u16>, option: &'static str) -> Result<u16, RecordError> {
-    let port = port.unwrap_or(0);
-    let address = listen(port, option)?.local_addr();
-    address.map(|a| a.port()).map_err(|source| RecordError::PortInUse { port, option, source })
 }

@@ -20,7 +20,7 @@ pub use load::{Loaded, Tailored};
 pub use materials::{CutError, PanelFabrics, Swatch};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use push_out::{PushOutReport, push_out};
-pub use spec::{DRESS_FORM, SceneSpec};
+pub use spec::{DRESS_FORM, FileRole, SceneSpec};
 
 use crate::body::distance::{Body, SurfacePoint};
 use crate::garment::fabric::Fabric;

@@ -18,6 +18,21 @@ pub const DRESS_FORM: &str = "form";
 /// The rest shape that is looked for.
 pub(super) const REST_AUTO: &str = "auto";
 
+/// Rest shapes that are no file.
+const REST_SHAPES: [&str; 3] = [REST_AUTO, "own", "texture"];
+
+/// The field in which a file is named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each is named as its field")]
+pub enum FileRole {
+    Body,
+    Garment,
+    Fabric,
+    FabricsFile,
+    Rest,
+    Table,
+}
+
 /// What is draped over what. The default is the low-cut dress on the dress form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -97,9 +112,46 @@ impl SceneSpec {
     /// The files it names.
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
-        let named =
-            [&self.body, &self.garment, &self.rest].into_iter().chain(&self.over).filter(|name| names_a_file(name));
-        named.map(PathBuf::from).chain(self.files_of_fabrics()).collect()
+        let named = self.file_names().into_iter().filter(|(role, _)| {
+            // These and the files that they name in turn are found as the loader finds them.
+            !matches!(role, FileRole::Fabric | FileRole::FabricsFile)
+        });
+        named.map(|(_, name)| PathBuf::from(name)).chain(self.files_of_fabrics()).collect()
+    }
+
+    /// Every value that the loader opens as a file, with the field it stands in. A new field does not compile until it is listed
+    /// here: servers refuse whatever this returns beyond the files they were started with.
+    #[must_use]
+    pub fn file_names(&self) -> Vec<(FileRole, &str)> {
+        let Self {
+            body,
+            garment,
+            over,
+            fabrics,
+            fabrics_file,
+            rest,
+            // Names of groups within a file that is named elsewhere.
+            body_group: _,
+            garment_group: _,
+            hold: _,
+            // Numbers and choices.
+            distance_to: _,
+            edge_cm: _,
+            unit: _,
+            up: _,
+            open_body: _,
+            weld: _,
+            push_out: _,
+            measurements: _,
+        } = self;
+        let mut named = vec![(FileRole::Body, body), (FileRole::Garment, garment)];
+        named.extend(over.iter().map(|garment| (FileRole::Garment, garment)));
+        named.extend(fabrics.iter().map(|fabric| (FileRole::Fabric, fabric)));
+        named.retain(|(_, name)| names_a_file(name));
+        // Opened whatever they look like.
+        named.extend(fabrics_file.iter().map(|file| (FileRole::FabricsFile, file)));
+        named.extend((!REST_SHAPES.contains(&rest.as_str())).then_some((FileRole::Rest, rest)));
+        named.into_iter().map(|(role, name)| (role, name.as_str())).collect()
     }
 
     /// What the garment is called where one name will do, a recording's for one.

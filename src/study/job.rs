@@ -13,7 +13,7 @@ use crate::base::serde_name::word;
 use crate::drape::{Drape, DrapeError, Refine, Settings, drape};
 use crate::mechanics::refine::Observer;
 use crate::parts::range_table::TABLE_3;
-use crate::scene::{Scene, SceneSpec};
+use crate::scene::{FileRole, Scene, SceneSpec};
 use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
 use crate::study::evaluate::{AssessError, AssessOptions, Assessment, assess, canonical, perturbed};
 use crate::study::metrics::Figures;
@@ -96,6 +96,16 @@ impl Job {
         let Settings { table, .. } = Settings::default();
         let settings = Settings { refine: Refine::Steps(0), table: table.named(TABLE_3), ..Settings::default() };
         Self { settings, ..Self::default() }
+    }
+
+    /// Every value that is opened as a file, with the field it stands in; see [`SceneSpec::file_names`]. A new field does not compile
+    /// until it is listed here.
+    #[must_use]
+    pub fn file_names(&self) -> Vec<(FileRole, &str)> {
+        let Self { scene, settings, seed: _, accuracy: _, spread_starts: _ } = self;
+        // Tables, models and fabrics of a job are their values, never names.
+        let Settings { table: _, min_part: _, model: _, refine: _, fabric: _, self_contact: _ } = settings;
+        scene.file_names()
     }
 
     /// Drapes `scene`, which [`SceneSpec::load`] made of the job's own: points of a sweep share it.

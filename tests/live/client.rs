@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use partwise::garment::MeshCache;
-use partwise::live::{LiveOptions, LiveServer};
+use partwise::live::{Limits, LiveOptions, LiveServer};
 use partwise::session::{Session, Workshop};
 use partwise::{DVec3, Job, SceneSpec};
 use serde_json::Value;
@@ -28,6 +28,7 @@ pub(crate) fn options() -> LiveOptions {
         control: None,
         onlooker: None,
         files: Vec::new(),
+        limits: Limits::default(),
         name: "test".to_owned(),
         front: DVec3::NEG_Y,
     }

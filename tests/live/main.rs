@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod client;
+mod files;
+mod hostile;
 #[path = "../fuzz/mutate.rs"]
 mod mutate;
 mod mutated;
@@ -125,6 +127,8 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
         ("GET", "/api/state", vec!["Origin: null"], "", 403, "null"),
         ("GET", "/api/events", vec!["Sec-Fetch-Site: cross-site"], "", 403, "cross-site"),
         ("GET", "/api/state", vec!["Host: evil.example"], "", 421, "evil.example"),
+        ("GET", "/api/state", vec!["Host: 127.0.0.1", "Host: 127.0.0.1"], "", 400, "2 Host headers"),
+        ("GET", "http://evil.example/api/state", vec![], "", 421, "evil.example"),
         ("POST", "/api/state", vec![json], "{}", 405, "PATCH"),
         ("DELETE", "/api/undo", vec![], "", 405, ""),
         ("POST", "/api/undo", vec![], "", 422, "undo"),
@@ -186,7 +190,9 @@ fn pinned_states_become_a_sweep_that_makes_them_again() {
 
 #[test]
 fn elsewhere_a_token_steers_and_another_looks_on() {
-    let (control, onlooker) = ("c".repeat(32), "o".repeat(32));
+    // Characters that mean something in an address are encoded there.
+    let (control, onlooker) = ("c&#%+ c".repeat(5), "o".repeat(32));
+    let encoded = "c%26%23%25%2B%20c".repeat(5);
     let far = LiveOptions { control: Some(control.clone()), onlooker: Some(onlooker.clone()), ..options() };
     let live = Live::start(&far);
     let bearer = |token: &str| format!("Authorization: Bearer {token}");
@@ -211,8 +217,8 @@ fn elsewhere_a_token_steers_and_another_looks_on() {
         assert_eq!(ask(method, path, Some(&onlooker)).0, 403, "{path}");
     }
     assert_eq!(ask("PATCH", "/api/state", Some(&control)).0, 200);
-    assert_eq!(live.get(&format!("/api/state?token={control}")).0, 200);
-    assert_eq!(live.get(&format!("//api/state?token={control}")).0, 200, "the printed address ends in a slash");
+    assert_eq!(live.get(&format!("/api/state?token={encoded}")).0, 200);
+    assert_eq!(live.get(&format!("//api/state?token={encoded}")).0, 200, "the printed address ends in a slash");
     // The page itself tells nothing.
     assert_eq!(live.text("GET", "/", &[], "").0, 200);
     let open = LiveOptions { address: "0.0.0.0:0".parse().unwrap(), ..options() };

@@ -1,146 +1,139 @@
-//! The web viewer's page, served on 127.0.0.1 alone. Nothing on it asks anybody else for anything.
+//! The viewer's page and its recording, served on 127.0.0.1. Nothing on it loads from another host.
 //!
-//! The viewer is Rerun's, as its crate bundles it; the page around it is ours, as Rerun's own asks for fonts, news and
-//! statistics elsewhere. The Content-Security-Policy forbids the browser every other host.
+//! The viewer is Rerun's, as its crate bundles it. The page around it is ours: Rerun's own loads fonts, news and statistics from
+//! elsewhere. The Content-Security-Policy forbids the browser every other host.
 
+mod hosts;
+mod recording;
 mod server;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::Write as _;
-use std::net;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
+use axum::Extension;
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::extract::Request;
+use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
+use axum::http::{Method, StatusCode, Uri};
+use axum::middleware::{Next, from_fn};
+use axum::response::Response;
+use axum::routing::get;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use http_body_util::Full;
-use hyper::body::Bytes;
-use hyper::header::{self, HeaderValue};
-use hyper::{Method, Request, Response, StatusCode};
 use re_web_viewer_server::WebViewerData;
 
-pub(crate) use server::{Server, answer};
+pub(crate) use hosts::{Hosts, Refused};
+pub(super) use recording::Recording;
+pub use server::Limits;
+pub(crate) use server::{Connection, Server};
 
-const INDEX: &str = include_str!("index.html");
-const START: &str = include_str!("start.js");
-/// What every page round the viewer needs.
-const PROGRAM: &str = include_str!("program.js");
+/// What a browser may do on a page with the viewer. WebAssembly is compiled code, which needs a permission of its own; the
+/// viewer sets styles and draws pictures it made.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; \
+    style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; \
+    base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What a browser may do on the page. WebAssembly is compiled code, which needs leave of its own; the data comes from
-/// another port of this machine; the viewer sets styles and draws pictures it made.
-const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
-    connect-src 'self' http://127.0.0.1:* http://localhost:*; style-src 'self' 'unsafe-inline'; \
-    img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; \
-    frame-ancestors 'none'";
-
-/// Serves the page to whom `listener` hears; it opens the recording at `recording` (`rerun+http://...`).
-pub(super) fn serve(listener: net::TcpListener, recording: &str) -> Result<Server, String> {
-    let files = Files::new(recording)?;
-    Server::start("page", listener, move |request| std::future::ready(files.answer(&request)))
+/// The page, the viewer and `recording`.
+pub(super) fn router(recording: &Recording) -> Result<Router, String> {
+    viewer()?;
+    let run = name_of_run();
+    let index = include_str!("index.html").replace("{run}", &run);
+    let index = move || std::future::ready(whole(StatusCode::OK, "text/html; charset=utf-8", index.clone()));
+    let start = || async { whole(StatusCode::OK, "text/javascript", include_str!("start.js")) };
+    Ok(Router::new()
+        .route("/", get(index.clone()))
+        .route("/index.html", get(index))
+        .route("/run", get(move || std::future::ready(whole(StatusCode::OK, "text/plain", run.clone()))))
+        .route("/start.js", get(start))
+        .fallback(|request: Request| async move { file(&request).map_err(refusal) })
+        .merge(recording.router())
+        .layer(from_fn(check)))
 }
 
-/// What there is to be had.
-#[derive(Clone)]
-struct Files {
-    index: Bytes,
-    run: String,
-    viewer: &'static WebViewerData,
+/// Refuses requests for other hosts and from other pages before any route sees them.
+async fn check(Extension(connection): Extension<Arc<Connection>>, request: Request, next: Next) -> Response {
+    if let Err(refused) = Hosts::default().check(request.headers(), request.uri()) {
+        return refusal(refused);
+    }
+    // Other sites' pages load pictures and scripts without an `Origin`, but never post without one.
+    if request.method() == Method::POST {
+        connection.authorise();
+    }
+    next.run(request).await
 }
 
-/// A name that no other server has, by which a page knows its own again: what the standard library keys its hashers with is random.
+fn refusal((status, sentence): Refused) -> Response {
+    whole(status, "text/plain", sentence + "\n")
+}
+
+/// A file of the viewer, for a page around it; these hold nothing of a recording or session.
+pub(crate) fn file(request: &Request) -> Result<Response, Refused> {
+    let (method, path) = (request.method(), request.uri().path());
+    if ![Method::GET, Method::HEAD].contains(method) {
+        return Err((StatusCode::METHOD_NOT_ALLOWED, format!("found {method} {path}, expected GET")));
+    }
+    let failed = |reason| (StatusCode::INTERNAL_SERVER_ERROR, reason);
+    let viewer = viewer().map_err(failed)?;
+    let (kind, bytes) = match path {
+        "/program.js" => ("text/javascript", include_bytes!("program.js").as_slice()),
+        "/re_viewer.js" => ("text/javascript", viewer.viewer_js()),
+        "/favicon.ico" => ("image/x-icon", viewer.favicon()),
+        "/re_viewer_bg.wasm" => return Ok(program(viewer.viewer_wasm(), takes_gzip(request.headers()))),
+        _ => return Err((StatusCode::NOT_FOUND, format!("found {path}, expected a page of this server"))),
+    };
+    Ok(whole(StatusCode::OK, kind, bytes))
+}
+
+/// The viewer's program. The page shows how much has arrived, and sees unpacked bytes only, so their number is sent too.
+fn program(wasm: &'static [u8], takes_gzip: bool) -> Response {
+    let packed = PACKED.get().filter(|_| takes_gzip).cloned();
+    let is_packed = packed.is_some();
+    let bytes = packed.unwrap_or_else(|| Bytes::from_static(wasm));
+    let mut response = whole(StatusCode::OK, "application/wasm", bytes);
+    response.headers_mut().insert("rerun-final-length", wasm.len().into());
+    if is_packed {
+        response.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    response
+}
+
+/// A response with this body, which a browser neither caches nor lets do more than the policy says.
+pub(crate) fn whole(status: StatusCode, kind: &'static str, body: impl Into<Body>) -> Response {
+    let mut response = Response::new(body.into());
+    *response.status_mut() = status;
+    for (name, value) in [
+        (header::CONTENT_TYPE, kind),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+        // The next run may be of another version on the same port.
+        (header::CACHE_CONTROL, "no-cache"),
+    ] {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// A random name of this server, by which a page recognises it after a restart: the standard library keys its hashers at random.
 pub(crate) fn name_of_run() -> String {
     format!("{:016x}", RandomState::new().build_hasher().finish())
 }
 
-impl Files {
-    fn new(recording: &str) -> Result<Self, String> {
-        let run = name_of_run();
-        let index = INDEX.replace("{recording}", recording).replace("{run}", &run).into();
-        Ok(Self { index, run, viewer: viewer()? })
-    }
-
-    fn answer<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
-        if request.method() != Method::GET && request.method() != Method::HEAD {
-            return response(StatusCode::METHOD_NOT_ALLOWED, "text/plain", Bytes::from_static(b"expected GET\n"));
-        }
-        let viewer = self.viewer;
-        let (kind, bytes) = match request.uri().path() {
-            "/" | "/index.html" => ("text/html; charset=utf-8", self.index.clone()),
-            "/run" => ("text/plain", Bytes::from(self.run.clone())),
-            "/start.js" => ("text/javascript", Bytes::from_static(START.as_bytes())),
-            "/program.js" => ("text/javascript", Bytes::from_static(PROGRAM.as_bytes())),
-            "/re_viewer.js" => ("text/javascript", Bytes::from_static(viewer.viewer_js())),
-            "/favicon.ico" => ("image/x-icon", Bytes::from_static(viewer.favicon())),
-            "/re_viewer_bg.wasm" => return self.program(request),
-            _ => return response(StatusCode::NOT_FOUND, "text/plain", Bytes::from_static(b"no such page\n")),
-        };
-        response(StatusCode::OK, kind, bytes)
-    }
-
-    fn program<B>(&self, request: &Request<B>) -> Response<Full<Bytes>> {
-        let program = program(self.viewer, takes_gzip(request.headers()));
-        program.measured(response(StatusCode::OK, program.kind, program.bytes.clone()))
-    }
+/// The first value of a parameter of the address, decoded.
+pub(crate) fn query(uri: &Uri, name: &str) -> Option<String> {
+    let mut pairs = form_urlencoded::parse(uri.query()?.as_bytes());
+    pairs.find(|(key, _)| key == name).map(|(_, value)| value.into_owned())
 }
 
-/// Whether who asks unpacks what comes packed.
-pub(crate) fn takes_gzip(headers: &header::HeaderMap) -> bool {
+fn takes_gzip(headers: &HeaderMap) -> bool {
     let accepted = headers.get(header::ACCEPT_ENCODING).and_then(|value| value.to_str().ok());
     accepted.is_some_and(|value| value.split(',').any(|name| name.trim().starts_with("gzip")))
 }
 
-/// A file of the bundled viewer, for a page around it.
-#[derive(Debug, Clone)]
-pub struct Bundled {
-    /// Its media type.
-    pub kind: &'static str,
-    /// Its bytes, or these packed.
-    pub bytes: Bytes,
-    /// Whether they are packed (gzip).
-    pub packed: bool,
-    /// How many there are unpacked.
-    pub whole: usize,
-}
-
-impl Bundled {
-    /// An answer with these bytes, which says how they are packed and how many there are.
-    pub(crate) fn measured<B>(&self, mut answer: Response<B>) -> Response<B> {
-        if self.packed {
-            answer.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-        }
-        // The page shows how much has come, and sees unpacked bytes only.
-        answer.headers_mut().insert("rerun-final-length", self.whole.into());
-        answer
-    }
-}
-
-/// The viewer's file at this path (`/program.js`, `/re_viewer.js`, `/re_viewer_bg.wasm`, `/favicon.ico`); none elsewhere, or where this
-/// program was built without the viewer.
-#[must_use]
-pub fn bundled(path: &str, packed: bool) -> Option<Bundled> {
-    let viewer = viewer().ok()?;
-    let plain = |kind, bytes: &'static [u8]| Bundled {
-        kind,
-        bytes: Bytes::from_static(bytes),
-        packed: false,
-        whole: bytes.len(),
-    };
-    match path {
-        "/program.js" => Some(plain("text/javascript", PROGRAM.as_bytes())),
-        "/re_viewer.js" => Some(plain("text/javascript", viewer.viewer_js())),
-        "/re_viewer_bg.wasm" => Some(program(viewer, packed)),
-        "/favicon.ico" => Some(plain("image/x-icon", viewer.favicon())),
-        _ => None,
-    }
-}
-
-fn program(viewer: &'static WebViewerData, takes_gzip: bool) -> Bundled {
-    let wasm = viewer.viewer_wasm();
-    let packed = PACKED.get().filter(|_| takes_gzip);
-    let bytes = packed.cloned().unwrap_or_else(|| Bytes::from_static(wasm));
-    Bundled { kind: "application/wasm", bytes, packed: packed.is_some(), whole: wasm.len() }
-}
-
-/// The viewer's files.
+/// The viewer's files; an error where this program was built without them.
 fn viewer() -> Result<&'static WebViewerData, String> {
     static VIEWER: OnceLock<WebViewerData> = OnceLock::new();
     if let Some(viewer) = VIEWER.get() {
@@ -148,23 +141,19 @@ fn viewer() -> Result<&'static WebViewerData, String> {
     }
     let loaded = WebViewerData::load(None).map_err(|e| e.to_string())?;
     let viewer = VIEWER.get_or_init(|| loaded);
-    // A second of work that a fast connection need not wait for: until it is done the program goes out as it is.
-    std::thread::spawn(|| packed(viewer.viewer_wasm()));
+    // Packing takes a second, for which a fast connection need not wait: until it is done the program goes out unpacked.
+    std::thread::spawn(|| pack(viewer.viewer_wasm()));
     Ok(viewer)
 }
 
 static PACKED: OnceLock<Bytes> = OnceLock::new();
 
-/// The viewer's program packed, 42 MB to a third; once in the life of this process.
-fn packed(wasm: &[u8]) {
+/// Packs the viewer's program, 42 MB to a third, once in the life of this process.
+fn pack(wasm: &[u8]) {
     PACKED.get_or_init(|| {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
         // Writing to memory does not fail.
         let _ = encoder.write_all(wasm);
         encoder.finish().unwrap_or_default().into()
     });
-}
-
-fn response(status: StatusCode, kind: &'static str, bytes: Bytes) -> Response<Full<Bytes>> {
-    answer(status, kind, POLICY, Full::new(bytes))
 }

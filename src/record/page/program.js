@@ -1,24 +1,21 @@
-// What both pages round the viewer need: its program, nothing asked of anybody else, and no chatter.
+// The viewer's program, for both pages around it: it sends nothing to other hosts, and logs no debug output.
 
-// Nothing leaves this machine. The viewer would send its statistics and look for news at its makers'; the server's
-// Content-Security-Policy forbids it, and here such a request is answered, so that it is no error either.
+// The viewer sends statistics to its makers and loads news from them. The server's Content-Security-Policy forbids both; this
+// answers such requests, so that they do not fail either.
 const plain = window.fetch.bind(window);
 window.fetch = (what, how) => {
   const address = new URL(what instanceof Request ? what.url : what, location.href);
-  const near =
-    address.origin === location.origin ||
-    ["127.0.0.1", "localhost"].includes(address.hostname) ||
-    ["blob:", "data:"].includes(address.protocol);
+  const near = address.origin === location.origin || ["blob:", "data:"].includes(address.protocol);
   return near ? plain(what, how) : Promise.resolve(new Response(null, { status: 204 }));
 };
 
-// Its shader compiler tells every step it takes: a hundred thousand lines before the first picture.
+// Its shader compiler logs each step, a hundred thousand lines before the first picture.
 console.debug = () => {};
 
 const message = document.getElementById("message");
 const canvas = document.getElementById("viewer");
 
-// Says why there is no viewer, and what to do.
+// Shows why the viewer does not run, and the remedy.
 export function fail(reason, remedy) {
   canvas.style.visibility = "hidden";
   message.hidden = false;
@@ -27,7 +24,7 @@ export function fail(reason, remedy) {
     `address may help. ${remedy}`;
 }
 
-// The viewer's program, with the share of it that has come.
+// The viewer's program; shows the share that has arrived.
 async function program() {
   const response = await plain("re_viewer_bg.wasm");
   if (!response.ok) throw new Error(`the server answers ${response.status}`);
@@ -43,7 +40,7 @@ async function program() {
   return new Response(response.body.pipeThrough(counted), { headers: { "Content-Type": "application/wasm" } });
 }
 
-// Runs the viewer in the page's canvas, with these options beside those that both pages share; its handle.
+// Runs the viewer in the page's canvas, with these options beside those of both pages, and returns its handle.
 export async function run(options, failed) {
   await wasm_bindgen({ module_or_path: program() });
   const handle = new wasm_bindgen.WebHandle({

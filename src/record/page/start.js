@@ -5,12 +5,12 @@ import { fail, run, show } from "./program.js";
 const failed = (error) => fail(error?.message ?? String(error), "Reload the page to try again.");
 const here = document.documentElement.dataset;
 const theme = new URLSearchParams(location.search).get("theme");
-run({ url: [here.recording], persist: true, theme }, failed).then(show, failed);
+const recording = `rerun+${location.protocol}//${location.host}/proxy`;
+run({ url: [recording], persist: true, theme }, failed).then(show, failed);
 
-// Asks now and then whether the program is still there. One that was started again has another recording, and may be of another
-// version: then the page is loaded anew.
+// Polls the program. After a restart it has another recording, and may be of another version: the page is then reloaded.
 const lost = document.getElementById("lost");
-lost.textContent = `The program behind this page has ended. Run it again with --web-port ${location.port}, and it is shown here.`;
+lost.textContent = `The program behind this page has ended. Run it again with --web-port ${location.port}, and this page shows it.`;
 for (let wait = 1000; ; ) {
   await new Promise((done) => setTimeout(done, wait));
   try {
