@@ -44,7 +44,10 @@ fn get(host: &str, path: &str) -> (String, Vec<u8>) {
 fn foreign(text: &str) -> Vec<String> {
     let addresses =
         text.split("//").skip(1).map(|rest| rest.split(['"', '\'', ' ', '<', ';']).next().unwrap_or_default());
-    addresses.filter(|a| a.contains('.') && !a.starts_with("127.0.0.1")).map(str::to_owned).collect()
+    addresses
+        .filter(|a| a.contains('.') && !a.starts_with("127.0.0.1") && !a.starts_with("${location.host}"))
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]
@@ -172,7 +175,7 @@ fn call(host: &str, method: &str, headers: &str) -> (String, Vec<u8>) {
     let mut stream = TcpStream::connect(host).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(2))).unwrap();
     let path = format!("/rerun.sdk_comms.v1alpha1.MessageProxyService/{method}");
-    let kind = "Content-Type: application/grpc-web+proto\r\nX-Grpc-Web: 1\r\nContent-Length: 5";
+    let kind = "Content-Type: application/grpc-web+proto\r\nX-Grpc-Web: 1\r\nConnection: close\r\nContent-Length: 5";
     stream.write_all(format!("POST {path} HTTP/1.1\r\n{headers}{kind}\r\n\r\n\0\0\0\0\0").as_bytes()).unwrap();
     let mut answer = Vec::new();
     // A recording goes on, so that this ends by the time limit.

@@ -1,4 +1,4 @@
-//! `partwise live`: a page with the dial beside the viewer, and the same by HTTP for scripts.
+//! `partwise live`: a page with the range table beside the viewer, and an HTTP interface for scripts.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use super::session_recorder::GLANCE;
 use super::sinks::SeenFrom;
 use super::{InputArgs, SinkArgs, StageArgs, browser, console, interrupt, session_recorder};
 
-/// Port of the page where none is asked for and this one is free, so that a page that is open finds the program when it is run again.
+/// Port of the page unless another is given, if it is free: an open page then finds the program when it is run again.
 const PORT: u16 = 7279;
 
 pub(crate) const LONG_ABOUT: &str = "\
@@ -37,13 +37,13 @@ pub(crate) struct LiveArgs {
     /// Port of the page; 0 takes any free one [default: 7279, or any where that is taken]
     #[arg(long, visible_alias = "web-port", value_name = "PORT", help_heading = "Page")]
     port: Option<u16>,
-    /// Address to listen on; others than this machine's own need a token, which is made and printed
+    /// Address to listen on; others than loopback ones need a token, which is made and printed
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]
     bind: IpAddr,
-    /// A name of this machine that browsers may use besides its address
+    /// A name of this machine that browsers may use besides its addresses
     #[arg(long, value_name = "NAME", help_heading = "Page")]
     host: Option<String>,
-    /// Token for control, 16 characters at least [default: made anew where --bind needs one]
+    /// Token for control, 16 characters at least [default: a random one where --bind needs it]
     #[arg(long, value_name = "TOKEN", env = "PARTWISE_TOKEN", hide_env_values = true, help_heading = "Page")]
     token: Option<String>,
     /// Open the page in your browser
@@ -166,7 +166,7 @@ impl LiveArgs {
         }
     }
 
-    /// Keeps every state that is finished in a file, on a thread of its own: a disk that is slow makes it skip some.
+    /// Records each finished state in a file, on a thread of its own; a slow disk makes it skip states.
     fn keep(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
         let file = self.record.clone()?;
         let sinks = SinkArgs { save: Some(file), seen_from: self.seen_from, ..SinkArgs::default() };
@@ -174,7 +174,7 @@ impl LiveArgs {
         Some(std::thread::spawn(move || session_recorder::keep(&session, &sinks)))
     }
 
-    /// Shows them to a viewer elsewhere, on another: one that is slow, silent or gone keeps nobody waiting.
+    /// Sends each finished state to a remote viewer, on a thread of its own, so that a slow or lost viewer delays nothing.
     fn show(&self, session: &Session) -> Option<JoinHandle<()>> {
         let connect = Some(self.connect.clone()?);
         let sinks = SinkArgs { no_save: true, connect, seen_from: self.seen_from, ..SinkArgs::default() };

@@ -46,7 +46,7 @@ pub(crate) struct DialArgs {
 pub(crate) struct StageArgs {
     /// Range table: `table-3` (the paper's) or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = TABLE_3)]
-    table: String,
+    pub(super) table: String,
     /// Newton steps at full resolution afterwards; 0 is the two-stage scheme alone [default: converged, 0 for `paper`]
     #[arg(long, value_name = "N|converged")]
     refine: Option<Refine>,

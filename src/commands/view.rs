@@ -36,7 +36,7 @@ impl ViewArgs {
         }
         interrupt::keep();
         self.try_to_read()?;
-        // The decoder's panics come back as errors; what they print on the way is for nobody.
+        // The decoder's panics are returned as errors; their output is of no use.
         let loud = std::panic::take_hook();
         std::panic::set_hook(Box::new(|_| {}));
         let served = web::serve_file(&self.file, self.web_port, self.grpc_port);
@@ -51,13 +51,13 @@ impl ViewArgs {
         Ok(())
     }
 
-    /// Reads the file in a process of its own. Rerun's decoder believes the sizes it finds, and a recording that came from
-    /// somewhere and is damaged can end the process that reads it in ways that no error handling hears of.
+    /// Reads the file in a process of its own. Rerun's decoder trusts the sizes in a file, and a damaged recording can end
+    /// the process by an allocation that no error handling sees.
     fn try_to_read(&self) -> anyhow::Result<()> {
         let mut reader = Command::new(std::env::current_exe()?);
         reader.arg("view").arg("--check").arg(&self.file);
         let ended = reader.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status()?;
-        // What it could say well we are about to say ourselves.
+        // This process reports the errors that the reader returned.
         if matches!(ended.code(), Some(0 | 2)) || interrupt::requested() {
             return Ok(());
         }

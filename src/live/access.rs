@@ -1,4 +1,4 @@
-//! What a request may do: read, or control as well, by its token.
+//! Permissions of requests by their tokens: to read, or to control as well.
 
 use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
 
@@ -16,7 +16,7 @@ pub(super) struct Access {
     onlooker: Option<String>,
 }
 
-/// What a request may do.
+/// The permissions of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Right {
     /// Read and control.
@@ -39,7 +39,7 @@ impl Access {
         Ok(Self { hosts, control, onlooker })
     }
 
-    /// What the request's token allows, from `Authorization: Bearer` or from the address (`?token=`).
+    /// The permissions of the request's token, from `Authorization: Bearer` or from the address (`?token=`).
     pub(super) fn right(&self, headers: &HeaderMap, uri: &Uri) -> Result<Right, Refused> {
         let Some(control) = &self.control else { return Ok(Right::Control) };
         let bearer = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());

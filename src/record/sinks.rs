@@ -61,7 +61,7 @@ impl Sink {
 
 /// A file in the making.
 pub(crate) struct Target {
-    /// What is written to it.
+    /// Its encoder.
     pub(super) writer: RrdWriter<WholeFile>,
     /// Where it goes when complete.
     pub(super) path: PathBuf,
@@ -107,7 +107,7 @@ fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> RecordError + '_ {
 }
 
 fn file(path: &Path) -> Result<Target, RecordError> {
-    // Below where one works only: a slip in an absolute path would leave folders anywhere.
+    // Below the current folder only: a mistake in an absolute path would leave folders anywhere.
     if let Some(folder) = path.parent().filter(|_| path.is_relative()) {
         std::fs::create_dir_all(folder).map_err(unwritable(path))?;
     }
@@ -131,7 +131,7 @@ fn connect(url: &str) -> Result<Remote, RecordError> {
         .to_socket_addrs()
         .map_err(|e| unreachable(format!("the name {host} cannot be resolved ({e})")))?
         .collect();
-    // Rerun's client connects in the background and says nothing when nobody is there.
+    // Rerun's client connects in the background and does not report a missing server.
     let Some(dialled) = addresses.iter().find_map(|a| TcpStream::connect_timeout(a, ANSWER).ok()) else {
         let tried: Vec<String> = addresses.iter().map(ToString::to_string).collect();
         return Err(unreachable(format!("nothing listens at {}", tried.join(", "))));
@@ -145,8 +145,8 @@ fn connect(url: &str) -> Result<Remote, RecordError> {
     Ok(sink)
 }
 
-/// Exchanges HTTP/2's first words (RFC 9113, section 3.4): whoever speaks it answers them with settings of his own.
-/// Rerun's client takes anybody who accepts a connection for a viewer, and then waits for ever.
+/// Exchanges the HTTP/2 preface (RFC 9113, section 3.4), which a server answers with its settings. Rerun's client takes
+/// any listener for a viewer, and then waits for ever.
 fn greet(mut stream: TcpStream) -> std::io::Result<()> {
     const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
     const NO_SETTINGS: [u8; 9] = [0, 0, 0, SETTINGS, 0, 0, 0, 0, 0];

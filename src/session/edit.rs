@@ -7,9 +7,9 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use super::presets;
+use crate::base::files::names_a_file;
 use crate::body::ShapeError;
 use crate::drape::{DrapeError, Model, Refine};
-use crate::base::files::names_a_file;
 use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::coupled::Motion;
 use crate::parts::range_table::{GapRule, RangeTable, TableError, TableRule};

@@ -1,6 +1,9 @@
 //! Mutated requests: whatever is asked, it is answered, in plain and short words, and the session goes on.
 //!
-//! `PARTWISE_FUZZ_REQUESTS` sets how many; without it a few seconds' worth.
+//! `PARTWISE_FUZZ_REQUESTS` sets their number, and then the state is answered within a second after each; the default takes a
+//! few seconds and has no such limit, as the machine may be busy.
+
+use std::time::Instant;
 
 use crate::client::{Live, options};
 use crate::mutate::mutate;
@@ -32,8 +35,11 @@ fn asked(path: &str) -> String {
 }
 
 #[test]
+#[allow(clippy::print_stderr, reason = "a test that reports what it measured")]
 fn whatever_is_asked_is_answered_and_the_session_goes_on() {
-    let requests = std::env::var("PARTWISE_FUZZ_REQUESTS").map_or(200, |text| text.parse::<u32>().unwrap());
+    let (requests, limit_s) = std::env::var("PARTWISE_FUZZ_REQUESTS")
+        .map_or((200, f64::INFINITY), |text| (text.parse::<u32>().unwrap(), 1.0));
+    let mut slowest_s = 0.0_f64;
     let live = Live::start(&options());
     let bodies: Vec<String> = SEEDS.iter().map(|(.., body)| (*body).to_owned()).collect();
     let paths: Vec<String> = SEEDS.iter().map(|(_, path, ..)| (*path).to_owned()).collect();
@@ -62,7 +68,12 @@ fn whatever_is_asked_is_answered_and_the_session_goes_on() {
             }
             _ => panic!("{what}: {status} {said}"),
         }
+        let asked = Instant::now();
+        assert_eq!(live.get("/api/state").0, 200, "{what}");
+        slowest_s = slowest_s.max(asked.elapsed().as_secs_f64());
+        assert!(slowest_s < limit_s, "{what}: the state after {slowest_s} s");
     }
+    eprintln!("{requests} requests, {taken} taken, {refused} refused, the slowest state after {slowest_s:.3} s");
     assert!(taken > requests / 20 && refused > requests / 20, "{taken} taken, {refused} refused");
     let before = live.get("/api/state").1["state"].as_u64().unwrap();
     let edit = r#"{"garment": "flared-skirt@900", "fabric": "jersey", "table": {"levels": [[0, 1.25], [1.25, "inf"]]}, "model": "coupled"}"#;

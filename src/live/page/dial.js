@@ -4,7 +4,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const STEP = 0.05;
 const LEAST = 0.005;
 const TOP = 18;
-// Half the width of what can be touched of a handle, pixels.
+// Half the width of a handle's touch area, pixels.
 const REACH = 7;
 const BOTTOM = 16;
 
@@ -34,7 +34,7 @@ export class Dial {
   #held = null;
   #gestures = Date.now();
 
-  // `change(edit, gesture)` is called for every move.
+  // `change(edit, gesture)` is called for each move.
   constructor(svg, change) {
     this.#svg = svg;
     this.#change = change;
@@ -42,7 +42,7 @@ export class Dial {
     svg.addEventListener("dblclick", (event) => this.split(this.#cm(event.clientX)));
   }
 
-  // Takes what the session says; what is being dragged stays under the hand.
+  // Takes the session's state; a handle that is being dragged stays at the pointer.
   show(state) {
     this.#histogram = state.histogram;
     this.#counts = state.parts?.levels ?? [];
@@ -69,7 +69,7 @@ export class Dial {
     return Math.max(far, last[0] * 1.05, last[1] === Infinity ? 0 : last[1]);
   }
 
-  // Near the body levels are thin, so the axis goes by the root of the distance.
+  // Levels are thin near the body, so the axis is the root of the distance.
   #x(value) {
     return Math.sqrt(Math.min(value, this.#far()) / this.#far()) * this.#width();
   }
@@ -83,7 +83,7 @@ export class Dial {
     return Math.max(0, Math.min(1, share)) ** 2 * this.#far();
   }
 
-  // The colour that PARTs at this distance have in the views; a bound under the hand is ahead of what the session says.
+  // The colour of PARTs at this distance in the views; a dragged bound is ahead of the session's state.
   #colour(value) {
     const ahead = this.#counts.length === this.#levels.length;
     const lower = ahead ? this.#levels.map((row) => row[0]) : this.#counts.map((level) => level.lower_cm);
@@ -91,7 +91,7 @@ export class Dial {
     return this.#colours[Math.max(level, 0)];
   }
 
-  // The bounds that can move: where it is, between which others, and what moving it does to the rows.
+  // The bounds that can move, each with its neighbours and its effect on the rows.
   #bounds() {
     const found = [];
     this.#levels.forEach((row, i) => {
@@ -154,7 +154,7 @@ export class Dial {
     this.#draw();
   }
 
-  // A bound or an extent that was typed.
+  // Takes a typed bound or extent.
   set(i, field, value) {
     const row = [...this.#levels[i]];
     if (field === 2) {
@@ -220,7 +220,7 @@ export class Dial {
     this.#draw();
   }
 
-  // The bound that is meant where several lie on each other: the next one that can go this way.
+  // Of several bounds at one place, the one that can move in this direction.
   #free(index, way) {
     const bounds = this.#bounds();
     const room = ({ value, least, most }) => Math.abs(this.#x(way < 0 ? least : most) - this.#x(value));
@@ -247,7 +247,7 @@ export class Dial {
     });
     const h = this.#histogram;
     if (h) {
-      // By the density over the axis as drawn, so that areas are vertices.
+      // Density over the axis as drawn, so that areas are numbers of vertices.
       const bars = h.counts.map((count, i) => {
         const [from, to] = [this.#x(h.edges_cm[i]), this.#x(h.edges_cm[i + 1])];
         const fill = this.#colour((h.edges_cm[i] + h.edges_cm[i + 1]) / 2);

@@ -1,4 +1,4 @@
-// The page: what is chosen becomes an edit, what the session says is shown.
+// The page: controls make edits, and the session's state is shown.
 
 import { Dial, cm } from "./dial.js";
 import { showNumbers, showPart, showPins } from "./numbers.js";
@@ -64,7 +64,7 @@ function showLevels(state) {
     field(level.slice(2).join(" × "), "cut to", (text) => {
       dial.set(i, 2, text === "" ? [] : text.split(/[x×,]/).map((t) => number(t.trim())).slice(0, 2));
     });
-    // Levels of the rule for holes are counted too; they make the numbers differ.
+    // Levels that the gap rule adds count too, so the numbers differ from the rows.
     row.insertCell().textContent = counts.length === dial.levels.length ? counts[i].parts : "";
     const change = row.insertCell();
     const button = (text, label, act) => {
@@ -112,7 +112,7 @@ function show() {
 
 let due = false;
 session.addEventListener("state", () => {
-  // However fast they come, each is drawn once a picture.
+  // At most one update for each animation frame.
   if (due) return;
   due = true;
   requestAnimationFrame(() => {
@@ -177,7 +177,7 @@ at("load").addEventListener("change", async () => {
   if (file) await session.send("api/state", "PATCH", await file.text(), "application/toml");
   at("load").value = "";
 });
-// Links carry no token, so what is saved is asked for here.
+// Links carry no token, so downloads are fetched here.
 const SAVED = { "save-table": "table.toml", "save-job": "job.toml", "save-obj": "drape.obj", "save-sweep": "sweep.toml" };
 for (const [id, name] of Object.entries(SAVED)) {
   const path = `api/${name}`;

@@ -1,4 +1,4 @@
-// What is told in numbers and lines: PARTs by level, times, residual, error and bound, the trail, pins, the selected PART.
+// Numbers and lines: PARTs by level, times, residual, error and bound, the trail, pins, the selected PART.
 
 import { cm, node } from "./dial.js";
 

@@ -1,8 +1,8 @@
-// The session as the page sees it: the newest state by server-sent events, edits by PATCH, one on its way at a time.
+// The session: its newest state by server-sent events, and edits by PATCH, one at a time.
 
 const given = new URLSearchParams(location.search).get("token");
 if (given !== null) {
-  // Out of the address, which is copied and shown; kept for a reload of this tab.
+  // Removed from the address, which users copy and show; kept for a reload of this tab.
   sessionStorage.setItem("token", given);
   history.replaceState(null, "", location.pathname);
 }
@@ -19,14 +19,14 @@ export class Session extends EventTarget {
   #waiting = null;
   #busy = false;
 
-  // Tells of every state for as long as the page is open.
+  // Dispatches each state for as long as the page is open.
   async follow() {
     for (let wait = 250; ; wait = Math.min(2 * wait, 5000)) {
       try {
         const first = await ask("api/state");
         if (!first.ok) throw new Error((await first.json()).error);
         const now = await first.json();
-        // A program that was started again counts its states anew, and may be of another version.
+        // After a restart of the program its states count from 1, and its version may differ.
         if (this.state && this.state.run !== now.run) return location.reload();
         this.#take(now);
         this.dispatchEvent(new Event("connected"));
@@ -72,7 +72,7 @@ export class Session extends EventTarget {
     return trail.slice(-300);
   }
 
-  // Hands in an edit; what is still waiting is joined with it, so that a drag never queues up.
+  // Sends an edit, merged with one that still waits, so that a drag does not queue up.
   edit(change, gesture) {
     this.#waiting = { change: { ...this.#waiting?.change, ...change }, gesture };
     if (!this.#busy) this.#send();
@@ -89,7 +89,7 @@ export class Session extends EventTarget {
     this.#busy = false;
   }
 
-  // A request that changes something, answered by the state or by a sentence.
+  // Sends a change; the answer is the new state or an error.
   async send(path, method, body, kind) {
     if (this.state?.may_steer === false) {
       this.#tell("refused", "This address looks on; the one with the token for control steers.");

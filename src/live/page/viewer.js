@@ -1,21 +1,21 @@
-// Rerun's viewer in the page, and the pieces that the server sends it.
+// Rerun's viewer in the page, and the pieces that it reads from the server.
 
 import { fail, run, show } from "./program.js";
 import { ask } from "./session.js";
 
 const message = document.getElementById("message");
 const CHANNEL = "session";
-// Pictures that the viewer draws of the first pieces before they are seen: it lays out by itself what has come of them.
+// Frames drawn before the canvas is shown: until the layout arrives, the viewer makes one of its own.
 const COVERED = 3;
 
-// The viewer reads each piece bit by bit and lets others run in between: a small piece would overtake the large one it builds on, and
-// be drawn without its triangles. Pieces are handed on in turns, each read in one go.
+// The viewer reads a piece in slices and yields between them: a small piece would overtake the large one it builds on, and be drawn
+// without its triangles. Here each piece is read without yielding.
 (window.scheduler ??= {}).yield = () => Promise.resolve();
 const turn = () => new Promise((done) => setTimeout(done));
 
 const failed = (error) => fail(error?.message ?? String(error), "All else on this page works without it.");
 
-// Starts the viewer; `picked(view, position)` is told where somebody clicked.
+// Starts the viewer; `picked(view, position)` is called for each click on a mesh.
 export async function start(theme, picked) {
   try {
     const handle = await run(
@@ -43,7 +43,7 @@ function heard(event, picked) {
   if (["parts", "preview", "rest"].includes(view)) picked(view, item.position);
 }
 
-// Shows the canvas some pictures after the first piece.
+// Shows the canvas some frames after the first piece.
 let uncover = () => {
   uncover = () => {};
   let drawn = 0;
@@ -51,7 +51,7 @@ let uncover = () => {
   requestAnimationFrame(count);
 };
 
-// Hands on the server's pieces; after a break it begins anew.
+// Passes the server's pieces to the viewer; reconnects after an error.
 async function feed(handle) {
   for (let wait = 250; ; wait = Math.min(2 * wait, 5000)) {
     try {
@@ -65,13 +65,13 @@ async function feed(handle) {
         window.dispatchEvent(new CustomEvent("piece", { detail: piece.length }));
       }
     } catch {
-      // The status line says that the session is lost.
+      // The status line shows that the session is lost.
     }
     await new Promise((done) => setTimeout(done, wait));
   }
 }
 
-// Each piece follows its length in four bytes, the least first.
+// Each piece follows its length in four little-endian bytes.
 async function* pieces(reader) {
   let rest = new Uint8Array(0);
   const take = async (count) => {

@@ -157,7 +157,7 @@ impl Workshop {
             Err(_) => {
                 // Whatever the panic left half done is computed anew.
                 (self.cloth, self.preview, self.rest, self.done) = (None, None, None, Done::default());
-                Some((PANICKED.to_owned(), target.sectioned.is_none()))
+                Some((PANICKED.to_owned(), false))
             }
         };
         if let Some((sentence, scene)) = refused
