@@ -48,7 +48,7 @@ impl WebViewer {
 
     /// The address to open in a browser.
     #[must_use]
-    pub(crate) fn url(&self) -> &str {
+    pub fn url(&self) -> &str {
         &self.url
     }
 }

@@ -63,8 +63,8 @@ mod tests {
         let far = Hosts { any_address: true, ..near.clone() };
         let status = |hosts: &Hosts, named: &[&str], origins: &[&str], uri: &str| {
             let mut headers = HeaderMap::new();
-            named.iter().for_each(|host| drop(headers.append(header::HOST, host.parse().unwrap())));
-            origins.iter().for_each(|origin| drop(headers.append(header::ORIGIN, origin.parse().unwrap())));
+            let named = named.iter().map(|host| (header::HOST, host.parse().unwrap()));
+            headers.extend(named.chain(origins.iter().map(|origin| (header::ORIGIN, origin.parse().unwrap()))));
             hosts.check(&headers, &uri.parse().unwrap()).map_err(|refused| refused.0.as_u16())
         };
         for (host, origin) in [
