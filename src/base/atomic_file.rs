@@ -1,5 +1,7 @@
 //! A file that is there whole or not at all: the one place that writes and renames.
 //!
+//! Where inputs are protected ([`files::protect_inputs`]), a file that the process has read as an input is not replaced.
+//!
 //! What is written grows beside its place under a random name that nobody can have planted (created with `O_EXCL`), and
 //! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What
 //! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was. Whoever ends the
@@ -12,6 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
+
+use super::files;
 
 /// Where files grow, of all threads.
 static GROWING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -85,7 +89,9 @@ impl WholeFile {
         if found.as_ref().is_some_and(fs::Metadata::is_dir) {
             return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a file name"));
         }
+        files::refuse_input(&path)?;
         if found.as_ref().is_some_and(|found| !found.is_file()) {
+            #[allow(clippy::disallowed_methods, reason = "a device or a pipe, which is written straight to")]
             let device = OpenOptions::new().write(true).open(&path)?;
             return Ok(Self { path, writer: BufWriter::new(device), beside: None });
         }
@@ -101,16 +107,19 @@ impl WholeFile {
         Ok(Self { path, writer: BufWriter::new(file), beside: Some(beside) })
     }
 
-    /// Whether a file could begin at `path`; what is no plain file, a pipe or a device, is not tried.
+    /// Whether a file could begin at `path`; what is no plain file, a pipe or a device, is not tried. From then on `path` is an output, and
+    /// not read as an input.
     ///
     /// # Errors
     /// As [`create`](Self::create).
     pub(crate) fn check(path: impl AsRef<Path>) -> io::Result<()> {
-        let found = fs::metadata(path.as_ref());
+        let path = path.as_ref();
+        let found = fs::metadata(path);
         if found.is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             return Ok(());
         }
-        Self::create(path).map(drop)
+        Self::create(path)?;
+        files::claim_output(path)
     }
 
     /// Writes `bytes` as the whole of `path`.
@@ -187,6 +196,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 }
 
 /// Makes a rename last through a power cut where the system can (a folder cannot be opened everywhere).
+#[allow(clippy::disallowed_methods, reason = "a folder, of which nothing is read")]
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(folder_of(path)) {
         let _ = folder.sync_all();

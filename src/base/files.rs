@@ -1,8 +1,13 @@
-//! What a name on the command line or in a file stands for: something built in, or a file.
+//! Reads files: regular ones only, up to a bound, and never one that the same run overwrites.
+//!
+//! Every read of the crate goes through this module (`clippy.toml` refuses the functions of `std::fs` elsewhere). A pipe or a
+//! device is refused before it is opened, because opening a pipe waits for its writer and a device may have no end.
 
-use std::fs::File;
+use std::collections::BTreeSet;
+use std::fs::{self, File, Metadata};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Most bytes of a text that is read: tables, fabrics, patterns and sweep files have thousands.
 pub(crate) const MOST_TEXT: u64 = 64 << 20;
@@ -12,11 +17,91 @@ pub(crate) const MOST_MESH: u64 = 2 << 30;
 
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{path}: cannot be read: {reason}; check the path and its permissions")]
+#[error("{path}: cannot be read: {reason}")]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub struct Unreadable {
     pub path: PathBuf,
     pub reason: String,
+}
+
+impl Unreadable {
+    /// The failure to read `path`; errors of the system get a remedy, those of this module have one.
+    #[must_use]
+    pub fn new(path: &Path, error: &io::Error) -> Self {
+        let remedy = if error.raw_os_error().is_some() { "; check the path and its permissions" } else { "" };
+        Self { path: path.to_owned(), reason: format!("{error}{remedy}") }
+    }
+}
+
+/// Files that the process reads as inputs, and those that it will write.
+#[derive(Default)]
+struct Claims {
+    inputs: BTreeSet<PathBuf>,
+    outputs: BTreeSet<PathBuf>,
+}
+
+/// The claims so far; `None` where inputs are not protected.
+static CLAIMS: Mutex<Option<Claims>> = Mutex::new(None);
+
+/// Protects inputs for the rest of the process, as the command line does without `--force`: a file that is read as an input
+/// ([`bounded`]) and is also an output ([`WholeFile`](crate::base::atomic_file::WholeFile)) is refused, whichever of the two is tried second.
+pub(crate) fn protect_inputs() {
+    CLAIMS.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
+}
+
+impl Claims {
+    /// Notes that `path` is an input.
+    fn input(&mut self, path: &Path) -> io::Result<()> {
+        refuse(path, &self.outputs)?;
+        self.inputs.insert(path.to_owned());
+        Ok(())
+    }
+
+    /// Notes that `path` is an output.
+    fn output(&mut self, path: &Path) -> io::Result<()> {
+        refuse(path, &self.inputs)?;
+        self.outputs.insert(path.to_owned());
+        Ok(())
+    }
+}
+
+/// Refuses `path` where it is one of `others`.
+fn refuse(path: &Path, others: &BTreeSet<PathBuf>) -> io::Result<()> {
+    match others.iter().find(|other| same_file(path, other)) {
+        None => Ok(()),
+        Some(other) => Err(io::Error::other(format!(
+            "the run reads and writes this file (as {} too), expected two files; give the output another name, or add --force to \
+             overwrite the input",
+            other.display()
+        ))),
+    }
+}
+
+/// Does `what` to the claims of the process.
+fn with_claims(what: impl FnOnce(&mut Claims) -> io::Result<()>) -> io::Result<()> {
+    CLAIMS.lock().unwrap_or_else(PoisonError::into_inner).as_mut().map_or(Ok(()), what)
+}
+
+/// Notes an output before anything is computed for it.
+pub(crate) fn claim_output(path: &Path) -> io::Result<()> {
+    with_claims(|claims| claims.output(path))
+}
+
+/// Refuses to replace an input.
+pub(crate) fn refuse_input(path: &Path) -> io::Result<()> {
+    with_claims(|claims| refuse(path, &claims.inputs))
+}
+
+/// Whether two paths lead to one file, by links of any kind.
+fn same_file(a: &Path, b: &Path) -> bool {
+    #[cfg(unix)]
+    let identity = |path| {
+        use std::os::unix::fs::MetadataExt as _;
+        fs::metadata(path).map(|found| (found.dev(), found.ino()))
+    };
+    #[cfg(not(unix))]
+    let identity = fs::canonicalize;
+    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }
 
 /// A folder in the user's cache (`$XDG_CACHE_HOME/partwise`, or under `~/.cache`, on Linux; where the system keeps caches
@@ -66,12 +151,12 @@ pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
 }
 
-/// Reads a text file.
+/// Reads an input that is text.
 pub(crate) fn read_text(path: &Path) -> Result<String, Unreadable> {
-    bounded_text(path).map_err(|e| Unreadable { path: path.to_owned(), reason: e.to_string() })
+    bounded_text(path).map_err(|e| Unreadable::new(path, &e))
 }
 
-/// The text of a file of at most [`MOST_TEXT`] bytes.
+/// The text of an input of at most [`MOST_TEXT`] bytes.
 ///
 /// # Errors
 /// As [`bounded`]; or that it is not UTF-8.
@@ -80,18 +165,60 @@ pub(crate) fn bounded_text(path: &Path) -> io::Result<String> {
     String::from_utf8(bounded(path, MOST_TEXT)?).map_err(|e| utf8(e.utf8_error()))
 }
 
-/// The bytes of a file of at most `most`: a device may have no end, and would take all memory.
+/// The bytes of an input of at most `most`.
 ///
 /// # Errors
-/// That it cannot be read, or is larger.
+/// That it cannot be read, is no regular file, is larger, or is an output of this run ([`protect_inputs`]).
 pub(crate) fn bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    with_claims(|claims| claims.input(path))?;
+    read(path, most)
+}
+
+/// The bytes of a file that the program wrote itself and may write again: rows, points, made meshes, references.
+///
+/// # Errors
+/// As [`bounded`], but for outputs.
+pub(crate) fn read_own(path: &Path) -> io::Result<Vec<u8>> {
+    read(path, MOST_MESH)
+}
+
+fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
     let mut bytes = Vec::new();
-    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most {
-        let larger = format!("found more than {} MB, expected no more than that", most >> 20);
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, larger));
+    // A length of 0 is no promise: the files of /proc have it.
+    if file.metadata()?.len() <= most {
+        file.take(most + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 <= most {
+            return Ok(bytes);
+        }
     }
-    Ok(bytes)
+    let larger = format!("found more than {} MB, expected no more than that", most >> 20);
+    Err(io::Error::new(io::ErrorKind::FileTooLarge, larger))
+}
+
+/// Opens a regular file to read.
+///
+/// # Errors
+/// What the system says; that it is a folder, a pipe or a device.
+#[allow(clippy::disallowed_methods, reason = "the one place that opens files to read")]
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    regular(&fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    // Again: another file may have taken the place in between.
+    regular(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn regular(found: &Metadata) -> io::Result<()> {
+    match (found.is_file(), found.is_dir()) {
+        (true, _) => Ok(()),
+        (_, true) => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a file")),
+        _ => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is a pipe or a device, expected a regular file; write what it holds to a file first (the shell's `<(...)` is a \
+             pipe, too)",
+        )),
+    }
 }
 
 #[cfg(test)]
@@ -99,14 +226,61 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_read_up_to_its_bound_and_an_endless_one_is_refused() {
+    fn a_file_is_read_up_to_its_bound() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "four").unwrap();
         assert_eq!(bounded(file.path(), 4).unwrap(), b"four");
         assert_eq!(bounded(file.path(), 3).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         std::fs::write(file.path(), b"a\xff").unwrap();
         assert!(read_text(file.path()).unwrap_err().to_string().contains("no UTF-8 text"));
-        #[cfg(unix)]
-        assert!(read_text(Path::new("/dev/zero")).unwrap_err().to_string().contains("more than 64 MB"));
+        // Larger than the memory, and empty: refused by its length.
+        file.as_file().set_len(1 << 40).unwrap();
+        assert_eq!(read_own(file.path()).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_input_is_no_output_and_an_output_no_input_under_any_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("garment.obj"), "").unwrap();
+        fs::write(path("other.obj"), "").unwrap();
+        fs::create_dir(path("below")).unwrap();
+        std::os::unix::fs::symlink("garment.obj", path("link.obj")).unwrap();
+        fs::hard_link(path("garment.obj"), path("below/hard.obj")).unwrap();
+        let (mut read, mut written) = (Claims::default(), Claims::default());
+        read.input(&path("garment.obj")).unwrap();
+        written.output(&path("garment.obj")).unwrap();
+        for name in ["garment.obj", "link.obj", "below/hard.obj", "below/../garment.obj"] {
+            for refused in [read.output(&path(name)), written.input(&path(name))] {
+                let said = refused.unwrap_err().to_string();
+                assert!(said.contains("garment.obj") && said.contains("--force"), "{name}: {said}");
+            }
+            read.input(&path(name)).unwrap();
+            written.output(&path(name)).unwrap();
+        }
+        for name in ["other.obj", "new.obj"] {
+            read.output(&path(name)).unwrap();
+            written.input(&path(name)).unwrap();
+        }
+        // Another file by the same name is another file.
+        fs::rename(path("other.obj"), path("link.obj")).unwrap();
+        Claims { inputs: [path("garment.obj")].into(), ..Claims::default() }.output(&path("link.obj")).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_devices_and_folders_are_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.obj");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [&*pipe, Path::new("/dev/zero"), Path::new("/dev/stdin/..")] {
+            let said = read_text(path).unwrap_err().to_string();
+            assert!(said.contains("expected a") && said.contains("file"), "{said}");
+            assert!(!said.contains("permissions"), "{said}");
+        }
+        assert!(read_own(&pipe).unwrap_err().to_string().contains("write what it holds to a file first"));
+        let missing = read_text(&folder.path().join("none")).unwrap_err().to_string();
+        assert!(missing.contains("check the path and its permissions"), "{missing}");
     }
 }

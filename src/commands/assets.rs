@@ -1,19 +1,20 @@
 //! `partwise assets`: everything built in, as files to open, edit and pass back.
 
-use std::path::{Path, PathBuf};
+use std::io::ErrorKind;
+use std::path::PathBuf;
 
-use crate::base::atomic_file::WholeFile;
+use crate::base::atomic_file::folder_of;
+use crate::base::files::{listed, read_own};
 use crate::body::dress_form::DressForm;
 use crate::garment::builtin::{BUILT_IN, GarmentSpec, garment_on};
 use crate::garment::fabric;
-use crate::mesh::export::write_mesh;
+use crate::mesh::export::mesh_text;
 use crate::parts::range_table::RangeTable;
-use anyhow::Context as _;
 use clap::Args;
 use rayon::prelude::*;
 
-use super::runtime::make_folder;
-use super::{MeasurementArgs, console};
+use super::runtime::{make_folder, write};
+use super::{MeasurementArgs, UserError, console};
 
 /// Triangles of the form as `run` makes it.
 const FORM_TRIANGLES: usize = crate::body::dress_form::DEFAULT_TRIANGLES;
@@ -39,37 +40,53 @@ pub(crate) struct AssetsArgs {
 
 impl AssetsArgs {
     /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specs as TOML; sewing patterns as JSON.
-    pub(crate) fn execute(&self) -> anyhow::Result<()> {
-        for folder in ["tables", "fabrics", "bodies", "garments", "patterns"] {
-            make_folder(&self.out.join(folder))?;
+    /// Without `force`, nothing is written where a file would lose what it holds now.
+    pub(crate) fn execute(&self, force: bool) -> anyhow::Result<()> {
+        let made = self.made()?;
+        // A file that cannot be read is not known to be ours.
+        let differs = |(name, text): &&(String, String)| match read_own(&self.out.join(name)) {
+            Ok(found) => found != text.as_bytes(),
+            Err(error) => error.kind() != ErrorKind::NotFound,
+        };
+        let differing: Vec<String> = made.iter().filter(differs).map(|(name, _)| name.clone()).collect();
+        if !force && !differing.is_empty() {
+            return Err(UserError::new(format!(
+                "{}: found files with other contents, {}; nothing is written: choose another folder with --out, or replace \
+                 them with --force",
+                self.out.display(),
+                listed(&differing)
+            )));
         }
-        let spec = self.measurements.spec()?;
-        let form = DressForm::new(&spec)?;
-        write_mesh(&self.path("bodies/form.obj"), &form.mesh(FORM_TRIANGLES)?)?;
-        self.text("bodies/form.toml", &toml::to_string(&spec)?)?;
-        BUILT_IN.par_iter().try_for_each(|name| -> anyhow::Result<()> {
-            let spec = GarmentSpec::by_name(name)?;
-            let made = garment_on(&spec, &form, self.vertices)?;
-            write_mesh(&self.path(&format!("garments/{name}.obj")), &made.mesh)?;
-            self.text(&format!("garments/{name}.toml"), &toml::to_string(&spec)?)
-        })?;
-        self.text("tables/table-3.toml", &RangeTable::table_3().to_toml())?;
-        for name in fabric::BUILT_IN {
-            self.text(&format!("fabrics/{name}.toml"), &toml::to_string(&fabric::Fabric::by_name(name)?)?)?;
-        }
-        for (name, text) in PATTERNS {
-            self.text(&format!("patterns/{name}.json"), text)?;
+        for (name, text) in &made {
+            let path = self.out.join(name);
+            make_folder(folder_of(&path))?;
+            write(&path, text, "--out")?;
         }
         console::result(&self.out.display().to_string());
         Ok(())
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.out.join(Path::new(name))
-    }
-
-    fn text(&self, name: &str, text: &str) -> anyhow::Result<()> {
-        let path = self.path(name);
-        WholeFile::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))
+    /// All files: where each lies in the folder, and what it holds.
+    fn made(&self) -> anyhow::Result<Vec<(String, String)>> {
+        let spec = self.measurements.spec()?;
+        let form = DressForm::new(&spec)?;
+        let garment = |name: &&str| -> anyhow::Result<[(String, String); 2]> {
+            let spec = GarmentSpec::by_name(name)?;
+            let made = garment_on(&spec, &form, self.vertices)?;
+            let text = toml::to_string(&spec)?;
+            Ok([(format!("garments/{name}.obj"), mesh_text(&made.mesh)), (format!("garments/{name}.toml"), text)])
+        };
+        let garments: Vec<_> = BUILT_IN.par_iter().map(garment).collect::<anyhow::Result<_>>()?;
+        let mut made = vec![
+            ("bodies/form.obj".to_owned(), mesh_text(&form.mesh(FORM_TRIANGLES)?)),
+            ("bodies/form.toml".to_owned(), toml::to_string(&spec)?),
+            ("tables/table-3.toml".to_owned(), RangeTable::table_3().to_toml()),
+        ];
+        made.extend(garments.into_iter().flatten());
+        for name in fabric::BUILT_IN {
+            made.push((format!("fabrics/{name}.toml"), toml::to_string(&fabric::Fabric::by_name(name)?)?));
+        }
+        made.extend(PATTERNS.map(|(name, text)| (format!("patterns/{name}.json"), text.to_owned())));
+        Ok(made)
     }
 }

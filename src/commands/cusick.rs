@@ -7,7 +7,7 @@ use crate::study::drape_test::results_csv;
 use clap::Args;
 
 use super::console;
-use super::runtime::write_csv;
+use super::runtime::{check, write};
 
 /// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
 const MOST_ROWS: u64 = 100;
@@ -28,6 +28,9 @@ pub(crate) struct CusickArgs {
 
 impl CusickArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        if let Some(path) = &self.csv {
+            check(path, "--csv")?;
+        }
         let names: Vec<&str> = match self.fabrics.as_slice() {
             [] => BUILT_IN.to_vec(),
             some => some.iter().map(String::as_str).collect(),
@@ -48,7 +51,7 @@ impl CusickArgs {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.csv {
-            write_csv(path, &csv)?;
+            write(path, &csv, "--csv")?;
         }
         let mut reader = csv::Reader::from_reader(csv.as_bytes());
         let mut table = console::table(console::RULED, reader.headers()?.iter(), []);

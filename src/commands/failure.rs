@@ -1,4 +1,4 @@
-//! Exit codes: 2 for what the user can mend, 1 for the rest.
+//! Exit codes: 2 for what the user can mend, a full disk included, 1 for the rest.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -39,7 +39,6 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
 }
 
 fn users_own(cause: &(dyn Error + 'static)) -> bool {
-    let store = |error: &StoreError| !matches!(error, StoreError::Write { .. } | StoreError::Io { .. });
     // A garment of which no vertex is free, say; what the solver itself fails at is ours.
     let drape = |error: &DrapeError| !matches!(error, DrapeError::Solve(_));
     cause.downcast_ref::<RecordError>().is_some_and(RecordError::is_users)
@@ -59,10 +58,6 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || matches!(cause.downcast_ref::<AssessError>(), Some(AssessError::Fallen | AssessError::Layers { .. }))
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
-        || cause.downcast_ref::<StoreError>().is_some_and(store)
-        || cause.downcast_ref::<MergeError>().is_some_and(|error| match error {
-            // Said in the store's own words, so it is no cause of its own.
-            MergeError::Store(error) => store(error),
-            _ => true,
-        })
+        || cause.is::<StoreError>()
+        || cause.is::<MergeError>()
 }

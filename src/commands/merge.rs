@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use crate::record::Tab;
 use crate::study::sweep::{Outcome, Status, merge, store};
-use anyhow::Context as _;
 use clap::Args;
 
+use super::runtime::unwritable;
 use super::sweep::record_all;
 use super::sweep::report::{Format, Report};
 use super::sweep::store::PointStore;
@@ -32,14 +32,14 @@ pub(crate) struct MergeArgs {
 impl MergeArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let started = Instant::now();
+        self.sinks.check_outputs(&[])?;
         let rows = merge(&self.shards, &self.out)?;
         let (manifest, _) = store::read(&self.out)?;
         let points = PointStore::in_folder(&self.out);
         let sources: Vec<PointStore> = self.shards.iter().map(|folder| PointStore::in_folder(folder)).collect();
         for row in rows.iter().filter(|row| row.status == Status::Ok) {
             for source in &sources {
-                let taken = points.adopt(source, &row.point);
-                if taken.with_context(|| format!("{}: cannot keep a point", self.out.display()))? {
+                if points.adopt(source, &row.point).map_err(unwritable(&self.out, "--out"))? {
                     break;
                 }
             }

@@ -31,7 +31,7 @@ mod watch;
 
 use std::process::ExitCode;
 
-use crate::base::atomic_file;
+use crate::base::{atomic_file, files};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 // What most commands take and say goes by one name in all of them.
@@ -63,7 +63,7 @@ Examples:
   partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
   partwise --format json --threads 1              one JSON object on stdout, for scripts
 
-Exit codes: 0 done, 2 something you gave cannot be used, 1 anything else, 130 interrupted (what was done is kept).";
+Exit codes: 0 done, 2 something you gave cannot be used or written, 1 anything else, 130 interrupted (what was done is kept).";
 
 #[derive(Debug, Parser)]
 #[command(
@@ -79,6 +79,9 @@ struct Cli {
     command: Option<Command>,
     #[command(flatten)]
     run: run::RunArgs,
+    /// Let an output replace an input of the same run, and `assets` replace files that were edited
+    #[arg(long, global = true, help_heading = "Output")]
+    force: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -119,6 +122,9 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::from_arg_matches(&with_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
     interrupt::listen();
+    if !cli.force {
+        files::protect_inputs();
+    }
     let outcome = match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
@@ -131,7 +137,7 @@ pub fn main() -> ExitCode {
         Some(Command::Bench(command)) => command.execute(),
         Some(Command::Merge(args)) => args.execute(),
         Some(Command::Pattern(args)) => args.execute(),
-        Some(Command::Assets(args)) => args.execute(),
+        Some(Command::Assets(args)) => args.execute(cli.force),
         Some(Command::View(args)) => args.execute(),
     };
     // A thread that still writes dies with the program.

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use crate::SceneSpec;
-use crate::base::atomic_file::WholeFile;
 use crate::garment::pattern::SewingPattern;
 use clap::Args;
 use serde::Serialize;
 
 use super::console;
 use super::run::Format;
+use super::runtime::{check, write};
 
 pub(crate) const LONG_ABOUT: &str = "\
 Reads a sewing pattern (JSON as GarmentCode writes it: *_specification.json), checks it, sews it and sums it up: panels with their areas, \
@@ -65,6 +65,9 @@ struct Report {
 
 impl PatternArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        if let Some(path) = &self.svg {
+            check(path, "--svg")?;
+        }
         let pattern = SewingPattern::read(&self.file)?;
         let sewn = pattern.sew(0.01 * self.edge_length)?;
         let panels = pattern.panels.iter().zip(&sewn.panels).map(|(panel, sewn)| PanelRow {
@@ -91,8 +94,7 @@ impl PatternArgs {
             notes: pattern.notes.iter().chain(&sewn.notes).cloned().collect(),
         };
         if let Some(path) = &self.svg {
-            WholeFile::write(path, pattern.to_svg())
-                .map_err(|e| anyhow::anyhow!("{}: cannot be written: {e}", path.display()))?;
+            write(path, pattern.to_svg(), "--svg")?;
         }
         if self.format == Format::Json {
             console::result(&crate::base::error_text::json(&report)?);

@@ -96,7 +96,7 @@ const MESH_EVERY: usize = 8;
 impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        self.sinks.refuse_twice(&[("--export", self.export.as_deref())])?;
+        self.sinks.check_outputs(&[("--export", self.export.as_deref())])?;
         coloured_export::refuse(self.export.as_deref(), self.export_colours)?;
         if self.method != by_method::TWO_STAGE {
             return self.run_by_method();
@@ -106,7 +106,7 @@ impl RunArgs {
         }
         let start = Instant::now();
         let job = self.job()?;
-        self.sinks.refuse_unwritable(&job.scene.garment_name(), &[self.export.as_deref()])?;
+        self.sinks.refuse_unwritable(&job.scene.garment_name())?;
         let mut solved = self.solve(job, start)?;
         let mut recorder = Recorder::open(solved.record_options(&self.sinks, !self.no_iterations, false))?;
         solved.record(&mut recorder, 0, !self.no_iterations)?;

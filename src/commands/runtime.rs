@@ -29,14 +29,19 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
     }
 }
 
-/// Writes a CSV that was asked for beside what is printed.
-pub(crate) fn write_csv(path: &Path, text: &str) -> anyhow::Result<()> {
-    WholeFile::write(path, text).map_err(unwritable(path, "file with --csv"))
+/// Refuses an output that cannot be written, or is an input, before anything is computed.
+pub(crate) fn check(path: &Path, flag: &str) -> anyhow::Result<()> {
+    WholeFile::check(path).map_err(unwritable(path, flag))
 }
 
-/// What to make of a file that cannot be written where another one can be chosen.
-pub(crate) fn unwritable<'a>(path: &'a Path, other: &'a str) -> impl FnOnce(io::Error) -> anyhow::Error + 'a {
-    move |e| UserError::new(format!("{}: cannot be written: {e}; choose another {other}", path.display()))
+/// Writes an output that the user asked for by `flag`.
+pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>, flag: &str) -> anyhow::Result<()> {
+    WholeFile::write(path, text).map_err(unwritable(path, flag))
+}
+
+/// The error of an output that cannot be written; the user can choose another place with `flag`.
+pub(crate) fn unwritable<'a>(path: &'a Path, flag: &'a str) -> impl FnOnce(io::Error) -> anyhow::Error + 'a {
+    move |e| UserError::new(format!("{}: cannot be written: {e}; choose another place with {flag}", path.display()))
 }
 
 /// Makes a folder that was asked for.

@@ -18,7 +18,7 @@ const AGAIN: Duration = Duration::from_secs(2);
 
 /// Records what is finished until the session is closed.
 pub(super) fn keep(session: &Session, sinks: &SinkArgs) -> anyhow::Result<RecordSummary> {
-    let kept = follow(session, sinks, &mut || ());
+    let kept = sinks.check_outputs(&[]).and_then(|()| follow(session, sinks, &mut || ()));
     if let Err(error) = &kept {
         console::error(error);
         console::note("the session goes on without the recording");

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::atomic_file::{WholeFile, same_place};
-use crate::mesh::MeshError;
+use crate::base::atomic_file::same_place;
+use crate::base::files::has_ending;
 use crate::record::Sink;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use super::UserError;
+use super::runtime::check;
 
 /// Where the views of a recording look from when it opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
@@ -42,6 +43,18 @@ pub(crate) fn mesh_file(path: PathBuf) -> Result<PathBuf, String> {
         )),
         _ => Ok(path),
     }
+}
+
+/// Refuses a recording's name that another program's file may have: `--save notes.txt` would replace the notes.
+fn recording_file(path: &Path) -> anyhow::Result<()> {
+    let device = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
+    if device || has_ending(path, "rrd") {
+        return Ok(());
+    }
+    Err(UserError::new(format!(
+        "{}: found a recording without the ending `.rrd`, expected one; add it",
+        path.display()
+    )))
 }
 
 /// The sinks of a recording; several at once are fine.
@@ -78,8 +91,9 @@ pub(crate) struct SinkArgs {
 }
 
 impl SinkArgs {
-    /// Refuses an output that would be written over the recording, or over another output.
-    pub(crate) fn refuse_twice(&self, outputs: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
+    /// Refuses outputs that cannot be written, that are two in one file, or one with an input, before anything is read or computed.
+    /// `outputs` are those of the command beside `--save`, by their flags.
+    pub(crate) fn check_outputs(&self, outputs: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
         let all = std::iter::once(("--save", self.save.as_deref())).chain(outputs.iter().copied());
         let given: Vec<(&str, &Path)> = all.filter_map(|(flag, path)| Some((flag, path?))).collect();
         for (i, (flag, path)) in given.iter().enumerate() {
@@ -90,17 +104,16 @@ impl SinkArgs {
                 )));
             }
         }
-        Ok(())
+        if let Some(path) = &self.save {
+            recording_file(path)?;
+            Sink::File(path.clone()).check()?;
+        }
+        outputs.iter().filter_map(|(flag, path)| Some((flag, (*path)?))).try_for_each(|(flag, path)| check(path, flag))
     }
 
-    /// Refuses a recording, or other outputs (`--export`), that could not be written, before anything is computed.
-    pub(crate) fn refuse_unwritable(&self, name: &str, outputs: &[Option<&Path>]) -> anyhow::Result<()> {
-        self.sinks(name).iter().try_for_each(Sink::check)?;
-        for path in outputs.iter().copied().flatten() {
-            let refused = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-            WholeFile::check(path).map_err(refused)?;
-        }
-        Ok(())
+    /// Refuses a recording that could not be written, before anything is computed.
+    pub(crate) fn refuse_unwritable(&self, name: &str) -> anyhow::Result<()> {
+        Ok(self.sinks(name).iter().try_for_each(Sink::check)?)
     }
 
     /// The sinks asked for; `name` names the file where the user did not.

@@ -32,7 +32,8 @@ impl ViewArgs {
     /// Serves until Ctrl-C.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         if self.check {
-            return Ok(web::check_file(&self.file)?);
+            console::warnings(web::check_file(&self.file)?.as_slice());
+            return Ok(());
         }
         interrupt::keep();
         self.try_to_read()?;
@@ -42,6 +43,9 @@ impl ViewArgs {
         let served = web::serve_file(&self.file, self.web_port, self.grpc_port);
         std::panic::set_hook(loud);
         let served = served?;
+        if let Some(warning) = served.warning() {
+            console::warning(warning);
+        }
         console::result(served.url());
         console::note("open this address in a browser; Ctrl-C ends");
         if self.open {

@@ -7,6 +7,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::base::files::read_own;
+
 /// A file is read once it has been still for so long.
 const SETTLE: Duration = Duration::from_millis(60);
 /// One that never is, or stays away, is read after so long.
@@ -67,7 +69,7 @@ fn stamp(file: &Path) -> Option<Stamp> {
 }
 
 fn contents(file: &Path) -> Option<blake3::Hash> {
-    std::fs::read(file).ok().map(|bytes| blake3::hash(&bytes))
+    read_own(file).ok().map(|bytes| blake3::hash(&bytes))
 }
 
 #[cfg(test)]

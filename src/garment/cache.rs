@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::builtin::{GarmentSpec, PlacedGarment, garment};
 use crate::base::checksum::{self, Kind};
-use crate::base::files::user_cache;
+use crate::base::files::{read_own, user_cache};
 use crate::body::ShapeError;
 use crate::body::dress_form::{BodySpec, DEFAULT_TRIANGLES, dress_form};
 use crate::mesh::{RestShape, TriMesh};
@@ -72,7 +72,7 @@ impl MeshCache {
         let (Some(folder), Ok(of)) = (&self.0, serde_json::to_string(of)) else { return make() };
         let of = format!("{} {} {of}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH);
         let path = folder.join(format!("{}.mesh", checksum::hash(KIND, &of).to_hex()));
-        let found = std::fs::read(&path).ok().and_then(|bytes| checksum::open::<(String, Stored)>(KIND, &bytes));
+        let found = read_own(&path).ok().and_then(|bytes| checksum::open::<(String, Stored)>(KIND, &bytes));
         if let Some((found_of, stored)) = found
             && found_of == of
         {

@@ -4,6 +4,7 @@ use axum::http::{StatusCode, Uri};
 use glam::DVec3;
 use serde_json::{Value, json};
 
+use crate::base::files::read_own;
 use crate::parts::UNASSIGNED;
 use crate::record::{Refused, query};
 use crate::session::{LoadedScene, Snapshot};
@@ -29,7 +30,7 @@ pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
     let folder = tempfile::tempdir().map_err(|e| failed(&e))?;
     let path = folder.path().join("drape.obj");
     ground.loaded.write(&path, positions).map_err(|e| failed(&e))?;
-    std::fs::read(&path).map_err(|e| failed(&e))
+    read_own(&path).map_err(|e| failed(&e))
 }
 
 /// A PART and its results: `number=N`, or the PART nearest the point `at=x,y,z`, m, of the garment `on=parts`, `preview` or `rest`.

@@ -22,15 +22,21 @@ pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> 
 
 /// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
 pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
-    write(path, mesh_text(mesh, None))
+    write(path, mesh_text(mesh))
 }
 
 /// The same with the texture coordinates of each triangle's corners, m: each is written once for every group.
 pub fn write_textured(path: &Path, mesh: &TriMesh, texture: &[[DVec2; 3]]) -> Result<(), MeshError> {
-    write(path, mesh_text(mesh, Some(texture)))
+    write(path, text_of(mesh, Some(texture)))
 }
 
-fn mesh_text(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> String {
+/// The text of [`write_mesh`].
+#[must_use]
+pub fn mesh_text(mesh: &TriMesh) -> String {
+    text_of(mesh, None)
+}
+
+fn text_of(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> String {
     let note = if texture.is_some() { "; texture coordinates are the flat pattern in m" } else { "" };
     let mut text = format!("# {} m, z up{note}\n", env!("CARGO_PKG_NAME"));
     mesh.positions.iter().for_each(|p| write_vertex(&mut text, *p));

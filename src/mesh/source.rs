@@ -54,11 +54,7 @@ impl ObjSource {
 
 /// Reads the lines of a file.
 pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
-    let unreadable = |reason: String| Unreadable { path: file.to_owned(), reason };
-    if file.is_dir() {
-        return Err(unreadable("it is a folder, expected an OBJ file".to_owned()).into());
-    }
-    let bytes = bounded(file, MOST_MESH).map_err(|e| unreadable(e.to_string()))?;
+    let bytes = bounded(file, MOST_MESH).map_err(|e| Unreadable::new(file, &e))?;
     if let Some(found) = other_format(file, &bytes) {
         return Err(MeshError::NotObj { file: file.to_owned(), found });
     }

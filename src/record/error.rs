@@ -66,6 +66,6 @@ impl RecordError {
     /// Whether the user can set it right by asking for something else (exit code 2) or not (1).
     #[must_use]
     pub fn is_users(&self) -> bool {
-        !matches!(self, Self::Incomplete { .. } | Self::Mismatch { .. } | Self::Rerun(_))
+        !matches!(self, Self::Mismatch { .. } | Self::Rerun(_))
     }
 }

@@ -1,7 +1,7 @@
 //! The bundled web viewer: page and recording on one port of 127.0.0.1. Nothing has to be installed.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::net::{Ipv4Addr, TcpListener};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -11,6 +11,7 @@ use rerun::sink::LogSink as _;
 
 use super::error::RecordError;
 use super::page::{self, Limits, Recording, Server};
+use crate::base::files;
 
 /// Port of the page unless another is given, if it is free: an open page then finds the program when it is run again. The
 /// digits spell PART on a telephone.
@@ -23,6 +24,7 @@ const WHOLE_HISTORY: u64 = 1 << 30;
 pub struct WebViewer {
     url: String,
     pub(super) recording: Recording,
+    warning: Option<String>,
     _servers: Vec<Server>,
 }
 
@@ -43,7 +45,7 @@ impl WebViewer {
         let start = |listener| Server::start("page", listener, router.clone(), Limits::default());
         let servers = std::iter::once(page).chain(further).map(start).collect::<Result<_, _>>();
         let servers = servers.map_err(|error| failed(error.to_string()))?;
-        Ok(Self { url: format!("http://127.0.0.1:{port}/"), recording, _servers: servers })
+        Ok(Self { url: format!("http://127.0.0.1:{port}/"), recording, warning: None, _servers: servers })
     }
 
     /// The address to open in a browser.
@@ -51,18 +53,24 @@ impl WebViewer {
     pub fn url(&self) -> &str {
         &self.url
     }
+
+    /// Set where the recording is incomplete.
+    #[must_use]
+    pub(crate) fn warning(&self) -> Option<&str> {
+        self.warning.as_deref()
+    }
 }
 
 fn listen(port: u16, option: &'static str) -> Result<TcpListener, RecordError> {
     TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|source| RecordError::PortInUse { port, option, source })
 }
 
-/// Checks that a recording can be served.
+/// Checks that a recording can be served. Returns a warning where it is incomplete.
 ///
 /// # Errors
 /// An unreadable file, or one that is no recording.
-pub(crate) fn check_file(path: &Path) -> Result<(), RecordError> {
-    read(path).map(|_| ())
+pub(crate) fn check_file(path: &Path) -> Result<Option<String>, RecordError> {
+    read(path).map(|(_, warning)| warning)
 }
 
 /// Serves an `.rrd` file in the bundled web viewer on 127.0.0.1, on ports as of [`Sink::Serve`](super::Sink::Serve). The file is
@@ -71,15 +79,19 @@ pub(crate) fn check_file(path: &Path) -> Result<(), RecordError> {
 /// # Errors
 /// An unreadable file, one that is no recording, a port in use.
 pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) -> Result<WebViewer, RecordError> {
-    let messages = read(path)?;
+    let (messages, warning) = read(path)?;
     let viewer = WebViewer::start(web_port, grpc_port, WHOLE_HISTORY)?;
     viewer.recording.send_all(messages);
-    Ok(viewer)
+    Ok(WebViewer { warning, ..viewer })
 }
 
-/// The messages of a recording. Some kinds of damage make the decoder allocate more memory than there is, which ends the program.
-fn read(path: &Path) -> Result<Vec<LogMsg>, RecordError> {
-    let file = File::open(path).map_err(|source| RecordError::Unreadable { path: path.to_owned(), source })?;
+/// The messages of a recording, and a warning where it is incomplete. Some kinds of damage make the decoder allocate more memory
+/// than there is, which ends the program.
+fn read(path: &Path) -> Result<(Vec<LogMsg>, Option<String>), RecordError> {
+    let unreadable = |source| RecordError::Unreadable { path: path.to_owned(), source };
+    let mut file = files::open(path).map_err(unreadable)?;
+    let ended = has_end(&mut file).map_err(unreadable)?;
+    let bytes = file.metadata().map_err(unreadable)?.len();
     let none = |reason| RecordError::NotARecording { path: path.to_owned(), reason };
     let decode = || -> Result<Vec<LogMsg>, String> {
         let decoder = rerun::external::re_log_encoding::Decoder::decode_eager(BufReader::new(file));
@@ -88,5 +100,60 @@ fn read(path: &Path) -> Result<Vec<LogMsg>, RecordError> {
     // The decoder does not validate the file, and panics on damage.
     let decoded = catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| Err("it is damaged".to_owned()));
     let messages = decoded.map_err(none)?;
-    if messages.is_empty() { Err(none("it is empty".to_owned())) } else { Ok(messages) }
+    if messages.is_empty() {
+        return Err(none("it is empty".to_owned()));
+    }
+    let warning = (!ended).then(|| {
+        format!(
+            "{}: the recording is incomplete: it breaks off after {bytes} bytes, before the end that Rerun writes last; only its \
+             first {} messages are shown. Make it again, or copy it again",
+            path.display(),
+            messages.len()
+        )
+    });
+    Ok((messages, warning))
+}
+
+/// Whether a file ends as Rerun ends a recording: `RRF2`, `FOOT`, and the number of footers in four bytes.
+fn has_end(file: &mut File) -> io::Result<bool> {
+    let mut end = [0; 12];
+    let length = file.seek(SeekFrom::End(0))?;
+    if length < end.len() as u64 {
+        return Ok(false);
+    }
+    file.seek(SeekFrom::End(-(end.len() as i64)))?;
+    file.read_exact(&mut end)?;
+    file.rewind()?;
+    Ok(end.starts_with(b"RRF2FOOT"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_that_was_cut_off_anywhere_is_refused_or_said_to_be_incomplete() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, cut] = ["whole.rrd", "cut.rrd"].map(|name| folder.path().join(name));
+        let recording = rerun::RecordingStreamBuilder::new("cut").save(&path).unwrap();
+        recording.log("a", &rerun::Points3D::new([[0.0, 0.5, 1.0]])).unwrap();
+        recording.flush_blocking().unwrap();
+        drop(recording);
+        let whole = std::fs::read(&path).unwrap();
+        assert_eq!(check_file(&path).unwrap(), None);
+        let mut shown = 0;
+        for length in 0..whole.len() {
+            std::fs::write(&cut, &whole[..length]).unwrap();
+            match check_file(&cut) {
+                Err(error) => assert!(matches!(error, RecordError::NotARecording { .. }), "{length}: {error}"),
+                Ok(said) => {
+                    let said = said.unwrap_or_else(|| panic!("{length} of {} bytes pass for whole", whole.len()));
+                    assert!(said.contains("cut.rrd") && said.contains(&format!("after {length} bytes")), "{said}");
+                    shown += 1;
+                }
+            }
+        }
+        assert!(shown > whole.len() / 4, "{shown} of {} cuts are shown", whole.len());
+        assert!(serve_file(&cut, None, None).unwrap().warning().is_some());
+    }
 }

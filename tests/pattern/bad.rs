@@ -87,6 +87,16 @@ fn what_is_no_pattern_is_refused() {
 }
 
 #[test]
+fn a_key_given_twice_is_refused_by_its_name() {
+    let text = pattern(&json!({ "front": straight(&SQUARE, 20.0), "sleeve": straight(&SQUARE, -20.0) }), &json!([]));
+    assert!(SewingPattern::parse(&text, "test").is_ok());
+    names(&said(&text.replace("\"sleeve\"", "\"front\"")), &["\"front\" twice", "line 1", "rename"]);
+    names(&said(&text.replacen("\"rotation\"", "\"translation\"", 1)), &["\"translation\" twice"]);
+    names(&said(&text.replacen("\"endpoints\":", "\"endpoints\":[0,1],\"endpoints\":", 1)), &["\"endpoints\" twice"]);
+    names(&said(&text.replacen("\"stitches\":", "\"stitches\":[],\"stitches\":", 1)), &["\"stitches\" twice"]);
+}
+
+#[test]
 fn what_is_not_understood_is_said() {
     let mut panel = straight(&SQUARE, 20.0);
     panel["grain"] = json!(45);

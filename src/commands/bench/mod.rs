@@ -11,7 +11,7 @@ use crate::study::table4::{self, Conditions, ContestError, ContestOptions, Conte
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use crate::commands::runtime::{make_folder, unwritable, use_threads, write_csv};
+use crate::commands::runtime::{check, make_folder, unwritable, use_threads, write};
 use crate::commands::sweep::report::Format;
 use crate::commands::{UserError, console, interrupt};
 
@@ -96,6 +96,10 @@ impl BenchCommand {
 impl TableFourArgs {
     fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
+        let kept = if self.quick { None } else { Some((&self.rows_file, "--rows-file")) };
+        for (path, flag) in self.csv.iter().map(|path| (path, "--csv")).chain(kept) {
+            check(path, flag)?;
+        }
         let fabric = Fabric::by_name(&self.fabric)?;
         let options = self.options();
         let conditions = Conditions::here(&fabric.name, &options);
@@ -133,7 +137,7 @@ impl TableFourArgs {
                     // Kept before it is recorded: a disk that is full then costs a picture and no row.
                     if !self.quick {
                         let file = &self.rows_file;
-                        journal.write(file).map_err(unwritable(file, "file with --rows-file"))?;
+                        journal.write(file).map_err(unwritable(file, "--rows-file"))?;
                     }
                     if let Some(folder) = &self.recordings {
                         let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
@@ -196,7 +200,7 @@ impl TableFourArgs {
         let rows: Vec<ContestRow> = asked.iter().filter_map(find).cloned().collect();
         let csv = table4::csv_lines(&rows)?;
         if let Some(path) = &self.csv {
-            write_csv(path, &csv)?;
+            write(path, &csv, "--csv")?;
         }
         if self.recordings.is_some() && kept > 0 {
             console::note(&format!(

@@ -18,7 +18,7 @@ use clap::Args;
 use self::changes::Changes;
 use self::table::Compared;
 use super::failure::UserError;
-use super::runtime::{cache, use_threads, write_csv};
+use super::runtime::{cache, use_threads, write};
 use super::sinks::SinkArgs;
 use super::stages::DialArgs;
 use super::sweep::chosen::MOST;
@@ -90,7 +90,7 @@ impl CompareArgs {
             return Err(UserError::new(text));
         }
         use_threads(self.threads)?;
-        self.sinks.refuse_twice(&[("--csv", self.csv.as_deref())])?;
+        self.sinks.check_outputs(&[("--csv", self.csv.as_deref())])?;
         interrupt::keep();
         let plan = self.plan()?;
         let store = PointStore::in_memory();
@@ -112,7 +112,7 @@ impl CompareArgs {
         console::warnings(&bench.bench.warnings());
         let compared = compared(&plan, &rows, &bench.bench)?;
         if let Some(path) = &self.csv {
-            write_csv(path, &table::csv(&compared)?)?;
+            write(path, table::csv(&compared)?, "--csv")?;
         }
         let folder = Path::new("recordings").join("compare");
         let recordings = record_all(&rows, &store, "compare", &folder, &self.sinks, Tab::SideBySide)?;

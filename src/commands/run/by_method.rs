@@ -94,7 +94,7 @@ impl RunArgs {
                 1 + spec.over.len()
             )));
         }
-        self.sinks.refuse_unwritable(&spec.garment_name(), &[self.export.as_deref()])?;
+        self.sinks.refuse_unwritable(&spec.garment_name())?;
         let loaded = self.input.load(&spec)?;
         self.stages.dials.cloth.check_used(&loaded)?;
         let load = began.elapsed();

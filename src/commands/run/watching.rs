@@ -45,7 +45,7 @@ impl RunArgs {
                 "--watch has no file to watch: everything is built in. Give --table, --fabric, --body or --garment a file",
             ));
         }
-        self.sinks.refuse_unwritable(&job.scene.garment_name(), &[self.export.as_deref()])?;
+        self.sinks.refuse_unwritable(&job.scene.garment_name())?;
         let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
         let mut watch = FileWatch::new(files);
         // What cannot be from the start is an error, as without --watch.

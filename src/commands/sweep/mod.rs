@@ -15,7 +15,6 @@ use crate::Job;
 use crate::record::{RecordSummary, Tab};
 use crate::study::job::Against;
 use crate::study::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
-use anyhow::Context as _;
 use clap::Args;
 
 use self::points::KeepingBench;
@@ -96,6 +95,7 @@ impl SweepArgs {
             )));
         }
         interrupt::keep();
+        self.sinks.check_outputs(&[])?;
         let plan = self.plan()?;
         let folder = self.folder();
         let store = PointStore::in_folder(&folder);
@@ -126,8 +126,7 @@ impl SweepArgs {
         bar.finish_and_clear();
         if let Some(error) = bench.take_broken() {
             let advice = "the rows before are intact: make room and go on with --resume";
-            return Err(anyhow::Error::new(error))
-                .with_context(|| format!("{}: cannot keep a point; {advice}", folder.display()));
+            return Err(UserError::new(format!("{}: cannot keep a point: {error}; {advice}", folder.display())));
         }
         let outcome = outcome?;
         self.mend(&plan, &outcome.rows, &store, &bench);

@@ -9,12 +9,12 @@
 //! A point's file is written before its row; one that is missing or damaged is computed again.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::base::checksum::{self, Kind, write};
+use crate::base::files::{self, read_own};
 use crate::drape::Drape;
 use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
@@ -172,7 +172,7 @@ impl PointStore {
     pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::open(POINT, &fs::read(point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+                checksum::open(POINT, &read_own(&point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
             }
             Self::Memory(kept) => open(kept).1.get(id).cloned(),
         }
@@ -183,7 +183,7 @@ impl PointStore {
         match self {
             Self::Folder(folder, _) => {
                 let mut head = Vec::new();
-                fs::File::open(point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
+                files::open(&point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
                 checksum::peek(POINT, &head).filter(|scene: &String| is_id(scene))
             }
             Self::Memory(kept) => Some(open(kept).1.get(id)?.scene.clone()),
@@ -194,7 +194,7 @@ impl PointStore {
     pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::open(SCENE, &fs::read(scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+                checksum::open(SCENE, &read_own(&scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
             }
             Self::Memory(kept) => open(kept).0.get(id).cloned(),
         }
@@ -210,6 +210,8 @@ impl PointStore {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     const SCENE_ID: &str = "0123456789abcdef0123456789abcdef";

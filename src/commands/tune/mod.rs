@@ -7,9 +7,8 @@ mod garment;
 mod recording;
 mod report;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::base::atomic_file::WholeFile;
 use crate::base::files::stem;
 use crate::garment::BUILT_IN;
 use crate::mechanics::coupled::Motion;
@@ -26,7 +25,7 @@ use self::garment::Garment;
 use self::report::Verdict;
 use super::fabrics::FabricArgs;
 use super::failure::UserError;
-use super::runtime::{cache, unwritable, use_threads};
+use super::runtime::{self, cache, make_folder, use_threads};
 use super::sinks::SinkArgs;
 use super::sweep::report::{Format, line};
 use super::{console, interrupt};
@@ -108,6 +107,12 @@ pub(crate) struct TuneArgs {
     threads: Option<usize>,
 }
 
+/// Kinds of tables that are searched for.
+const KINDS: [&str; 2] = ["levels", "levels and extents"];
+/// Names of the other files.
+const FRONT: &str = "front.csv";
+const VERDICTS: &str = "verdicts.csv";
+
 /// All that was found.
 #[derive(Default)]
 struct Results {
@@ -122,6 +127,7 @@ impl TuneArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         interrupt::keep();
+        self.sinks.check_outputs(&[])?;
         let ladder = self.ladder()?;
         self.cloth.only("tune")?;
         let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
@@ -130,6 +136,13 @@ impl TuneArgs {
         } else {
             self.garment.clone()
         };
+        make_folder(&self.out)?;
+        let stems: Vec<String> = names.iter().map(|name| stem(name)).collect();
+        let stems = if self.together { vec![stems.join("+")] } else { stems };
+        let tables = stems.iter().flat_map(|name| KINDS.map(|kind| self.table_file(name, kind)));
+        for path in tables.chain([FRONT, VERDICTS].map(|name| self.out.join(name))) {
+            runtime::check(&path, "--out")?;
+        }
         let load = |names: &[String]| -> anyhow::Result<Option<Vec<Garment>>> {
             names.iter().map(|name| Garment::load(name, &self.body, &self.cloth, self.motion, &options)).collect()
         };
@@ -149,8 +162,8 @@ impl TuneArgs {
             self.tune(set, &held_out, (&ladder.0, &ladder.1), &mut results)?;
         }
         let front = report::csv(results.fronts.iter().flat_map(report::lines))?;
-        self.write(&self.out.join("front.csv"), &front)?;
-        self.write(&self.out.join("verdicts.csv"), &report::csv(&results.verdicts)?)?;
+        runtime::write(&self.out.join(FRONT), &front, "--out")?;
+        runtime::write(&self.out.join(VERDICTS), report::csv(&results.verdicts)?, "--out")?;
         // JSON is Unicode; names of files need not be.
         let name = |path: &PathBuf| path.display().to_string();
         match self.format {
@@ -158,7 +171,7 @@ impl TuneArgs {
             Format::Json => console::result(&crate::base::error_text::json(&serde_json::json!({
                 "verdicts": results.verdicts,
                 "tables": results.tables.iter().map(name).collect::<Vec<_>>(),
-                "front": name(&self.out.join("front.csv")),
+                "front": name(&self.out.join(FRONT)),
                 "recordings": results.recordings.iter().map(|r| r.path.as_ref().map(name)).collect::<Vec<_>>(),
             }))?),
             Format::Text => {
@@ -169,7 +182,7 @@ impl TuneArgs {
                     results.text,
                     report::verdicts(&results.verdicts),
                     report::worse(&results.verdicts),
-                    self.out.join("front.csv").display()
+                    self.out.join(FRONT).display()
                 ));
             }
         }
@@ -191,15 +204,15 @@ impl TuneArgs {
         };
         let mut taken: Vec<(&'static str, Taken)> = Vec::new();
         let fronts: Vec<&Front> = found.iterations.iter().map(|i| &i.front).collect();
-        let kinds = [("levels", &fronts[..found.levels]), ("levels and extents", &fronts[..])];
+        let kinds = [(KINDS[0], &fronts[..found.levels]), (KINDS[1], &fronts[..])];
         for (kind, fronts) in kinds.into_iter().take(if fronts.len() == found.levels { 1 } else { 2 }) {
             let Some(front) = fronts.last().copied() else { continue };
-            let exact = kind == "levels" && found.exact;
+            let exact = kind == KINDS[0] && found.exact;
             results.text.push_str(&report::front(&format!("{name}, {kind}"), front, set, exact));
             results.fronts.push((name.clone(), kind, front.clone()));
             let Some(best) = check(fronts, set, &limits, &format!("{name}, {kind}"))? else { continue };
-            let path = self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")));
-            self.write(&path, &report::with_provenance(&best, set).to_toml())?;
+            let path = self.table_file(&name, kind);
+            runtime::write(&path, report::with_provenance(&best, set).to_toml(), "--out")?;
             results.tables.push(path);
             let on = |w: &Garment, table: &RangeTable| {
                 Ok::<_, anyhow::Error>(Verdict::new((&name, kind), table, w.worth(table)?, w))
@@ -246,9 +259,9 @@ impl TuneArgs {
         Ok((or(&self.extents, widths), or(&self.shapes, shapes)))
     }
 
-    fn write(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let written = std::fs::create_dir_all(&self.out).and_then(|()| WholeFile::write(path, text));
-        written.map_err(unwritable(path, "folder with --out"))
+    /// Where the table of a set of garments is written.
+    fn table_file(&self, name: &str, kind: &str) -> PathBuf {
+        self.out.join(format!("{name}-{}.toml", kind.replace(' ', "-")))
     }
 }
 

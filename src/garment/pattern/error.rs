@@ -15,6 +15,9 @@ pub enum PatternError {
     /// No JSON.
     #[error("this is no JSON: {reason}; expected a sewing pattern as GarmentCode writes it (*_specification.json)")]
     NotJson { reason: String },
+    /// A panel, or any other key, twice.
+    #[error("{reason}")]
+    Repeated { reason: String },
     /// Too long to be a pattern.
     #[error(
         "found {megabytes:.1} MB of JSON, expected a sewing pattern of {most_mb} MB at most; is this another file?"

@@ -4,9 +4,10 @@
 //! `absolute`. A panel point (x, y) is placed at Rz Ry Rx (x, y, 0) + translation, angles in degrees.
 
 use glam::{DMat3, DVec2, DVec3};
+use serde_json::error::Category;
 use serde_json::{Map, Value};
 
-use super::value::At;
+use super::value::{At, Unique};
 use super::{Curve, EdgeAt, PanelEdge, PatternError, PatternPanel, SewingPattern, Stitch};
 
 /// A pattern of 115,000 in the public data set has 60 kB at most.
@@ -25,7 +26,10 @@ pub(super) fn pattern(text: &str, name: &str) -> Result<SewingPattern, PatternEr
     if text.len() > MOST_MB << 20 {
         return Err(PatternError::TooLong { megabytes: text.len() as f64 / f64::from(1 << 20), most_mb: MOST_MB });
     }
-    let value: Value = serde_json::from_str(text).map_err(|e| PatternError::NotJson { reason: e.to_string() })?;
+    let Unique(value) = serde_json::from_str(text).map_err(|e| match e.classify() {
+        Category::Data => PatternError::Repeated { reason: e.to_string() },
+        _ => PatternError::NotJson { reason: e.to_string() },
+    })?;
     let root = At::new(&value, "the file");
     let mut notes = Vec::new();
     let object = root.object("an object with \"pattern\" in it")?;

@@ -14,7 +14,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::base::checksum::{self, Kind};
-use crate::base::files::user_cache;
+use crate::base::files::{read_own, user_cache};
 use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, TriMesh};
 
@@ -129,7 +129,7 @@ impl ReferenceCache {
     ) -> Result<Found, E> {
         let path = self.directory.join(key.file_name());
         let mut warnings = Vec::new();
-        match std::fs::read(&path) {
+        match read_own(&path) {
             Ok(bytes) => match checksum::open::<([u8; blake3::OUT_LEN], Reference)>(KIND, &bytes) {
                 Some((of, reference)) if of == *key.0.as_bytes() && reference.positions.len() == vertices => {
                     return Ok(Found { reference, cached: true, warnings });

@@ -1,12 +1,13 @@
 //! Files that survive a crash: replaced whole or not at all, or grown line by line with nothing half-written kept; and the lock that keeps
 //! others off them.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 use crate::base::atomic_file::WholeFile;
+use crate::base::files::read_own;
 
 /// Where lines are appended: a file, or what a test puts in its place.
 pub trait Append: Send {
@@ -33,6 +34,10 @@ impl Append for File {
 }
 
 /// Opens a file to append to, made if it is not there.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "to read and write: that blocks on no pipe, and a pipe has no end to seek"
+)]
 pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
     let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
     let at_end = opened.and_then(|mut file| file.seek(SeekFrom::End(0)).map(|_| file));
@@ -41,7 +46,7 @@ pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
 
 /// The file's bytes, or nothing where there is no file.
 pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
-    match fs::read(path) {
+    match read_own(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(error) => Err(StoreError::io(path, "cannot be read")(error)),

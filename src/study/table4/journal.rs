@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ContestOptions, ContestRow, ENTRANTS};
 use crate::base::atomic_file::WholeFile;
-use crate::base::files::read_text;
+use crate::base::files::{Unreadable, read_own};
 
 /// What rows must have in common to stand in one table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,8 +37,9 @@ impl Conditions {
     #[must_use]
     pub(crate) fn here(fabric: &str, options: &ContestOptions) -> Self {
         // Only Linux tells without asking a library; elsewhere the architecture must do.
-        let told = std::fs::read_to_string("/proc/cpuinfo").ok();
-        let model = told.as_deref().and_then(|text| text.lines().find_map(|line| line.strip_prefix("model name")));
+        let told = read_own(Path::new("/proc/cpuinfo")).unwrap_or_default();
+        let told = String::from_utf8_lossy(&told);
+        let model = told.lines().find_map(|line| line.strip_prefix("model name"));
         let machine = model.map_or(std::env::consts::ARCH, |m| m.trim_start_matches([' ', '\t', ':'])).to_owned();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -78,7 +79,7 @@ pub struct Journal {
 pub enum JournalError {
     /// It cannot be read.
     #[error(transparent)]
-    Unreadable(#[from] crate::base::files::Unreadable),
+    Unreadable(#[from] Unreadable),
     /// It is no journal.
     #[error("{file}: this is no journal of a contest ({reason}); choose another file with --rows-file")]
     Syntax { file: String, reason: String },
@@ -99,8 +100,8 @@ impl Journal {
             return Ok(Self { conditions, rows: Vec::new() });
         }
         let file = path.display().to_string();
-        let text = read_text(path)?;
-        let journal: Self = serde_json::from_str(&text)
+        let bytes = read_own(path).map_err(|e| Unreadable::new(path, &e))?;
+        let journal: Self = serde_json::from_slice(&bytes)
             .map_err(|e| JournalError::Syntax { file: file.clone(), reason: e.to_string() })?;
         if journal.conditions != conditions {
             let [found, expected] = [&journal.conditions, &conditions]
