@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::base::atomic_file::{WholeFile, folder_of};
+use crate::base::files::regular;
 
 /// First bytes of a sealed value: what it is, and the version of its format.
 pub(crate) type Kind = [u8; 8];
@@ -21,9 +22,12 @@ pub(crate) fn seal(kind: &Kind, value: &impl Serialize) -> std::io::Result<Vec<u
     Ok(bytes)
 }
 
-/// Writes `value` sealed as the whole of `path`, whose folder is made if it is not there.
+/// Writes `value` sealed as the whole of `path`, whose folder is made if it is not there. A pipe in its place is refused: nobody reads it.
 pub(crate) fn write(path: &Path, kind: &Kind, value: &impl Serialize) -> std::io::Result<()> {
     std::fs::create_dir_all(folder_of(path))?;
+    if let Ok(found) = std::fs::metadata(path) {
+        regular(&found)?;
+    }
     WholeFile::write(path, seal(kind, value)?)
 }
 

@@ -209,7 +209,8 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-fn regular(found: &Metadata) -> io::Result<()> {
+/// Refuses a folder, a pipe or a device.
+pub(crate) fn regular(found: &Metadata) -> io::Result<()> {
     match (found.is_file(), found.is_dir()) {
         (true, _) => Ok(()),
         (_, true) => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a file")),
@@ -228,10 +229,10 @@ mod tests {
     #[test]
     fn a_file_is_read_up_to_its_bound() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), "four").unwrap();
+        fs::write(file.path(), "four").unwrap();
         assert_eq!(bounded(file.path(), 4).unwrap(), b"four");
         assert_eq!(bounded(file.path(), 3).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
-        std::fs::write(file.path(), b"a\xff").unwrap();
+        fs::write(file.path(), b"a\xff").unwrap();
         assert!(read_text(file.path()).unwrap_err().to_string().contains("no UTF-8 text"));
         // Larger than the memory, and empty: refused by its length.
         file.as_file().set_len(1 << 40).unwrap();

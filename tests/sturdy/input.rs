@@ -4,9 +4,9 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::ffi::OsStrExt as _;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
-use super::{Bench, GARMENT, SCENE};
+use super::{Bench, GARMENT, SCENE, ended};
 
 #[test]
 fn numbers_beyond_all_measure_are_refused_with_their_limit() {
@@ -63,17 +63,112 @@ fn what_the_user_can_mend_ends_with_two() {
 }
 
 #[test]
-fn an_input_without_end_is_refused_before_it_fills_the_memory() {
+fn pipes_and_devices_are_refused_wherever_a_file_is_read() {
     let bench = Bench::new();
-    std::os::unix::fs::symlink("/dev/zero", bench.path("endless.json")).unwrap();
-    bench.run(&["--pattern", "endless.json", "--no-save"]).with(2, &["endless.json", "more than 64 MB"]);
-    bench.run(&["--pattern", "endless.obj", "--no-save"]).with(2, &["endless.obj", "ends in `.json`"]);
-    for flag in ["--table", "--fabric", "--measurements"] {
-        bench.run(&[flag, "/dev/zero", "--no-save"]).with(2, &["/dev/zero", "more than 64 MB"]);
+    let pipe = |path: &str| assert!(Command::new("mkfifo").arg(bench.path(path)).status().unwrap().success());
+    for name in ["pipe.obj", "pipe.toml", "pipe.json", "pipe.rrd"] {
+        pipe(name);
     }
-    bench.run(&["sweep", "/dev/zero"]).with(2, &["/dev/zero: cannot be read", "more than 64 MB"]);
-    bench.write("s.toml", "name = \"s\"\n[base]\ngarment = \"flared-skirt@400\"\n[grid]\ntables = [\"/dev/zero\"]\n");
-    bench.run(&["sweep", "s.toml"]).with(2, &["s.toml", "/dev/zero", "more than 64 MB"]);
+    std::os::unix::fs::symlink("/dev/zero", bench.path("endless.json")).unwrap();
+    let sweep = |name: &str, base: &str, tables: &str| {
+        bench.write(name, &format!("name = \"s\"\nrepeats = 1\n[base]\n{base}\n[grid]\ntables = [{tables}]\n"));
+    };
+    sweep("whole.toml", "garment = \"flared-skirt@400\"", "\"table-3\"");
+    sweep("garment.toml", "garment = \"pipe.obj\"", "\"table-3\"");
+    sweep("body.toml", "body = \"pipe.obj\"\ngarment = \"garment.obj\"", "\"table-3\"");
+    sweep("fabric.toml", "garment = \"flared-skirt@400\"\nfabric = \"pipe.toml\"", "\"table-3\"");
+    sweep("table.toml", "garment = \"flared-skirt@400\"", "\"pipe.toml\"");
+    bench.run(&["sweep", "whole.toml", "--out", "whole", "--no-save", "--accuracy", "none"]).with(0, &[]);
+    for (folder, file) in [("rows", "rows.jsonl"), ("plan", "plan.json")] {
+        fs::create_dir(bench.path(folder)).unwrap();
+        for name in ["rows.jsonl", "plan.json"] {
+            if name == file {
+                pipe(&format!("{folder}/{name}"));
+            } else {
+                fs::copy(bench.path(format!("whole/{name}")), bench.path(format!("{folder}/{name}"))).unwrap();
+            }
+        }
+    }
+    // A test that hangs says less than one that fails.
+    let run = |line: &str| {
+        ended(
+            Command::new("timeout")
+                .arg("60")
+                .arg(env!("CARGO_BIN_EXE_partwise"))
+                .args(line.split(' '))
+                .current_dir(bench.0.path())
+                .env("XDG_CACHE_HOME", bench.0.path()),
+        )
+    };
+    for line in [
+        "--no-save --body pipe.obj --garment garment.obj",
+        "--no-save --body body.obj --garment pipe.obj",
+        "--no-save --body body.obj --garment garment.obj --rest pipe.obj",
+        "--no-save --body body.obj --garment garment.obj --fabrics pipe.toml",
+        "--no-save --body pipe.toml",
+        "--no-save --garment pipe.toml",
+        "--no-save --pattern pipe.json",
+        "--no-save --pattern endless.json",
+        "--no-save --table pipe.toml",
+        "--no-save --table /dev/zero",
+        "--no-save --table pipe.toml --watch",
+        "--no-save --fabric pipe.toml",
+        "--no-save --measurements pipe.toml",
+        "check body.obj pipe.obj",
+        "check body.obj garment.obj --unit m --up z --certificate pipe.obj",
+        "pattern pipe.json",
+        "compare table-3 pipe.toml --no-save",
+        "tune --fabric pipe.toml --garment flared-skirt@400 --no-save",
+        "cusick pipe.toml",
+        "bench table-4 --rows-file pipe.json",
+        "live --table pipe.toml",
+        "sweep pipe.toml",
+        "sweep garment.toml --out none",
+        "sweep body.toml --out none",
+        "sweep fabric.toml --out none",
+        "sweep table.toml --out none",
+        "sweep whole.toml --out rows --resume",
+        "sweep whole.toml --out plan --resume",
+        "merge rows --out none",
+        "merge plan --out none",
+        "view pipe.rrd",
+        "view --check /dev/zero",
+    ] {
+        run(line).with(2, &["it is a pipe or a device, expected a regular file"]);
+    }
+    // Entries of caches that are none are made anew.
+    let cached =
+        |folder: &str| fs::read_dir(bench.path(folder)).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
+    run("--no-save --garment flared-skirt@400 --accuracy --cache kept").with(0, &[]);
+    for entry in cached("partwise/meshes").into_iter().chain(cached("kept")) {
+        fs::remove_file(&entry).unwrap();
+        pipe(entry.to_str().unwrap());
+    }
+    run("--no-save --garment flared-skirt@400 --accuracy --cache kept").with(0, &["kept", "pipe"]);
+    for entry in cached("whole/points") {
+        fs::remove_file(&entry).unwrap();
+        pipe(entry.to_str().unwrap());
+    }
+    run("sweep whole.toml --out whole --resume --accuracy none").with(0, &["missing from the recording"]);
+}
+
+#[test]
+fn an_input_beyond_its_bound_is_refused_before_it_fills_the_memory() {
+    let bench = Bench::new();
+    for (name, mb) in [("large.toml", 65), ("large.json", 65), ("large.obj", 2049)] {
+        fs::File::create(bench.path(name)).unwrap().set_len(mb << 20).unwrap();
+    }
+    bench.run(&["--pattern", "large.json", "--no-save"]).with(2, &["large.json", "more than 64 MB"]);
+    bench.run(&["--pattern", "large.obj", "--no-save"]).with(2, &["large.obj", "ends in `.json`"]);
+    bench.run(&["--garment", "large.obj", "--no-save"]).with(2, &["large.obj", "more than 2048 MB"]);
+    for flag in ["--table", "--fabric", "--measurements"] {
+        bench.run(&[flag, "large.toml", "--no-save"]).with(2, &["large.toml", "more than 64 MB"]);
+    }
+    bench.run(&["sweep", "large.toml"]).with(2, &["large.toml: cannot be read", "more than 64 MB"]);
+    // A terabyte of rows: more than any memory.
+    fs::create_dir(bench.path("rows")).unwrap();
+    fs::File::create(bench.path("rows/plan.json")).unwrap().set_len(1 << 40).unwrap();
+    bench.run(&["merge", "rows", "--out", "none"]).with(2, &["rows/plan.json", "more than 2048 MB"]);
 }
 
 #[test]
