@@ -8,14 +8,14 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::draft::Draft;
+use super::cleanup::Cleaned;
 use super::error::MeshError;
 use super::frame::{Axis, Frame, Unit};
 use super::frame_guess::{guess_frame, guess_frame_around};
+use super::obj_lines::{Face, ObjContents, used};
+use super::obj_source::{ObjSource, read};
 use super::orientation::face_outward;
 use super::report::{MeshReport, Remark, Repair};
-use super::scan::{Face, Scan, used};
-use super::source::{ObjSource, read};
 use super::topology::{NONE, Topology};
 use super::{TriMesh, each_once};
 
@@ -99,11 +99,11 @@ impl Imported {
 /// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; a unit that
 /// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
 pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
-    let scan = read(file)?;
-    let faces = chosen_faces(file, &scan, options)?;
-    let frame = guess_frame(&used_positions(&scan, &faces), options.unit, options.up)
+    let contents = read(file)?;
+    let faces = chosen_faces(file, &contents, options)?;
+    let frame = guess_frame(&used_positions(&contents, &faces), options.unit, options.up)
         .map_err(|height| MeshError::UnknownScale { file: file.to_owned(), height })?;
-    let mut imported = build(file, scan, faces, frame, options)?;
+    let mut imported = build(file, contents, faces, frame, options)?;
     face_outward(&mut imported);
     let topology = Topology::new(&imported.mesh);
     if let Some([a, b]) = topology.boundary_edges().next() {
@@ -125,8 +125,8 @@ pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, Mes
 /// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; no frame that
 /// puts it around the body.
 pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
-    let scan = read(file)?;
-    let faces = chosen_faces(file, &scan, options)?;
+    let contents = read(file)?;
+    let faces = chosen_faces(file, &contents, options)?;
     let frame = match (body, options.unit, options.up) {
         (_, Some(unit), Some(up)) => Frame::given(unit, up),
         (Beside::File(frame), unit, up) => Frame {
@@ -135,10 +135,12 @@ pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -
             guessed: frame.guessed,
             reason: "as the body".to_owned(),
         },
-        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&used_positions(&scan, &faces), (lo, hi), unit, up)
-            .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() })?,
+        (&Beside::Bounds(lo, hi), unit, up) => {
+            guess_frame_around(&used_positions(&contents, &faces), (lo, hi), unit, up)
+                .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() })?
+        }
     };
-    build(file, scan, faces, frame, options)
+    build(file, contents, faces, frame, options)
 }
 
 /// What may close a body that came in open: its seams joined, or the body alone taken out of a scene.
@@ -157,17 +159,18 @@ fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
     hint
 }
 
-fn chosen_faces(file: &Path, scan: &Scan, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
+fn chosen_faces(file: &Path, contents: &ObjContents, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
     let faces = match &options.group {
-        None => scan.faces.clone(),
+        None => contents.faces.clone(),
         Some(asked) => {
-            let wanted = scan.number_of(asked);
-            let chosen = scan.faces.iter().filter(|face| wanted.is_some_and(|w| face.group == w || face.object == w));
+            let wanted = contents.number_of(asked);
+            let chosen =
+                contents.faces.iter().filter(|face| wanted.is_some_and(|w| face.group == w || face.object == w));
             let chosen: Vec<Face> = chosen.copied().collect();
             if chosen.is_empty() {
-                let used: BTreeSet<u32> = scan.faces.iter().flat_map(|face| [face.group, face.object]).collect();
+                let used: BTreeSet<u32> = contents.faces.iter().flat_map(|face| [face.group, face.object]).collect();
                 let available =
-                    (0u32..).zip(&scan.names).filter(|(i, _)| used.contains(i)).map(|(_, name)| name.clone());
+                    (0u32..).zip(&contents.names).filter(|(i, _)| used.contains(i)).map(|(_, name)| name.clone());
                 let (file, asked) = (file.to_owned(), asked.clone());
                 return Err(MeshError::UnknownGroup { file, asked, available: available.collect() });
             }
@@ -176,47 +179,47 @@ fn chosen_faces(file: &Path, scan: &Scan, options: &ImportOptions) -> Result<Vec
     };
     if faces.is_empty() {
         let file = file.to_owned();
-        return Err(MeshError::Empty { file, vertices: scan.positions.len(), faces: 0 });
+        return Err(MeshError::Empty { file, vertices: contents.positions.len(), faces: 0 });
     }
     Ok(faces)
 }
 
-fn used_positions(scan: &Scan, faces: &[Face]) -> Vec<DVec3> {
-    let used = used(scan.positions.len(), faces, &scan.corners);
-    scan.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
+fn used_positions(contents: &ObjContents, faces: &[Face]) -> Vec<DVec3> {
+    let used = used(contents.positions.len(), faces, &contents.corners);
+    contents.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
 }
 
 fn build(
     file: &Path,
-    scan: Scan,
+    contents: ObjContents,
     faces: Vec<Face>,
     frame: Frame,
     options: &ImportOptions,
 ) -> Result<Imported, MeshError> {
-    let placed: Vec<DVec3> = scan.positions.iter().map(|&p| frame.to_metres(p)).collect();
+    let placed: Vec<DVec3> = contents.positions.iter().map(|&p| frame.to_metres(p)).collect();
     let mut repairs = Vec::new();
     let mut remarks = Vec::new();
     if let Some(name) = &options.group {
-        repairs.push(Repair::GroupChosen { name: name.clone(), left_out: scan.faces.len() - faces.len() });
+        repairs.push(Repair::GroupChosen { name: name.clone(), left_out: contents.faces.len() - faces.len() });
     }
-    let draft = Draft::new(&placed, &scan.corners, &faces, options.weld, &mut repairs);
-    if draft.triangles.is_empty() {
-        let (file, vertices) = (file.to_owned(), scan.positions.len());
+    let cleaned = Cleaned::new(&placed, &contents.corners, &faces, options.weld, &mut repairs);
+    if cleaned.triangles.is_empty() {
+        let (file, vertices) = (file.to_owned(), contents.positions.len());
         return Err(MeshError::Empty { file, vertices, faces: faces.len() });
     }
-    let group: Vec<u32> = draft.face.iter().map(|&f| scan.group_of(&faces[f as usize])).collect();
-    let (groups, triangle_group) = named_groups(&group, &scan.names);
-    let texture = draft.corner.iter().map(|corners| {
-        let known = corners.map(|c| scan.corners[c as usize].texture);
-        known.iter().all(|&t| t != NONE).then(|| known.map(|t| scan.textures[t as usize]))
+    let group: Vec<u32> = cleaned.face.iter().map(|&f| contents.group_of(&faces[f as usize])).collect();
+    let (groups, triangle_group) = named_groups(&group, &contents.names);
+    let texture = cleaned.corner.iter().map(|corners| {
+        let known = corners.map(|c| contents.corners[c as usize].texture);
+        known.iter().all(|&t| t != NONE).then(|| known.map(|t| contents.textures[t as usize]))
     });
     let texture: Vec<_> = texture.collect();
-    let mesh = TriMesh { positions: draft.positions, triangles: draft.triangles, groups, triangle_group };
-    if scan.small_faces > 0 {
-        remarks.push(Remark::SmallFaces { count: scan.small_faces });
+    let mesh = TriMesh { positions: cleaned.positions, triangles: cleaned.triangles, groups, triangle_group };
+    if contents.small_faces > 0 {
+        remarks.push(Remark::SmallFaces { count: contents.small_faces });
     }
-    if let Some((line, text)) = scan.first_unknown.clone() {
-        remarks.push(Remark::UnknownLines { count: scan.unknown, line, text });
+    if let Some((line, text)) = contents.first_unknown.clone() {
+        remarks.push(Remark::UnknownLines { count: contents.unknown, line, text });
     }
     let report = MeshReport {
         file: file.display().to_string(),
@@ -234,15 +237,15 @@ fn build(
     let source = ObjSource {
         file: file.to_owned(),
         frame,
-        corners: scan.corners,
+        corners: contents.corners,
         faces,
-        statements: scan.statements,
-        positions: scan.positions,
-        textures: scan.textures,
-        mesh_vertex: draft.mesh_vertex,
+        statements: contents.statements,
+        positions: contents.positions,
+        textures: contents.textures,
+        mesh_vertex: cleaned.mesh_vertex,
     };
-    let mut imported = Imported { mesh, report, source, texture, face: draft.face };
-    imported.make_agree(draft.coincident);
+    let mut imported = Imported { mesh, report, source, texture, face: cleaned.face };
+    imported.make_agree(cleaned.coincident);
     Ok(imported)
 }
 

@@ -5,12 +5,12 @@
 //! triangles (barycentric area).
 
 pub mod bridges;
+mod cleanup;
 pub mod coarse;
 mod collapse;
 mod csr;
 mod decimate;
 mod dijkstra;
-mod draft;
 mod duplicates;
 mod error;
 pub mod export;
@@ -24,6 +24,8 @@ pub mod health;
 pub mod import;
 pub(crate) mod lattice;
 pub(crate) mod morton;
+mod obj_lines;
+mod obj_source;
 mod orientation;
 pub(crate) mod polygon;
 pub(crate) mod remesh;
@@ -31,9 +33,7 @@ pub mod report;
 pub mod rest;
 #[cfg(test)]
 pub(crate) mod samples;
-mod scan;
 pub mod self_intersection;
-mod source;
 mod topology;
 pub(crate) mod triangle_crossing;
 pub(crate) mod winding;
@@ -44,10 +44,10 @@ pub(crate) use csr::Lists;
 pub(crate) use dijkstra::Flow;
 pub use error::{Keyword, LineProblem, MeshError};
 pub use frame::{Axis, Frame, Unit};
+pub use obj_lines::{Corner, Face};
+pub use obj_source::ObjSource;
 pub use remesh::Density;
 pub use rest::RestShape;
-pub use scan::{Corner, Face};
-pub use source::ObjSource;
 pub use topology::{NONE, Topology};
 
 /// An indexed triangle mesh with optional named groups of triangles.

@@ -3,14 +3,14 @@
 use glam::DVec3;
 
 use super::duplicates::twins;
+use super::obj_lines::{Corner, Face, used};
 use super::polygon;
 use super::report::Repair;
-use super::scan::{Corner, Face, used};
 use super::{renumbered, retain};
 
 /// Triangles that still know where they come from.
 #[derive(Debug, Default)]
-pub(super) struct Draft {
+pub(super) struct Cleaned {
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// Corner of the file behind each triangle corner.
@@ -23,7 +23,7 @@ pub(super) struct Draft {
     pub(super) coincident: usize,
 }
 
-impl Draft {
+impl Cleaned {
     /// Cuts `faces` over `positions` (by file vertex, m) and cleans up; what is done is added to `repairs`.
     pub(super) fn new(
         positions: &[DVec3],
@@ -36,7 +36,7 @@ impl Draft {
         let (place, coincident) = coincident(positions, &used);
         let mut stand_in: Vec<u32> = if weld { place.clone() } else { (0..positions.len() as u32).collect() };
         let stands_for = |v: u32| stand_in[v as usize];
-        let mut draft = Self { coincident: if weld { 0 } else { coincident }, ..Self::default() };
+        let mut cleaned = Self { coincident: if weld { 0 } else { coincident }, ..Self::default() };
         let (mut quads, mut larger, mut degenerate) = (0, 0, 0);
         for (number, face) in faces.iter().enumerate() {
             match face.count {
@@ -60,15 +60,15 @@ impl Draft {
                     degenerate += 1;
                     continue;
                 }
-                draft.triangles.push([a, b, c]);
-                draft.corner.push(corner);
-                draft.face.push(number as u32);
+                cleaned.triangles.push([a, b, c]);
+                cleaned.corner.push(corner);
+                cleaned.face.push(number as u32);
             }
         }
-        let duplicates = draft.drop_duplicates();
-        let (parts, twins) = draft.drop_twins(&place, &mut stand_in);
+        let duplicates = cleaned.drop_duplicates();
+        let (parts, twins) = cleaned.drop_twins(&place, &mut stand_in);
         let unused = used.iter().filter(|&&used| !used).count();
-        draft.compact(positions, &stand_in);
+        cleaned.compact(positions, &stand_in);
         let mut note = |count: usize, repair: Repair| {
             if count > 0 {
                 repairs.push(repair);
@@ -80,7 +80,7 @@ impl Draft {
         note(duplicates, Repair::DuplicatesDropped { triangles: duplicates });
         note(twins, Repair::TwinsDropped { parts, triangles: twins });
         note(unused, Repair::UnusedDropped { vertices: unused });
-        draft
+        cleaned
     }
 
     /// Keeps the first of the triangles over the same three vertices, whichever way round.

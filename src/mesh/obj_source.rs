@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::error::MeshError;
 use super::frame::Frame;
-use super::scan::{Corner, Face, Scan};
+use super::obj_lines::{Corner, Face, ObjContents};
 use super::topology::NONE;
 use crate::base::files::{MOST_MESH, Unreadable, bounded};
 
@@ -53,7 +53,7 @@ impl ObjSource {
 }
 
 /// Reads the lines of a file.
-pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
+pub(super) fn read(file: &Path) -> Result<ObjContents, MeshError> {
     let bytes = bounded(file, MOST_MESH).map_err(|e| Unreadable::new(file, &e))?;
     if let Some(found) = other_format(file, &bytes) {
         return Err(MeshError::NotObj { file: file.to_owned(), found });
@@ -62,9 +62,9 @@ pub(super) fn read(file: &Path) -> Result<Scan, MeshError> {
     let text = String::from_utf8_lossy(&bytes);
     // As old Macintosh programs end their lines.
     if text.contains('\r') && !text.contains('\n') {
-        return Scan::new(file, &text.replace('\r', "\n"));
+        return ObjContents::new(file, &text.replace('\r', "\n"));
     }
-    Scan::new(file, &text)
+    ObjContents::new(file, &text)
 }
 
 /// What a file is if it's no OBJ; told by its first bytes, not by its name, except where the bytes tell nothing.
