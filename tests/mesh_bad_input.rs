@@ -46,6 +46,13 @@ fn indices_out_of_range_name_their_line_and_the_range() {
     says(&format!("{three}f 1 2 99999999999\n"), &["line 4", "99999999999"]);
     says(&format!("{three}f 1 2 3.5\n"), &["line 4", "\"3.5\"", "v/vt/vn"]);
     says(&format!("{three}f 1/2/3/4 2 3\n"), &["line 4", "1/2/3/4"]);
+    says(&format!("{three}f 1/// 2 3\n"), &["line 4", "1///"]);
+    says(&format!("{three}f /1 2 3\n"), &["line 4", "\"/1\""]);
+    let textured = format!("{three}vt 0 0\n");
+    for index in ["0", "-2", "-9223372036854775808", "9223372036854775807"] {
+        let expected = format!("found {index}, expected 1 to 1, the texture coordinates");
+        says(&format!("{textured}f 1/1 2/{index} 3/1\n"), &["line 5", &expected]);
+    }
 }
 
 #[test]

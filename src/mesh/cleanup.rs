@@ -1,4 +1,4 @@
-//! From polygons to a clean list of triangles: cut, weld if asked, drop what is degenerate, double or unused.
+//! Cuts polygons into triangles, welds vertices on request, and drops degenerate triangles, duplicates and unused vertices.
 
 use glam::DVec3;
 
@@ -8,7 +8,7 @@ use super::polygon;
 use super::report::Repair;
 use super::{renumbered, retain};
 
-/// Triangles that still know where they come from.
+/// A cleaned triangle list, with the origin of each triangle in the file.
 #[derive(Debug, Default)]
 pub(super) struct Cleaned {
     pub(super) positions: Vec<DVec3>,
@@ -19,12 +19,12 @@ pub(super) struct Cleaned {
     pub(super) face: Vec<u32>,
     /// Mesh vertex of each file vertex, or [`NONE`](super::NONE).
     pub(super) mesh_vertex: Vec<u32>,
-    /// Vertices in the mesh that lie on an earlier one.
+    /// Number of vertices in the mesh that coincide with an earlier one.
     pub(super) coincident: usize,
 }
 
 impl Cleaned {
-    /// Cuts `faces` over `positions` (by file vertex, m) and cleans up; what is done is added to `repairs`.
+    /// Cuts and cleans `faces` over `positions` (by file vertex, m); adds each change to `repairs`.
     pub(super) fn new(
         positions: &[DVec3],
         corners: &[Corner],
@@ -44,7 +44,7 @@ impl Cleaned {
                 4 => quads += 1,
                 _ => larger += 1,
             }
-            // A corner repeated in a row adds nothing to the outline.
+            // Consecutive equal corners are one corner of the outline.
             let mut outline: Vec<u32> = (face.first..face.first + face.count).collect();
             let vertex = |c: &u32| stands_for(corners[*c as usize].vertex);
             outline.dedup_by_key(|c| vertex(c));
@@ -83,7 +83,7 @@ impl Cleaned {
         cleaned
     }
 
-    /// Keeps the first of the triangles over the same three vertices, whichever way round.
+    /// Keeps the first triangle over each set of three vertices, whatever its winding; returns the number dropped.
     fn drop_duplicates(&mut self) -> usize {
         let mut keys: Vec<([u32; 3], u32)> = self.triangles.iter().copied().zip(0..).collect();
         keys.iter_mut().for_each(|(key, _)| key.sort_unstable());
@@ -95,8 +95,8 @@ impl Cleaned {
         self.keep(&keep)
     }
 
-    /// Keeps the first of connected parts that lie on each other, `place` by `place`; the vertices of the others stand for its own. How many
-    /// parts are dropped, and how many triangles.
+    /// Keeps the first of the connected parts with the same `place` numbers, and maps the vertices of the others to it.
+    /// Returns the numbers of parts and of triangles dropped.
     fn drop_twins(&mut self, place: &[u32], stand_in: &mut [u32]) -> (usize, usize) {
         let found = if self.coincident > 0 { twins(&self.triangles, &self.face, place) } else { None };
         let Some(found) = found else { return (0, 0) };
@@ -105,7 +105,7 @@ impl Cleaned {
         (found.parts, self.keep(&found.keep))
     }
 
-    /// Keeps some of the triangles, and says how many it drops.
+    /// Keeps the marked triangles and returns the number dropped.
     fn keep(&mut self, keep: &[bool]) -> usize {
         let dropped = keep.iter().filter(|&&keep| !keep).count();
         if dropped > 0 {
@@ -116,7 +116,7 @@ impl Cleaned {
         dropped
     }
 
-    /// Numbers the vertices that are left, in the order of the file.
+    /// Renumbers the used vertices in the order of the file.
     fn compact(&mut self, positions: &[DVec3], stand_in: &[u32]) {
         let mut used = vec![false; positions.len()];
         self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -127,9 +127,10 @@ impl Cleaned {
     }
 }
 
-/// For each vertex the first used one at exactly its place, and how many used vertices lie on an earlier one.
+/// The first used vertex at exactly the position of each vertex, and the number of used vertices that coincide with an
+/// earlier one.
 fn coincident(positions: &[DVec3], used: &[bool]) -> (Vec<u32>, usize) {
-    // Adding zero makes the two zeros one.
+    // Adding zero turns -0 into 0.
     let key = |v: u32| (positions[v as usize] + 0.0).to_array().map(f64::to_bits);
     let mut order: Vec<u32> = (0..positions.len() as u32).filter(|&v| used[v as usize]).collect();
     order.sort_by_key(|&v| (key(v), v));

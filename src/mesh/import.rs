@@ -1,7 +1,8 @@
-//! Somebody else's body and garment, read from OBJ, set in metres with z up, repaired as far as is safe.
+//! Imports a body or a garment from OBJ: converts it to metres with z up and repairs it as far as is safe.
 //!
-//! Vertices are those of the file, in its order, so far as a face uses them: corners that differ in texture coordinate
-//! alone are one vertex. Nothing is joined by position unless asked, as that can make a clean mesh non-manifold.
+//! The mesh has the vertices of the file that a face uses, in the order of the file: corners that differ only in their
+//! texture coordinate share a vertex. Vertices are welded by position only on request, because welding can make a clean
+//! mesh non-manifold.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -22,42 +23,42 @@ use super::{TriMesh, each_once};
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
 
-/// What the user chose about a file.
+/// Options of an import.
 #[derive(Debug, Clone, Default)]
 pub struct ImportOptions {
-    /// Take this group (or object) alone.
+    /// Import only this group or object.
     pub group: Option<String>,
     /// Unit of the file; guessed where it is not given.
     pub unit: Option<Unit>,
     /// Up axis of the file; guessed where it is not given.
     pub up: Option<Axis>,
-    /// Join vertices at exactly the same place.
+    /// Weld vertices at exactly the same position.
     pub weld: bool,
     /// Accept a body with a boundary.
     pub open_body: bool,
 }
 
-/// What is known of the body when a garment comes in.
+/// The body that a garment is imported for.
 #[derive(Debug, Clone)]
 pub enum Beside<'a> {
-    /// It came from a file of this frame, which the garment shares.
+    /// A body from a file of this frame, which the garment shares.
     File(&'a Frame),
-    /// It is in metres, z up, within these bounds; the garment's frame is the one that fits it best.
+    /// A body within these bounds (m, z up); the garment's frame is the one that fits it best.
     Bounds(DVec3, DVec3),
 }
 
-/// A mesh with its origin.
+/// An imported mesh, its report and its source.
 #[derive(Debug, Clone)]
 pub struct Imported {
     /// The mesh: metres, z up.
     pub mesh: TriMesh,
-    /// What was found and repaired.
+    /// Counts, repairs and remarks.
     pub report: MeshReport,
-    /// What an export needs.
+    /// The file, for the export.
     pub source: ObjSource,
-    /// Texture coordinates of each triangle's corners; `None` for triangles without.
+    /// Texture coordinates of the corners of each triangle; `None` if a corner has none.
     pub texture: Vec<Option<[DVec2; 3]>>,
-    /// Face of the file, by its place in the source, behind each triangle.
+    /// Index into [`ObjSource::faces`] of the face that each triangle was cut from.
     pub(super) face: Vec<u32>,
 }
 
@@ -68,7 +69,7 @@ impl Imported {
         &self.source.frame
     }
 
-    /// This mesh at the vertices of `other`, a file of the same faces: the garment in its rest shape.
+    /// This mesh at the positions of `other`, a file of the same faces that holds the rest shape.
     pub fn in_the_shape_of(&self, other: &Self) -> Result<TriMesh, MeshError> {
         let differs = |difference: String| MeshError::OtherTopology {
             file: other.source.file.clone(),
@@ -86,7 +87,7 @@ impl Imported {
                 return Err(differs(format!("face {} has other vertices", i + 1)));
             }
         }
-        // The polygons agree; triangles are taken from here, as another shape may cut its quads along other diagonals.
+        // The polygons agree. The triangles are those of `self`: another shape may cut its quads along other diagonals.
         let place = |&v: &u32| theirs.mesh_vertex.get(v as usize).and_then(|&w| other.mesh.positions.get(w as usize));
         let positions: Option<Vec<DVec3>> = ours.file_vertices().iter().map(|v| place(v).copied()).collect();
         Ok(self.mesh.with_positions(positions.ok_or_else(|| differs("vertices are missing".to_owned()))?))
@@ -143,7 +144,7 @@ pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -
     build(file, contents, faces, frame, options)
 }
 
-/// What may close a body that came in open: its seams joined, or the body alone taken out of a scene.
+/// Suggests a remedy for an open body: welding, or choosing the body's group.
 fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
     let apart = report.remarks.iter().find_map(|remark| match remark {
         Remark::Coincident { vertices } => Some(*vertices),
@@ -249,7 +250,7 @@ fn build(
     Ok(imported)
 }
 
-/// Groups in the order of the file, those without triangles left out.
+/// Names of the groups that have triangles, in the order of the file, and the index of each triangle's group.
 fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
     let used = each_once(group.iter().copied());
     if used == [NONE] {

@@ -101,20 +101,27 @@ struct Prepared {
 impl Prepared {
     fn line<'a>(&mut self, keyword: &str, words: impl Iterator<Item = &'a str>) {
         self.text.push_str(keyword);
-        self.text.extend(words.flat_map(|word| [" ", word]));
+        for word in words {
+            self.text.push(' ');
+            self.text.push_str(word);
+        }
         self.text.push('\n');
     }
 
     /// Adds a face and returns the number of its corners.
-    fn face<'a>(&mut self, words: impl Iterator<Item = &'a str> + Clone, groups: (u32, u32)) -> usize {
+    fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>, groups: (u32, u32)) -> usize {
         let first = self.textured.len();
-        for corner in words.clone() {
-            let mut parts = corner.split('/').skip(1);
-            let texture = parts.next().unwrap_or_default();
-            self.unchecked |= parts.nth(1).is_some() || !(texture.is_empty() || texture.starts_with(one_to_nine));
-            self.textured.push(!texture.is_empty());
+        self.text.push('f');
+        for corner in words {
+            let texture = corner.split_once('/').map_or("", |(_, texture)| texture);
+            let textured = !texture.is_empty() && !texture.starts_with('/');
+            self.textured.push(textured);
+            self.unchecked |= textured && !texture.starts_with(|c| matches!(c, '1'..='9'))
+                || corner.bytes().filter(|&b| b == b'/').count() > 2;
+            self.text.push(' ');
+            self.text.push_str(corner);
         }
-        self.line("f", words);
+        self.text.push('\n');
         self.groups.push(groups);
         self.textured.len() - first
     }
@@ -242,10 +249,6 @@ impl ObjContents {
     }
 }
 
-fn one_to_nine(c: char) -> bool {
-    matches!(c, '1'..='9')
-}
-
 /// The first mistake of a text, with its line; `None` where every number and every index is usable.
 fn first_mistake(text: &str) -> Option<(usize, LineProblem)> {
     let count = |keyword| logical_lines(text).filter(|(_, line)| words(line).next() == Some(keyword)).count();
@@ -319,7 +322,7 @@ fn excerpt(word: &str) -> String {
 }
 
 /// The words of a line without its comment, which begins a word: a `#` within a word belongs to a name.
-fn words(line: &str) -> impl Iterator<Item = &str> + Clone {
+fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split_whitespace().take_while(|word| !word.starts_with('#'))
 }
 

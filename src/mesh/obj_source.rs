@@ -1,4 +1,4 @@
-//! An OBJ file as it was written: polygons, groups, texture coordinates, in its own unit and axes.
+//! An OBJ file in its own unit and axes: polygons, groups and texture coordinates, from which an export is written.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::obj_lines::{Corner, Face, ObjContents};
 use super::topology::NONE;
 use crate::base::files::{MOST_MESH, Unreadable, bounded};
 
-/// What an export needs to give a file back with other positions.
+/// The contents of an OBJ file that an export writes again at other positions.
 #[derive(Debug, Clone)]
 pub struct ObjSource {
     /// The file read.
@@ -19,7 +19,7 @@ pub struct ObjSource {
     pub frame: Frame,
     /// Corners of all faces, face after face.
     pub corners: Vec<Corner>,
-    /// The faces of three corners and more; of the chosen group where one was chosen.
+    /// The faces of three or more corners; those of the chosen group, if one was chosen.
     pub faces: Vec<Face>,
     /// Grouping and material lines, each with the number of the face it stands before.
     pub statements: Vec<(u32, String)>,
@@ -52,22 +52,22 @@ impl ObjSource {
     }
 }
 
-/// Reads the lines of a file.
+/// Reads a file.
 pub(super) fn read(file: &Path) -> Result<ObjContents, MeshError> {
     let bytes = bounded(file, MOST_MESH).map_err(|e| Unreadable::new(file, &e))?;
     if let Some(found) = other_format(file, &bytes) {
         return Err(MeshError::NotObj { file: file.to_owned(), found });
     }
-    // Comments and names come in any encoding; numbers are ASCII in all of them.
+    // Comments and names may be in any encoding; numbers are ASCII in all of them.
     let text = String::from_utf8_lossy(&bytes);
-    // As old Macintosh programs end their lines.
+    // Line ends of Mac OS 9 and earlier.
     if text.contains('\r') && !text.contains('\n') {
         return ObjContents::new(file, &text.replace('\r', "\n"));
     }
     ObjContents::new(file, &text)
 }
 
-/// What a file is if it's no OBJ; told by its first bytes, not by its name, except where the bytes tell nothing.
+/// The format of a file that is not an OBJ, recognised by its first bytes; DXF also by the extension, as its text has no signature.
 fn other_format(file: &Path, bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]).into_owned();
