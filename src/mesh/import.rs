@@ -94,10 +94,10 @@ impl Imported {
     }
 }
 
-/// Reads a body.
+/// Imports a body.
 ///
 /// # Errors
-/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; a unit that
+/// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; a unit that
 /// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
 pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
     let contents = read(file)?;
@@ -120,10 +120,10 @@ pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, Mes
     Ok(imported)
 }
 
-/// Reads a garment that belongs to a body.
+/// Imports a garment for a body.
 ///
 /// # Errors
-/// [`MeshError`]: a file that is missing, no OBJ, empty, or wrong in a line; a group that is not there; no frame that
+/// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; no frame that
 /// puts it around the body.
 pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
     let contents = read(file)?;

@@ -290,19 +290,14 @@ fn bad_number<'a>(words: impl Iterator<Item = &'a str>, expected: usize, of: Key
 
 /// What is wrong with a corner; `so_far` and `there_are` count vertices and texture coordinates above it and in all.
 fn bad_corner(word: &str, so_far: [usize; 2], there_are: [usize; 2]) -> Option<LineProblem> {
-    let bad = || Some(LineProblem::BadCorner { found: excerpt(word) });
-    for (k, part) in word.split('/').enumerate() {
-        if part.is_empty() && (1..3).contains(&k) {
-            continue;
-        }
-        let Ok(found) = part.parse::<i64>() else { return bad() };
-        let of = match k {
-            0 => Keyword::Vertex,
-            1 => Keyword::Texture,
-            // A normal is not used, so it need not exist.
-            2 => continue,
-            _ => return bad(),
-        };
+    let parts: Vec<&str> = word.split('/').collect();
+    let well_formed = |(k, part): (usize, &&str)| k > 0 && part.is_empty() || part.parse::<i64>().is_ok();
+    if parts.len() > 3 || !parts.iter().enumerate().all(well_formed) {
+        return Some(LineProblem::BadCorner { found: excerpt(word) });
+    }
+    // A normal is not used, so it need not exist.
+    for (k, of) in [Keyword::Vertex, Keyword::Texture].into_iter().enumerate() {
+        let Some(found) = parts.get(k).and_then(|part| part.parse::<i64>().ok()) else { continue };
         let (so_far, there_are) = (so_far[k], there_are[k]);
         let index = if found < 0 { found.saturating_add(so_far as i64 + 1) } else { found };
         if index < 1 || index > there_are as i64 {
