@@ -1,6 +1,6 @@
-//! Why there is no scene. The user can mend all of these.
+//! Errors of loading a scene; the user can correct all of them.
 
-use super::CutError;
+use super::materials::CutError;
 use crate::base::files::{Unreadable, listed};
 use crate::body::ShapeError;
 use crate::body::distance::DistanceError;
@@ -12,19 +12,19 @@ use crate::mesh::rest::RestError;
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum SceneError {
-    /// A mesh file, or a garment nowhere near the body.
+    /// A mesh file that cannot be used.
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// A body that no distance can be measured to.
     #[error(transparent)]
     Distance(#[from] DistanceError),
-    /// A rest shape that is none.
+    /// A rest shape that cannot be used.
     #[error(transparent)]
     Rest(#[from] RestError),
-    /// A sewing pattern that is none.
+    /// A sewing pattern that cannot be used.
     #[error(transparent)]
     Pattern(#[from] PatternError),
-    /// Measurements or a garment that make no shape.
+    /// Measurements or a garment that no mesh can be made of.
     #[error(transparent)]
     Shape(#[from] ShapeError),
     /// The same, in a file.
@@ -33,41 +33,39 @@ pub enum SceneError {
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// A body by a name that means nothing.
+    /// An unknown name of a body.
     #[error(
         "no body is called `{found}`; expected `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file"
     )]
     UnknownBody { found: String },
-    /// A built-in garment on somebody's body.
+    /// A built-in garment on a body from a file.
     #[error(
         "the built-in garments are cut for the dress form, not for {body}; give --garment an OBJ file placed around that \
          body, or leave --body out and give its measurements (--bust, --waist, ...)"
     )]
     NotCutForIt { body: String },
-    /// Measurements, given as numbers, that make no body.
+    /// Measurements, given as numbers, that no body can be made of.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
-    /// The garment is elsewhere.
+    /// A garment that is not near the body.
     #[error(
         "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
          the same unit, up axis and place (--unit, --up)?"
     )]
     NotNear { nearest: f64, limit: f64 },
-    /// What it is cut from.
+    /// Fabrics that cannot be assigned.
     #[error(transparent)]
     Cut(Box<CutError>),
-    /// Nothing to hold.
-    #[error(
-        "--hold {what}: found no edge there, only cloth that goes on; expected an open edge to hold, as a waistband has"
-    )]
+    /// A group without a boundary edge.
+    #[error("--hold {what}: found no open edge there; expected one, such as the edge of a waistband")]
     NoEdge { what: String },
-    /// A connected part that is not there.
+    /// A connected part that does not exist.
     #[error("--hold: found \"{found}\", expected `top:1` to `top:{parts}`: the garment has {parts} connected parts")]
     UnknownPart { found: String, parts: usize },
-    /// A group to hold that is not there.
+    /// A group that does not exist.
     #[error("--hold: found no group \"{found}\" in the garment, expected `top`, `top:N`{}", or_one_of(known))]
     UnknownGroup { found: String, known: Vec<String> },
-    /// Any of these, where it does not say itself which body, garment or file it is about.
+    /// Any of these, with the name of the body, garment or file it concerns.
     #[error("{name}: {source}")]
     In { name: String, source: Box<SceneError> },
 }
@@ -79,6 +77,12 @@ impl SceneError {
 
     pub(super) fn in_file(file: &str) -> impl FnOnce(ShapeError) -> Self {
         move |source| Self::ShapeFile { file: file.to_owned(), source }
+    }
+}
+
+impl From<CutError> for SceneError {
+    fn from(error: CutError) -> Self {
+        Self::Cut(Box::new(error))
     }
 }
 

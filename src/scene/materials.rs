@@ -1,146 +1,162 @@
-//! What each garment and panel is cut from: a fabric a garment, or a file that names those of its panels.
+//! The fabric of each garment and panel: one fabric per garment, or a file that names those of its panels.
 //!
 //! ```toml
-//! default = "interlock"        # every panel that is not named; left out, these are of the fabric of the settings
+//! default = "interlock"        # every panel that is not named; without it these take the fabric of the settings
 //! [panels]
 //! left_cuff = "denim"          # a built-in fabric
-//! "right_*" = "rib.toml"       # or a file, beside this one; * stands for any letters
+//! "right_*" = "rib.toml"       # or a file, beside this one; * matches any letters
 //! ```
 //!
-//! A panel that is named itself goes before one that fits a `*`. The panels of a mesh from a file are its groups.
+//! A panel's own line takes precedence over lines with a `*`. The panels of a mesh from a file are its groups.
 
-mod names;
-
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
 
-use super::{Scene, SceneError, SceneSpec};
-use crate::base::files::{listed, names_a_file, stem};
-use crate::garment::fabric::Fabric;
+use crate::base::files::{Unreadable, line_of, listed, names_a_file, read_text};
+use crate::garment::fabric::{Fabric, FabricError};
 use crate::mesh::{RestShape, TriMesh};
-use names::{BESIDE, files_named_in, fits};
-pub use names::{CutError, PanelFabrics};
 
-/// A share of a garment that is cut from one fabric.
+/// Ending of the file beside a garment's that names the fabrics of its panels.
+pub(super) const BESIDE: &str = "fabrics.toml";
+
+/// Fabrics that cannot be assigned to a garment.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
+pub enum CutError {
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
+    /// A file with other contents.
+    #[error("{file}: {reason}\nexpected default = \"FABRIC\", and under [panels] lines such as left_cuff = \"FABRIC\"")]
+    Syntax { file: String, reason: String },
+    /// A line whose fabric does not exist or cannot be read.
+    #[error("{file}, line {line}, {key}: {source}")]
+    Fabric { file: String, line: usize, key: String, source: FabricError },
+    /// The same on the command line.
+    #[error(transparent)]
+    Given(#[from] FabricError),
+    /// A line whose panel does not exist.
+    #[error(
+        "{file}, line {line}: found no panel `{found}` in {garment}, expected {}",
+        if known.is_empty() { "none: it has neither panels nor groups".to_owned() } else { format!("one of {}", listed(known)) }
+    )]
+    Panel { file: String, line: usize, garment: String, found: String, known: Vec<String> },
+    /// A panel that matches two lines.
+    #[error("{file}: panel `{panel}` fits both {first} and {second}, of different fabrics; give it a line of its own")]
+    Both { file: String, panel: String, first: String, second: String },
+    /// Two fabrics for the panels that are not named.
+    #[error(
+        "{garment}: {file} says default = \"{default}\", and --fabric says {fabric} for the same; take one of them away"
+    )]
+    Twice { garment: String, file: String, default: String, fabric: String },
+    /// Neither one fabric nor one for each garment.
+    #[error("found {fabrics} fabrics for {garments} garments, expected one for all, or one for each in the same order")]
+    Count { fabrics: usize, garments: usize },
+    /// One file for several garments.
+    #[error(
+        "--fabrics {file}: found {garments} garments, expected one; put a file beside each garment's own, GARMENT.{BESIDE}"
+    )]
+    Whose { file: String, garments: usize },
+    /// A fabric that no panel takes.
+    #[error(
+        "--fabric {fabric}: found nothing to cut from it, every panel has its own ({by}); take --fabric away, or `default` there"
+    )]
+    Unused { fabric: String, by: String },
+}
+
+/// The panels of a garment that are cut from one fabric.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Swatch {
     /// The garment.
     pub garment: String,
-    /// The fabric; none is that of the settings.
+    /// The fabric; `None` is that of the settings.
     pub fabric: Option<String>,
-    /// Its panels; none where it is all of the garment.
+    /// Its panels; empty for the whole garment.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub panels: Vec<String>,
-    /// The file that says so; none where the command line does.
+    /// The file that assigns it; `None` for the command line.
     #[serde(skip)]
     pub by: Option<String>,
 }
 
 impl Swatch {
-    /// The same by the name of its fabric, `of_settings` being that of what names none itself.
+    /// The same with the name of its fabric, which is `of_settings` where it has none of its own.
     #[must_use]
     pub(crate) fn cut_from(&self, of_settings: &Fabric) -> Self {
         Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
     }
 }
 
-/// The fabrics of a garment: those that its rest shape numbers, none being that of the settings.
+impl std::fmt::Display for Swatch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let fabric = self.fabric.as_deref().unwrap_or("the fabric of the settings");
+        write!(f, "{}: {fabric}", self.garment)?;
+        if !self.panels.is_empty() {
+            write!(f, " for {}", listed(&self.panels))?;
+        }
+        self.by.as_ref().map_or(Ok(()), |file| write!(f, ", by {file}"))
+    }
+}
+
+/// The fabrics of a garment, in the order of the numbers in its rest shape; `None` is that of the settings.
 #[derive(Default)]
 pub(super) struct Cut {
     pub(super) fabrics: Vec<Option<Fabric>>,
     pub(super) swatches: Vec<Swatch>,
 }
 
-impl SceneSpec {
-    /// Whether as many fabrics are given as can be.
-    pub(super) fn check_fabrics(&self) -> Result<(), CutError> {
-        let (fabrics, garments) = (self.fabrics.len(), 1 + self.over.len());
-        match &self.fabrics_file {
-            Some(file) if garments > 1 => Err(CutError::Whose { file: file.clone(), garments }),
-            _ if fabrics != 0 && fabrics != garments => Err(CutError::Count { fabrics, garments }),
-            _ => Ok(()),
-        }
-    }
-
-    /// The file that names the fabrics of the garment's panels: the one that is given, or one beside the garment's.
-    #[must_use]
-    pub(crate) fn names_of_fabrics(&self) -> Option<PathBuf> {
-        if let Some(file) = &self.fabrics_file {
-            return Some(file.into());
-        }
-        let own = Path::new(&self.garment);
-        let called = [stem(&self.garment), self.layer_name()]
-            .into_iter()
-            .map(|stem| own.with_file_name(format!("{stem}.{BESIDE}")));
-        if names_a_file(&self.garment) { called.into_iter().find(|path| path.is_file()) } else { None }
-    }
-
-    /// All files that say what the garments are cut from.
-    #[must_use]
-    pub(crate) fn files_of_fabrics(&self) -> Vec<PathBuf> {
-        let mut files: Vec<PathBuf> =
-            self.fabrics.iter().filter(|name| names_a_file(name)).map(PathBuf::from).collect();
-        for path in self.layers().filter_map(|layer| layer.names_of_fabrics()) {
-            files.extend(files_named_in(&path));
-            files.push(path);
-        }
-        files
-    }
-
-    /// What the garment is cut from, its triangles numbered by it.
-    pub(super) fn cut(&self, mesh: &TriMesh, rest: &mut RestShape) -> Result<Cut, CutError> {
-        let given = self.fabrics.first().map(|name| Fabric::by_name(name)).transpose()?;
-        let garment = self.layer_name();
-        let Some(path) = self.names_of_fabrics() else {
-            let swatch = |fabric: &Fabric| Swatch {
-                garment: garment.clone(),
-                fabric: Some(fabric.name.clone()),
-                panels: Vec::new(),
-                by: None,
-            };
-            let swatches = given.iter().map(swatch).collect();
-            return Ok(Cut { fabrics: vec![given], swatches });
+impl Cut {
+    /// Assigns a fabric to each triangle of `garment`: the `given` one, or those of the file `names`.
+    pub(super) fn new(
+        garment: &str,
+        given: Option<Fabric>,
+        names: Option<PathBuf>,
+        mesh: &TriMesh,
+        rest: &mut RestShape,
+    ) -> Result<Self, CutError> {
+        let swatch = |fabric: &Option<Fabric>, panels: Vec<String>, by: Option<String>| {
+            let fabric = fabric.as_ref().map(|fabric| fabric.name.clone());
+            Swatch { garment: garment.to_owned(), fabric, panels, by }
+        };
+        let Some(path) = names else {
+            let swatches = if given.is_some() { vec![swatch(&given, Vec::new(), None)] } else { Vec::new() };
+            return Ok(Self { fabrics: vec![given], swatches });
         };
         let names = PanelFabrics::read(&path)?;
+        let garment_name = || garment.to_owned();
         if let (Some(default), Some(given)) = (&names.default, &given) {
             let (default, fabric) = (default.name.clone(), given.name.clone());
-            return Err(CutError::Twice { garment, file: names.file, default, fabric });
+            return Err(CutError::Twice { garment: garment_name(), file: names.file, default, fabric });
         }
-        if let Some((found, line, _)) =
-            names.panels.iter().find(|(p, ..)| !mesh.groups.iter().any(|group| fits(p, group)))
-        {
+        let unknown = |(name, ..): &&(String, usize, Fabric)| !mesh.groups.iter().any(|group| matches(name, group));
+        if let Some((found, line, _)) = names.panels.iter().find(unknown) {
             let (file, found, known) = (names.file.clone(), found.clone(), mesh.groups.clone());
-            return Err(CutError::Panel { file, line: *line, garment, found, known });
+            return Err(CutError::Panel { file, line: *line, garment: garment_name(), found, known });
         }
         let own = |panel: &String| Ok(names.of(panel)?.or(given.as_ref()).cloned());
         let of_group = mesh.groups.iter().map(own).collect::<Result<Vec<_>, CutError>>()?;
         let unnamed = names.default.as_ref().or(given.as_ref()).cloned();
-        let mut cut = Cut { fabrics: Vec::new(), swatches: Vec::new() };
-        let mut numbers = Vec::with_capacity(mesh.triangles.len());
-        for t in 0..mesh.triangles.len() {
+        let mut cut = Self::default();
+        let of_triangle = (0..mesh.triangles.len()).map(|t| {
             let group = mesh.triangle_group.get(t).map(|&group| group as usize);
-            numbers.push(cut.number(group.map_or(&unnamed, |group| &of_group[group])));
-        }
+            cut.number(group.map_or(&unnamed, |group| &of_group[group]))
+        });
+        let numbers: Vec<u16> = of_triangle.collect();
+        let several = cut.fabrics.len() > 1;
         let panels = |fabric: &Option<Fabric>| {
-            let named = mesh.groups.iter().zip(&of_group).filter(|(_, of)| *of == fabric);
+            let named = mesh.groups.iter().zip(&of_group).filter(|(_, of)| several && *of == fabric);
             named.map(|(panel, _)| panel.clone()).collect()
         };
-        let several = cut.fabrics.len() > 1;
-        let swatch = |fabric: &Option<Fabric>| Swatch {
-            garment: garment.clone(),
-            fabric: fabric.as_ref().map(|fabric| fabric.name.clone()),
-            panels: if several { panels(fabric) } else { Vec::new() },
-            by: Some(names.file.clone()),
-        };
-        cut.swatches = cut.fabrics.iter().map(swatch).collect();
+        cut.swatches =
+            cut.fabrics.iter().map(|fabric| swatch(fabric, panels(fabric), Some(names.file.clone()))).collect();
         rest.cut_from = if several { numbers } else { Vec::new() };
         Ok(cut)
     }
-}
 
-impl Cut {
-    /// The number of a fabric, which is new or known.
+    /// The number of a fabric, which is appended if it is new.
     fn number(&mut self, fabric: &Option<Fabric>) -> u16 {
         let known = self.fabrics.iter().position(|known| known == fabric);
         let number = known.unwrap_or(self.fabrics.len());
@@ -150,7 +166,7 @@ impl Cut {
         number as u16
     }
 
-    /// Takes in what another garment of `more` triangles is cut from, before its rest shape is joined to this one's of `own`.
+    /// Adds the fabrics of another garment, of `more` triangles, before its rest shape is joined to this one's of `own`.
     pub(super) fn join(&mut self, outer: Self, of_outer: &RestShape, rest: &mut RestShape, [own, more]: [usize; 2]) {
         let numbers: Vec<u16> = outer.fabrics.iter().map(|fabric| self.number(fabric)).collect();
         if self.fabrics.len() > 1 {
@@ -161,54 +177,114 @@ impl Cut {
     }
 }
 
-impl Scene {
-    /// The fabrics that its rest shape numbers, `of_settings` being that of what names none itself.
-    #[must_use]
-    pub fn fabrics(&self, of_settings: &Fabric) -> Vec<Fabric> {
-        self.own_fabrics.iter().map(|own| own.as_ref().unwrap_or(of_settings).clone()).collect()
+/// The file as written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    default: Option<Spanned<String>>,
+    #[serde(default)]
+    panels: BTreeMap<Spanned<String>, Spanned<String>>,
+}
+
+/// A parsed file of panels' fabrics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PanelFabrics {
+    /// Its path.
+    pub file: String,
+    /// The fabric of every panel that is not named.
+    pub default: Option<Fabric>,
+    /// Panels' names, or patterns with `*`, with their lines and fabrics.
+    pub panels: Vec<(String, usize, Fabric)>,
+}
+
+impl PanelFabrics {
+    fn read(path: &Path) -> Result<Self, CutError> {
+        Self::parse(&read_text(path)?, path)
     }
 
-    /// The number of the fabric of each vertex, of several the last.
-    #[must_use]
-    pub(crate) fn fabric_of_vertices(&self) -> Vec<u16> {
-        let mut fabric = vec![0; self.garment.vertex_count()];
-        for (t, triangle) in self.garment.triangles.iter().enumerate() {
-            let of = self.rest.fabric_of(t) as u16;
-            triangle.iter().for_each(|&v| fabric[v as usize] = of.max(fabric[v as usize]));
+    /// Parses the TOML text of the file at `path`, which errors name; paths of fabric files are relative to its folder.
+    ///
+    /// # Errors
+    /// [`CutError`] names the file, its line, and the expected content.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, CutError> {
+        let file = path.display().to_string();
+        let written: Written = toml::from_str(text)
+            .map_err(|e| CutError::Syntax { file: file.clone(), reason: e.to_string().trim_end().to_owned() })?;
+        let fabric = |key: &str, name: &Spanned<String>| {
+            let located = |source| {
+                let line = line_of(text, name.span().start);
+                CutError::Fabric { file: file.clone(), line, key: key.to_owned(), source }
+            };
+            Fabric::by_name(&beside(path, name.get_ref())).map_err(located)
+        };
+        let default = written.default.as_ref().map(|name| fabric("default", name)).transpose()?;
+        let panel = |(panel, name): (&Spanned<String>, &Spanned<String>)| {
+            let (line, panel) = (line_of(text, panel.span().start), panel.get_ref());
+            Ok((panel.clone(), line, fabric(&format!("panels.{panel}"), name)?))
+        };
+        let panels = written.panels.iter().map(panel).collect::<Result<Vec<_>, CutError>>()?;
+        Ok(Self { file, default, panels })
+    }
+
+    /// The fabric of a panel; `None` where neither a line nor a default assigns one.
+    ///
+    /// # Errors
+    /// [`CutError::Both`] where it matches two lines of different fabrics.
+    pub fn of(&self, panel: &str) -> Result<Option<&Fabric>, CutError> {
+        if let Some((.., fabric)) = self.panels.iter().find(|(name, ..)| name == panel) {
+            return Ok(Some(fabric));
         }
-        fabric
-    }
-
-    /// What they are called, in one line.
-    #[must_use]
-    pub fn fabric_names(&self, of_settings: &Fabric) -> String {
-        let names = self.own_fabrics.iter().map(|own| own.as_ref().unwrap_or(of_settings).name.as_str());
-        names.collect::<Vec<_>>().join(" + ")
-    }
-
-    /// Whether any of it is cut from the fabric of the settings.
-    #[must_use]
-    pub fn takes_the_settings_fabric(&self) -> bool {
-        self.own_fabrics.contains(&None)
+        let mut matching = self.panels.iter().filter(|(name, ..)| matches(name, panel));
+        let Some((first, _, fabric)) = matching.next() else { return Ok(self.default.as_ref()) };
+        let Some((second, ..)) = matching.find(|(.., other)| other != fabric) else { return Ok(Some(fabric)) };
+        let (file, panel, first, second) = (self.file.clone(), panel.to_owned(), first.clone(), second.clone());
+        Err(CutError::Both { file, panel, first, second })
     }
 }
 
-impl std::fmt::Display for Swatch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: ", self.garment)?;
-        match &self.fabric {
-            Some(fabric) => write!(f, "{fabric}")?,
-            None => f.write_str("the fabric of the settings")?,
-        }
-        if !self.panels.is_empty() {
-            write!(f, " for {}", listed(&self.panels))?;
-        }
-        self.by.as_ref().map_or(Ok(()), |file| write!(f, ", by {file}"))
+/// Whether a name matches a pattern in which each `*` stands for any letters or none.
+fn matches(pattern: &str, name: &str) -> bool {
+    let mut parts: Vec<&str> = pattern.split('*').collect();
+    let Some(mut left) = name.strip_prefix(parts.remove(0)) else { return false };
+    let Some(last) = parts.pop() else { return left.is_empty() };
+    for part in parts {
+        let Some(at) = left.find(part) else { return false };
+        left = &left[at + part.len()..];
     }
+    left.ends_with(last)
 }
 
-impl From<CutError> for SceneError {
-    fn from(error: CutError) -> Self {
-        Self::Cut(Box::new(error))
+/// The fabric files named in the file at `path`; none where it cannot be parsed.
+pub(super) fn files_named_in(path: &Path) -> Vec<PathBuf> {
+    let written = read_text(path).ok().and_then(|text| toml::from_str::<Written>(&text).ok());
+    let names = written.iter().flat_map(|w| w.panels.values().chain(&w.default));
+    names.filter(|name| names_a_file(name.get_ref())).map(|name| beside(path, name.get_ref()).into()).collect()
+}
+
+/// A fabric's name unchanged, or its file's path relative to the working directory.
+fn beside(file: &Path, name: &str) -> String {
+    if names_a_file(name) { file.with_file_name(name).display().to_string() } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_matches_any_letters() {
+        for (pattern, name, fit) in [
+            ("cuff", "cuff", true),
+            ("cuff", "cuffs", false),
+            ("*cuff", "left_cuff", true),
+            ("*cuff", "left_cuffs", false),
+            ("sleeve*", "sleeve", true),
+            ("l*_s*_f", "left_sleeve_f", true),
+            ("l*_s*_f", "left_sleeve_b", false),
+            ("*", "", true),
+            ("a*a", "a", false),
+            ("", "a", false),
+        ] {
+            assert_eq!(matches(pattern, name), fit, "{pattern} {name}");
+        }
     }
 }

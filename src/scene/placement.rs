@@ -1,4 +1,4 @@
-//! How a garment lies about a body before anything is draped.
+//! Placement of a garment around a body before the drape: distances, crossings, and orientation.
 
 use serde::Serialize;
 
@@ -8,20 +8,20 @@ use crate::body::distance::Body;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{Topology, TriMesh};
 
-/// A garment whose nearest vertex is farther than this from the body (m) is not worn: the loosest gown hangs from a shoulder
-/// or a waist.
+/// Largest distance, m, from the body to the nearest vertex of a garment that is worn: the loosest gown hangs from a
+/// shoulder or a waist.
 pub const FARTHEST: f64 = 1.0;
 
-/// Body and garment together, in figures.
+/// Metrics of a garment around its body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Placement {
     /// Garment vertices inside the body.
     pub penetrating_vertices: usize,
-    /// The deepest of them, m below the surface.
+    /// Depth of the deepest of them, m.
     pub deepest_m: f64,
-    /// Pairs of a garment and a body triangle that cross, counted exactly.
+    /// Pairs of a garment and a body triangle that cross, by exact predicates.
     pub crossing_pairs: usize,
-    /// Signed distance of the garment's vertices to the body, m.
+    /// Signed distances of the garment's vertices to the body, m.
     pub clearance_m: Percentiles,
 }
 
@@ -38,7 +38,7 @@ impl Placement {
         }
     }
 
-    /// Name and value of each figure, as a table wants them.
+    /// Name and value of each metric, as rows of a table.
     #[must_use]
     pub(crate) fn rows(&self) -> Vec<(&'static str, String)> {
         let inside = match self.penetrating_vertices {
@@ -53,19 +53,19 @@ impl Placement {
     }
 }
 
-/// Refuses a garment of which every vertex is farther than [`FARTHEST`] from the body.
+/// Rejects a garment of which every vertex is farther than [`FARTHEST`] from the body.
 pub(super) fn check_near(garment: &TriMesh, body: &Body) -> Result<(), SceneError> {
     let distances = body.nearest_all(&garment.positions);
     let nearest = distances.iter().map(|near| near.signed_distance.abs()).fold(f64::INFINITY, f64::min);
     if nearest > FARTHEST { Err(SceneError::NotNear { nearest, limit: FARTHEST }) } else { Ok(()) }
 }
 
-/// Triangles of the connected parts of a garment that face the body, which by our winding they should not: those to be
-/// turned so that normals point away from it. A part faces the body if the area-weighted sum of n · ∇q is negative.
+/// Whether each triangle belongs to a connected part whose normals point towards the body and whose winding must be
+/// reversed: a part of which the area-weighted sum of n · ∇q is negative.
 #[must_use]
 pub fn facing_body(garment: &TriMesh, body: &Body) -> Vec<bool> {
     let (component, count) = Topology::new(garment).components();
-    let middles: Vec<_> = (0..garment.triangles.len())
+    let centroids: Vec<_> = (0..garment.triangles.len())
         .map(|t| {
             let [a, b, c] = garment.corners(t);
             (a + b + c) / 3.0
@@ -73,7 +73,7 @@ pub fn facing_body(garment: &TriMesh, body: &Body) -> Vec<bool> {
         .collect();
     let mut outward = vec![0.0; count];
     let part = |t: usize| component[garment.triangles[t][0] as usize] as usize;
-    for (t, near) in body.nearest_all(&middles).iter().enumerate() {
+    for (t, near) in body.nearest_all(&centroids).iter().enumerate() {
         outward[part(t)] += garment.double_area_vector(t).dot(near.normal);
     }
     (0..garment.triangles.len()).map(|t| outward[part(t)] < 0.0).collect()

@@ -1,22 +1,29 @@
-//! Body and garment by name or file, and what is asked of them: plain data that flags, sweep files and scripts fill.
+//! Body and garments by name or file, with all options of loading them: plain data that flags, sweep files and scripts fill.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{DistanceTo, SceneError};
+use super::loaded::{Loaded, Tailored, Unplaced};
+use super::materials::{BESIDE, Cut, CutError, files_named_in};
+use super::placement::facing_body;
+use super::{DistanceTo, Scene, SceneError};
 use crate::base::files::{has_ending, names_a_file, read_text, stem};
 use crate::body::BodySpec;
-use crate::garment::pattern::DEFAULT_EDGE_M;
-use crate::garment::{GarmentRequest, GarmentSpec};
-use crate::mesh::import::ImportOptions;
-use crate::mesh::{Axis, Unit};
+use crate::body::distance::{Body, DistanceError};
+use crate::garment::fabric::Fabric;
+use crate::garment::pattern::{DEFAULT_EDGE_M, SewingPattern, SewnGarment};
+use crate::garment::sewing::{draw_shut, put_on};
+use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
+use crate::mesh::flat_pattern::FlatPattern;
+use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
+use crate::mesh::{Axis, RestShape, Unit, retain};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";
 
-/// The rest shape that is looked for.
-pub(super) const REST_AUTO: &str = "auto";
+/// The rest shape that takes texture coordinates where they are a flat pattern, and the garment's own edges elsewhere.
+const REST_AUTO: &str = "auto";
 
 /// Rest shapes that are no file.
 const REST_SHAPES: [&str; 3] = [REST_AUTO, "own", "texture"];
@@ -33,44 +40,44 @@ pub enum FileRole {
     Table,
 }
 
-/// What is draped over what. The default is the low-cut dress on the dress form.
+/// A body and the garments on it, by name or file. The default is the low-cut dress on the dress form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneSpec {
     /// `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file.
     pub body: String,
-    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, an OBJ file placed around the body, or a sewing
-    /// pattern (JSON as GarmentCode writes it).
+    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, an OBJ file placed around the body, or a
+    /// sewing pattern (JSON as GarmentCode writes it).
     pub garment: String,
-    /// Garments worn over it, inner to outer, each named as it is.
+    /// Garments worn over it, inner to outer, each given like `garment`.
     pub over: Vec<String>,
-    /// Fabrics of the garments, inner to outer, each a built-in name or a file; empty where all are of that of the settings.
+    /// Fabrics of the garments, inner to outer, each a built-in name or a file; empty where all take the fabric of the settings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fabrics: Vec<String>,
-    /// TOML file that names the fabrics of the garment's panels; where it is not given, `GARMENT.fabrics.toml` beside the garment's file.
+    /// TOML file that names the fabrics of the garment's panels; by default `GARMENT.fabrics.toml` beside the garment's file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fabrics_file: Option<String>,
-    /// What distances count to where garments are worn over each other.
+    /// The surface that distances are measured to where garments are worn over each other.
     pub distance_to: DistanceTo,
-    /// One group or object of the body's file alone.
+    /// The only group or object of the body's file that is read.
     pub body_group: Option<String>,
-    /// One group or object of the garment's file alone.
+    /// The only group or object of the garment's file that is read.
     pub garment_group: Option<String>,
-    /// Length of the edges that a sewing pattern is meshed with, cm.
+    /// Edge length of the mesh of a sewing pattern, cm.
     pub edge_cm: f64,
-    /// Unit of the files; guessed from the body where it is not given.
+    /// Unit of the files; by default guessed from the body.
     pub unit: Option<Unit>,
-    /// Up axis of the files; guessed from the body where it is not given.
+    /// Up axis of the files; by default guessed from the body.
     pub up: Option<Axis>,
-    /// Whether a body that is not closed is accepted, inside and outside told by its normals.
+    /// Whether a body that is not closed is accepted; its normals then separate inside from outside.
     pub open_body: bool,
-    /// Whether vertices at exactly the same place are joined.
+    /// Whether vertices at exactly the same position are merged.
     pub weld: bool,
-    /// Rest shape of a garment from a file: `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`: the
-    /// texture coordinates where they are the flat pattern, in whatever unit, else its own edges.
+    /// Rest shape of a garment from a file: its `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces,
+    /// or `auto`: the texture coordinates where they are the flat pattern, in any unit, else its own edges.
     pub rest: String,
-    /// Edges held where they are, separated by commas: `top` (the highest), `top:2` (the highest of the second connected part) or those of a
-    /// group; without it what a built-in garment holds.
+    /// Edges whose vertices keep their positions, separated by commas: `top` (the highest), `top:2` (the highest of the second
+    /// connected part) or those of a group. By default those that a built-in garment holds.
     pub hold: Option<String>,
     /// Whether garment vertices that start inside the body are pushed out.
     pub push_out: bool,
@@ -103,7 +110,7 @@ impl Default for SceneSpec {
 }
 
 impl SceneSpec {
-    /// A body and a garment, each a name or a file; everything else as it comes.
+    /// A body and a garment, each a name or a file; all else by default.
     #[must_use]
     pub fn new(body: impl Into<String>, garment: impl Into<String>) -> Self {
         Self { body: body.into(), garment: garment.into(), ..Self::default() }
@@ -113,7 +120,7 @@ impl SceneSpec {
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let named = self.file_names().into_iter().filter(|(role, _)| {
-            // These and the files that they name in turn are found as the loader finds them.
+            // These, and the files that they name in turn, are found as the loader finds them.
             !matches!(role, FileRole::Fabric | FileRole::FabricsFile)
         });
         named.map(|(_, name)| PathBuf::from(name)).chain(self.files_of_fabrics()).collect()
@@ -154,17 +161,38 @@ impl SceneSpec {
         named.into_iter().map(|(role, name)| (role, name.as_str())).collect()
     }
 
-    /// What the garment is called where one name will do, a recording's for one.
+    /// All files that assign fabrics to the garments.
     #[must_use]
-    pub(crate) fn garment_name(&self) -> String {
-        if !self.over.is_empty() {
-            return self.layers().map(|layer| layer.layer_name()).collect::<Vec<_>>().join("-under-");
+    pub(crate) fn files_of_fabrics(&self) -> Vec<PathBuf> {
+        let mut files: Vec<PathBuf> =
+            self.fabrics.iter().filter(|name| names_a_file(name)).map(PathBuf::from).collect();
+        for path in self.layers().filter_map(|layer| layer.names_of_fabrics()) {
+            files.extend(files_named_in(&path));
+            files.push(path);
         }
-        self.layer_name()
+        files
     }
 
-    /// What the garment itself is called, whatever is worn over it.
-    pub(super) fn layer_name(&self) -> String {
+    /// The file that names the fabrics of the garment's panels: the one that is given, or one beside the garment's.
+    #[must_use]
+    pub(crate) fn names_of_fabrics(&self) -> Option<PathBuf> {
+        if self.fabrics_file.is_some() || !names_a_file(&self.garment) {
+            return self.fabrics_file.as_ref().map(PathBuf::from);
+        }
+        let stems = [stem(&self.garment), self.layer_name()].into_iter();
+        stems
+            .map(|stem| Path::new(&self.garment).with_file_name(format!("{stem}.{BESIDE}")))
+            .find(|path| path.is_file())
+    }
+
+    /// One name for all garments, for example of a recording.
+    #[must_use]
+    pub(crate) fn garment_name(&self) -> String {
+        self.layers().map(|layer| layer.layer_name()).collect::<Vec<_>>().join("-under-")
+    }
+
+    /// The name of the innermost garment.
+    fn layer_name(&self) -> String {
         if names_a_file(&self.garment) {
             let stem = stem(&self.garment);
             return stem.strip_suffix("_specification").map_or(stem.clone(), str::to_owned);
@@ -173,7 +201,7 @@ impl SceneSpec {
     }
 
     /// Each garment by itself, inner to outer.
-    pub(super) fn layers(&self) -> impl Iterator<Item = Self> + '_ {
+    fn layers(&self) -> impl Iterator<Item = Self> + '_ {
         let one = |(k, garment): (usize, &String)| Self {
             garment: garment.clone(),
             over: Vec::new(),
@@ -183,32 +211,36 @@ impl SceneSpec {
         std::iter::once(&self.garment).chain(&self.over).enumerate().map(one)
     }
 
-    /// Finds names that mean nothing before any time is spent.
+    /// Reports unknown names before anything is read or made.
     pub fn check_names(&self) -> Result<(), SceneError> {
         if self.body != DRESS_FORM && !names_a_file(&self.body) {
             return Err(SceneError::UnknownBody { found: self.body.clone() });
         }
-        self.check_fabrics()?;
+        let (fabrics, garments) = (self.fabrics.len(), 1 + self.over.len());
+        if let Some(file) = self.fabrics_file.clone().filter(|_| garments > 1) {
+            return Err(CutError::Whose { file, garments }.into());
+        }
+        if fabrics != 0 && fabrics != garments {
+            return Err(CutError::Count { fabrics, garments }.into());
+        }
         for layer in self.layers().filter(|layer| !names_a_file(&layer.garment)) {
             layer.described()?;
         }
         Ok(())
     }
 
-    /// Whether the garment is a sewing pattern.
-    #[must_use]
-    pub(crate) fn is_a_pattern(&self) -> bool {
+    fn is_a_pattern(&self) -> bool {
         has_ending(self.garment.as_ref(), "json")
     }
 
-    /// Whether the garment is a mesh from a file, as any is that is neither a description nor a pattern: its reader knows other formats
-    /// by what is in them.
-    pub(super) fn is_a_mesh(&self) -> bool {
+    /// Whether the garment is a mesh from a file: any file that is neither a description nor a pattern. The reader detects the
+    /// format by the content.
+    fn is_a_mesh(&self) -> bool {
         names_a_file(&self.garment) && !is_toml(&self.garment) && !self.is_a_pattern()
     }
 
-    /// The built-in or described garment, and how many vertices are asked of it.
-    pub(super) fn described(&self) -> Result<(GarmentSpec, Option<usize>), SceneError> {
+    /// The built-in or described garment, and the number of vertices in its name.
+    fn described(&self) -> Result<(GarmentSpec, Option<usize>), SceneError> {
         if names_a_file(&self.garment) {
             let spec = GarmentSpec::from_toml(&read_text(self.garment.as_ref())?);
             return Ok((spec.map_err(SceneError::in_file(&self.garment))?, None));
@@ -218,11 +250,11 @@ impl SceneSpec {
     }
 
     /// Whether the body is a mesh from a file.
-    pub(super) fn body_is_a_mesh(&self) -> bool {
+    fn body_is_a_mesh(&self) -> bool {
         names_a_file(&self.body) && !is_toml(&self.body)
     }
 
-    /// The form's measurements, where the body is a file of them from there.
+    /// The measurements of the dress form, from the body's file where it has them.
     pub(crate) fn form(&self) -> Result<BodySpec, SceneError> {
         if !is_toml(&self.body) {
             return Ok(self.measurements.clone());
@@ -230,14 +262,173 @@ impl SceneSpec {
         BodySpec::from_toml(&read_text(self.body.as_ref())?).map_err(SceneError::in_file(&self.body))
     }
 
-    pub(super) fn import_options(&self, group: Option<&String>) -> ImportOptions {
-        ImportOptions {
-            group: group.cloned(),
-            unit: self.unit,
-            up: self.up,
-            weld: self.weld,
-            open_body: self.open_body,
+    fn import_options(&self, group: Option<&String>) -> ImportOptions {
+        let Self { unit, up, weld, open_body, .. } = *self;
+        ImportOptions { group: group.cloned(), unit, up, weld, open_body }
+    }
+
+    /// Reads or makes body and garments.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file, its line or the name, and the remedy.
+    pub fn load(&self) -> Result<Loaded, SceneError> {
+        self.load_with(&MeshCache::default())
+    }
+
+    /// [`load`](Self::load) with the built-in form and garments from a cache.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn load_with(&self, meshes: &MeshCache) -> Result<Loaded, SceneError> {
+        self.check_names()?;
+        // Built-in garments depend on the form's measurements, not on its mesh, so both are made at once.
+        let (body, made) = rayon::join(|| self.load_body(meshes), || self.make_garment(meshes));
+        let (body, imported_body) = body?;
+        let mut unplaced = self.unplaced(&body, imported_body.as_ref(), made)?;
+        let mut layers = vec![unplaced.layer(self.layer_name(), (0, 0))];
+        for spec in self.layers().skip(1) {
+            let outer = spec.unplaced(&body, imported_body.as_ref(), spec.make_garment(meshes))?;
+            let before = (unplaced.mesh.vertex_count(), unplaced.mesh.triangles.len());
+            unplaced.add_outer(outer);
+            layers.push(unplaced.layer(spec.layer_name(), before));
         }
+        let (mut scene, mut pushed_out) = Scene::place(body, unplaced.mesh, unplaced.rest, self.push_out)
+            .map_err(SceneError::about(&self.garment))?;
+        (scene.layers, scene.distance_to) = (layers, self.distance_to);
+        scene.own_fabrics = unplaced.cut.fabrics;
+        scene.let_go = self.hold.is_none() && unplaced.tailored.is_some();
+        scene.held = match &self.hold {
+            None => unplaced.held,
+            Some(edges) => scene.edges(edges).map_err(SceneError::about(&self.garment))?,
+        };
+        // Built-in garments have no protrusions in them.
+        if self.push_out && self.layers().any(|spec| spec.is_a_mesh() || spec.is_a_pattern()) {
+            pushed_out.off_ends_m = scene.pull_off_protrusions();
+        }
+        let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
+        let reports = imported_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
+        Ok(Loaded {
+            scene,
+            body_name: stem(&self.body),
+            garment_name: self.garment_name(),
+            reports,
+            pushed_out,
+            tailored: unplaced.tailored,
+            flat_pattern: unplaced.flat_pattern,
+            swatches: unplaced.cut.swatches,
+            girths_at_m: form.map(|m| [m.bust_height, m.waist_height, m.hip_height]),
+            imported: unplaced.imported,
+        })
+    }
+
+    /// The innermost garment with its fabrics.
+    fn unplaced(
+        &self,
+        body: &Body,
+        imported_body: Option<&Imported>,
+        made: Option<Result<Unplaced, SceneError>>,
+    ) -> Result<Unplaced, SceneError> {
+        let mut unplaced = match made {
+            Some(made) => made,
+            None if self.is_a_pattern() => self.tailor(body),
+            None => self.load_garment(body, imported_body),
+        }?;
+        let given = self.fabrics.first().map(|name| Fabric::by_name(name)).transpose().map_err(CutError::from)?;
+        let Unplaced { mesh, rest, .. } = &mut unplaced;
+        unplaced.cut = Cut::new(&self.layer_name(), given, self.names_of_fabrics(), mesh, rest)?;
+        Ok(unplaced)
+    }
+
+    fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
+        let new = if self.open_body { Body::new_open } else { Body::new };
+        if self.body_is_a_mesh() {
+            let imported = import_body(self.body.as_ref(), &self.import_options(self.body_group.as_ref()))?;
+            return Ok((new(&imported.mesh)?, Some(imported)));
+        }
+        let form = meshes.dress_form(&self.form()?).map_err(|source| match names_a_file(&self.body) {
+            true => SceneError::in_file(&self.body)(source),
+            false => SceneError::Measurements(source),
+        })?;
+        Ok((new(&form)?, None))
+    }
+
+    /// A built-in or described garment; `None` for a mesh or a pattern.
+    fn make_garment(&self, meshes: &MeshCache) -> Option<Result<Unplaced, SceneError>> {
+        let make = || {
+            if self.body_is_a_mesh() {
+                return Err(SceneError::NotCutForIt { body: self.body.clone() });
+            }
+            let (spec, vertices) = self.described()?;
+            let made = meshes.garment(&spec, &self.form()?, vertices)?;
+            Ok(Unplaced { held: made.held, ..Unplaced::new(made.mesh, made.rest) })
+        };
+        (!self.is_a_mesh() && !self.is_a_pattern()).then(make)
+    }
+
+    /// A garment mesh from a file.
+    fn load_garment(&self, body: &Body, imported_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
+        let beside = match (imported_body, body.mesh().bounds()) {
+            (Some(body), _) => Beside::File(body.frame()),
+            (None, Some((low, high))) => Beside::Bounds(low, high),
+            (None, None) => return Err(DistanceError::Empty.into()),
+        };
+        let options = self.import_options(self.garment_group.as_ref());
+        let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
+        imported.turn_outward(&facing_body(&imported.mesh, body));
+        let auto = self.rest == REST_AUTO;
+        let flat_pattern = if auto { FlatPattern::find(&imported.mesh, &imported.texture) } else { None };
+        let rest = self.imported_rest(&mut imported, flat_pattern)?;
+        if self.push_out {
+            draw_shut(&mut imported, &rest, body);
+        }
+        let mesh = imported.mesh.clone();
+        Ok(Unplaced { imported: Some(imported), flat_pattern, ..Unplaced::new(mesh, rest) })
+    }
+
+    /// A sewing pattern, sewn and put on the body.
+    fn tailor(&self, body: &Body) -> Result<Unplaced, SceneError> {
+        let pattern = SewingPattern::read(self.garment.as_ref())?;
+        let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
+        let SewnGarment { mesh, rest, .. } = &put_on.garment;
+        let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
+        Ok(Unplaced { held, tailored: Some(Tailored { pattern, put_on }), ..Unplaced::new(mesh, rest) })
+    }
+
+    /// The rest shape of a garment from a file, which loses the triangles that have no area in it.
+    fn imported_rest(
+        &self,
+        imported: &mut Imported,
+        flat_pattern: Option<FlatPattern>,
+    ) -> Result<RestShape, SceneError> {
+        let about = SceneError::about;
+        let mut name = self.garment.as_str();
+        let of_texture =
+            |scale: f64| RestShape::texture_of(&imported.mesh, &imported.texture, scale).map_err(about(&self.garment));
+        let mut rest = match (self.rest.as_str(), flat_pattern) {
+            (REST_AUTO, Some(pattern)) => of_texture(pattern.metres_per_unit)?,
+            (how @ (REST_AUTO | "own"), _) => imported.own_rest(how == REST_AUTO),
+            ("texture", _) => of_texture(1.0)?,
+            (file, _) => {
+                let frame = imported.frame();
+                let options = ImportOptions {
+                    unit: Some(frame.unit),
+                    up: Some(frame.up),
+                    ..self.import_options(self.garment_group.as_ref())
+                };
+                let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
+                let shape = imported.in_the_shape_of(&other)?;
+                name = file;
+                RestShape::edges_of(&shape)
+            }
+        };
+        let flat = rest.without_area();
+        if flat.iter().all(|&flat| flat) {
+            return rest.checked().map_err(about(name));
+        }
+        imported.drop_triangles(&flat);
+        retain(&mut rest.corners, |t| !flat[t]);
+        imported.remark_on(&rest);
+        Ok(rest)
     }
 }
 

@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::membrane::Triangle;
 use super::proximity::{Gap, Place, offset};
 use super::{Cloth, Contacts};
-use crate::body::distance::Body;
+use crate::body::distance::{Body, pull_off_protrusions};
 use crate::mesh::TriMesh;
 use crate::mesh::lattice::lattice;
 use crate::mesh::self_intersection::crossing_pairs;
@@ -71,7 +71,7 @@ impl Contacts<'_> {
         let pairs = crossing_pairs(&garment, body.mesh());
         if !pairs.is_empty() && self.cover.ends < ENDS {
             self.cover.ends += 1;
-            let taken = body.taken_off_ends(&garment, &cloth.held);
+            let taken = pull_off_protrusions(body, &garment, &cloth.held);
             let itself = self.proximity.as_mut();
             if let Some(taken) = taken.filter(|taken| itself.is_none_or(|p| p.put(&garment.positions, taken))) {
                 *x = taken;

@@ -1,0 +1,125 @@
+//! A scene with its origin: what was read, guessed, repaired and made on the way to it, and how it is written back.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::layering::join;
+use super::materials::{Cut, Swatch};
+use super::{Layer, PushOutReport, Scene};
+use crate::base::files::has_ending;
+use crate::garment::pattern::SewingPattern;
+use crate::garment::sewing::PutOn;
+use crate::mesh::export::{write_imported, write_mesh, write_textured};
+use crate::mesh::flat_pattern::FlatPattern;
+use crate::mesh::glb::write_glb;
+use crate::mesh::import::Imported;
+use crate::mesh::report::MeshReport;
+use crate::mesh::{MeshError, RestShape, TriMesh};
+
+/// A scene with its origin.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The body and the garments on it.
+    pub scene: Scene,
+    /// The name of the body.
+    pub body_name: String,
+    /// The name of the garments.
+    pub garment_name: String,
+    /// Guesses, findings and repairs in each file, the body's first.
+    pub reports: Vec<MeshReport>,
+    /// The repair of vertices that started inside the body.
+    pub pushed_out: PushOutReport,
+    /// The sewing pattern that the garment was made of.
+    pub tailored: Option<Tailored>,
+    /// The flat pattern found in the texture coordinates.
+    pub flat_pattern: Option<FlatPattern>,
+    /// Heights at which the built-in form has its bust, waist and hip girths, m.
+    pub girths_at_m: Option<[f64; 3]>,
+    /// The fabrics that were assigned.
+    pub swatches: Vec<Swatch>,
+    pub(super) imported: Option<Imported>,
+}
+
+/// A garment made of a sewing pattern.
+#[derive(Debug, Clone)]
+pub struct Tailored {
+    /// The pattern as in its file.
+    pub pattern: SewingPattern,
+    /// The garment, sewn and put on the body.
+    pub put_on: PutOn,
+}
+
+impl Loaded {
+    /// Findings that the user should act on.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        if self.pushed_out.is_clean() { Vec::new() } else { vec![self.pushed_out.to_string()] }
+    }
+
+    /// Guesses, findings and repairs.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
+        if let Some(pattern) = &self.flat_pattern {
+            notes.push(format!("{}: {pattern}", self.garment_name));
+        }
+        if let Some(Tailored { pattern, put_on }) = &self.tailored {
+            let of_both = pattern.notes.iter().cloned().chain(put_on.notes());
+            notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
+        }
+        notes.extend(self.swatches.iter().map(|swatch| format!("cut: {swatch}")));
+        if self.pushed_out.is_clean() && (self.pushed_out.found_inside > 0 || self.pushed_out.off_ends_m > 0.0) {
+            notes.push(self.pushed_out.to_string());
+        }
+        notes
+    }
+
+    /// Writes the garment at `positions` (m) as glTF where the path ends in `.glb`, else as OBJ. In OBJ, a garment from a file
+    /// keeps its faces, groups and texture coordinates; one of a pattern has its panels as groups and the flat pattern as
+    /// texture coordinates.
+    pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
+        let path = path.as_ref();
+        let mesh = || self.scene.garment.with_positions(positions.to_vec());
+        match (&self.imported, &self.tailored) {
+            _ if has_ending(path, "glb") => write_glb(path, &mesh(), None),
+            (Some(imported), _) => write_imported(path, imported, positions),
+            (None, Some(Tailored { pattern, put_on })) => {
+                write_textured(path, &mesh(), &put_on.garment.laid_out(pattern))
+            }
+            (None, None) => write_mesh(path, &mesh()),
+        }
+    }
+}
+
+/// A garment before it is placed on the body.
+pub(super) struct Unplaced {
+    pub(super) mesh: TriMesh,
+    pub(super) rest: RestShape,
+    pub(super) held: Vec<u32>,
+    pub(super) cut: Cut,
+    pub(super) tailored: Option<Tailored>,
+    pub(super) imported: Option<Imported>,
+    pub(super) flat_pattern: Option<FlatPattern>,
+}
+
+impl Unplaced {
+    pub(super) fn new(mesh: TriMesh, rest: RestShape) -> Self {
+        let (held, cut) = (Vec::new(), Cut::default());
+        Self { mesh, rest, held, cut, tailored: None, imported: None, flat_pattern: None }
+    }
+
+    /// The layer of the vertices and triangles after the given counts.
+    pub(super) fn layer(&self, name: String, (vertices, triangles): (usize, usize)) -> Layer {
+        Layer { name, vertices: vertices..self.mesh.vertex_count(), triangles: triangles..self.mesh.triangles.len() }
+    }
+
+    /// Adds a garment that is worn over it. Files and patterns then describe only a part of the mesh and are dropped.
+    pub(super) fn add_outer(&mut self, outer: Self) {
+        let triangles = [&self.mesh, &outer.mesh].map(|mesh| mesh.triangles.len());
+        self.cut.join(outer.cut, &outer.rest, &mut self.rest, triangles);
+        let before = join(&mut self.mesh, &mut self.rest, outer.mesh, outer.rest);
+        self.held.extend(outer.held.iter().map(|v| v + before));
+        (self.tailored, self.imported, self.flat_pattern) = (None, None, None);
+    }
+}
