@@ -18,13 +18,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     for table in tables {
         job.settings.table = table;
         let draped = job.drape(&input.scene, &mut unobserved)?;
-        let figures = job.measure(&input.scene, &draped, None, &mut unobserved)?.figures;
+        let metrics = job.measure(&input.scene, &draped, None, &mut unobserved)?.metrics;
         println!(
             "{:<20} {:>5} PARTs {:>8.1} ms {:>6.1} mm off",
             draped.table.name,
-            figures.part_count,
+            metrics.part_count,
             1e3 * draped.times.total.as_secs_f64(),
-            figures.error_mm().unwrap_or_default()
+            metrics.error_mm().unwrap_or_default()
         );
     }
     Ok(())

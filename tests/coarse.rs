@@ -185,9 +185,9 @@ fn a_preview_that_begins_on_it_hangs_as_its_parts_can_whatever_the_threads() {
     let (one, two) = (on(1), on(2));
     assert_eq!(one.positions, two.positions);
     assert!(one.parts.len() <= 10 && one.warnings.is_empty(), "{} PARTs, {:?}", one.parts.len(), one.warnings);
-    let figures = job.measure(&input.scene, &one, None, &mut unobserved).unwrap().figures;
-    let (error, bound) = (figures.rms_mm.unwrap(), figures.own_affine_rms_mm.unwrap());
-    assert!(figures.penetrating_vertices == 0 && error <= 1.5 * bound + 3.0, "{error} mm, the bound is {bound} mm");
+    let metrics = job.measure(&input.scene, &one, None, &mut unobserved).unwrap().metrics;
+    let (error, bound) = (metrics.rms_mm.unwrap(), metrics.own_affine_rms_mm.unwrap());
+    assert!(metrics.penetrating_vertices == 0 && error <= 1.5 * bound + 3.0, "{error} mm, the bound is {bound} mm");
 }
 
 #[test]

@@ -111,11 +111,11 @@ fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
     assert_eq!(draped.table, job.settings.table.resolve(&scene.distances_m().unwrap()).unwrap());
     assert_eq!(draped.table.name, "thirds");
     let measured = job.measure(&scene, &draped, None, &mut unobserved).unwrap();
-    let figures = &measured.figures;
-    assert!(figures.canonical_rms_mm.unwrap() > 0.0, "{figures:?}");
+    let metrics = &measured.metrics;
+    assert!(metrics.canonical_rms_mm.unwrap() > 0.0, "{metrics:?}");
     // What translates can turn and stretch as well.
-    assert!(figures.representable_affine_rms_mm.unwrap() < figures.representable_rms_mm.unwrap(), "{figures:?}");
-    assert!(figures.rms_mm.is_none() && measured.error_mm.len() == figures.vertices);
+    assert!(metrics.representable_affine_rms_mm.unwrap() < metrics.representable_rms_mm.unwrap(), "{metrics:?}");
+    assert!(metrics.rms_mm.is_none() && measured.error_mm.len() == metrics.vertices);
     job.seed = 7;
     let moved = job.drape(&scene, &mut unobserved).unwrap();
     assert_ne!(moved.positions, draped.positions);
@@ -123,7 +123,7 @@ fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
     assert_eq!(moved.table, draped.table);
     (job.seed, job.accuracy, job.settings.refine) = (0, Against::Own, Refine::Converged);
     let settled = job.drape(&scene, &mut unobserved).unwrap();
-    let own = job.measure(&scene, &settled, None, &mut unobserved).unwrap().figures;
+    let own = job.measure(&scene, &settled, None, &mut unobserved).unwrap().metrics;
     // The solver's residual is under its tolerance; what friction can hold is another figure.
     assert!(own.rms_mm.is_some() && own.residual_at_rest_over_weight.is_some());
     assert_eq!(own.residual_over_weight, settled.state.map(|s| s.residual_over_weight));

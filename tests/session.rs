@@ -90,7 +90,7 @@ fn a_fabric_keeps_the_parts_and_begins_at_the_drape_before() {
     let balanced = told.iter().find(|rest| rest.0).unwrap();
     assert!(!balanced.1 && balanced.2 < 1e-3, "told before it is looked at that it lasts: {told:?}");
     assert!(told.iter().skip_while(|rest| !rest.0).all(|rest| rest.0), "once balanced, so it stays: {told:?}");
-    assert_eq!(done.finished.as_ref().unwrap().figures.penetrating_vertices, 0);
+    assert_eq!(done.finished.as_ref().unwrap().metrics.penetrating_vertices, 0);
     assert!(rms_mm(&rest.positions, &before.rest.as_ref().unwrap().positions) > 0.1);
 }
 
@@ -169,7 +169,7 @@ fn without_warm_starts_a_session_is_a_run_bit_for_bit() {
         assert_eq!(finished.drape.preview, run.preview, "{change}");
         assert_eq!(finished.drape.positions, run.positions, "{change}");
         assert_eq!(finished.drape.parts, run.parts, "{change}");
-        assert_eq!(finished.figures, partwise::study::metrics::Figures::of(scene, &run), "{change}");
+        assert_eq!(finished.metrics, partwise::study::metrics::Metrics::of(scene, &run), "{change}");
     }
 }
 

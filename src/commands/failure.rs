@@ -16,7 +16,7 @@ use crate::parts::range_table::TableError;
 use crate::record::RecordError;
 use crate::scene::SceneError;
 use crate::session::EditError;
-use crate::study::evaluate::AssessError;
+use crate::study::evaluate::EvaluateError;
 use crate::study::sweep::{MergeError, PlanError, StoreError};
 use crate::study::table_search::SearchError;
 
@@ -55,7 +55,7 @@ fn users_own(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<PaperError>()
         || cause.is::<EditError>()
         || cause.downcast_ref::<LiveError>().is_some_and(|error| !matches!(error, LiveError::Server(_)))
-        || matches!(cause.downcast_ref::<AssessError>(), Some(AssessError::Fallen | AssessError::Layers { .. }))
+        || matches!(cause.downcast_ref::<EvaluateError>(), Some(EvaluateError::Fallen | EvaluateError::Layers { .. }))
         || cause.is::<PlanError>()
         || cause.is::<SearchError>()
         || cause.is::<StoreError>()

@@ -12,7 +12,7 @@ use crate::Job;
 use crate::drape::{self, LetGo};
 use crate::record::Recorder;
 use crate::study::certificate::certify;
-use crate::study::evaluate::AssessError;
+use crate::study::evaluate::EvaluateError;
 use crate::study::job::Against;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
@@ -168,7 +168,7 @@ impl RunArgs {
         let draped = Instant::now();
         let measured = match refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress)) {
             // The drape is there all the same, and is not lost for what it was to be compared with.
-            Err(error @ (AssessError::Fallen | AssessError::Interrupted)) => {
+            Err(error @ (EvaluateError::Fallen | EvaluateError::Interrupted)) => {
                 console::warning(&format!("{error}; the drape is kept without its error"));
                 job.accuracy = Against::None;
                 job.measure(&loaded.scene, &drape, None, &mut drape::unobserved)?

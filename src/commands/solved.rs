@@ -56,10 +56,10 @@ impl Solved {
                 several_tables: live,
                 follow: live,
                 iterations: iterations && self.snapshots.len() > 1,
-                error: self.measured.assessment.is_some(),
+                error: self.measured.evaluation.is_some(),
                 pattern: self.loaded.tailored.is_some(),
                 outfit: if several { layers.clone() } else { Vec::new() },
-                wrinkles: self.measured.assessment.is_some(),
+                wrinkles: self.measured.evaluation.is_some(),
                 fit: of_cloth.map(str::to_owned).collect(),
                 // Who drapes an outfit looks at that first.
                 opens_on: if several { Tab::Outfit } else { Tab::Stages },
@@ -80,7 +80,7 @@ impl Solved {
         if let Some(folds) = &self.drape.folds {
             overlays.push(Overlay { name: "folds", unit: "%", values: &folds.excess_percent });
         }
-        if self.measured.assessment.is_some() {
+        if self.measured.evaluation.is_some() {
             overlays.push(Overlay { name: "error", unit: "mm", values: &self.measured.error_mm });
         }
         overlays
@@ -96,7 +96,7 @@ impl Solved {
             recorder.cut_from(index, &scene.fabric_of_vertices())?;
         }
         let forces: Vec<DVec3> = self.drape.outcomes.iter().map(|o| o.force_n).collect();
-        let mut scalars = self.summary.figures.scalars();
+        let mut scalars = self.summary.metrics.scalars();
         scalars.retain(|(name, _)| name.starts_with("error/"));
         recorder.step(&StepView {
             index,
@@ -124,9 +124,9 @@ impl Solved {
             let (excess_percent, across) = (&folds.excess_percent, &folds.across);
             recorder.folds(&FoldView { index, draped, excess_percent, across })?;
         }
-        if let Some(assessment) = &self.measured.assessment {
+        if let Some(evaluation) = &self.measured.evaluation {
             let joining = scene.topology.edges.as_slice();
-            let seams = self.drape.parts.seams.iter().zip(&assessment.wrinkles.seams);
+            let seams = self.drape.parts.seams.iter().zip(&evaluation.wrinkles.seams);
             let jumps_mm: Vec<([u32; 2], f64)> = seams
                 .flat_map(|(seam, measured)| {
                     seam.edges.iter().map(|&e| (joining[e as usize], measured.displacement_difference_mm))
@@ -136,7 +136,7 @@ impl Solved {
                 index,
                 draped: &self.drape.positions,
                 jumps_mm: &jumps_mm,
-                curvature_per_m: &assessment.wrinkles.vertex_curvature_per_m,
+                curvature_per_m: &evaluation.wrinkles.vertex_curvature_per_m,
             })?;
         }
         if iterations {

@@ -13,7 +13,7 @@ use crate::scene::{Loaded, Swatch};
 use crate::study::accuracy::Accuracy;
 use crate::study::certificate::Certificate;
 use crate::study::job::Measured;
-use crate::study::metrics::{Figures, GirthEase, LevelCount};
+use crate::study::metrics::{GirthEase, LevelCount, Metrics};
 use comfy_table::Table;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -38,7 +38,7 @@ pub(crate) struct Summary {
     fabrics: Vec<Fabric>,
     table: String,
     #[serde(flatten)]
-    pub(crate) figures: Figures,
+    pub(crate) metrics: Metrics,
     parts_per_level: Vec<usize>,
     level_bounds_cm: Vec<[Option<f64>; 2]>,
     vertices_per_level: Vec<usize>,
@@ -73,7 +73,7 @@ impl Summary {
     ) -> anyhow::Result<Self> {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
-        let accuracy = measured.assessment.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
+        let accuracy = measured.evaluation.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
         let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
         let mut summary = Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -86,7 +86,7 @@ impl Summary {
             cut: loaded.swatches.iter().map(|swatch| swatch.cut_from(&settings.fabric)).collect(),
             fabrics: loaded.scene.fabrics(&settings.fabric),
             table: drape.table.name.clone(),
-            figures: measured.figures.clone(),
+            metrics: measured.metrics.clone(),
             parts_per_level: levels.iter().map(|l| l.parts).collect(),
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
@@ -125,23 +125,23 @@ impl Summary {
 
     /// For the terminal.
     pub(crate) fn text(&self) -> String {
-        let figures = &self.figures;
-        let (vertices, triangles) = (figures.vertices, figures.triangles);
+        let metrics = &self.metrics;
+        let (vertices, triangles) = (metrics.vertices, metrics.triangles);
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
         let (table, parts, levels, singletons) =
-            (&self.table, figures.parts_text(), figures.levels, figures.singletons);
+            (&self.table, metrics.parts_text(), metrics.levels, metrics.singletons);
         let stage_one = format!("table {table}: {parts} in {levels} levels, {singletons} of them single vertices");
         let _ = writeln!(out, "{:<20}{stage_one}", "stage one");
         let _ = writeln!(
             out,
             "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
-            "stage two", self.model, self.motion, self.fabric, figures.contact_parts, figures.displacement_rms_mm
+            "stage two", self.model, self.motion, self.fabric, metrics.contact_parts, metrics.displacement_rms_mm
         );
         if let Some(let_go) = &self.let_go {
             let _ = writeln!(out, "{:<20}{let_go}", "let go");
         }
         let since = self.since_last.iter().map(|since| ("since the last save", since.clone()));
-        for (name, value) in figures.findings().into_iter().chain(since) {
+        for (name, value) in metrics.findings().into_iter().chain(since) {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let _ = writeln!(out, "\n{}", self.levels_table());
@@ -156,7 +156,7 @@ impl Summary {
         let of_model = [("model", self.model.to_owned()), ("motion", self.motion.to_owned())];
         let ease: Vec<String> = self.covered().map(|(e, _, cm)| format!("{} {cm:+.1} cm", e.at)).collect();
         let ease = (!ease.is_empty()).then(|| ("ease", ease.join(", ")));
-        let facts = of_model.into_iter().chain(self.figures.facts()).chain(ease);
+        let facts = of_model.into_iter().chain(self.metrics.facts()).chain(ease);
         let facts = facts.chain(self.since_last.iter().map(|since| ("since the last save", since.clone())));
         Panel {
             title: format!("{} on {}", self.garment, self.body),

@@ -143,7 +143,7 @@ fn rest(found: &AtRest) -> Value {
 }
 
 fn figures(found: &Finished) -> Value {
-    let mut all = json!(found.figures);
+    let mut all = json!(found.metrics);
     all["state"] = json!(found.state);
     all["preview_error_mm"] = json!(found.preview_error_mm);
     all["bound_mm"] = json!(found.bound_mm);

@@ -183,7 +183,7 @@ impl Open {
         }
         self.at(index, 1);
         self.log_mesh(paths::GARMENT, &meshes::plain(garment, colours::CLOTH))?;
-        if self.layout().method.is_none() && !self.layout().contest {
+        if self.layout().method.is_none() && !self.layout().table4 {
             self.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
             self.log_mesh(paths::PARTS, &self.cells.shape())?;
             self.log_mesh(paths::FORCE, &self.cells.shape())?;

@@ -19,7 +19,7 @@ use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
 use crate::scene::{Loaded, SceneSpec};
 use crate::study::job::Job;
-use crate::study::metrics::Figures;
+use crate::study::metrics::Metrics;
 
 /// Body and garment, and how far apart they are: what stays while tables and fabrics change.
 #[derive(Debug)]
@@ -119,7 +119,7 @@ pub struct Finished {
     /// All of it.
     pub drape: Drape,
     /// Its figures.
-    pub figures: Figures,
+    pub metrics: Metrics,
     /// RMS distance of the two stages alone from where the garment rests, mm, where it was refined.
     pub preview_error_mm: Option<f64>,
     /// What affine maps of these PARTs, blended over the seams, could hold that to, mm.

@@ -30,7 +30,7 @@ const WAVES: usize = 8;
 
 /// Why a drape could not be assessed.
 #[derive(Debug, thiserror::Error)]
-pub enum AssessError {
+pub enum EvaluateError {
     /// The cloth cannot be set up.
     #[error(transparent)]
     Energy(#[from] EnergyError),
@@ -57,9 +57,9 @@ pub enum AssessError {
     Interrupted,
 }
 
-/// What is asked of an assessment.
+/// What is asked of an evaluation.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct AssessOptions {
+pub(crate) struct EvaluateOptions {
     /// Where references are kept; `None` computes them anew.
     pub cache: Option<ReferenceCache>,
     /// Perturbed starts for the spread of the canonical drape.
@@ -68,7 +68,7 @@ pub(crate) struct AssessOptions {
 
 /// A drape, assessed.
 #[derive(Debug, Clone)]
-pub struct Assessment {
+pub struct Evaluation {
     /// All figures.
     pub accuracy: Accuracy,
     /// Distance of each vertex to its own continuation, mm.
@@ -87,14 +87,14 @@ pub struct Assessment {
 /// Finds or makes the references of `drape` and measures it against them.
 ///
 /// # Errors
-/// [`AssessError`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
-pub(crate) fn assess(
+/// [`EvaluateError`]; [`EvaluateError::Interrupted`] where `observer` ends a reference before it has converged.
+pub(crate) fn evaluate(
     scene: &Scene,
     settings: &Settings,
     drape: &Drape,
-    options: &AssessOptions,
+    options: &EvaluateOptions,
     observer: Observer<'_>,
-) -> Result<Assessment, AssessError> {
+) -> Result<Evaluation, EvaluateError> {
     of_one_garment(scene)?;
     let cloth =
         Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)?;
@@ -127,7 +127,7 @@ pub(crate) fn assess(
         wrinkles::rank_correlation(&folds.excess_percent, &wrinkles::mean_curvature(&settled, &scene.topology))
     });
     let moved: Vec<DVec3> = drape.outcomes.iter().map(|o| o.displacement).collect();
-    Ok(Assessment {
+    Ok(Evaluation {
         error_mm: accuracy::vertex_errors(&drape.positions, &own.positions).iter().map(|e| 1e3 * e).collect(),
         wrinkles: wrinkles::measure(&scene.garment, &scene.topology, &drape.parts, &moved, &drape.positions),
         fold_rank_correlation,
@@ -142,9 +142,9 @@ pub(crate) fn assess(
 pub(crate) fn canonical(
     scene: &Scene,
     fabric: &Fabric,
-    options: &AssessOptions,
+    options: &EvaluateOptions,
     observer: Observer<'_>,
-) -> Result<(Reference, Vec<String>), AssessError> {
+) -> Result<(Reference, Vec<String>), EvaluateError> {
     of_one_garment(scene)?;
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
     let solver = RefineOptions::default();
@@ -153,9 +153,9 @@ pub(crate) fn canonical(
     Ok((reference, references.warnings))
 }
 
-fn of_one_garment(scene: &Scene) -> Result<(), AssessError> {
+fn of_one_garment(scene: &Scene) -> Result<(), EvaluateError> {
     match scene.layers.len() {
-        garments @ 2.. => Err(AssessError::Layers { garments }),
+        garments @ 2.. => Err(EvaluateError::Layers { garments }),
         _ => Ok(()),
     }
 }
@@ -191,12 +191,12 @@ struct References<'a> {
     scene: &'a Scene,
     cloth: &'a Cloth,
     solver: RefineOptions,
-    options: &'a AssessOptions,
+    options: &'a EvaluateOptions,
     warnings: Vec<String>,
 }
 
 impl References<'_> {
-    fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, AssessError> {
+    fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, EvaluateError> {
         let solver = self.solver.clone();
         let key = ReferenceKey::new(&ReferenceInput {
             garment: &self.scene.garment,
@@ -219,7 +219,7 @@ impl References<'_> {
                 answer
             })?;
             if refined.stop == Stop::Interrupted {
-                return Err(if stopped { AssessError::Interrupted } else { AssessError::Fallen });
+                return Err(if stopped { EvaluateError::Interrupted } else { EvaluateError::Fallen });
             }
             Ok(Reference {
                 energy_j: refined.energy,

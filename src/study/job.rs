@@ -15,8 +15,8 @@ use crate::mechanics::refine::Observer;
 use crate::parts::range_table::TABLE_3;
 use crate::scene::{FileRole, Scene, SceneSpec};
 use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
-use crate::study::evaluate::{AssessError, AssessOptions, Assessment, assess, canonical, perturbed};
-use crate::study::metrics::Figures;
+use crate::study::evaluate::{EvaluateError, EvaluateOptions, Evaluation, canonical, evaluate, perturbed};
+use crate::study::metrics::Metrics;
 
 /// What a drape is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -79,11 +79,11 @@ fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
 #[derive(Debug, Clone)]
 pub struct Measured {
     /// Its figures.
-    pub figures: Figures,
+    pub metrics: Metrics,
     /// Distance of each vertex to the reference it is judged by, mm; empty where none was asked for.
     pub error_mm: Vec<f64>,
     /// The whole comparison with its own continuation, where it was asked for.
-    pub assessment: Option<Assessment>,
+    pub evaluation: Option<Evaluation>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -123,46 +123,46 @@ impl Job {
     /// Measures a drape of `scene`; references are kept in `cache`, if there is one.
     ///
     /// # Errors
-    /// As [`assess`]; [`AssessError::Interrupted`] where `observer` ends a reference before it has converged.
+    /// As [`evaluate`]; [`EvaluateError::Interrupted`] where `observer` ends a reference before it has converged.
     pub fn measure(
         &self,
         scene: &Scene,
         drape: &Drape,
         cache: Option<&ReferenceCache>,
         observer: Observer<'_>,
-    ) -> Result<Measured, AssessError> {
-        let figures = Figures::of(scene, drape);
-        let warnings = figures.warnings(scene);
-        let options = AssessOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
-        let (reference, assessment, of_reference) = match self.accuracy {
+    ) -> Result<Measured, EvaluateError> {
+        let metrics = Metrics::of(scene, drape);
+        let warnings = metrics.warnings(scene);
+        let options = EvaluateOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
+        let (reference, evaluation, of_reference) = match self.accuracy {
             Against::None => {
-                return Ok(Measured { figures, error_mm: Vec::new(), assessment: None, warnings });
+                return Ok(Measured { metrics, error_mm: Vec::new(), evaluation: None, warnings });
             }
             Against::Canonical => {
                 let (reference, warnings) = canonical(scene, &self.settings.fabric, &options, observer)?;
                 (reference.positions, None, warnings)
             }
             Against::Own => {
-                let found = assess(scene, &self.settings, drape, &options, observer)?;
+                let found = evaluate(scene, &self.settings, drape, &options, observer)?;
                 (found.canonical.positions.clone(), Some(found.clone()), found.warnings)
             }
         };
         let best = representable(&scene.topology, &drape.parts, &scene.is_held(), &scene.garment.positions, &reference);
         let affine = Some(best.blended_affine_rms_mm).filter(|mm| mm.is_finite());
-        let mut figures = Figures {
+        let mut metrics = Metrics {
             canonical_rms_mm: Some(accuracy::rms_mm(&drape.positions, &reference)),
             representable_rms_mm: Some(best.translation_rms_mm),
             representable_affine_rms_mm: affine,
-            ..figures
+            ..metrics
         };
-        let error_mm = match &assessment {
+        let error_mm = match &evaluation {
             Some(found) => {
-                figures = figures.assessed(found);
+                metrics = metrics.with_evaluation(found);
                 found.error_mm.clone()
             }
             None => accuracy::vertex_errors(&drape.positions, &reference).iter().map(|e| 1e3 * e).collect(),
         };
-        Ok(Measured { figures, error_mm, assessment, warnings: [warnings, of_reference].concat() })
+        Ok(Measured { metrics, error_mm, evaluation, warnings: [warnings, of_reference].concat() })
     }
 }
 

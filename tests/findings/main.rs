@@ -13,7 +13,7 @@ use partwise::drape::{Scene, drape, unobserved};
 use partwise::mesh::TriMesh;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::self_intersection::crossing_pairs;
-use partwise::study::metrics::Figures;
+use partwise::study::metrics::Metrics;
 use partwise::study::sweep::{Bench, Plan, Status};
 
 /// Rings of `around` points from the top down, closed by a point at each end where `ends` are given.
@@ -55,14 +55,14 @@ fn sphere() -> TriMesh {
     turned(&(1..24).map(ring).collect::<Vec<_>>(), 48, Some([1.3, 0.7]))
 }
 
-fn draped(scene: &Scene) -> (Figures, Vec<String>, Vec<DVec3>) {
+fn draped(scene: &Scene) -> (Metrics, Vec<String>, Vec<DVec3>) {
     draped_by(scene, &Job::default())
 }
 
-fn draped_by(scene: &Scene, job: &Job) -> (Figures, Vec<String>, Vec<DVec3>) {
+fn draped_by(scene: &Scene, job: &Job) -> (Metrics, Vec<String>, Vec<DVec3>) {
     let result = drape(scene, &job.settings, &mut unobserved).unwrap();
     let measured = job.measure(scene, &result, None, &mut unobserved).unwrap();
-    (measured.figures, measured.warnings, result.positions)
+    (measured.metrics, measured.warnings, result.positions)
 }
 
 #[test]
@@ -71,15 +71,15 @@ fn a_garment_that_slides_down_is_told_with_what_to_hold() {
     tube.groups = vec!["waist".to_owned()];
     tube.triangle_group = vec![0; tube.triangles.len()];
     let mut scene = Scene::of_meshes(&cone(), tube).unwrap();
-    let (figures, warnings, x) = draped(&scene);
+    let (metrics, warnings, x) = draped(&scene);
     let sank = (0..40).map(|v| scene.garment.positions[v].z - x[v].z).sum::<f64>() / 40.0;
-    assert!(sank > 0.2 && (figures.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
+    assert!(sank > 0.2 && (metrics.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
     let said = warnings.join("\n");
     assert!(said.contains("slid down") && said.contains("--hold top") && said.contains("waist"), "{said}");
     // Held, it stays, and nothing is said.
     scene.held = scene.edge("top").unwrap();
-    let (figures, warnings, _) = draped(&scene);
-    assert_eq!(figures.top_sank_mm, 0.0);
+    let (metrics, warnings, _) = draped(&scene);
+    assert_eq!(metrics.top_sank_mm, 0.0);
     assert!(!warnings.join("\n").contains("slid"), "{warnings:?}");
 }
 
@@ -99,11 +99,11 @@ fn the_connected_part_that_slides_or_falls_is_told_by_its_number() {
     let cape = turned(&[(0.03, 1.05), (0.06, 1.03), (0.1, 1.02), (0.13, 0.99)], 24, None);
     // A cape that stays where it is, the highest edge of all, over trousers that do not.
     let mut scene = Scene::of_meshes(&cone(), beside(cape.clone(), &tube(0.3, 0.9))).unwrap();
-    let (figures, warnings, x) = draped(&scene);
+    let (metrics, warnings, x) = draped(&scene);
     let of = |v: usize| scene.garment.positions[v].z - x[v].z;
     let sank = [0..24, 96..136].map(|ring| ring.clone().map(of).sum::<f64>() / ring.len() as f64);
     assert!(sank[0] < 0.05 && sank[1] > 0.15, "{sank:?}");
-    assert!((figures.top_sank_mm - 1e3 * sank[1]).abs() < 1e-9, "{} mm", figures.top_sank_mm);
+    assert!((metrics.top_sank_mm - 1e3 * sank[1]).abs() < 1e-9, "{} mm", metrics.top_sank_mm);
     let said =
         format!("connected part 2 of the garment's 2 has slid down: its highest edge sank by {:.0} cm", 1e2 * sank[1]);
     assert!(warnings.iter().any(|w| w.contains(&said) && w.contains("(--hold top:2)")), "{warnings:?}");
@@ -138,12 +138,12 @@ fn two_ponchos_laid_flat_over_each_other_stay_on() {
     let scene = Scene::of_meshes(&post, beside(poncho(1.53), &poncho(1.536))).unwrap();
     let mut job = Job::preview();
     job.settings.fabric = partwise::garment::fabric::Fabric::by_name("denim").unwrap();
-    let (figures, warnings, x) = draped_by(&scene, &job);
+    let (metrics, warnings, x) = draped_by(&scene, &job);
     let necks = [0..71, 28 * 71..29 * 71].map(|ring| ring.map(|v| x[v].z).fold(f64::INFINITY, f64::min));
     assert!(necks.iter().all(|z| *z > 1.35), "{necks:?}");
-    assert!(figures.strain_max.unwrap() < 0.5, "{:?}", figures.strain_max);
+    assert!(metrics.strain_max.unwrap() < 0.5, "{:?}", metrics.strain_max);
     // Their hems are as high as their necks as placed, and sink as they should.
-    assert!(figures.top_sank_mm < 100.0 && !warnings.iter().any(|w| w.contains("slid")), "{warnings:?}");
+    assert!(metrics.top_sank_mm < 100.0 && !warnings.iter().any(|w| w.contains("slid")), "{warnings:?}");
 }
 
 #[test]
@@ -159,15 +159,15 @@ fn skin_between_vertices_that_are_outside_is_told() {
     let scene = Scene::of_meshes(&sphere(), cape(12, 5)).unwrap();
     let mut bare = Job::default();
     bare.settings.self_contact = false;
-    let (figures, warnings, x) = draped_by(&scene, &bare);
+    let (metrics, warnings, x) = draped_by(&scene, &bare);
     let pairs = crossing_pairs(&scene.garment.with_positions(x), scene.body.mesh()).len();
-    assert!(pairs > 0 && figures.body_crossing_pairs == pairs && figures.penetrating_vertices == 0, "{pairs}");
+    assert!(pairs > 0 && metrics.body_crossing_pairs == pairs && metrics.penetrating_vertices == 0, "{pairs}");
     let said = warnings.join("\n");
     assert!(said.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{said}");
     assert!(said.contains("no vertex is inside"), "{said}");
     // A fine mesh shows none even so.
-    let (figures, warnings, _) = draped_by(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap(), &bare);
-    assert_eq!(figures.body_crossing_pairs, 0);
+    let (metrics, warnings, _) = draped_by(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap(), &bare);
+    assert_eq!(metrics.body_crossing_pairs, 0);
     assert_eq!(warnings, [""; 0]);
 }
 
@@ -180,12 +180,12 @@ fn cloth_that_ends_in_cloth_is_told() {
     let scene = over(DVec3::new(0.02, 0.01, 0.003));
     let mut bare = Job::default();
     bare.settings.self_contact = false;
-    let (figures, warnings, _) = draped_by(&scene, &bare);
-    let said = format!("cloth goes through cloth: {} pairs", figures.self_intersecting_pairs);
-    assert!(figures.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&said)), "{warnings:?}");
+    let (metrics, warnings, _) = draped_by(&scene, &bare);
+    let said = format!("cloth goes through cloth: {} pairs", metrics.self_intersecting_pairs);
+    assert!(metrics.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&said)), "{warnings:?}");
     // Over each other and kept so, nothing is told.
-    let (figures, warnings, _) = draped(&over(DVec3::Z * 0.008));
-    assert_eq!((figures.self_intersecting_pairs, warnings.len()), (0, 0), "{warnings:?}");
+    let (metrics, warnings, _) = draped(&over(DVec3::Z * 0.008));
+    assert_eq!((metrics.self_intersecting_pairs, warnings.len()), (0, 0), "{warnings:?}");
 }
 
 #[test]
@@ -233,8 +233,8 @@ fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
         assert!(said.contains("--hold") && said.contains(expected), "{said}");
     }
     scene.held = scene.edges("top:1,top:2").unwrap();
-    let (figures, _, x) = draped(&scene);
-    assert!(figures.residual_over_weight.unwrap() < 1e-3 && figures.top_sank_mm == 0.0);
+    let (metrics, _, x) = draped(&scene);
+    assert!(metrics.residual_over_weight.unwrap() < 1e-3 && metrics.top_sank_mm == 0.0);
     assert!(scene.held.iter().all(|&v| x[v as usize] == scene.garment.positions[v as usize]));
 }
 
@@ -246,13 +246,13 @@ fn what_is_stretched_beyond_what_fabrics_bear_and_what_presses_is_told() {
     // A preview that rests on the body presses on it.
     let job = Job::preview();
     let preview = drape(&scene, &job.settings, &mut unobserved).unwrap();
-    let figures = job.measure(&scene, &preview, None, &mut unobserved).unwrap().figures;
-    assert!(figures.contact_parts > 0 && figures.pressure_max_kpa.unwrap() > 0.0, "{:?}", figures.pressure_max_kpa);
+    let metrics = job.measure(&scene, &preview, None, &mut unobserved).unwrap().metrics;
+    assert!(metrics.contact_parts > 0 && metrics.pressure_max_kpa.unwrap() > 0.0, "{:?}", metrics.pressure_max_kpa);
     // Cut for somebody of less than half the size, and held at both ends.
     scene.rest.corners.iter_mut().flatten().for_each(|p| *p *= 0.4);
     scene.held = (0..40).chain(360..400).collect();
-    let (figures, warnings, _) = draped(&scene);
-    assert!(figures.strain_max.unwrap() > 0.5, "{:?}", figures.strain_max);
+    let (metrics, warnings, _) = draped(&scene);
+    assert!(metrics.strain_max.unwrap() > 0.5, "{:?}", metrics.strain_max);
     let told = warnings.iter().find(|w| w.contains("more than fabrics bear")).unwrap();
     // Both its openings are held as long as they were before it was cut anew.
     assert!(told.contains("its opening at a height of"), "{told}");

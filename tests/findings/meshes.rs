@@ -138,8 +138,8 @@ fn a_pattern_torn_in_one_corner_is_told_with_its_face() {
     let face = cape.triangles.iter().position(|t| t.contains(&17)).unwrap() + 1;
     assert!(notes.contains("6 triangles are of another size at rest than as worn"), "{notes}");
     assert!(notes.contains(&format!("farthest off in face {face}: 4.")) || notes.contains("m long at rest"), "{notes}");
-    let (figures, warnings, x) = draped(&loaded.scene);
-    assert!(x.iter().all(|p| p.is_finite()) && figures.strain_max.is_some(), "{warnings:?}");
+    let (metrics, warnings, x) = draped(&loaded.scene);
+    assert!(x.iter().all(|p| p.is_finite()) && metrics.strain_max.is_some(), "{warnings:?}");
 }
 
 #[test]
@@ -207,8 +207,8 @@ fn seams_that_long_triangles_bridge_are_told_when_the_garment_falls_through() {
         mesh.triangles.extend(quad(far + a, 1, columns).map(|[a, b, c]| [a, c, b]));
     }
     mesh.triangles.extend((0..columns - 1).flat_map(|i| quad(i, 1, far)).map(|[a, b, c]| [a, c, b]));
-    let (figures, warnings, _) = draped(&Scene::of_meshes(&sphere(), mesh).unwrap());
-    assert!(figures.top_sank_mm > 100.0, "{} mm", figures.top_sank_mm);
+    let (metrics, warnings, _) = draped(&Scene::of_meshes(&sphere(), mesh).unwrap());
+    assert!(metrics.top_sank_mm > 100.0, "{} mm", metrics.top_sank_mm);
     let bridges = format!("{} of its triangles are up to 80 cm long", 2 * (columns - 1));
     assert!(warnings.iter().any(|w| w.contains(&bridges) && w.contains("--pattern")), "{warnings:?}");
 }

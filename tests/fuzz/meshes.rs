@@ -7,7 +7,7 @@ use partwise::drape::{drape, unobserved};
 use partwise::mesh::export::write_imported;
 use partwise::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
 use partwise::mesh::{Axis, Frame, TriMesh, Unit};
-use partwise::study::metrics::Figures;
+use partwise::study::metrics::Metrics;
 use partwise::study::sweep::{Existing, Manifest, Plan, Row, Store, Timing, csv_text, join};
 use partwise::{Job, SceneSpec};
 
@@ -141,7 +141,7 @@ fn rows() {
     let point = &plan.points[0];
     let scene = point.job.scene.load().unwrap().scene;
     let solved = point.job.drape(&scene, &mut unobserved).unwrap();
-    store.append(Row::solved(point, &Figures::of(&scene, &solved), "00ff", &Timing::default())).unwrap();
+    store.append(Row::solved(point, &Metrics::of(&scene, &solved), "00ff", &Timing::default())).unwrap();
     store.append(Row::failed(&plan.points[1], "it failed")).unwrap();
     store.append(Row::failed(&plan.points[2], "it failed")).unwrap();
     drop(store);

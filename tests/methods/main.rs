@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-mod contest;
 mod gross2003;
 mod scenes;
+mod table4;
 mod thomaszewski2006;
 mod zhu2016;

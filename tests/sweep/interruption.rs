@@ -119,7 +119,7 @@ fn failed_points_are_rows_and_are_tried_again() {
     let outcome = sweep(&plan(), None, folder.path(), Existing::Refuse, &run, &rows_by(panicking)).unwrap();
     assert_eq!((outcome.failed, outcome.rows.len(), outcome.stopped), (6, 200, false));
     assert_eq!((outcome.rows[11].status, outcome.rows[11].error.as_str()), (Status::Error, "panicked: point eleven"));
-    assert!(outcome.rows[7].error.starts_with("synthetic failure") && outcome.rows[7].figures.is_none());
+    assert!(outcome.rows[7].error.starts_with("synthetic failure") && outcome.rows[7].metrics.is_none());
 
     let kept = Existing::Resume { retry_failed: false, adopt: false };
     assert_eq!(sweep(&plan(), None, folder.path(), kept, &run, &rows_by(solve)).unwrap().failed, 6);

@@ -3,9 +3,9 @@
 // The lint knows test functions, not what they share.
 #![allow(clippy::unwrap_used)]
 
-mod figures;
 mod interruption;
 mod killed;
+mod metrics;
 mod plan;
 mod shards;
 
@@ -18,7 +18,7 @@ use std::time::Duration;
 use glam::DVec3;
 use partwise::Job;
 use partwise::drape::StageTimes;
-use partwise::study::metrics::Figures;
+use partwise::study::metrics::Metrics;
 use partwise::study::sweep::{
     Append, Existing, Manifest, Medium, Outcome, Pass, Plan, Point, PointError, Row, Run, Store, StoreError,
     SweepProgress, result_hash, row_of, run_missing, sweep,
@@ -41,20 +41,20 @@ fn plan() -> Plan {
 }
 
 /// A drape made of nothing but the point's id: any point as good as any other, the same on every machine.
-fn solve(point: &Point) -> Result<Pass<Figures>, PointError> {
+fn solve(point: &Point) -> Result<Pass<Metrics>, PointError> {
     let byte = |i: usize| u8::from_str_radix(&point.id[2 * i..2 * i + 2], 16).unwrap();
     let x = |i: usize| (f64::from(byte(i)) + 0.1) / f64::from(byte(i + 1)).mul_add(3.0, 7.0);
     if point.index % 41 == 7 {
         return Err(PointError::Failed(format!("synthetic failure, \"quoted\",\nover two lines: ü {}", byte(0))));
     }
     let positions: Vec<DVec3> = (0..4).map(|i| DVec3::new(x(i), x(i + 4), x(i + 8))).collect();
-    let value = Figures {
+    let value = Metrics {
         vertices: 4,
         part_count: usize::from(byte(3)),
         displacement_rms_mm: x(0),
         residual_over_weight: Some(x(1) * 1e-9),
         rms_mm: (byte(2) > 100).then(|| x(2) * 1e5),
-        ..Figures::default()
+        ..Metrics::default()
     };
     let times = StageTimes { total: Duration::from_micros(u64::from(byte(5))), ..StageTimes::default() };
     Ok(Pass { value, times, result_hash: result_hash(&positions) })
@@ -62,7 +62,7 @@ fn solve(point: &Point) -> Result<Pass<Figures>, PointError> {
 
 /// Rows made by a function in place of a drape, in two passes each as the plan has it.
 fn rows_by(
-    solve: impl Fn(&Point) -> Result<Pass<Figures>, PointError> + Sync,
+    solve: impl Fn(&Point) -> Result<Pass<Metrics>, PointError> + Sync,
 ) -> impl Fn(&Point) -> Option<Row> + Sync {
     move |point| row_of(point, (0, 2), || solve(point), Ok)
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::SceneSpec;
 use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
 use crate::garment::{GarmentRequest, MeshCache};
-use crate::study::table4::{self, Conditions, ContestError, ContestOptions, ContestRow, ENTRANTS, Journal, TEN_ROWS};
+use crate::study::table4::{self, Conditions, METHODS, RowLog, TEN_ROWS, Table4Error, Table4Options, Table4Row};
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -60,10 +60,10 @@ pub(crate) struct TableFourArgs {
     #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_FABRIC)]
     fabric: String,
     /// Counted rounds
-    #[arg(long, value_name = "N", default_value_t = ContestOptions::default().rounds as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = Table4Options::default().rounds as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     rounds: u64,
     /// Canonical drapes from this many perturbed starts, for the spread between equilibria
-    #[arg(long, value_name = "N", default_value_t = ContestOptions::default().starts)]
+    #[arg(long, value_name = "N", default_value_t = Table4Options::default().starts)]
     starts: u64,
     /// Two garments of 600 vertices, one round, no perturbed starts; nothing is kept
     #[arg(long, conflicts_with_all = ["rows", "growth", "rounds", "starts", "rows_file"])]
@@ -104,27 +104,27 @@ impl TableFourArgs {
         let options = self.options();
         let conditions = Conditions::here(&fabric.name, &options);
         let asked = self.asked()?;
-        let mut journal = if self.quick {
-            Journal { conditions, rows: Vec::new() }
+        let mut log = if self.quick {
+            RowLog { conditions, rows: Vec::new() }
         } else {
-            Journal::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
+            RowLog::open(&self.rows_file, conditions).map_err(|e| UserError::new(e.to_string()))?
         };
         if let Some(folder) = &self.recordings {
             make_folder(folder)?;
         }
         interrupt::keep();
-        let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !journal.has(name, *n)).collect();
+        let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !log.has(name, *n)).collect();
         let kept = asked.len() - left.len();
         let runs = options.warm_up + options.rounds;
-        let bar = console::progress(Some((left.len() * runs * ENTRANTS.len()) as u64), "table 4");
+        let bar = console::progress(Some((left.len() * runs * METHODS.len()) as u64), "table 4");
         for (done, (name, vertices)) in left.iter().enumerate() {
-            let (mut begun, before) = (0, (done * runs * ENTRANTS.len()) as u64);
+            let (mut begun, before) = (0, (done * runs * METHODS.len()) as u64);
             let mut last = (usize::MAX, String::new());
             let mut listen = |round: usize, of: usize, what: &str| {
                 if last.0 != round || last.1 != what {
                     last = (round, what.to_owned());
                     bar.set_position(before + begun);
-                    begun = (begun + 1).min((runs * ENTRANTS.len()) as u64);
+                    begun = (begun + 1).min((runs * METHODS.len()) as u64);
                     bar.set_message(format!("{name}@{vertices}: {what}, round {} of {of}", (round + 1).min(of)));
                 }
                 interrupt::go_on()
@@ -132,33 +132,33 @@ impl TableFourArgs {
             let spec = SceneSpec::new(SceneSpec::default().body, format!("{name}@{vertices}"));
             let loaded = spec.load_with(&MeshCache::in_user_cache())?;
             match table4::row((name, *vertices), &loaded.scene, &fabric, &options, &mut listen) {
-                Ok(contested) => {
-                    journal.rows.push(contested.row.clone());
+                Ok(draped_row) => {
+                    log.rows.push(draped_row.row.clone());
                     // Kept before it is recorded: a disk that is full then costs a picture and no row.
                     if !self.quick {
                         let file = &self.rows_file;
-                        journal.write(file).map_err(unwritable(file, "--rows-file"))?;
+                        log.write(file).map_err(unwritable(file, "--rows-file"))?;
                     }
                     if let Some(folder) = &self.recordings {
-                        let path = recorded::record(folder, &contested, &loaded.scene, &journal.rows)?;
+                        let path = recorded::record(folder, &draped_row, &loaded.scene, &log.rows)?;
                         bar.suspend(|| console::note(&format!("recording: {}", path.display())));
                     }
                 }
-                Err(ContestError::Interrupted) => break,
+                Err(Table4Error::Interrupted) => break,
                 Err(error) => return Err(error.into()),
             }
         }
         bar.finish_and_clear();
-        self.report(&journal, &asked, kept)
+        self.report(&log, &asked, kept)
     }
 
-    fn options(&self) -> ContestOptions {
+    fn options(&self) -> Table4Options {
         if self.quick {
-            return ContestOptions { rounds: 1, warm_up: 0, starts: 0, ..ContestOptions::default() };
+            return Table4Options { rounds: 1, warm_up: 0, starts: 0, ..Table4Options::default() };
         }
         // The parser bounds it.
         let rounds = usize::try_from(self.rounds).unwrap_or(usize::MAX);
-        ContestOptions { rounds, starts: self.starts, ..ContestOptions::default() }
+        Table4Options { rounds, starts: self.starts, ..Table4Options::default() }
     }
 
     /// Garments and vertices, in order.
@@ -194,10 +194,9 @@ impl TableFourArgs {
         Ok(asked)
     }
 
-    fn report(&self, journal: &Journal, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {
-        let find =
-            |(name, n): &(String, usize)| journal.rows.iter().find(|row| row.garment == *name && row.asked == *n);
-        let rows: Vec<ContestRow> = asked.iter().filter_map(find).cloned().collect();
+    fn report(&self, log: &RowLog, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {
+        let find = |(name, n): &(String, usize)| log.rows.iter().find(|row| row.garment == *name && row.asked == *n);
+        let rows: Vec<Table4Row> = asked.iter().filter_map(find).cloned().collect();
         let csv = table4::csv_lines(&rows)?;
         if let Some(path) = &self.csv {
             write(path, &csv, "--csv")?;
@@ -212,10 +211,10 @@ impl TableFourArgs {
         match self.format {
             Format::Csv => console::result(&csv),
             Format::Json => {
-                let json = json!({ "conditions": journal.conditions, "rows": rows, "missing_rows": missing });
+                let json = json!({ "conditions": log.conditions, "rows": rows, "missing_rows": missing });
                 console::result(&crate::base::error_text::json(&json)?);
             }
-            Format::Text => console::result(&text(journal, &rows)),
+            Format::Text => console::result(&text(log, &rows)),
         }
         if missing > 0 {
             console::warning(&format!("{missing} of {} rows are not done; the same command goes on", asked.len()));
@@ -225,8 +224,8 @@ impl TableFourArgs {
 }
 
 /// For people.
-fn text(journal: &Journal, rows: &[ContestRow]) -> String {
-    let mut out = journal.conditions.said();
+fn text(log: &RowLog, rows: &[Table4Row]) -> String {
+    let mut out = log.conditions.said();
     for cells in table4::tables(rows).into_iter().chain(table4::exponents(rows)) {
         let mut table = console::table(console::RULED, &cells.header, 1..);
         table.add_rows(&cells.rows);
@@ -234,7 +233,7 @@ fn text(journal: &Journal, rows: &[ContestRow]) -> String {
     }
     for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {
         if let Some(error) = &entry.error {
-            out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.entrant);
+            out += &format!("\n{}@{}: {}: {error}", row.garment, row.asked, entry.method);
         }
     }
     out

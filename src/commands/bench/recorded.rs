@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::record::{Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
 use crate::scene::Scene;
 use crate::study::accuracy::vertex_errors;
-use crate::study::table4::{ContestRow, Contested, ENTRANTS, Entrant, Entry};
+use crate::study::table4::{ComparedMethod, DrapedRow, METHODS, MethodResult, Table4Row};
 
 /// Share of the distances that the colours tell apart; what is beyond takes the last.
 const TOLD_APART: f64 = 0.75;
@@ -14,15 +14,15 @@ const TOLD_APART: f64 = 0.75;
 /// Writes a row's recording into a folder; `rows` are all so far, this one among them.
 pub(super) fn record(
     folder: &Path,
-    contested: &Contested,
+    draped_row: &DrapedRow,
     scene: &Scene,
-    rows: &[ContestRow],
+    rows: &[Table4Row],
 ) -> anyhow::Result<PathBuf> {
-    let Contested { row, draped, canonical } = contested;
+    let DrapedRow { row, draped, canonical } = draped_row;
     let name = format!("{}-{}", row.garment, row.asked);
     let path = folder.join(format!("{name}.rrd"));
-    let titles = ENTRANTS.map(Entrant::title);
-    let said = |(entry, title): (&Entry, &str)| match entry.error {
+    let titles = METHODS.map(ComparedMethod::title);
+    let said = |(entry, title): (&MethodResult, &str)| match entry.error {
         None => format!("{title}: {:.0} ms, {:.1} mm off", entry.median_ms, entry.canonical_rms_mm),
         Some(_) => format!("{title}: cannot run here"),
     };
@@ -30,7 +30,7 @@ pub(super) fn record(
         sinks: vec![Sink::File(path.clone())],
         name: format!("{name}: Table 4"),
         layout: Layout {
-            contest: true,
+            table4: true,
             compare: row.entries.iter().zip(titles).map(said).collect(),
             ..Layout::default()
         },
@@ -46,7 +46,7 @@ pub(super) fn record(
         let colours = Colours::Overlay(Overlay { name: "distance", unit: "mm", values }, range);
         recorder.compare(&Chosen { index: 0, slot, caption: "", draped: x, colours })?;
     }
-    let points = |of: &ContestRow, place: fn(&ContestRow, usize) -> [f64; 2], named: bool| {
+    let points = |of: &Table4Row, place: fn(&Table4Row, usize) -> [f64; 2], named: bool| {
         let ran = (0..of.entries.len()).filter(|&i| of.entries[i].error.is_none());
         let point = |i: usize| {
             let [x, y] = place(of, i);
@@ -56,7 +56,7 @@ pub(super) fn record(
     };
     let errors = points(row, |row, i| [row.entries[i].median_ms, row.entries[i].canonical_rms_mm], true);
     recorder.scatter(0, Picture::of_error("time, ms"), &errors)?;
-    let growth = |of: &ContestRow| points(of, |row, i| [row.vertices as f64, row.entries[i].median_ms], false);
+    let growth = |of: &Table4Row| points(of, |row, i| [row.vertices as f64, row.entries[i].median_ms], false);
     recorder.scatter(0, Picture::of_growth(), &rows.iter().flat_map(growth).collect::<Vec<_>>())?;
     recorder.finish()?;
     Ok(path)

@@ -12,7 +12,7 @@ use crate::methods::{self, Dressing, METHODS, MethodDrape, RestRule};
 use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
 use crate::scene::Loaded;
 use crate::study::certificate::{Certificate, certify};
-use crate::study::metrics::MethodFigures;
+use crate::study::metrics::MethodMetrics;
 use anyhow::Context as _;
 use serde::Serialize;
 
@@ -48,7 +48,7 @@ struct Report<'a> {
     method: &'static str,
     fabric: &'a str,
     #[serde(flatten)]
-    figures: &'a MethodFigures,
+    metrics: &'a MethodMetrics,
     /// What the method counted: tests, elements, iterations.
     counts: BTreeMap<&'static str, u64>,
     /// Milliseconds of `load`, of each part of the method, of all `method`, of `measure`, `record` and `total`.
@@ -120,20 +120,20 @@ impl RunArgs {
         bar.finish_and_clear();
         let drape = drape.map_err(|e| UserError::new(e.to_string()))?;
         let measured = Instant::now();
-        let (figures, fit) = MethodFigures::of(&dressing, &drape);
+        let (metrics, fit) = MethodMetrics::of(&dressing, &drape);
         let certificate = self.certify.then(|| certify(&scene, fabric, &drape.positions)).transpose()?;
         let ms = |time: Duration| 1e3 * time.as_secs_f64();
         let mut timings = vec![("load", ms(load))];
         timings.extend(drape.times.iter().map(|(name, time)| (*name, ms(*time))));
         timings.extend([("method", ms(drape.total)), ("measure", ms(measured.elapsed()))]);
-        let mut warnings = [loaded.warnings(), figures.warnings(&dressing)].concat();
+        let mut warnings = [loaded.warnings(), metrics.warnings(&dressing)].concat();
         if scene.let_go && !scene.held.is_empty() {
             warnings.push(format!("{} does not let go: what is held stays held", self.method));
         }
         let recorded = Instant::now();
-        let (loaded, drape, figures) = (&loaded, &drape, &figures);
+        let (loaded, drape, metrics) = (&loaded, &drape, &metrics);
         let made =
-            Made { loaded, drape, figures, fit: &fit, fabric, kept: &kept, timings_ms: &timings, warnings: &warnings };
+            Made { loaded, drape, metrics, fit: &fit, fabric, kept: &kept, timings_ms: &timings, warnings: &warnings };
         let recorder = self.record_method(&made)?;
         timings.push(("record", ms(recorded.elapsed())));
         let mut outputs = Vec::new();
@@ -155,7 +155,7 @@ impl RunArgs {
             garment: &loaded.garment_name,
             method: self.method,
             fabric: &fabric.name,
-            figures,
+            metrics,
             counts: drape.counts.iter().copied().collect(),
             timings_ms: timings.iter().copied().collect(),
             notes: &drape.notes,
@@ -204,7 +204,7 @@ impl RunArgs {
         }
         let facts = [("method".to_owned(), self.method.to_owned())];
         let counts = made.drape.counts.iter().map(|(name, count)| ((*name).to_owned(), count.to_string()));
-        let found = made.figures.findings().into_iter().map(|(name, value)| (name.to_owned(), value));
+        let found = made.metrics.findings().into_iter().map(|(name, value)| (name.to_owned(), value));
         let notes = made.drape.notes.iter().map(|note| ("note".to_owned(), note.clone()));
         let panel = Panel {
             title: format!("{} on {}, by {}", loaded.garment_name, loaded.body_name, self.method),
@@ -230,7 +230,7 @@ impl RunArgs {
 struct Made<'a> {
     loaded: &'a Loaded,
     drape: &'a MethodDrape,
-    figures: &'a MethodFigures,
+    metrics: &'a MethodMetrics,
     fit: &'a Fit,
     fabric: &'a Fabric,
     kept: &'a [Kept],
@@ -241,10 +241,10 @@ struct Made<'a> {
 impl Report<'_> {
     /// For the terminal.
     fn text(&self, drape: &MethodDrape, timings_ms: &[(&'static str, f64)]) -> String {
-        let MethodFigures { vertices, triangles, .. } = self.figures;
+        let MethodMetrics { vertices, triangles, .. } = self.metrics;
         let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
         let _ = writeln!(out, "{:<20}{} in {}", "method", self.method, self.fabric);
-        for (name, value) in self.figures.findings() {
+        for (name, value) in self.metrics.findings() {
             let _ = writeln!(out, "{name:<20}{value}");
         }
         let counts: Vec<String> = drape.counts.iter().map(|(name, count)| format!("{name} {count}")).collect();

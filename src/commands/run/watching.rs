@@ -142,11 +142,11 @@ impl RunArgs {
         let scene = &finished.ground.loaded.scene;
         match job.measure(scene, &finished.drape, cache(self.cache.as_ref()).as_ref(), &mut go_on) {
             Ok(measured) => Ok(Some(measured)),
-            Err(crate::study::evaluate::AssessError::Interrupted) if interrupt::requested() => {
+            Err(crate::study::evaluate::EvaluateError::Interrupted) if interrupt::requested() => {
                 let plain = Job { accuracy: Against::None, ..job.clone() };
                 Ok(Some(plain.measure(scene, &finished.drape, None, &mut go_on)?))
             }
-            Err(crate::study::evaluate::AssessError::Interrupted) => Ok(None),
+            Err(crate::study::evaluate::EvaluateError::Interrupted) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }

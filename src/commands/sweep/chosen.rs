@@ -10,7 +10,7 @@ const FEWEST: usize = 4;
 
 /// The error a row is judged by, mm.
 pub(crate) fn error_mm(row: &Row) -> Option<f64> {
-    row.figures.as_ref()?.error_mm()
+    row.metrics.as_ref()?.error_mm()
 }
 
 /// The time a row took, ms.
@@ -50,18 +50,18 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     if rows.len() <= MOST {
         return (0..rows.len()).collect();
     }
-    let figures: Vec<Option<(usize, f64)>> =
-        rows.iter().map(|row| Some((row.figures.as_ref()?.part_count, error_mm(row).unwrap_or(0.0)))).collect();
+    let metrics: Vec<Option<(usize, f64)>> =
+        rows.iter().map(|row| Some((row.metrics.as_ref()?.part_count, error_mm(row).unwrap_or(0.0)))).collect();
     let beaten = |mine: (usize, f64)| {
-        figures
+        metrics
             .iter()
             .flatten()
             .any(|&(parts, error)| parts <= mine.0 && error <= mine.1 && (parts < mine.0 || error < mine.1))
     };
     let known = rows.iter().any(|row| error_mm(row).is_some());
-    let mut front: Vec<usize> = (1..rows.len()).filter(|&i| figures[i].is_some_and(|f| !known || !beaten(f))).collect();
-    front.sort_by_key(|&i| figures[i].map(|f| f.0));
-    front.dedup_by_key(|i| figures[*i].map(|f| (f.0, f.1.to_bits())));
+    let mut front: Vec<usize> = (1..rows.len()).filter(|&i| metrics[i].is_some_and(|f| !known || !beaten(f))).collect();
+    front.sort_by_key(|&i| metrics[i].map(|f| f.0));
+    front.dedup_by_key(|i| metrics[*i].map(|f| (f.0, f.1.to_bits())));
     let room = MOST - 1;
     let mut chosen = vec![0];
     if front.len() <= room {
@@ -72,12 +72,12 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
     chosen.sort_unstable();
     chosen.dedup();
     let apart = |i: usize, chosen: &[usize]| {
-        let parts = |i: usize| figures[i].map(|f| (f.0.max(1) as f64).ln());
+        let parts = |i: usize| metrics[i].map(|f| (f.0.max(1) as f64).ln());
         let gaps = chosen.iter().map(|&c| Some((parts(i)? - parts(c)?).abs()));
         gaps.flatten().fold(f64::INFINITY, f64::min)
     };
     while chosen.len() < FEWEST {
-        let others = (0..rows.len()).filter(|i| figures[*i].is_some() && !chosen.contains(i));
+        let others = (0..rows.len()).filter(|i| metrics[*i].is_some() && !chosen.contains(i));
         // Of equals the first.
         let Some(next) = others.rev().max_by(|&a, &b| apart(a, &chosen).total_cmp(&apart(b, &chosen))) else { break };
         chosen.push(next);
@@ -89,12 +89,12 @@ pub(crate) fn choose(rows: &[&Row]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::metrics::Figures;
+    use crate::study::metrics::Metrics;
 
     fn row(table: &str, parts: usize, error: f64) -> Row {
         Row {
             table: table.to_owned(),
-            figures: Some(Figures { part_count: parts, canonical_rms_mm: Some(error), ..Figures::default() }),
+            metrics: Some(Metrics { part_count: parts, canonical_rms_mm: Some(error), ..Metrics::default() }),
             extent_cm: "8".to_owned(),
             ..Row::default()
         }

@@ -11,7 +11,7 @@ use crate::record::{
     Chosen, Colours, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
     Sink, StepView, Tab,
 };
-use crate::study::metrics::Figures;
+use crate::study::metrics::Metrics;
 use crate::study::sweep::{Row, Status, Timing};
 
 use super::chosen::{choose, error_mm, labels, total_ms};
@@ -107,7 +107,7 @@ pub(crate) fn record(
             part_force_n: &point.force_n,
             draped: &point.positions,
             panel: &panel(row, label, sweep, &point),
-            scalars: &row.figures.as_ref().map(Figures::scalars).unwrap_or_default(),
+            scalars: &row.metrics.as_ref().map(Metrics::scalars).unwrap_or_default(),
             overlays,
         })?;
     }
@@ -132,7 +132,7 @@ pub(crate) fn record(
 
 fn caption(row: &Row) -> String {
     let error = error_mm(row).map_or(String::new(), |mm| format!(" · {mm:.1} mm"));
-    let parts = row.figures.as_ref().map_or(0, |f| f.part_count);
+    let parts = row.metrics.as_ref().map_or(0, |f| f.part_count);
     format!("{parts} PARTs · {:.0} ms{error}", total_ms(row).unwrap_or_default())
 }
 
@@ -162,7 +162,7 @@ fn panel(row: &Row, label: &str, sweep: &str, point: &KeptPoint) -> Panel {
         ("motion", row.motion.clone()),
         ("refinement", row.refine.clone()),
     ];
-    let measured = row.figures.iter().flat_map(Figures::facts);
+    let measured = row.metrics.iter().flat_map(Metrics::facts);
     let times = row.timing.iter().flat_map(Timing::stages);
     Panel {
         title: format!("{} on {}", row.garment, row.body),

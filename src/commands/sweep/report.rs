@@ -97,7 +97,7 @@ pub(crate) fn line(recording: &RecordSummary) -> String {
 
 /// What the columns of [`rows_table`] are, where an error was measured.
 pub(crate) fn explained(rows: &[Row]) -> &'static str {
-    let measured = |row: &Row| row.figures.as_ref().is_some_and(|figures| figures.canonical_rms_mm.is_some());
+    let measured = |row: &Row| row.metrics.as_ref().is_some_and(|metrics| metrics.canonical_rms_mm.is_some());
     if !rows.iter().any(measured) {
         return "";
     }
@@ -117,17 +117,17 @@ pub(crate) fn rows_table(rows: &[Row]) -> Table {
             table.add_row([index, garment, format!("{label}: {}", row.error)]);
             continue;
         }
-        let Some(figures) = &row.figures else { continue };
+        let Some(metrics) = &row.metrics else { continue };
         table.add_row([
             index,
             garment,
             label,
-            figures.part_count.to_string(),
+            metrics.part_count.to_string(),
             mm(total_ms(row)),
-            mm(figures.rms_mm),
-            mm(figures.canonical_rms_mm),
-            mm(figures.representable_affine_rms_mm),
-            mm(figures.representable_rms_mm),
+            mm(metrics.rms_mm),
+            mm(metrics.canonical_rms_mm),
+            mm(metrics.representable_affine_rms_mm),
+            mm(metrics.representable_rms_mm),
         ]);
     }
     table

@@ -7,7 +7,7 @@ use crate::mechanics::refine::SolveError;
 use crate::parts::range_table::RangeTable;
 use crate::parts::{Grain, Parts, segment};
 use crate::study::accuracy::{self, representable};
-use crate::study::evaluate::{AssessError, AssessOptions, assess, canonical};
+use crate::study::evaluate::{EvaluateError, EvaluateOptions, canonical, evaluate};
 use crate::study::table_search::Sample;
 use crate::{Scene, SceneSpec};
 use glam::DVec3;
@@ -51,7 +51,7 @@ pub(crate) struct Garment {
     /// From undraped to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
     fabric: Fabric,
-    options: AssessOptions,
+    options: EvaluateOptions,
     /// How PARTs move in the search.
     pub(crate) motion: Motion,
     /// Its grain, which pieces narrow and tall follow.
@@ -69,7 +69,7 @@ impl Garment {
         body: &str,
         cloth: &FabricArgs,
         motion: Motion,
-        options: &AssessOptions,
+        options: &EvaluateOptions,
     ) -> anyhow::Result<Option<Self>> {
         let (loaded, fabric) = (SceneSpec::new(body, name).load()?, cloth.first()?);
         cloth.check_used(&loaded)?;
@@ -78,8 +78,8 @@ impl Garment {
         });
         let (reference, warnings) = match found {
             Ok(found) => found,
-            Err(AssessError::Interrupted) => return Ok(None),
-            Err(AssessError::Fallen) => {
+            Err(EvaluateError::Interrupted) => return Ok(None),
+            Err(EvaluateError::Fallen) => {
                 return Err(UserError::new(format!(
                     "{name}: it falls off the body, so there is no drape to find tables for; give one that stays on by itself"
                 )));
@@ -164,12 +164,12 @@ impl Garment {
     pub(crate) fn worth(&self, table: &RangeTable) -> anyhow::Result<TableQuality> {
         let (settings, draped) = self.preview(table)?;
         let own = refining(&format!("{}: the rest of a preview", self.name), |observer| {
-            assess(&self.scene, &settings, &draped, &self.options, observer)
+            evaluate(&self.scene, &settings, &draped, &self.options, observer)
         });
         let own_mm = match own {
             Ok(own) => Some(own.accuracy.vertices.rms_mm),
             // One table's preview may slide off where others stay: that is no end to the search.
-            Err(AssessError::Interrupted | AssessError::Fallen) => None,
+            Err(EvaluateError::Interrupted | EvaluateError::Fallen) => None,
             Err(other) => return Err(other.into()),
         };
         Ok(TableQuality {

@@ -15,7 +15,7 @@ use crate::mechanics::coupled::Motion;
 use crate::parts::range_table::RangeTable;
 use crate::record::RecordSummary;
 use crate::scene::DRESS_FORM;
-use crate::study::evaluate::AssessOptions;
+use crate::study::evaluate::EvaluateOptions;
 use crate::study::table_search::Front;
 use clap::Args;
 
@@ -130,7 +130,7 @@ impl TuneArgs {
         self.sinks.check_outputs(&[])?;
         let ladder = self.ladder()?;
         self.cloth.only("tune")?;
-        let options = AssessOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
+        let options = EvaluateOptions { cache: cache(self.cache.as_ref()), spread_starts: 0 };
         let names: Vec<String> = if self.garment.is_empty() {
             BUILT_IN.iter().map(|n| (*n).to_owned()).filter(|n| !self.hold_out.contains(n)).collect()
         } else {

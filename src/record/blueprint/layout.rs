@@ -49,7 +49,7 @@ pub struct Layout {
     /// A reference method, with the names of what it shows besides the garment: its tab stands for the stages.
     pub method: Option<Vec<String>>,
     /// What is side by side are ways to drape: they stand for the stages, and times are plotted over errors and over vertices.
-    pub contest: bool,
+    pub table4: bool,
     /// The recording is watched while it grows: the cursor follows the newest step.
     pub follow: bool,
     /// The tab shown when the recording opens.
@@ -87,7 +87,7 @@ impl Layout {
 
     /// The views, seen from `eye`.
     pub(crate) fn root(&self, eye: &Eye) -> Node {
-        if self.contest {
+        if self.table4 {
             return Node::Tabs(0, vec![self.side_by_side(eye), table4::numbers()]);
         }
         let first = self.method.as_ref().map_or_else(|| self.stages(eye), |exhibits| self.of_method(exhibits, eye));

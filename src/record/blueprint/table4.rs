@@ -28,7 +28,7 @@ impl Layout {
         let view =
             |(slot, title): (usize, &String)| on_the_body(title.clone(), &format!("{}/{slot}", paths::COMPARE), eye);
         let views = in_rows("Side by side", self.compare.iter().enumerate().map(view).collect(), rows);
-        let name = if self.contest { "Colours: distance to the canonical drape" } else { "What they cost" };
+        let name = if self.table4 { "Colours: distance to the canonical drape" } else { "What they cost" };
         let below = View::plane(name, &[paths::COMPARE_CAPTIONS], visible(cells)).into();
         let height = BARS_HEIGHT * cells[1] as f32;
         Node::Column("Side by side", vec![(1.0 - height, views), (height, below)])
@@ -38,7 +38,7 @@ impl Layout {
     pub(super) fn compare_grid(&self, eye: &Eye) -> (usize, f64) {
         let below = |lines: usize| [ASPECT, 1.0 - f64::from(BARS_HEIGHT) * lines as f64];
         let (rows, aspect) = grid(eye, self.compare.len(), below(1));
-        if rows == 1 || self.contest {
+        if rows == 1 || self.table4 {
             return (rows, aspect);
         }
         let [w, h] = view_of(self.compare.len(), rows, below(rows));
@@ -48,6 +48,6 @@ impl Layout {
     /// Columns and rows of the drawing below.
     pub(crate) fn captions(&self, eye: &Eye) -> [usize; 2] {
         let (rows, _) = self.compare_grid(eye);
-        [self.compare.len().div_ceil(rows), if self.contest { 1 } else { rows }]
+        [self.compare.len().div_ceil(rows), if self.table4 { 1 } else { rows }]
     }
 }

@@ -18,7 +18,7 @@ use crate::session::EditError;
 use crate::session::results::{AtRest, Finished};
 use crate::session::state::ms_since;
 use crate::study::accuracy::{self, representable::representable};
-use crate::study::metrics::Figures;
+use crate::study::metrics::Metrics;
 
 /// A drape on its way to rest.
 pub(super) struct Way<'a> {
@@ -141,13 +141,13 @@ impl Workshop {
     /// A whole drape of the state, with its figures.
     pub(super) fn show(&mut self, piece: Piece<'_>, drape: Drape) {
         let (settings, scene) = (piece.settings(), piece.scene());
-        let figures = Figures::of(scene, &drape);
+        let metrics = Metrics::of(scene, &drape);
         let rested = drape.state.is_some() && settings.refine != Refine::Steps(0);
         let preview_error_mm = rested.then(|| accuracy::rms_mm(&drape.preview, &drape.positions));
         let bound_mm = rested.then(|| bound(settings, scene, &drape));
         let bound_mm = bound_mm.filter(|mm| mm.is_finite());
         let (state, ground) = (piece.target.state, Arc::clone(piece.ground()));
-        let finished = Finished { state, ground, drape, figures, preview_error_mm, bound_mm };
+        let finished = Finished { state, ground, drape, metrics, preview_error_mm, bound_mm };
         self.done.finished = true;
         piece.publish(|desk| {
             desk.add_to_trail(|point| {

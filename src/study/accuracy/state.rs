@@ -20,7 +20,7 @@ use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::principal_strain;
 use crate::mechanics::reactions::grant_beside;
 
-/// Figures of one drape.
+/// Metrics of one drape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// E, J.
@@ -38,7 +38,7 @@ pub struct State {
 }
 
 impl State {
-    /// Figures of `cloth` on `body` at `x`.
+    /// Metrics of `cloth` on `body` at `x`.
     #[must_use]
     pub fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
         let contacts = cloth.contacts(body, x);

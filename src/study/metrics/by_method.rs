@@ -1,19 +1,19 @@
-//! The figures of a garment draped by a reference method: those of [`Figures`] that need no PARTs, taken from where the cloth
+//! The figures of a garment draped by a reference method: those of [`Metrics`] that need no PARTs, taken from where the cloth
 //! lies, and how the run in time ended.
 
 use serde::Serialize;
 
-use super::Figures;
+use super::Metrics;
 use super::warnings::{Slid, sank};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use crate::methods::{Dressing, Ended, MethodDrape};
 use crate::study::accuracy::{self, state::State};
 
-/// The figures of one such drape. Those named as in [`Figures`] mean the same, energy and pressure by this project's own.
+/// The figures of one such drape. Those named as in [`Metrics`] mean the same, energy and pressure by this project's own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "named as in `Figures`; what is of runs in time alone is said")]
-pub struct MethodFigures {
+#[allow(missing_docs, reason = "named as in `Metrics`; what is of runs in time alone is said")]
+pub struct MethodMetrics {
     pub vertices: usize,
     pub triangles: usize,
     /// Why the run in time ended.
@@ -40,7 +40,7 @@ pub struct MethodFigures {
     pub pressure_max_kpa: f64,
 }
 
-impl MethodFigures {
+impl MethodMetrics {
     /// What a drape says by itself, and strain and pressure at its vertices.
     #[must_use]
     pub(crate) fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
@@ -50,7 +50,7 @@ impl MethodFigures {
         let state = State::of(cloth, &scene.body, x);
         let fit = fit(cloth, cloth.contacts(&scene.body, x), x, cloth.contact_stiffness());
         let (top_sank_mm, slid) = sank(scene, x);
-        let figures = Self {
+        let metrics = Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
             ended: drape.ended,
@@ -70,7 +70,7 @@ impl MethodFigures {
             strain_max: state.strain_max,
             pressure_max_kpa: fit.pressure_max_kpa,
         };
-        (figures, fit)
+        (metrics, fit)
     }
 
     /// How it ended, strain and what else was measured, in words: name and value.
@@ -106,8 +106,8 @@ impl MethodFigures {
     }
 
     /// The same where they are told as a drape's by PARTs.
-    fn shared(&self) -> Figures {
-        Figures {
+    fn shared(&self) -> Metrics {
+        Metrics {
             penetrating_vertices: self.penetrating_vertices,
             penetration_mm: self.penetration_mm,
             body_crossing_pairs: self.body_crossing_pairs,
@@ -117,7 +117,7 @@ impl MethodFigures {
             strain_p95: Some(self.strain_p95),
             strain_max: Some(self.strain_max),
             pressure_max_kpa: Some(self.pressure_max_kpa),
-            ..Figures::default()
+            ..Metrics::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The figures of a drape: one view, which the terminal, scripts, the rows of a sweep and the recording read from.
 //!
-//! [`Figures`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
+//! [`Metrics`] are plain numbers, deterministic all of them; [`LevelCount`]s tell them level by level. What needs a
 //! reference drape is there where somebody asked for one.
 
 mod by_method;
@@ -8,7 +8,7 @@ mod ease;
 mod levels;
 mod warnings;
 
-pub use by_method::MethodFigures;
+pub use by_method::MethodMetrics;
 pub use ease::GirthEase;
 pub use levels::LevelCount;
 use serde::{Deserialize, Serialize};
@@ -21,11 +21,11 @@ use crate::mechanics::fit::TORN_PERCENT;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::scene::Scene;
 use crate::study::accuracy::{self, Accuracy};
-use crate::study::evaluate::Assessment;
+use crate::study::evaluate::Evaluation;
 
 /// The figures of one drape. The names are the keys of `--format json` and the columns of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Figures {
+pub struct Metrics {
     /// Vertices of the garment.
     pub vertices: usize,
     /// Its triangles.
@@ -101,7 +101,7 @@ pub struct Figures {
     pub fold_rank_correlation: Option<f64>,
 }
 
-impl Figures {
+impl Metrics {
     /// What the drape of `scene` says by itself.
     #[must_use]
     pub fn of(scene: &Scene, drape: &Drape) -> Self {
@@ -139,10 +139,10 @@ impl Figures {
         }
     }
 
-    /// With what an assessment found. A model without a state of its own gets energy and strain from it.
+    /// With what an evaluation found. A model without a state of its own gets energy and strain from it.
     #[must_use]
-    pub(crate) fn assessed(self, assessment: &Assessment) -> Self {
-        let Accuracy { vertices, canonical_rms_mm, canonical_spread_mm, state, .. } = assessment.accuracy;
+    pub(crate) fn with_evaluation(self, evaluation: &Evaluation) -> Self {
+        let Accuracy { vertices, canonical_rms_mm, canonical_spread_mm, state, .. } = evaluation.accuracy;
         Self {
             energy_j: self.energy_j.or(Some(state.energy_j)),
             strain_p95: self.strain_p95.or(Some(state.strain_p95)),
@@ -151,9 +151,9 @@ impl Figures {
             canonical_rms_mm,
             canonical_spread_mm,
             residual_at_rest_over_weight: Some(state.residual_over_weight),
-            wrinkle_rank_correlation: assessment.wrinkles.rank_correlation,
-            fold_rank_correlation: assessment.fold_rank_correlation,
-            own_affine_rms_mm: assessment.accuracy.representable.map(|r| r.blended_affine_rms_mm),
+            wrinkle_rank_correlation: evaluation.wrinkles.rank_correlation,
+            fold_rank_correlation: evaluation.fold_rank_correlation,
+            own_affine_rms_mm: evaluation.accuracy.representable.map(|r| r.blended_affine_rms_mm),
             ..self
         }
     }

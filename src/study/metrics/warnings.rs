@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::Figures;
+use super::Metrics;
 use crate::mechanics::fit::TORN_PERCENT;
 use crate::mesh::TriMesh;
 use crate::mesh::bridges::Bridges;
@@ -16,7 +16,7 @@ const SANK_MM: f64 = 100.0;
 /// An opening that is longer by more than this is told where the cloth is stretched too far.
 const STRETCHED: f64 = 1.1;
 
-impl Figures {
+impl Metrics {
     /// What in these figures a user should act upon, in the terms of a garment with these held vertices and groups.
     #[must_use]
     pub(crate) fn warnings(&self, scene: &Scene) -> Vec<String> {

@@ -18,9 +18,9 @@ use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
 use crate::scene::{Fallen, Loaded};
 use crate::study::accuracy::reference::ReferenceCache;
-use crate::study::evaluate::AssessError;
+use crate::study::evaluate::EvaluateError;
 use crate::study::job::Measured;
-use crate::study::metrics::Figures;
+use crate::study::metrics::Metrics;
 
 /// Why a point has no result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -75,7 +75,7 @@ pub fn row_of<T>(
     point: &Point,
     (warm_up, repeats): (usize, usize),
     pass: impl Fn() -> Result<Pass<T>, PointError>,
-    measure: impl FnOnce(T) -> Result<Figures, PointError>,
+    measure: impl FnOnce(T) -> Result<Metrics, PointError>,
 ) -> Option<Row> {
     let work = || {
         for _ in 0..warm_up {
@@ -165,12 +165,12 @@ impl<'a> Bench<'a> {
             let measured =
                 point.job.measure(&loaded.scene, &drape, self.cache.as_ref(), &mut |_: &Step<'_>| self.listen());
             let measured = measured.map_err(|e| match e {
-                AssessError::Interrupted => PointError::Interrupted,
+                EvaluateError::Interrupted => PointError::Interrupted,
                 other => PointError::failed(&other),
             })?;
             keep(&loaded, &drape, &measured)?;
             cut_from.set(Some(loaded.scene.fabric_names(&point.job.settings.fabric)));
-            Ok(measured.figures)
+            Ok(measured.metrics)
         };
         let row = row_of(point, passes, || self.pass(point), measure)?;
         // Of what has fabrics of its own, these.

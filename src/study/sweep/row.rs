@@ -1,6 +1,6 @@
-//! One row of a sweep: the point, its [`Figures`], its times; the same columns in JSON lines and in CSV.
+//! One row of a sweep: the point, its [`Metrics`], its times; the same columns in JSON lines and in CSV.
 //!
-//! Figures are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
+//! Metrics are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
 //! digits every reader's parser gives back the same bits, so that rows that were read and written again do not drift.
 //! The identity of results, bit for bit, is `result_hash`'s task. A point that failed has no figures and no times:
 //! empty cells in the CSV, no keys in its line.
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Point, Timing};
-use crate::study::metrics::Figures;
+use crate::study::metrics::Metrics;
 
 /// Whether a point has a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -55,7 +55,7 @@ pub struct Row {
     /// Why it failed; empty where it did not.
     pub error: String,
     #[serde(flatten)]
-    pub figures: Option<Figures>,
+    pub metrics: Option<Metrics>,
     /// blake3 over the bits of the displaced positions.
     pub result_hash: String,
     #[serde(flatten)]
@@ -89,13 +89,13 @@ impl Row {
 
     /// The row of a point with a result; a failed one where a figure is not finite.
     #[must_use]
-    pub fn solved(point: &Point, figures: &Figures, result_hash: &str, timing: &Timing) -> Self {
-        if let Some((name, value)) = not_finite(figures) {
+    pub fn solved(point: &Point, metrics: &Metrics, result_hash: &str, timing: &Timing) -> Self {
+        if let Some((name, value)) = not_finite(metrics) {
             return Self::failed(point, format!("{name} is {value}, expected a finite figure: the drape diverged"));
         }
         Self {
             status: Status::Ok,
-            figures: rounded(figures),
+            metrics: rounded(metrics),
             result_hash: result_hash.to_owned(),
             timing: rounded(timing),
             ..Self::failed(point, "")
@@ -119,7 +119,7 @@ impl Row {
 /// The columns, in order.
 #[must_use]
 pub fn columns() -> Vec<String> {
-    let full = Row { figures: Some(Figures::default()), timing: Some(Timing::default()), ..Row::default() };
+    let full = Row { metrics: Some(Metrics::default()), timing: Some(Timing::default()), ..Row::default() };
     cells(&full).into_keys().collect()
 }
 
@@ -161,9 +161,9 @@ fn cells(row: &Row) -> IndexMap<String, Value> {
 }
 
 /// The first figure that is no number, and what it is. JSON has nothing for it; a CSV says so.
-fn not_finite(figures: &Figures) -> Option<(String, String)> {
+fn not_finite(metrics: &Metrics) -> Option<(String, String)> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.serialize(figures).ok()?;
+    writer.serialize(metrics).ok()?;
     let text = writer.into_inner().ok()?;
     let mut reader = csv::Reader::from_reader(text.as_slice());
     let names = reader.headers().ok()?.clone();
@@ -173,8 +173,8 @@ fn not_finite(figures: &Figures) -> Option<(String, String)> {
 }
 
 /// The same with every figure to nine significant digits, 0 below 1e-12.
-fn rounded<T: Serialize + DeserializeOwned>(figures: &T) -> Option<T> {
-    let mut value = serde_json::to_value(figures).ok()?;
+fn rounded<T: Serialize + DeserializeOwned>(metrics: &T) -> Option<T> {
+    let mut value = serde_json::to_value(metrics).ok()?;
     for number in value.as_object_mut()?.values_mut().filter(|v| v.is_f64()) {
         let x = number.as_f64()?;
         let digits = format!("{x:.8e}").parse().unwrap_or(x);

@@ -204,8 +204,8 @@ fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
         let parsed = match line.strip_suffix(b"\n") {
             None => Err("the line has no end".to_owned()),
             Some(line) => serde_json::from_slice(line).map_err(|e| e.to_string()).and_then(|row: Row| {
-                let whole = (row.figures.is_some() && row.timing.is_some()) == (row.status == Status::Ok);
-                if whole { Ok(row) } else { Err("its status and its figures do not agree".to_owned()) }
+                let whole = (row.metrics.is_some() && row.timing.is_some()) == (row.status == Status::Ok);
+                if whole { Ok(row) } else { Err("its status and its metrics do not agree".to_owned()) }
             }),
         };
         match parsed {

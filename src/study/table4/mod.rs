@@ -20,8 +20,8 @@
 //! A garment has several equilibria: the RMS between canonical drapes of starts put on a little differently is told
 //! with each row, and an error under it says nothing.
 
-mod journal;
-mod lineup;
+mod methods;
+mod row_log;
 mod run;
 mod shape;
 mod table;
@@ -39,8 +39,8 @@ use crate::methods::RestRule;
 use crate::scene::Scene;
 use crate::study::accuracy::{self, state::State};
 use crate::study::evaluate::perturbed;
-pub use journal::{Conditions, Journal, JournalError};
-pub use lineup::{ENTRANTS, Entrant, TEN_ROWS, printed_ms};
+pub use methods::{ComparedMethod, METHODS, TEN_ROWS, printed_ms};
+pub use row_log::{Conditions, RowLog, RowLogError};
 use run::{Outcome, run};
 pub use shape::Silhouette;
 use shape::Tape;
@@ -48,7 +48,7 @@ pub use table::{Cells, csv_lines, exponents, tables};
 
 /// How a contest is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContestOptions {
+pub struct Table4Options {
     /// Counted rounds.
     pub rounds: usize,
     /// Rounds before them.
@@ -59,7 +59,7 @@ pub struct ContestOptions {
     pub rule: RestRule,
 }
 
-impl Default for ContestOptions {
+impl Default for Table4Options {
     fn default() -> Self {
         Self { rounds: 5, warm_up: 1, starts: 2, rule: RestRule::default() }
     }
@@ -67,9 +67,10 @@ impl Default for ContestOptions {
 
 /// One way to drape one garment, measured.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Entry {
+pub struct MethodResult {
     /// Its name.
-    pub entrant: String,
+    #[serde(rename = "entrant")]
+    pub method: String,
     /// Why there is nothing else.
     pub error: Option<String>,
     /// Time of each counted round, ms.
@@ -111,7 +112,7 @@ pub struct Entry {
 
 /// A row: a garment at a size, with all entrants.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct ContestRow {
+pub struct Table4Row {
     /// The garment.
     pub garment: String,
     /// Vertices asked for.
@@ -124,14 +125,14 @@ pub struct ContestRow {
     #[serde(default)]
     pub canonical: Silhouette,
     /// One for each entrant.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<MethodResult>,
 }
 
 /// A row with the drapes it is about.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contested {
+pub struct DrapedRow {
     /// The figures.
-    pub row: ContestRow,
+    pub row: Table4Row,
     /// Vertices of each entrant's last drape, m; `None` for who cannot run.
     pub draped: Vec<Option<Vec<DVec3>>>,
     /// The canonical drape, m.
@@ -140,7 +141,7 @@ pub struct Contested {
 
 /// Why there is no row.
 #[derive(Debug, thiserror::Error)]
-pub enum ContestError {
+pub enum Table4Error {
     /// The caller stopped it: no row.
     #[error("interrupted")]
     Interrupted,
@@ -156,33 +157,33 @@ pub(crate) type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> Control
 /// Runs a row.
 ///
 /// # Errors
-/// [`ContestError`]; an entrant that fails has an entry that says why.
+/// [`Table4Error`]; an entrant that fails has an entry that says why.
 pub fn row(
     (garment, asked): (&str, usize),
     scene: &Scene,
     fabric: &Fabric,
-    options: &ContestOptions,
+    options: &Table4Options,
     listener: Listener<'_>,
-) -> Result<Contested, ContestError> {
-    let failed = |e: &dyn std::error::Error| ContestError::Failed(e.to_string());
+) -> Result<DrapedRow, Table4Error> {
+    let failed = |e: &dyn std::error::Error| Table4Error::Failed(e.to_string());
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)
         .map_err(|e| failed(&e))?;
     let rounds = options.warm_up + options.rounds;
-    let mut times: Vec<Vec<f64>> = vec![Vec::new(); ENTRANTS.len()];
-    let mut last: Vec<Option<Result<Outcome, String>>> = ENTRANTS.iter().map(|_| None).collect();
+    let mut times: Vec<Vec<f64>> = vec![Vec::new(); METHODS.len()];
+    let mut last: Vec<Option<Result<Outcome, String>>> = METHODS.iter().map(|_| None).collect();
     for round in 0..rounds {
-        for (i, entrant) in ENTRANTS.into_iter().enumerate() {
+        for (i, entrant) in METHODS.into_iter().enumerate() {
             // What cannot run once cannot run at all.
             if matches!(last[i], Some(Err(_))) {
                 continue;
             }
             let mut go_on = || listener(round, rounds, entrant.name());
             if go_on().is_break() {
-                return Err(ContestError::Interrupted);
+                return Err(Table4Error::Interrupted);
             }
             let outcome = run(entrant, scene, fabric, &cloth, &options.rule, &mut go_on);
             if outcome.as_ref().is_ok_and(|o| o.ended == "interrupted") {
-                return Err(ContestError::Interrupted);
+                return Err(Table4Error::Interrupted);
             }
             if let (Ok(outcome), true) = (&outcome, round >= options.warm_up) {
                 times[i].push(1e3 * outcome.time.as_secs_f64());
@@ -190,11 +191,11 @@ pub fn row(
             last[i] = Some(outcome);
         }
     }
-    let mut settle = |start: &[DVec3], what: &str| -> Result<Vec<DVec3>, ContestError> {
+    let mut settle = |start: &[DVec3], what: &str| -> Result<Vec<DVec3>, Table4Error> {
         let mut go_on = |_: &crate::mechanics::refine::Step<'_>| listener(rounds, rounds, what);
         let found = refine(&cloth, &scene.body, start.to_vec(), &RefineOptions::default(), &mut go_on);
         let found = found.map_err(|e| failed(&e))?;
-        if found.stop == Stop::Interrupted { Err(ContestError::Interrupted) } else { Ok(found.positions) }
+        if found.stop == Stop::Interrupted { Err(Table4Error::Interrupted) } else { Ok(found.positions) }
     };
     let canonical = settle(&scene.garment.positions, "canonical drape")?;
     let mut squares = Vec::new();
@@ -203,11 +204,12 @@ pub fn row(
         squares.push(accuracy::rms_mm(&settle(&start, "perturbed starts")?, &canonical).powi(2));
     }
     let spread_mm = (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
-    let base = ENTRANTS.iter().position(|e| *e == Entrant::Converged).map(|i| times[i].clone()).unwrap_or_default();
+    let base =
+        METHODS.iter().position(|e| *e == ComparedMethod::Converged).map(|i| times[i].clone()).unwrap_or_default();
     let tape = Tape::new(scene, &canonical);
     let (mut entries, mut draped) = (Vec::new(), Vec::new());
-    for ((entrant, times_ms), outcome) in ENTRANTS.into_iter().zip(times).zip(last) {
-        let mut entry = Entry { entrant: entrant.name().to_owned(), ..Entry::default() };
+    for ((entrant, times_ms), outcome) in METHODS.into_iter().zip(times).zip(last) {
+        let mut entry = MethodResult { method: entrant.name().to_owned(), ..MethodResult::default() };
         match outcome {
             Some(Ok(outcome)) => {
                 let x = outcome.positions;
@@ -235,8 +237,8 @@ pub fn row(
     }
     let vertices = scene.garment.vertex_count();
     let measured = tape.measure(scene, &canonical);
-    let row = ContestRow { garment: garment.to_owned(), asked, vertices, spread_mm, canonical: measured, entries };
-    Ok(Contested { row, draped, canonical })
+    let row = Table4Row { garment: garment.to_owned(), asked, vertices, spread_mm, canonical: measured, entries };
+    Ok(DrapedRow { row, draped, canonical })
 }
 
 /// Median and interquartile range.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 
-use super::Entrant;
+use super::ComparedMethod;
 use crate::drape::{Model, Refine, Settings, StageTimes, drape};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
@@ -25,7 +25,7 @@ pub(super) struct Outcome {
 
 /// Drapes once; the error says why not.
 pub(super) fn run(
-    entrant: Entrant,
+    entrant: ComparedMethod,
     scene: &Scene,
     fabric: &Fabric,
     cloth: &Cloth,
@@ -33,12 +33,12 @@ pub(super) fn run(
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
     let (model, refine) = match entrant {
-        Entrant::Method(name) => {
+        ComparedMethod::Reference(name) => {
             return in_time(name, &Dressing { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
         }
-        Entrant::Paper => ("paper", Refine::Steps(0)),
-        Entrant::Preview => ("coupled", Refine::Steps(0)),
-        Entrant::Converged => ("coupled", Refine::Converged),
+        ComparedMethod::Paper => ("paper", Refine::Steps(0)),
+        ComparedMethod::Preview => ("coupled", Refine::Steps(0)),
+        ComparedMethod::Converged => ("coupled", Refine::Converged),
     };
     let model = Model::by_name(model).unwrap_or_default();
     let settings = Settings { model, refine, fabric: fabric.clone(), ..Settings::default() };
@@ -47,9 +47,9 @@ pub(super) fn run(
     let state = made.state.as_ref();
     let ended = match (entrant, state.map(|s| s.stop)) {
         (_, Some(Stop::Interrupted)) => "interrupted",
-        (Entrant::Converged, Some(Stop::Converged)) => "converged",
-        (Entrant::Converged, Some(Stop::Stalled)) => "stalled",
-        (Entrant::Converged, _) => "steps-done",
+        (ComparedMethod::Converged, Some(Stop::Converged)) => "converged",
+        (ComparedMethod::Converged, Some(Stop::Stalled)) => "stalled",
+        (ComparedMethod::Converged, _) => "steps-done",
         _ => "two-stages",
     };
     Ok(Outcome {

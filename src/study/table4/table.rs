@@ -1,6 +1,6 @@
 //! A contest as text: times beside the paper's, errors, and how costs grow; and as CSV.
 
-use super::{ContestRow, ENTRANTS, Entry, Silhouette, printed_ms};
+use super::{METHODS, MethodResult, Silhouette, Table4Row, printed_ms};
 
 /// Text of a table: header and rows of cells.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -15,29 +15,31 @@ pub struct Cells {
 
 /// Times and ratios, errors, and state of every row.
 #[must_use]
-pub fn tables(rows: &[ContestRow]) -> Vec<Cells> {
-    let cell = |row: &ContestRow, name: &str, text: &dyn Fn(&Entry) -> String| {
-        let entry = row.entries.iter().find(|e| e.entrant == name);
+pub fn tables(rows: &[Table4Row]) -> Vec<Cells> {
+    let cell = |row: &Table4Row, name: &str, text: &dyn Fn(&MethodResult) -> String| {
+        let entry = row.entries.iter().find(|e| e.method == name);
         entry.map_or("–".to_owned(), |e| if e.error.is_some() { "–".to_owned() } else { text(e) })
     };
-    let names: Vec<&str> = ENTRANTS.iter().map(|e| e.name()).collect();
-    let table =
-        |title: &str, last: &[&str], text: &dyn Fn(&Entry) -> String, end: &dyn Fn(&ContestRow) -> Vec<String>| Cells {
-            title: title.to_owned(),
-            header: ["garment", "vertices"].iter().chain(&names).chain(last).map(|&s| s.to_owned()).collect(),
-            rows: rows
-                .iter()
-                .map(|row| {
-                    let own = names.iter().map(|name| cell(row, name, text));
-                    [row.garment.clone(), row.vertices.to_string()].into_iter().chain(own).chain(end(row)).collect()
-                })
-                .collect(),
-        };
-    let printed = |row: &ContestRow| match printed_ms(&row.garment, row.asked) {
+    let names: Vec<&str> = METHODS.iter().map(|e| e.name()).collect();
+    let table = |title: &str,
+                 last: &[&str],
+                 text: &dyn Fn(&MethodResult) -> String,
+                 end: &dyn Fn(&Table4Row) -> Vec<String>| Cells {
+        title: title.to_owned(),
+        header: ["garment", "vertices"].iter().chain(&names).chain(last).map(|&s| s.to_owned()).collect(),
+        rows: rows
+            .iter()
+            .map(|row| {
+                let own = names.iter().map(|name| cell(row, name, text));
+                [row.garment.clone(), row.vertices.to_string()].into_iter().chain(own).chain(end(row)).collect()
+            })
+            .collect(),
+    };
+    let printed = |row: &Table4Row| match printed_ms(&row.garment, row.asked) {
         Some(ms) => ms.iter().map(|ms| format!("{ms:.0}")).collect(),
         None => vec!["–".to_owned(); 4],
     };
-    let nothing = |_: &ContestRow| Vec::new();
+    let nothing = |_: &Table4Row| Vec::new();
     vec![
         table(
             "time to drape, ms: median ± interquartile range; on the right what the paper printed (Core i5 650, 2010)",
@@ -99,27 +101,27 @@ fn short(x: f64) -> String {
 /// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in
 /// logarithms.
 #[must_use]
-pub fn exponents(rows: &[ContestRow]) -> Option<Cells> {
+pub fn exponents(rows: &[Table4Row]) -> Option<Cells> {
     let mut garments: Vec<&str> = rows.iter().map(|r| r.garment.as_str()).collect();
     garments.sort_unstable();
     garments.dedup();
     let mut found = Vec::new();
     for garment in garments {
-        let of: Vec<&ContestRow> = rows.iter().filter(|r| r.garment == garment).collect();
+        let of: Vec<&Table4Row> = rows.iter().filter(|r| r.garment == garment).collect();
         if of.len() < 3 {
             continue;
         }
         let mut cells = vec![garment.to_owned(), of.len().to_string()];
-        cells.extend(ENTRANTS.iter().map(|entrant| {
+        cells.extend(METHODS.iter().map(|entrant| {
             let points = of.iter().filter_map(|row| {
-                let entry = row.entries.iter().find(|e| e.entrant == entrant.name() && e.error.is_none())?;
+                let entry = row.entries.iter().find(|e| e.method == entrant.name() && e.error.is_none())?;
                 Some(((row.vertices as f64).ln(), entry.median_ms.ln()))
             });
             slope(&points.collect::<Vec<_>>()).map_or("–".to_owned(), |[p, error]| format!("{p:.2} ± {error:.2}"))
         }));
         found.push(cells);
     }
-    let header = ["garment", "sizes"].into_iter().chain(ENTRANTS.iter().map(|e| e.name())).map(str::to_owned).collect();
+    let header = ["garment", "sizes"].into_iter().chain(METHODS.iter().map(|e| e.name())).map(str::to_owned).collect();
     let title = "exponent p of time ~ verticesᵖ, least squares in logarithms ± standard error".to_owned();
     (!found.is_empty()).then_some(Cells { title, header, rows: found })
 }
@@ -134,7 +136,7 @@ fn slope(points: &[(f64, f64)]) -> Option<[f64; 2]> {
 }
 
 /// What an entrant did in a row, column by column: of who failed only who it was and why.
-fn columns(row: &ContestRow, e: &Entry) -> [(&'static str, String); 25] {
+fn columns(row: &Table4Row, e: &MethodResult) -> [(&'static str, String); 25] {
     let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
     let number = |x: f64| if e.error.is_some() { String::new() } else { x.to_string() };
     let [near_hem, half_way, near_top] = e.silhouette.girths_cm.map(optional);
@@ -142,7 +144,7 @@ fn columns(row: &ContestRow, e: &Entry) -> [(&'static str, String); 25] {
     [
         ("garment", row.garment.clone()),
         ("vertices", row.vertices.to_string()),
-        ("entrant", e.entrant.clone()),
+        ("entrant", e.method.clone()),
         ("median_ms", number(e.median_ms)),
         ("spread_ms", number(e.spread_ms)),
         ("ratio_to_converged", number(e.ratio)),
@@ -172,9 +174,9 @@ fn columns(row: &ContestRow, e: &Entry) -> [(&'static str, String); 25] {
 ///
 /// # Errors
 /// Those of the CSV writer, which writes to memory.
-pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
+pub fn csv_lines(rows: &[Table4Row]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns(&ContestRow::default(), &Entry::default()).map(|(name, _)| name))?;
+    writer.write_record(columns(&Table4Row::default(), &MethodResult::default()).map(|(name, _)| name))?;
     for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {
         writer.write_record(columns(row, entry).map(|(_, cell)| cell))?;
     }
@@ -186,14 +188,14 @@ pub fn csv_lines(rows: &[ContestRow]) -> Result<String, csv::Error> {
 mod tests {
     use super::*;
 
-    fn row(vertices: usize) -> ContestRow {
-        let entries = ENTRANTS.iter().enumerate().map(|(i, e)| Entry {
-            entrant: e.name().to_owned(),
+    fn row(vertices: usize) -> Table4Row {
+        let entries = METHODS.iter().enumerate().map(|(i, e)| MethodResult {
+            method: e.name().to_owned(),
             median_ms: (vertices as f64).powf(1.0 + 0.25 * i as f64),
             error: (i == 1).then(|| "cannot, as it is".to_owned()),
-            ..Entry::default()
+            ..MethodResult::default()
         });
-        ContestRow {
+        Table4Row {
             garment: "flared-skirt".to_owned(),
             asked: vertices,
             vertices,
@@ -222,7 +224,7 @@ mod tests {
         assert_eq!(hem.rows[0].last().unwrap(), "61.2; 190.0, 120.0, –");
         assert_eq!(tables(&rows)[0].rows[0][8..], ["824", "929", "979", "686"]);
         let csv = csv_lines(&rows).unwrap();
-        assert_eq!(csv.lines().count(), 1 + 2 * ENTRANTS.len());
+        assert_eq!(csv.lines().count(), 1 + 2 * METHODS.len());
         assert!(csv.contains("\"cannot, as it is\"") || csv.contains("cannot"), "{csv}");
     }
 }

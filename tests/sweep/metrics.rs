@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use partwise::drape::StageTimes;
-use partwise::study::metrics::Figures;
+use partwise::study::metrics::Metrics;
 use partwise::study::sweep::{Row, Status, Timing, columns};
 use proptest::prelude::*;
 
@@ -37,7 +37,7 @@ fn csv_and_json_lines_have_the_same_columns_and_cells() {
 
 #[test]
 fn only_timings_are_dropped_for_comparison() {
-    let measures = Figures { rms_mm: Some(3.0), ..Figures::default() };
+    let measures = Metrics { rms_mm: Some(3.0), ..Metrics::default() };
     let pass = |ms| StageTimes { total: std::time::Duration::from_millis(ms), ..StageTimes::default() };
     let of = |passes: &[u64]| Timing::of(&passes.iter().map(|&ms| pass(ms)).collect::<Vec<_>>());
     let (quick, slow) = (
@@ -51,7 +51,7 @@ fn only_timings_are_dropped_for_comparison() {
     assert!(columns().iter().any(|name| name.starts_with("time_")));
     assert!(object.as_object().unwrap().keys().all(|name| !name.starts_with("time_")));
     let other = Row {
-        figures: Some(Figures { rms_mm: Some(3.5), ..Figures::default() }),
+        metrics: Some(Metrics { rms_mm: Some(3.5), ..Metrics::default() }),
         result_hash: "cd".to_owned(),
         ..slow
     };
@@ -65,9 +65,9 @@ proptest! {
     #[test]
     fn figures_survive_reading(value in any::<f64>().prop_filter("finite", |v| v.is_finite()), small in -1e3..1e3_f64) {
         let (value, point) = (value.clamp(-1e25, 1e25), &plan().points[0]);
-        let measures = Figures { displacement_rms_mm: small, rms_mm: Some(value), strain_p95: Some(small * 1e-12), ..Figures::default() };
+        let measures = Metrics { displacement_rms_mm: small, rms_mm: Some(value), strain_p95: Some(small * 1e-12), ..Metrics::default() };
         let row = Row::solved(point, &measures, "", &Timing::default());
-        prop_assert!((row.figures.as_ref().unwrap().displacement_rms_mm - small).abs() <= 5e-9 * small.abs() + 1e-12);
+        prop_assert!((row.metrics.as_ref().unwrap().displacement_rms_mm - small).abs() <= 5e-9 * small.abs() + 1e-12);
         let read: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();
         prop_assert_eq!(read, row);
     }

@@ -5,9 +5,9 @@ use crate::methods::{gross2003, thomaszewski2006, zhu2016};
 
 /// A way to drape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Entrant {
+pub enum ComparedMethod {
     /// A reference method, by its name.
-    Method(&'static str),
+    Reference(&'static str),
     /// The paper's equations.
     Paper,
     /// The coupled model's two stages alone.
@@ -16,12 +16,12 @@ pub enum Entrant {
     Converged,
 }
 
-impl Entrant {
+impl ComparedMethod {
     /// Its name in tables and files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Method(name) => name,
+            Self::Reference(name) => name,
             Self::Paper => "paper",
             Self::Preview => "preview",
             Self::Converged => "converged",
@@ -31,10 +31,10 @@ impl Entrant {
     #[must_use]
     pub(crate) fn title(self) -> &'static str {
         match self {
-            Self::Method(zhu2016::NAME) => "[19] Zhu 2016",
-            Self::Method(gross2003::NAME) => "[20] Groß 2003",
-            Self::Method(thomaszewski2006::NAME) => "[21] Thomaszewski 2006",
-            Self::Method(name) => name,
+            Self::Reference(zhu2016::NAME) => "[19] Zhu 2016",
+            Self::Reference(gross2003::NAME) => "[20] Groß 2003",
+            Self::Reference(thomaszewski2006::NAME) => "[21] Thomaszewski 2006",
+            Self::Reference(name) => name,
             Self::Paper => "The paper's equations",
             Self::Preview => "Our two stages",
             Self::Converged => "Our converged drape",
@@ -43,13 +43,13 @@ impl Entrant {
 }
 
 /// In the order of the columns.
-pub const ENTRANTS: [Entrant; 6] = [
-    Entrant::Method(zhu2016::NAME),
-    Entrant::Method(gross2003::NAME),
-    Entrant::Method(thomaszewski2006::NAME),
-    Entrant::Paper,
-    Entrant::Preview,
-    Entrant::Converged,
+pub const METHODS: [ComparedMethod; 6] = [
+    ComparedMethod::Reference(zhu2016::NAME),
+    ComparedMethod::Reference(gross2003::NAME),
+    ComparedMethod::Reference(thomaszewski2006::NAME),
+    ComparedMethod::Paper,
+    ComparedMethod::Preview,
+    ComparedMethod::Converged,
 ];
 
 /// The ten rows of Table 4: garment and vertices.

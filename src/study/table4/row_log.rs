@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ContestOptions, ContestRow, ENTRANTS};
+use super::{METHODS, Table4Options, Table4Row};
 use crate::base::atomic_file::WholeFile;
 use crate::base::files::{Unreadable, read_own};
 
@@ -28,14 +28,14 @@ pub struct Conditions {
     /// What the machine calls itself.
     pub machine: String,
     /// Who takes part.
-    #[serde(default)]
-    pub entrants: Vec<String>,
+    #[serde(default, rename = "entrants")]
+    pub methods: Vec<String>,
 }
 
 impl Conditions {
     /// Those of a run on this machine.
     #[must_use]
-    pub(crate) fn here(fabric: &str, options: &ContestOptions) -> Self {
+    pub(crate) fn here(fabric: &str, options: &Table4Options) -> Self {
         // Only Linux tells without asking a library; elsewhere the architecture must do.
         let told = read_own(Path::new("/proc/cpuinfo")).unwrap_or_default();
         let told = String::from_utf8_lossy(&told);
@@ -50,7 +50,7 @@ impl Conditions {
             rest: [options.rule.speed_m_per_s, options.rule.over_s],
             threads: rayon::current_num_threads(),
             machine,
-            entrants: ENTRANTS.map(|e| e.name().to_owned()).to_vec(),
+            methods: METHODS.map(|e| e.name().to_owned()).to_vec(),
         }
     }
 
@@ -66,22 +66,22 @@ impl Conditions {
 
 /// Rows and what they have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Journal {
+pub struct RowLog {
     /// What they have in common.
     pub conditions: Conditions,
     /// The rows so far.
-    pub rows: Vec<ContestRow>,
+    pub rows: Vec<Table4Row>,
 }
 
-/// Why a journal cannot be gone on with.
+/// Why a log cannot be gone on with.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
-pub enum JournalError {
+pub enum RowLogError {
     /// It cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// It is no journal.
-    #[error("{file}: this is no journal of a contest ({reason}); choose another file with --rows-file")]
+    /// It is no log.
+    #[error("{file}: this is no log of a contest ({reason}); choose another file with --rows-file")]
     Syntax { file: String, reason: String },
     /// Its rows were made under other conditions.
     #[error(
@@ -90,25 +90,25 @@ pub enum JournalError {
     Other { file: String, found: String, expected: String },
 }
 
-impl Journal {
-    /// The journal in a file, or an empty one where there is none.
+impl RowLog {
+    /// The log in a file, or an empty one where there is none.
     ///
     /// # Errors
-    /// [`JournalError`] where the file is none, or of other conditions.
-    pub(crate) fn open(path: &Path, conditions: Conditions) -> Result<Self, JournalError> {
+    /// [`RowLogError`] where the file is none, or of other conditions.
+    pub(crate) fn open(path: &Path, conditions: Conditions) -> Result<Self, RowLogError> {
         if !path.exists() {
             return Ok(Self { conditions, rows: Vec::new() });
         }
         let file = path.display().to_string();
         let bytes = read_own(path).map_err(|e| Unreadable::new(path, &e))?;
-        let journal: Self = serde_json::from_slice(&bytes)
-            .map_err(|e| JournalError::Syntax { file: file.clone(), reason: e.to_string() })?;
-        if journal.conditions != conditions {
-            let [found, expected] = [&journal.conditions, &conditions]
-                .map(|c| format!("version {}, {}; {}", c.version, c.said(), c.entrants.join(", ")));
-            return Err(JournalError::Other { file, found, expected });
+        let log: Self = serde_json::from_slice(&bytes)
+            .map_err(|e| RowLogError::Syntax { file: file.clone(), reason: e.to_string() })?;
+        if log.conditions != conditions {
+            let [found, expected] = [&log.conditions, &conditions]
+                .map(|c| format!("version {}, {}; {}", c.version, c.said(), c.methods.join(", ")));
+            return Err(RowLogError::Other { file, found, expected });
         }
-        Ok(journal)
+        Ok(log)
     }
 
     /// Whether a row is there.
@@ -134,18 +134,18 @@ mod tests {
     fn a_journal_goes_on_under_its_own_conditions_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rows.json");
-        let here = Conditions::here("interlock", &ContestOptions::default());
-        let mut journal = Journal::open(&path, here.clone()).unwrap();
-        assert!(journal.rows.is_empty());
-        let row = ContestRow { garment: "flared-skirt".to_owned(), asked: 900, vertices: 901, ..ContestRow::default() };
-        journal.rows.push(row);
-        journal.write(&path).unwrap();
-        let again = Journal::open(&path, here.clone()).unwrap();
-        assert_eq!(again, journal);
+        let here = Conditions::here("interlock", &Table4Options::default());
+        let mut log = RowLog::open(&path, here.clone()).unwrap();
+        assert!(log.rows.is_empty());
+        let row = Table4Row { garment: "flared-skirt".to_owned(), asked: 900, vertices: 901, ..Table4Row::default() };
+        log.rows.push(row);
+        log.write(&path).unwrap();
+        let again = RowLog::open(&path, here.clone()).unwrap();
+        assert_eq!(again, log);
         assert!(again.has("flared-skirt", 900) && !again.has("flared-skirt", 901));
         let other = Conditions { threads: 99, ..here.clone() };
-        assert!(matches!(Journal::open(&path, other), Err(JournalError::Other { .. })));
+        assert!(matches!(RowLog::open(&path, other), Err(RowLogError::Other { .. })));
         std::fs::write(&path, "{}").unwrap();
-        assert!(Journal::open(&path, here).unwrap_err().to_string().contains("rows.json"));
+        assert!(RowLog::open(&path, here).unwrap_err().to_string().contains("rows.json"));
     }
 }

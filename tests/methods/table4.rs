@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use partwise::SceneSpec;
 use partwise::garment::fabric::Fabric;
-use partwise::study::table4::{ContestError, ContestOptions, Contested, ENTRANTS, row};
+use partwise::study::table4::{DrapedRow, METHODS, Table4Error, Table4Options, row};
 
-const SMALL: ContestOptions = ContestOptions {
+const SMALL: Table4Options = Table4Options {
     rounds: 2,
     warm_up: 0,
     starts: 1,
@@ -21,17 +21,17 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
         told.push((round, what.to_owned()));
         ControlFlow::Continue(())
     });
-    let Contested { row: made, draped, canonical } = made.unwrap();
+    let DrapedRow { row: made, draped, canonical } = made.unwrap();
     let vertices = scene.garment.vertex_count();
-    assert!(canonical.len() == vertices && draped.len() == ENTRANTS.len());
+    assert!(canonical.len() == vertices && draped.len() == METHODS.len());
     for (entry, x) in made.entries.iter().zip(&draped) {
         let apart = partwise::study::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
-        assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.entrant);
+        assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.method);
     }
     assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
-    let names: Vec<&str> = made.entries.iter().map(|e| e.entrant.as_str()).collect();
-    assert_eq!(names, ENTRANTS.map(partwise::study::table4::Entrant::name));
+    let names: Vec<&str> = made.entries.iter().map(|e| e.method.as_str()).collect();
+    assert_eq!(names, METHODS.map(partwise::study::table4::ComparedMethod::name));
     for entry in &made.entries {
         assert_eq!(entry.error, None);
         assert_eq!(entry.times_ms.len(), 2);
@@ -47,7 +47,7 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
     assert!(paper.canonical_rms_mm > converged.canonical_rms_mm);
     // Interleaved: each round has all of them before the next begins.
     let first_of_second = told.iter().position(|(round, _)| *round == 1).unwrap();
-    assert!(ENTRANTS.iter().all(|e| told[..first_of_second].iter().any(|(_, what)| what == e.name())));
+    assert!(METHODS.iter().all(|e| told[..first_of_second].iter().any(|(_, what)| what == e.name())));
 }
 
 #[test]
@@ -56,9 +56,9 @@ fn who_cannot_run_says_why_and_the_others_go_on() {
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
     scene.body = partwise::body::distance::Body::new_open(&open).unwrap();
-    let options = ContestOptions { rounds: 1, starts: 0, ..SMALL };
+    let options = Table4Options { rounds: 1, starts: 0, ..SMALL };
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &options, &mut |_, _, _| ControlFlow::Continue(()));
-    let Contested { row: made, draped, .. } = made.unwrap();
+    let DrapedRow { row: made, draped, .. } = made.unwrap();
     assert_eq!(draped.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, true, true, true, true]);
     let error = made.entries[0].error.as_deref().unwrap();
     assert!(error.contains("zhu2016 cannot run here") && error.contains("not closed"), "{error}");
@@ -76,5 +76,5 @@ fn an_interrupted_row_is_none() {
         asked += 1;
         if asked > 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    assert!(matches!(made, Err(ContestError::Interrupted)));
+    assert!(matches!(made, Err(Table4Error::Interrupted)));
 }
