@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::SceneSpec;
-use crate::garment::pattern::SewingPattern;
+use crate::garment::pattern::{self, SewingPattern};
 use clap::Args;
 use serde::Serialize;
 
@@ -68,8 +68,8 @@ impl PatternArgs {
         if let Some(path) = &self.svg {
             check(path, "--svg")?;
         }
-        let pattern = SewingPattern::read(&self.file)?;
-        let sewn = pattern.sew(0.01 * self.edge_length)?;
+        let pattern = pattern::read(&self.file)?;
+        let sewn = pattern::sew(&pattern, 0.01 * self.edge_length)?;
         let panels = pattern.panels.iter().zip(&sewn.panels).map(|(panel, sewn)| PanelRow {
             name: panel.name.clone(),
             label: panel.label.clone(),
@@ -94,7 +94,7 @@ impl PatternArgs {
             notes: pattern.notes.iter().chain(&sewn.notes).cloned().collect(),
         };
         if let Some(path) = &self.svg {
-            write(path, pattern.to_svg(), "--svg")?;
+            write(path, pattern::to_svg(&pattern), "--svg")?;
         }
         if self.format == Format::Json {
             console::result(&crate::base::error_text::json(&report)?);

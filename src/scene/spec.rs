@@ -12,7 +12,7 @@ use crate::base::files::{has_ending, names_a_file, read_text, stem};
 use crate::body::BodySpec;
 use crate::body::distance::{Body, DistanceError};
 use crate::garment::fabric::Fabric;
-use crate::garment::pattern::{DEFAULT_EDGE_M, SewingPattern, SewnGarment};
+use crate::garment::pattern::{self, DEFAULT_EDGE_M, SewnGarment};
 use crate::garment::sewing::{draw_shut, put_on};
 use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
 use crate::mesh::flat_pattern::FlatPattern;
@@ -387,7 +387,7 @@ impl SceneSpec {
 
     /// A sewing pattern, sewn and put on the body.
     fn tailor(&self, body: &Body) -> Result<Unplaced, SceneError> {
-        let pattern = SewingPattern::read(self.garment.as_ref())?;
+        let pattern = pattern::read(self.garment.as_ref())?;
         let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());

@@ -7,7 +7,7 @@ use partwise::base::error_text::said;
 use partwise::body::BodySpec;
 use partwise::drape::Refine;
 use partwise::garment::fabric::{self, Fabric};
-use partwise::garment::pattern::SewingPattern;
+use partwise::garment::pattern;
 use partwise::garment::{BUILT_IN, GarmentSpec};
 use partwise::parts::range_table::RangeTable;
 use partwise::scene::PanelFabrics;
@@ -226,9 +226,9 @@ fn jobs() {
 #[test]
 fn patterns() {
     // Every one that is taken is sewn, too: some milliseconds each.
-    fuzz("pattern", 0.1, with_ending("patterns", "json"), |text| match SewingPattern::parse(text, "input") {
+    fuzz("pattern", 0.1, with_ending("patterns", "json"), |text| match pattern::parse(text, "input") {
         Err(e) => refused(&e),
-        Ok(pattern) => match pattern.sew(0.04) {
+        Ok(pattern) => match pattern::sew(&pattern, 0.04) {
             Err(e) => refused(&e),
             Ok(sewn) => {
                 check(sewn.mesh.positions.iter().all(|p| p.is_finite()), "a position is no number")?;
@@ -236,7 +236,7 @@ fn patterns() {
                 check(sewn.rest.corners.len() == sewn.mesh.triangles.len(), "rest and mesh differ")?;
                 let known = |v: &u32| (*v as usize) < sewn.mesh.vertex_count();
                 check(sewn.mesh.triangles.as_flattened().iter().all(known), "a triangle has no vertex")?;
-                check(pattern.to_svg().ends_with("</svg>\n"), "its drawing has no end")?;
+                check(pattern::to_svg(&pattern).ends_with("</svg>\n"), "its drawing has no end")?;
                 Ok(Said::Taken)
             }
         },

@@ -1,6 +1,6 @@
 //! Patterns that cannot be used, and what is said of them.
 
-use partwise::garment::pattern::SewingPattern;
+use partwise::garment::pattern::sew;
 use serde_json::{Value, json};
 
 use crate::{pattern, stitch, straight};
@@ -8,7 +8,7 @@ use crate::{pattern, stitch, straight};
 const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]];
 
 fn said(text: &str) -> String {
-    SewingPattern::parse(text, "test").unwrap_err().to_string()
+    partwise::garment::pattern::parse(text, "test").unwrap_err().to_string()
 }
 
 fn with(edit: impl Fn(&mut Value)) -> String {
@@ -89,7 +89,7 @@ fn what_is_no_pattern_is_refused() {
 #[test]
 fn a_key_given_twice_is_refused_by_its_name() {
     let text = pattern(&json!({ "front": straight(&SQUARE, 20.0), "sleeve": straight(&SQUARE, -20.0) }), &json!([]));
-    assert!(SewingPattern::parse(&text, "test").is_ok());
+    assert!(partwise::garment::pattern::parse(&text, "test").is_ok());
     names(&said(&text.replace("\"sleeve\"", "\"front\"")), &["\"front\" twice", "line 1", "rename"]);
     names(&said(&text.replacen("\"rotation\"", "\"translation\"", 1)), &["\"translation\" twice"]);
     names(&said(&text.replacen("\"endpoints\":", "\"endpoints\":[0,1],\"endpoints\":", 1)), &["\"endpoints\" twice"]);
@@ -100,17 +100,20 @@ fn a_key_given_twice_is_refused_by_its_name() {
 fn what_is_not_understood_is_said() {
     let mut panel = straight(&SQUARE, 20.0);
     panel["grain"] = json!(45);
-    let read = SewingPattern::parse(&pattern(&json!({ "a": panel }), &json!([])), "test").unwrap();
+    let read = partwise::garment::pattern::parse(&pattern(&json!({ "a": panel }), &json!([])), "test").unwrap();
     names(&read.notes.join("\n"), &["panel a", "grain"]);
 }
 
 #[test]
 fn edge_lengths_have_bounds() {
-    let read = SewingPattern::parse(&pattern(&json!({ "a": straight(&SQUARE, 20.0) }), &json!([])), "test").unwrap();
+    let read =
+        partwise::garment::pattern::parse(&pattern(&json!({ "a": straight(&SQUARE, 20.0) }), &json!([])), "test")
+            .unwrap();
     for wrong in [0.0, -1.0, f64::NAN, 1e-9, 3.0, f64::INFINITY] {
-        names(&read.sew(wrong).unwrap_err().to_string(), &["edge length", "0.2 to 20 cm"]);
+        names(&sew(&read, wrong).unwrap_err().to_string(), &["edge length", "0.2 to 20 cm"]);
     }
     let large: Vec<[f64; 2]> = SQUARE.iter().map(|v| v.map(|x| 50.0 * x)).collect();
-    let read = SewingPattern::parse(&pattern(&json!({ "a": straight(&large, 20.0) }), &json!([])), "test").unwrap();
-    names(&read.sew(0.002).unwrap_err().to_string(), &["250000", "longer"]);
+    let read = partwise::garment::pattern::parse(&pattern(&json!({ "a": straight(&large, 20.0) }), &json!([])), "test")
+        .unwrap();
+    names(&sew(&read, 0.002).unwrap_err().to_string(), &["250000", "longer"]);
 }

@@ -1,6 +1,7 @@
 //! Every kind of edge, as meshed, against the formula of the format.
 
 use glam::DVec2;
+use partwise::garment::pattern::sew;
 use serde_json::json;
 
 use crate::{parse, pattern};
@@ -27,7 +28,7 @@ fn meshed_edges_lie_on_their_curves_at_equal_lengths() {
         { "endpoints": [2, 3], "curvature": { "type": "circle", "params": [30.0, 0, 1] } },
         { "endpoints": [3, 0] },
     ] });
-    let sewn = parse(&pattern(&json!({ "one": panel }), &json!([]))).sew(0.01).unwrap();
+    let sewn = sew(&parse(&pattern(&json!({ "one": panel }), &json!([]))), 0.01).unwrap();
     let panel = &sewn.panels[0];
     let flat = |edge: usize| -> Vec<DVec2> {
         let places = panel.along(edge);

@@ -34,5 +34,5 @@ fn stitch(a: (&str, usize), b: (&str, usize)) -> Value {
 }
 
 fn parse(text: &str) -> SewingPattern {
-    SewingPattern::parse(text, "test").unwrap()
+    partwise::garment::pattern::parse(text, "test").unwrap()
 }

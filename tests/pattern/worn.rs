@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use partwise::body::{BodySpec, dress_form};
-use partwise::garment::pattern::SewingPattern;
+use partwise::garment::pattern::{SewingPattern, read, sew, to_svg};
 use partwise::garment::sewing::Landmarks;
 use partwise::mesh::import::{Beside, ImportOptions, import_garment};
 use partwise::mesh::self_intersection::self_intersecting_pairs;
@@ -13,6 +13,10 @@ use partwise::{DVec3, SceneSpec};
 
 fn asset(name: &str) -> String {
     format!("{}/assets/patterns/{name}.json", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn tshirt() -> SewingPattern {
+    read(Path::new(&asset("tshirt"))).unwrap()
 }
 
 #[test]
@@ -77,16 +81,16 @@ fn an_exported_garment_keeps_its_panels_and_its_flat_pattern() {
     for (a, b) in rest.areas().iter().zip(loaded.scene.rest.areas()) {
         assert!((a - b).abs() < 1e-12);
     }
-    let pattern = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap();
+    let pattern = tshirt();
     assert_eq!(pattern.stitches.len(), 8);
-    assert!(pattern.to_svg().matches("<path").count() >= 2 + 2 + 16);
+    assert!(to_svg(&pattern).matches("<path").count() >= 2 + 2 + 16);
 }
 
 #[test]
 fn a_pattern_in_texture_coordinates_is_known_as_such() {
     // As GarmentCode's own meshes come: panels held about the body, seams bridged by long triangles, coordinates in cm.
-    let pattern = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap();
-    let sewn = pattern.sew(0.02).unwrap();
+    let pattern = tshirt();
+    let sewn = sew(&pattern, 0.02).unwrap();
     let texture: Vec<_> = sewn.laid_out(&pattern).iter().map(|c| c.map(|p| 100.0 * p)).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("box.obj").display().to_string();
@@ -106,7 +110,7 @@ fn a_pattern_in_texture_coordinates_is_known_as_such() {
 
 #[test]
 fn without_its_pattern_a_mesh_with_open_seams_is_as_large_at_rest_as_what_it_was_cut_from() {
-    let sewn = SewingPattern::read(Path::new(&asset("tshirt"))).unwrap().sew(0.02).unwrap();
+    let sewn = sew(&tshirt(), 0.02).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("box.obj").display().to_string();
     partwise::mesh::export::write_mesh(Path::new(&path), &sewn.mesh).unwrap();

@@ -1,35 +1,37 @@
-//! What makes panels and stitches a pattern: edges with a length, loops that do not cross themselves, each edge sewn once, to one about
-//! as long.
+//! Checks of a pattern: edges have a length, loops do not cross themselves, and each edge is sewn at most once, to one of
+//! similar length.
 
 use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::{EdgeAt, PatternError, SewingPattern};
+use super::curve::Curve;
+use super::error::PatternError;
+use super::panels::{EdgeAt, SewingPattern};
 
-/// Edges are longer than this, m.
-const SHORTEST: f64 = 1e-4;
+/// Least length of an edge, m.
+const MIN_LENGTH: f64 = 1e-4;
 
-/// Gathering beyond this is said: ruffles are cut two to three times as long.
-const MUCH: f64 = 3.0;
-/// Beyond this it is refused.
-const MOST: f64 = 10.0;
+/// Ratio of a stitch's lengths from which a note is made: ruffles are cut two to three times as long.
+const NOTED_RATIO: f64 = 3.0;
+/// Largest accepted ratio. A heuristic.
+const MAX_RATIO: f64 = 10.0;
 
-/// Chords of a curve when it is looked at for crossings.
+/// Chords by which a curve is tested for crossings.
 const CHORDS: usize = 16;
 
-pub(super) fn pattern(pattern: &mut SewingPattern) -> Result<(), PatternError> {
+pub(super) fn check(pattern: &mut SewingPattern) -> Result<(), PatternError> {
     for panel in &pattern.panels {
         for (edge, e) in panel.edges.iter().enumerate() {
             let length = e.curve.length();
-            // NaN is no length either.
-            if !(length >= SHORTEST && length.is_finite()) {
+            // The negation also rejects NaN.
+            if !(length >= MIN_LENGTH && length.is_finite()) {
                 return Err(PatternError::Short { panel: panel.name.clone(), edge, length_cm: 100.0 * length });
             }
         }
         let chords: Vec<Chord> = (panel.edges.iter().enumerate())
             .flat_map(|(edge, e)| {
-                let count = if let super::Curve::Line { .. } = e.curve { 1 } else { CHORDS };
+                let count = if let Curve::Line { .. } = e.curve { 1 } else { CHORDS };
                 let points = e.curve.divided(count);
                 (0..count).map(|i| Chord { edge, from: points[i], to: points[i + 1] }).collect::<Vec<_>>()
             })
@@ -48,7 +50,7 @@ struct Chord {
     to: DVec2,
 }
 
-/// The first two chords that meet where they should not, and where.
+/// The first two chords that cross or overlap, and the point.
 fn crossing(chords: &[Chord]) -> Option<(usize, usize, DVec2)> {
     let n = chords.len();
     for i in 0..n {
@@ -64,7 +66,7 @@ fn crossing(chords: &[Chord]) -> Option<(usize, usize, DVec2)> {
     None
 }
 
-/// Where two segments meet.
+/// The point where two segments meet.
 fn meeting(a: &Chord, b: &Chord) -> Option<DVec2> {
     let (low, high) = (a.from.min(a.to), a.from.max(a.to));
     if b.from.min(b.to).cmpgt(high).any() || b.from.max(b.to).cmplt(low).any() {
@@ -77,11 +79,11 @@ fn meeting(a: &Chord, b: &Chord) -> Option<DVec2> {
     if apart(s, t) || apart(u, v) {
         return None;
     }
-    // Along one line the boxes say whether they meet.
+    // Of collinear segments the boxes decide whether they meet.
     Some(if s == t { b.from } else { b.from.lerp(b.to, s / (s - t)) })
 }
 
-/// Where one edge runs straight back over the one before.
+/// The start of an edge that runs straight back over the one before.
 fn folded(a: &Chord, b: &Chord, in_order: bool) -> Option<DVec2> {
     let (a, b) = if in_order { (a, b) } else { (b, a) };
     let (back, on) = (a.from - a.to, b.to - b.from);
@@ -102,10 +104,10 @@ fn stitches(pattern: &mut SewingPattern) -> Result<(), PatternError> {
         let ([a_m, b_m], ratio) = (pattern.lengths(stitch), pattern.gathering(stitch));
         let [a, b] = stitch.sides.map(|side| pattern.edge_name(side));
         let (a_cm, b_cm) = (100.0 * a_m, 100.0 * b_m);
-        if ratio > MOST {
-            return Err(PatternError::Lengths { stitch: number, a, a_cm, b, b_cm, most: MOST });
+        if ratio > MAX_RATIO {
+            return Err(PatternError::Lengths { stitch: number, a, a_cm, b, b_cm, most: MAX_RATIO });
         }
-        if ratio > MUCH {
+        if ratio > NOTED_RATIO {
             notes.push(format!(
                 "stitch {number}: {a} ({a_cm:.1} cm) and {b} ({b_cm:.1} cm) differ by a factor of {ratio:.1}"
             ));

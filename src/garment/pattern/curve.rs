@@ -7,16 +7,16 @@
 //! | cubic | (1−t)³ a + 3 t (1−t)² c + 3 t² (1−t) d + t³ b |
 //! | arc | m + r (cos φ, sin φ), φ = φ₀ + t Δφ |
 //!
-//! Lengths of Béziers are Gauss sums (five points) over [`PIECES`] pieces each, good to 1e-12 of the length where a curve has no cusp; a
-//! point at a given length along them is found in its piece by bisection and secants, so it lies on the curve to rounding.
-//! All in metres.
+//! Lengths of Béziers are Gauss sums (five points) over [`PIECES`] pieces each, with a relative error of 1e-12 where a curve
+//! has no cusp. The point at a given length is found in its piece by bisection of the parameter, so it lies on the curve to
+//! rounding. All in metres.
 
 use glam::DVec2;
 
-/// Pieces of a Bézier, of five Gauss points each.
+/// Pieces of a Bézier, of five Gauss points each; more are more accurate near cusps.
 const PIECES: usize = 32;
 
-/// Abscissae and weights of Gauss and Legendre's rule of five points on [−1, 1].
+/// Abscissae and weights of the five-point Gauss-Legendre rule on [−1, 1].
 const GAUSS: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
     (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -35,17 +35,17 @@ pub enum Curve {
     Quadratic { a: DVec2, c: DVec2, b: DVec2 },
     /// A Bézier with two control points.
     Cubic { a: DVec2, c: DVec2, d: DVec2, b: DVec2 },
-    /// A part of a circle; `turn` (radians) is positive counter-clockwise.
+    /// An arc of a circle; `turn` (radians) is positive counter-clockwise.
     Arc { a: DVec2, b: DVec2, centre: DVec2, radius: f64, from: f64, turn: f64 },
 }
 
 impl Curve {
-    /// The arc from `a` to `b` of this radius, as in SVG but y up: the longer one if `large`, counter-clockwise (it bulges to the right
-    /// of a → b) if `right`. `None` where the radius does not reach.
+    /// The arc from `a` to `b` of this radius, as in SVG but with y up: the longer one if `large`, counter-clockwise (bulging to
+    /// the right of a → b) if `right`. `None` where the radius is shorter than half the distance.
     #[must_use]
     pub(crate) fn arc(a: DVec2, b: DVec2, radius: f64, large: bool, right: bool) -> Option<Self> {
         let half = 0.5 * (b - a);
-        // A half circle's radius is rounded in files.
+        // Files round the radius of a half circle.
         let short = half.length() - radius;
         if !(short <= 1e-4 * radius && radius > 0.0 && half.length() > 0.0) {
             return None;
@@ -64,7 +64,7 @@ impl Curve {
         Some(Self::Arc { a, b, centre, radius, from, turn })
     }
 
-    /// Where it begins.
+    /// Its first point.
     #[must_use]
     pub(crate) fn start(&self) -> DVec2 {
         match *self {
@@ -72,7 +72,7 @@ impl Curve {
         }
     }
 
-    /// Where it ends.
+    /// Its last point.
     #[must_use]
     pub(crate) fn end(&self) -> DVec2 {
         match *self {
@@ -112,7 +112,7 @@ impl Curve {
     }
 
     /// Length between two parameters in one piece.
-    fn stretch(&self, from: f64, to: f64) -> f64 {
+    fn piece_length(&self, from: f64, to: f64) -> f64 {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         half * GAUSS.iter().map(|(x, w)| w * self.velocity(middle + half * x).length()).sum::<f64>()
     }
@@ -123,11 +123,11 @@ impl Curve {
         match *self {
             Self::Line { a, b } => a.distance(b),
             Self::Arc { radius, turn, .. } => radius * turn.abs(),
-            _ => (0..PIECES).map(|i| self.stretch(parameter(i), parameter(i + 1))).sum(),
+            _ => (0..PIECES).map(|i| self.piece_length(parameter(i), parameter(i + 1))).sum(),
         }
     }
 
-    /// `count` + 1 points at equal lengths along it, both ends among them.
+    /// `count` + 1 points at equal arc lengths, both ends included.
     #[must_use]
     pub(crate) fn divided(&self, count: usize) -> Vec<DVec2> {
         let share = |i: usize| i as f64 / count as f64;
@@ -136,7 +136,7 @@ impl Curve {
         }
         let mut before = vec![0.0];
         for i in 0..PIECES {
-            before.push(before[i] + self.stretch(parameter(i), parameter(i + 1)));
+            before.push(before[i] + self.piece_length(parameter(i), parameter(i + 1)));
         }
         let whole = before[PIECES];
         (0..=count)
@@ -150,7 +150,7 @@ impl Curve {
                 let origin = low;
                 for _ in 0..60 {
                     let middle = 0.5 * (low + high);
-                    if before[piece] + self.stretch(origin, middle) < wanted {
+                    if before[piece] + self.piece_length(origin, middle) < wanted {
                         low = middle;
                     } else {
                         high = middle;
@@ -164,13 +164,13 @@ impl Curve {
             .collect()
     }
 
-    /// ½ ∮ p × dp along it: the edges of a loop add up to its area, m², positive counter-clockwise.
+    /// ½ ∫ p × dp along it. The edges of a loop add up to its area, m², positive counter-clockwise.
     #[must_use]
     pub(crate) fn area(&self) -> f64 {
         if let Self::Arc { centre, radius, turn, a, b, .. } = *self {
             return 0.5 * (centre.perp_dot(b - a) + radius * radius * turn);
         }
-        // A polynomial of fifth degree at most: one rule of five points is exact.
+        // The integrand is a polynomial of degree five at most, for which the rule is exact.
         0.5 * GAUSS
             .iter()
             .map(|(x, w)| {
@@ -194,7 +194,7 @@ mod tests {
     const B: DVec2 = DVec2::new(0.0, 1.0);
 
     #[test]
-    fn arcs_go_the_way_and_the_length_that_is_asked() {
+    fn arcs_have_the_requested_direction_and_length() {
         for (large, right, length, middle) in [
             // Of the unit circle about 0 and the one about (1, 1).
             (false, true, FRAC_PI_2, DVec2::splat(0.5_f64.sqrt())),
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_has_its_length_and_equal_parts_of_it() {
+    fn a_parabola_has_its_closed_form_length_and_is_divided_into_equal_parts() {
         // y = x² from −1 to 1: length √5 + ½ asinh 2.
         let parabola = Curve::Quadratic { a: DVec2::new(-1.0, 1.0), c: DVec2::new(0.0, -1.0), b: DVec2::new(1.0, 1.0) };
         let exact = 5.0_f64.sqrt() + 0.5 * 2.0_f64.asinh();

@@ -1,30 +1,65 @@
-//! From GarmentCode's JSON to panels and stitches in metres.
+//! GarmentCode's JSON to panels and stitches in metres.
 //!
-//! Control points of an edge a → b are [u, w]: a + u d + w l with d = b − a and l = (−d.y, d.x), or coordinates where the file says
-//! `absolute`. A panel point (x, y) is placed at Rz Ry Rx (x, y, 0) + translation, angles in degrees.
+//! A control point [u, w] of an edge a → b is a + u d + w l with d = b − a and l = (−d.y, d.x); in files with
+//! `curvature_coords` = `absolute` it is a coordinate. A panel point (x, y) is placed at Rz Ry Rx (x, y, 0) + translation,
+//! angles in degrees.
+
+use std::fmt;
+use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::error::Category;
 use serde_json::{Map, Value};
 
-use super::value::{At, Unique};
-use super::{Curve, EdgeAt, PanelEdge, PatternError, PatternPanel, SewingPattern, Stitch};
+use super::check;
+use super::curve::Curve;
+use super::error::PatternError;
+use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
+use crate::base::files::{read_text, stem};
 
-/// A pattern of 115,000 in the public data set has 60 kB at most.
-const MOST_MB: usize = 4;
-/// More panels or edges are another file.
-const MOST_PANELS: usize = 500;
-const MOST_EDGES: usize = 300;
+/// Longest accepted file, MB. The 115,000 patterns of the public data set have at most 60 kB.
+const MAX_MB: usize = 4;
+/// Most panels, and most edges of a panel; a file with more is no sewing pattern.
+const MAX_PANELS: usize = 500;
+const MAX_EDGES: usize = 300;
 
-/// What all panels share.
+/// Largest coordinate in the pattern's own unit: a hundred metres in centimetres.
+const MAX_NUMBER: f64 = 1e4;
+
+/// Most characters of a value that a message quotes.
+const MAX_QUOTE: usize = 60;
+
+/// The file's conventions.
 struct Properties {
     metres_per_unit: f64,
     relative: bool,
 }
 
-pub(super) fn pattern(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
-    if text.len() > MOST_MB << 20 {
-        return Err(PatternError::TooLong { megabytes: text.len() as f64 / f64::from(1 << 20), most_mb: MOST_MB });
+/// Reads and checks the pattern in a file.
+///
+/// # Errors
+/// [`PatternError`] names the file, the panel and the edge.
+pub fn read(path: &Path) -> Result<SewingPattern, PatternError> {
+    let file = path.display().to_string();
+    let name = stem(&file);
+    let name = name.strip_suffix("_specification").unwrap_or(&name);
+    parse(&read_text(path)?, name).map_err(|source| PatternError::In { file, source: Box::new(source) })
+}
+
+/// Reads and checks the pattern `name` in a text.
+///
+/// # Errors
+/// As [`read`], without the file.
+pub fn parse(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
+    let mut pattern = unchecked(text, name)?;
+    check::check(&mut pattern)?;
+    Ok(pattern)
+}
+
+fn unchecked(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
+    if text.len() > MAX_MB << 20 {
+        return Err(PatternError::TooLong { megabytes: text.len() as f64 / f64::from(1 << 20), most_mb: MAX_MB });
     }
     let Unique(value) = serde_json::from_str(text).map_err(|e| match e.classify() {
         Category::Data => PatternError::Repeated { reason: e.to_string() },
@@ -46,9 +81,9 @@ pub(super) fn pattern(text: &str, name: &str) -> Result<SewingPattern, PatternEr
     let properties = properties(object.get("properties"), &mut notes)?;
     let panels = At::new(key(inner, "panels", place, "the panels by name")?, "pattern.panels");
     let by_name = panels.object("the panels by name")?;
-    if by_name.is_empty() || by_name.len() > MOST_PANELS {
+    if by_name.is_empty() || by_name.len() > MAX_PANELS {
         let found = format!("{} panels", by_name.len());
-        return Err(PatternError::Wrong { place: panels.place, found, expected: format!("1 to {MOST_PANELS}") });
+        return Err(PatternError::Wrong { place: panels.place, found, expected: format!("1 to {MAX_PANELS}") });
     }
     let mut read = Vec::new();
     for name in ordered(inner.get("panel_order"), by_name) {
@@ -77,7 +112,7 @@ fn unknown(object: &Map<String, Value>, known: &[&str], place: &str, notes: &mut
     }
 }
 
-/// The panels in the preferred order, if it names each once; else by name.
+/// The panels' names in the preferred order if that has each of them once, else sorted.
 fn ordered(order: Option<&Value>, panels: &Map<String, Value>) -> Vec<String> {
     let mut names: Vec<String> = panels.keys().cloned().collect();
     names.sort();
@@ -136,9 +171,9 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
     }
     let list = At::new(key(object, "edges", &place, "a list of edges")?, format!("{place}, edges"));
     let values = list.list("a list of edges")?;
-    if !(2..=MOST_EDGES).contains(&values.len()) {
+    if !(2..=MAX_EDGES).contains(&values.len()) {
         let found = format!("{} edges", values.len());
-        return Err(PatternError::Wrong { place: list.place, found, expected: format!("2 to {MOST_EDGES}") });
+        return Err(PatternError::Wrong { place: list.place, found, expected: format!("2 to {MAX_EDGES}") });
     }
     let mut edges = Vec::new();
     let mut ends: Vec<[usize; 2]> = Vec::new();
@@ -177,7 +212,7 @@ fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, Pat
     Ok((!text.is_empty()).then(|| text.to_owned()))
 }
 
-/// Placement with z up and the front at −y.
+/// The placement with z up and the front at −y.
 fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
     let [a, b, c] = degrees.to_array().map(f64::to_radians);
     let rotation = DMat3::from_rotation_z(c) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(a);
@@ -192,7 +227,7 @@ fn curve(place: &str, value: &Value, a: DVec2, b: DVec2, of: &Properties) -> Res
         let p = DVec2::from_array(At::new(value, at.place.clone()).numbers::<2>("a control point [u, w]")?);
         Ok(if of.relative { a + d * p.x + d.perp() * p.y } else { p * of.metres_per_unit })
     };
-    // Older files: a bare control point.
+    // Older files have a bare control point.
     if value.is_array() {
         return Ok(Curve::Quadratic { a, c: control(value)?, b });
     }
@@ -250,4 +285,128 @@ fn stitch(number: usize, value: &Value, panels: &[PatternPanel]) -> Result<Stitc
         Ok(EdgeAt { panel, edge: place.ok_or_else(missing)? })
     };
     Ok(Stitch { sides: [side(pair[0])?, side(pair[1])?], right_wrong })
+}
+
+/// A JSON value in which no object has a key twice. `Value` itself keeps the last of two panels of one name and drops the first.
+struct Unique(Value);
+
+impl<'de> Deserialize<'de> for Unique {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_any(UniqueVisitor).map(Self)
+    }
+}
+
+struct UniqueVisitor;
+
+impl<'de> Visitor<'de> for UniqueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Unique(value)) = list.next_element()? {
+            values.push(value);
+        }
+        Ok(Value::Array(values))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some((key, Unique(value))) = entries.next_entry::<String, Unique>()? {
+            if object.contains_key(&key) {
+                return Err(A::Error::custom(format!(
+                    "found {key:?} twice in one object, expected each name once; rename one"
+                )));
+            }
+            object.insert(key, value);
+        }
+        Ok(Value::Object(object))
+    }
+}
+
+/// A JSON value with its place in the file, for messages.
+struct At<'a> {
+    value: &'a Value,
+    place: String,
+}
+
+impl<'a> At<'a> {
+    fn new(value: &'a Value, place: impl Into<String>) -> Self {
+        Self { value, place: place.into() }
+    }
+
+    fn wrong(&self, expected: impl Into<String>) -> PatternError {
+        PatternError::Wrong { place: self.place.clone(), found: shown(self.value), expected: expected.into() }
+    }
+
+    fn object(&self, expected: &str) -> Result<&'a Map<String, Value>, PatternError> {
+        self.value.as_object().ok_or_else(|| self.wrong(expected))
+    }
+
+    fn list(&self, expected: &str) -> Result<&'a [Value], PatternError> {
+        self.value.as_array().map(Vec::as_slice).ok_or_else(|| self.wrong(expected))
+    }
+
+    fn text(&self, expected: &str) -> Result<&'a str, PatternError> {
+        self.value.as_str().ok_or_else(|| self.wrong(expected))
+    }
+
+    /// A number within the bounds of lengths and angles.
+    fn number(&self) -> Result<f64, PatternError> {
+        let number = self.value.as_f64().filter(|x| x.abs() <= MAX_NUMBER);
+        number.ok_or_else(|| self.wrong(format!("a number from -{MAX_NUMBER:.0} to {MAX_NUMBER:.0}")))
+    }
+
+    fn numbers<const N: usize>(&self, expected: &str) -> Result<[f64; N], PatternError> {
+        let list = self.list(expected)?;
+        if list.len() != N {
+            return Err(self.wrong(expected));
+        }
+        let mut numbers = [0.0; N];
+        for (slot, value) in numbers.iter_mut().zip(list) {
+            *slot = At::new(value, self.place.clone()).number()?;
+        }
+        Ok(numbers)
+    }
+}
+
+/// A value as messages quote it.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Object(_) => "an object".to_owned(),
+        other => {
+            let text = other.to_string();
+            match text.char_indices().nth(MAX_QUOTE) {
+                Some((end, _)) => format!("{}...", &text[..end]),
+                None => text,
+            }
+        }
+    }
 }

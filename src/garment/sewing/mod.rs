@@ -19,7 +19,7 @@ pub use landmarks::Landmarks;
 pub(crate) use preclose::draw_shut;
 
 use crate::body::distance::Body;
-use crate::garment::pattern::{PatternError, SewingPattern, SewnGarment};
+use crate::garment::pattern::{PatternError, SewingPattern, SewnGarment, sew};
 use crate::mesh::{Topology, each_once};
 use arap::{Closing, close};
 
@@ -62,7 +62,7 @@ pub struct PutOn {
 /// Puts a pattern on a body, in edges of about `edge_m` (m).
 ///
 /// # Errors
-/// As [`SewingPattern::sew`].
+/// As [`sew`].
 pub(crate) fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn, PatternError> {
     let began = Instant::now();
     let landmarks = Landmarks::of(body.mesh());
@@ -75,7 +75,7 @@ pub(crate) fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Resul
     let mut steps = 0;
     for (edge, gap, most) in COARSER {
         // A small panel may have no mesh in edges as long as it is wide; then the next ones begin.
-        let Ok(garment) = pattern.sew(edge) else { continue };
+        let Ok(garment) = sew(&pattern, edge) else { continue };
         if edge < COARSER_BY * edge_m {
             continue;
         }
@@ -92,7 +92,7 @@ pub(crate) fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Resul
         steps += taken;
         coarse = Some((garment, x));
     }
-    let mut garment = pattern.sew(edge_m)?;
+    let mut garment = sew(&pattern, edge_m)?;
     let start = begin(&garment, coarse.as_ref());
     let most = if coarse.is_some() { LAST.1 } else { COARSER[0].2 };
     let how = Closing { held: &[], gap: LAST.0, steps: most, still: STILL };
