@@ -1,9 +1,9 @@
-//! Made meshes on disk: contouring and remeshing a form and a garment takes a second, reading them a few milliseconds.
+//! A cache on disk of built-in meshes: making a form and a garment takes a second, reading them a few milliseconds.
 //!
-//! An entry is named by the hash of all that determines the mesh: the specs as JSON (numbers in digits that read back as
-//! the same bits), the crate's version, and the machine's architecture, whose mathematics may round otherwise. It is
-//! [`sealed`] with that text and written whole or not at all. Whatever is wrong with an entry or its folder, the mesh is
-//! made anew, and nobody needs to know: the result is the same, bit for bit.
+//! An entry's name is the hash of all that determines the mesh: the specs as JSON (numbers with digits that parse to the same
+//! bits), the crate's version, and the machine's architecture, which may round differently. The entry has a checksum and that
+//! text, and is written atomically. Where an entry or its folder is damaged, the mesh is made anew: the result is the same, bit
+//! for bit.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -18,33 +18,33 @@ use crate::body::ShapeError;
 use crate::body::dress_form::{BodySpec, DEFAULT_TRIANGLES, dress_form};
 use crate::mesh::{RestShape, TriMesh};
 
-/// First bytes of an entry, and part of every name; the number goes up with the format and with every change of what the
-/// mesher makes, so that an older mesh is never taken for a newer one.
+/// First bytes of an entry, and part of every name. The number rises with the format and with every change of the mesher's
+/// results, so that an older mesh is never used for a newer one.
 const KIND: &Kind = b"PWMESH01";
-/// Entries kept, the newest: a sweep over measurements makes a form for each.
-const MOST: usize = 64;
+/// Most entries, the newest: a sweep over measurements makes a form for each.
+const MAX_ENTRIES: usize = 64;
 
 /// Positions, triangles, groups and their triangles; rest corners and held vertices, of a garment.
 type Stored = (Vec<DVec3>, Vec<[u32; 3]>, Vec<String>, Vec<u32>, Vec<[DVec2; 3]>, Vec<u32>);
 
-/// A folder of made meshes, or none: then all are made anew.
+/// A folder of cached meshes, or none.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MeshCache(Option<PathBuf>);
 
 impl MeshCache {
-    /// Meshes in `folder`, which is made when the first is written.
+    /// A cache in `folder`, which is created with the first entry.
     #[must_use]
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self(Some(folder.into()))
     }
 
-    /// The user's cache (`meshes`, beside the references); none where the user has no home.
+    /// The user's cache (`meshes`, beside the references); none where the user has no home folder.
     #[must_use]
     pub fn in_user_cache() -> Self {
         Self(user_cache("meshes"))
     }
 
-    /// [`dress_form`], from the cache where it is there.
+    /// [`dress_form`], cached.
     pub fn dress_form(&self, spec: &BodySpec) -> Result<TriMesh, ShapeError> {
         let make = || {
             let (mesh, rest) = (dress_form(spec)?, RestShape::new(Vec::new()));
@@ -53,7 +53,7 @@ impl MeshCache {
         Ok(self.get_or_make(&("form", spec, DEFAULT_TRIANGLES), make)?.mesh)
     }
 
-    /// [`garment`], from the cache where it is there.
+    /// [`garment`], cached.
     pub fn garment(
         &self,
         spec: &GarmentSpec,
@@ -79,13 +79,13 @@ impl MeshCache {
             return Ok(unpack(stored));
         }
         let made = make()?;
-        // What cannot be kept is made again the next time.
-        let _ = keep(folder, &path, &of, &made);
+        // A mesh that cannot be stored is made again the next time.
+        let _ = store(folder, &path, &of, &made);
         Ok(made)
     }
 }
 
-fn keep(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::Result<()> {
+fn store(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::Result<()> {
     let PlacedGarment { mesh, rest, held, .. } = made;
     let stored = (&mesh.positions, &mesh.triangles, &mesh.groups, &mesh.triangle_group, &rest.corners, held);
     checksum::write(path, KIND, &(of, stored))?;
@@ -94,7 +94,7 @@ fn keep(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::
         .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
         .collect();
     kept.sort();
-    kept.iter().rev().skip(MOST).try_for_each(|(_, path)| std::fs::remove_file(path))
+    kept.iter().rev().skip(MAX_ENTRIES).try_for_each(|(_, path)| std::fs::remove_file(path))
 }
 
 fn unpack((positions, triangles, groups, triangle_group, corners, held): Stored) -> PlacedGarment {
@@ -106,7 +106,7 @@ fn unpack((positions, triangles, groups, triangle_group, corners, held): Stored)
 mod tests {
     use super::*;
 
-    /// A skirt of the fewest vertices.
+    /// A skirt of as few vertices as possible.
     fn skirt(cache: &MeshCache) -> PlacedGarment {
         let spec = GarmentSpec::by_name("flared-skirt").unwrap();
         cache.garment(&spec, &BodySpec::default(), Some(400)).unwrap()
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_is_what_was_made_and_damage_is_made_anew() {
+    fn a_cached_mesh_equals_the_made_one_and_a_damaged_entry_is_made_anew() {
         let folder = tempfile::tempdir().unwrap();
         let cache = MeshCache::new(folder.path().join("meshes"));
         let made = skirt(&MeshCache::default());
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_written_is_done_without_and_old_entries_go() {
+    fn an_unwritable_folder_is_ignored_and_old_entries_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let made = skirt(&MeshCache::default());
         // A file where the folder should be: nothing can be made in it, by nobody.
@@ -156,16 +156,16 @@ mod tests {
         std::fs::create_dir(&entry).unwrap();
         assert_eq!(skirt(&cache), made);
         std::fs::remove_dir(&entry).unwrap();
-        for i in 0..MOST + 3 {
+        for i in 0..MAX_ENTRIES + 3 {
             std::fs::write(folder.path().join(format!("meshes/{i}.mesh")), "").unwrap();
         }
         skirt(&cache);
         let left = entries(&folder.path().join("meshes"));
-        assert!(left.len() == MOST && left.contains(&entry), "{}", left.len());
+        assert!(left.len() == MAX_ENTRIES && left.contains(&entry), "{}", left.len());
     }
 
     #[test]
-    fn two_at_once_find_the_same() {
+    fn two_threads_make_one_entry() {
         let folder = tempfile::tempdir().unwrap();
         let cache = MeshCache::new(folder.path());
         let both = std::thread::scope(|scope| {

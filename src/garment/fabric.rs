@@ -1,5 +1,12 @@
 //! Fabrics: the measured constants of a cloth, with their source.
 //!
+//! A vertex between two fabrics has the mean of their constants, weighted by the rest area that it has of each:
+//!
+//! c_v = Σ A_t c_t / Σ A_t = c₀ + Σ A_t (c_t − c₀) / Σ A_t
+//!
+//! over its triangles t, with c₀ the constant of one of them. The second form gives a vertex within one fabric that fabric's
+//! constant to the last bit.
+//!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | ρ | areal density | kg/m² |
@@ -8,26 +15,25 @@
 //! | ν | Poisson's ratio, couples weft and warp | – |
 //! | B | bending stiffness along weft, on the bias and along warp | N·m |
 //! | μ_f | Coulomb friction against the body | – |
-
-mod mean;
+//! | c | any of these constants | its own |
+//! | A_t | rest area of a triangle | m² |
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use mean::at_vertices;
-
 use crate::base::files::{Unreadable, names_a_file, read_text};
+use crate::mesh::{RestShape, TriMesh};
 
 /// The constants of one fabric.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fabric {
-    /// What it is called on the command line and in reports.
+    /// Its name on the command line and in reports.
     pub name: String,
-    /// Where the figures come from.
+    /// The source of the constants.
     pub source: String,
     /// Areal density ρ, kg/m².
     pub density_kg_per_m2: f64,
-    /// Thickness, m: also how far its middle surface stays off the body.
+    /// Thickness, m; also the distance of its middle surface from the body.
     pub thickness_m: f64,
     /// Membrane stiffness along the weft k_u, N/m.
     pub stretch_weft_n_per_m: f64,
@@ -43,7 +49,7 @@ pub struct Fabric {
     pub friction: f64,
 }
 
-/// The fabrics inside the binary, as they stand in `assets/fabrics/`.
+/// The built-in fabrics: `assets/fabrics/`.
 const FILES: [(&str, &str); 11] = [
     ("interlock", include_str!("../../assets/fabrics/interlock.toml")),
     ("jersey", include_str!("../../assets/fabrics/jersey.toml")),
@@ -69,36 +75,36 @@ pub const BUILT_IN: [&str; FILES.len()] = {
     names
 };
 
-/// What can be wrong with a fabric.
+/// Errors of fabrics and their files.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum FabricError {
-    /// No such name.
+    /// An unknown name.
     #[error("no fabric is called `{found}`; expected one of {known}, or a TOML file")]
     Unknown { found: String, known: String },
     /// A file that cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// Not a fabric file.
+    /// A file that is no fabric.
     #[error("{file}: {reason}; see assets/fabrics/ for examples")]
     Syntax { file: String, reason: String },
-    /// A constant no cloth can have.
+    /// A constant out of range.
     #[error("{file}: {key} is {}; expected {expected}", plain(*found))]
     Constant { file: String, key: &'static str, found: f64, expected: &'static str },
 }
 
-/// The fabric unless asked otherwise.
+/// The default fabric.
 pub(crate) const DEFAULT_FABRIC: &str = BUILT_IN[0];
 
 impl Default for Fabric {
-    /// The first of the built-in ones, a knit.
+    /// [`DEFAULT_FABRIC`], a knit.
     fn default() -> Self {
-        // The text is part of the program and a test reads it, so it always parses.
+        // A test parses the built-in text.
         Self::parse(FILES[0].1, DEFAULT_FABRIC).unwrap_or_else(|e| unreachable!("{e}"))
     }
 }
 
-/// A number with as few digits as it needs: 1e200 has two hundred zeros.
+/// A number in its shorter notation: 1e200 has two hundred zeros.
 fn plain(x: f64) -> String {
     if x == 0.0 || (1e-6..1e10).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
@@ -115,7 +121,7 @@ impl Fabric {
         }
     }
 
-    /// Bending stiffness of all directions on average, N·m.
+    /// Bending stiffness averaged over all directions, N·m.
     pub(crate) fn mean_bending_nm(&self) -> f64 {
         let [weft, bias, warp] = self.bending_nm;
         0.25 * (weft + 2.0 * bias + warp)
@@ -129,56 +135,71 @@ impl Fabric {
         Ok(fabric)
     }
 
-    /// Whether every constant can be used; `file` is named in errors.
+    /// Checks every constant; `file` is named in errors.
     pub(crate) fn check(&self, file: &str) -> Result<(), FabricError> {
-        let positive = [
-            ("density_kg_per_m2", self.density_kg_per_m2),
-            ("thickness_m", self.thickness_m),
-            ("stretch_weft_n_per_m", self.stretch_weft_n_per_m),
-            ("stretch_warp_n_per_m", self.stretch_warp_n_per_m),
-            ("shear_n_per_m", self.shear_n_per_m),
-            ("bending_nm, weft", self.bending_nm[0]),
-            ("bending_nm, bias", self.bending_nm[1]),
-            ("bending_nm, warp", self.bending_nm[2]),
+        let positive = "a positive, finite number";
+        // The upper and lower bounds run from far below gossamer to far above sheet steel; beyond, rounding dominates.
+        let density = "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6";
+        let stiffness = "newtons per metre, 0.001 to 1e9; most cloth has 5 to 10,000";
+        let bending = "newton metres, 1e-12 to 1000; most cloth has 1e-6 to 1e-3";
+        let constants = [
+            ("density_kg_per_m2", self.density_kg_per_m2, 1e-4..=1e2, density),
+            ("thickness_m", self.thickness_m, 0.0..=f64::MAX, positive),
+            ("stretch_weft_n_per_m", self.stretch_weft_n_per_m, 1e-3..=1e9, stiffness),
+            ("stretch_warp_n_per_m", self.stretch_warp_n_per_m, 1e-3..=1e9, stiffness),
+            ("shear_n_per_m", self.shear_n_per_m, 1e-3..=1e9, stiffness),
+            ("bending_nm, weft", self.bending_nm[0], 1e-12..=1e3, bending),
+            ("bending_nm, bias", self.bending_nm[1], 1e-12..=1e3, bending),
+            ("bending_nm, warp", self.bending_nm[2], 1e-12..=1e3, bending),
+        ];
+        let others = [
+            // Beyond √(k_u k_v) the membrane energy would have no lower bound; one half is the isotropic limit.
+            ("poisson", self.poisson, 0.0..=0.5, "0 to 0.5"),
+            ("friction", self.friction, 0.0..=10.0, "0 (none) to 10"),
+            // Thicker than this is upholstery, and probably a wrong unit.
+            ("thickness_m", self.thickness_m, 0.0..=0.02, "metres, at most 0.02; is it in millimetres?"),
         ];
         let wrong = |key, found, expected| FabricError::Constant { file: file.to_owned(), key, found, expected };
-        for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(wrong(key, value, "a positive, finite number"));
-            }
+        if let Some(&(key, value, ..)) = constants.iter().find(|(_, value, ..)| !(value.is_finite() && *value > 0.0)) {
+            return Err(wrong(key, value, positive));
         }
-        // From far below gossamer to far above sheet steel: beyond, rounding decides and not the cloth.
-        let density = ("density_kg_per_m2", self.density_kg_per_m2);
-        if !(1e-4..=1e2).contains(&density.1) {
-            return Err(wrong(
-                density.0,
-                density.1,
-                "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6",
-            ));
+        match constants.into_iter().chain(others).find(|(_, value, range, _)| !range.contains(value)) {
+            Some((key, value, _, expected)) => Err(wrong(key, value, expected)),
+            None => Ok(()),
         }
-        for (key, value) in positive.into_iter().filter(|(key, _)| key.ends_with("n_per_m")) {
-            if !(1e-3..=1e9).contains(&value) {
-                return Err(wrong(key, value, "newtons per metre, 0.001 to 1e9; most cloth has 5 to 10,000"));
-            }
-        }
-        for (key, value) in positive.into_iter().filter(|(key, _)| key.starts_with("bending_nm")) {
-            if !(1e-12..=1e3).contains(&value) {
-                return Err(wrong(key, value, "newton metres, 1e-12 to 1000; most cloth has 1e-6 to 1e-3"));
-            }
-        }
-        // Beyond √(k_u k_v) the membrane's energy would have no lower bound; one half is the isotropic limit.
-        if !(0.0..=0.5).contains(&self.poisson) {
-            return Err(wrong("poisson", self.poisson, "0 to 0.5"));
-        }
-        if !(0.0..=10.0).contains(&self.friction) {
-            return Err(wrong("friction", self.friction, "0 (none) to 10"));
-        }
-        // Thicker than this is upholstery, and a likely slip of the unit.
-        if self.thickness_m > 0.02 {
-            return Err(wrong("thickness_m", self.thickness_m, "metres, at most 0.02; is it in millimetres?"));
-        }
-        Ok(())
     }
+}
+
+impl AsRef<[Fabric]> for Fabric {
+    /// The fabrics of a garment that is cut from one.
+    fn as_ref(&self) -> &[Self] {
+        std::slice::from_ref(self)
+    }
+}
+
+/// A constant of the fabrics at every vertex; at a vertex without triangles, that of the first fabric.
+pub(crate) fn at_vertices(
+    mesh: &TriMesh,
+    rest: &RestShape,
+    fabrics: &[Fabric],
+    constant: impl Fn(&Fabric) -> f64,
+) -> Vec<f64> {
+    let of: Vec<f64> = fabrics.iter().map(constant).collect();
+    let n = mesh.vertex_count();
+    let first = of.first().copied().unwrap_or_default();
+    let (mut base, mut more, mut area) = (vec![first; n], vec![0.0; n], vec![0.0; n]);
+    for ((t, triangle), own) in mesh.triangles.iter().enumerate().zip(rest.areas()) {
+        let c = of.get(rest.fabric_of(t)).copied().unwrap_or(first);
+        for v in triangle.map(|v| v as usize) {
+            if area[v] == 0.0 {
+                base[v] = c;
+            }
+            area[v] += own.abs();
+            more[v] += own.abs() * (c - base[v]);
+        }
+    }
+    let mean = |((base, more), area): ((f64, f64), f64)| if area > 0.0 { base + more / area } else { base };
+    base.into_iter().zip(more).zip(area).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -186,28 +207,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_built_in_fabric_reads_and_bears_its_name() {
+    fn every_built_in_fabric_parses_and_has_its_name() {
         for name in BUILT_IN {
             assert_eq!(Fabric::by_name(name).unwrap().name, name);
         }
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn errors_name_the_constant_and_the_range() {
         let good = FILES[0].1;
-        let said = |text: &str| Fabric::parse(text, "f.toml").unwrap_err().to_string();
-        assert!(said(&good.replace("poisson = 0.3", "poisson = 0.9")).contains("poisson is 0.9"));
-        assert!(said(&good.replace("8.00e-04", "0.8")).contains("millimetres"));
-        assert!(said(&good.replace("friction", "frction")).contains("frction"));
+        let error = |text: &str| Fabric::parse(text, "f.toml").unwrap_err().to_string();
+        assert!(error(&good.replace("poisson = 0.3", "poisson = 0.9")).contains("poisson is 0.9"));
+        assert!(error(&good.replace("8.00e-04", "0.8")).contains("millimetres"));
+        assert!(error(&good.replace("friction", "frction")).contains("frction"));
         for (key, value) in
             [("stretch_warp_n_per_m", "1e200"), ("shear_n_per_m", "1e-9"), ("density_kg_per_m2", "1e-300")]
         {
             let start = good.find(key).unwrap();
             let line = good[start..].lines().next().unwrap();
-            let text = said(&good.replace(line, &format!("{key} = {value}")));
+            let text = error(&good.replace(line, &format!("{key} = {value}")));
             assert!(text.contains(key) && text.contains("most cloth"), "{text}");
         }
-        assert!(said(&good.replace("density_kg_per_m2 = 0.187", "density_kg_per_m2 = nan")).contains("density"));
+        assert!(error(&good.replace("density_kg_per_m2 = 0.187", "density_kg_per_m2 = nan")).contains("density"));
         assert!(Fabric::by_name("tweed").unwrap_err().to_string().contains("denim"));
     }
 }

@@ -1,22 +1,22 @@
-//! Seams drawn shut: from panels held about the body to a garment on it, by geometry alone.
+//! Closing of seams by as-rigid-as-possible steps: from panels placed around the body to a garment on it.
 //!
-//! What is sewn has one vertex for both sides of a seam, at the mean of two places that may be half a metre apart. The cloth is given
-//! back its shape by as-rigid-as-possible steps (Sorkine, Alexa: "As-rigid-as-possible surface modeling", SGP 2007; its planar
-//! form by Liu, Zhang, Xu, Gotsman, Gortler, SGP 2008): with F_t the 3×2 map from the flat triangle t to its place,
+//! A sewn mesh has one vertex for both sides of a seam, at the mean of two positions that may be half a metre apart. The cloth
+//! regains its shape by as-rigid-as-possible steps (Sorkine, Alexa: "As-rigid-as-possible surface modeling", SGP 2007; its
+//! planar form by Liu, Zhang, Xu, Gotsman, Gortler, SGP 2008). With F_t the 3×2 map from the flat triangle t to its position,
 //!
-//! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²,
+//! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²
 //!
-//! in turn for the isometries R_t nearest to F_t, which is a polar decomposition each, and for x, which is one sparse
-//! solve for three right sides. A vertex nearer to the body than the gap is drawn to y_c, the point at the gap above
-//! the nearest of the body, and is free again when the cloth draws it away; no vertex goes farther in a step than a limb is thick, so
-//! that none passes through one. There is no friction and no bending, and gravity only where a skirt is to hang from its held waist inside the
-//! arms (− Σ γ A_i z_i, added to E): it is a placement, not a drape.
+//! is minimised in turn over the isometries R_t nearest to F_t (a polar decomposition each) and over x (a sparse solve with
+//! three right-hand sides). A vertex nearer to the body than the gap is attracted to y_c, the point at the gap above its
+//! nearest body point, and is free again once the cloth pulls it away. No vertex moves farther in a step than a limb is thick,
+//! so that none passes through one. There is no friction and no bending. Gravity acts only on a skirt that hangs from its held
+//! waist between the arms (− Σ γ A_i z_i, added to E). The result is a placement, not a drape.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | A_t | rest area | m² |
-//! | w | weight of a contact | – |
-//! | m | weight of staying, for what nothing holds | – |
+//! | w | weight of a contact, [`CONTACT`] | – |
+//! | m | weight of the proximal term, [`PROXIMAL`], for vertices that nothing else fixes | – |
 //! | x' | positions before the step | m |
 //! | γ | weight over stiffness, [`HANGING`] | 1/m |
 //!
@@ -31,51 +31,52 @@ use glam::{DMat2, DVec2, DVec3};
 use crate::body::distance::Body;
 use crate::mesh::{RestShape, TriMesh};
 
-/// Weight of a contact against a vertex's own of some 3.5: a step closes most of its gap, and cloth still slides along the body.
+/// w. A vertex's own weight is about 3.5, so a step closes most of the gap and cloth still slides along the body. A heuristic.
 const CONTACT: f64 = 3.0;
 
-/// Weight of staying.
-const STAY: f64 = 1e-3;
+/// m. A heuristic, small enough not to slow the steps.
+const PROXIMAL: f64 = 1e-3;
 
-/// Longest way of a vertex in one step, m: a wrist is 5 cm thick.
-const LONGEST_STEP: f64 = 0.02;
+/// Largest displacement of a vertex in one step, m; a wrist is 5 cm thick.
+const MAX_STEP: f64 = 0.02;
 
-/// γ, 1/m: half a metre of cloth stretches by a fortieth where it hangs by its weight.
+/// γ, 1/m: half a metre of hanging cloth stretches by a fortieth.
 const HANGING: f64 = 0.1;
 
-/// Weight of staying of what is held.
+/// Proximal weight of held vertices.
 const HELD: f64 = 1e3;
 
-/// Steps of laying flat at most, and how far none goes any more, m.
-const FLATTENING: (usize, f64) = (100, 2e-5);
+/// Most steps of [`laid_flat`], and the displacement, m, at which they end.
+const MAX_FLATTENING_STEPS: usize = 100;
+const FLAT_CONVERGED: f64 = 2e-5;
 
-/// How a garment is drawn shut.
+/// Options of [`close`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Closing<'a> {
-    /// What is held while the rest hangs; nothing hangs where there is none.
+    /// Vertices that are held while the others hang; without any there is no gravity.
     pub(super) held: &'a [u32],
     /// Distance kept from the body, m.
     pub(super) gap: f64,
-    /// At most so many steps.
-    pub(super) steps: usize,
-    /// Steps end where no vertex goes farther than this, m.
-    pub(super) still: f64,
+    /// Most steps.
+    pub(super) max_steps: usize,
+    /// Steps end when no vertex moves farther, m.
+    pub(super) converged: f64,
 }
 
-/// What stays the same from step to step: triangles, their maps, and the matrix's places.
-struct Shape {
+/// The constant part of the problem: triangles, gradients and the matrix.
+struct System {
     triangles: Vec<[u32; 3]>,
-    /// Columns: weights of the corners in the two columns of F.
+    /// Weights of the corners in the two columns of F.
     gradients: Vec<[DVec2; 3]>,
     areas: Vec<f64>,
     /// Lower half of Σ A ∇ᵀ∇, sorted by column.
     entries: Vec<Triplet<u32, u32, f64>>,
 }
 
-impl Shape {
+impl System {
     fn new(mesh: &TriMesh, rest: &RestShape, held: &[u32]) -> Self {
         let (mut gradients, mut areas) = (Vec::new(), Vec::new());
-        let mut terms: Vec<((u32, u32), f64)> = (0..mesh.vertex_count() as u32).map(|v| ((v, v), STAY)).collect();
+        let mut terms: Vec<((u32, u32), f64)> = (0..mesh.vertex_count() as u32).map(|v| ((v, v), PROXIMAL)).collect();
         for (triangle, &[a, b, c]) in mesh.triangles.iter().zip(&rest.corners) {
             let inverse = DMat2::from_cols(b - a, c - a).inverse();
             let (of_b, of_c) = (inverse.row(0), inverse.row(1));
@@ -104,16 +105,16 @@ impl Shape {
         Self { triangles: mesh.triangles.clone(), gradients, areas, entries }
     }
 
-    /// Adds the weight.
+    /// Adds gravity.
     fn hang(&self, side: &mut [DVec3]) {
         for (triangle, area) in self.triangles.iter().zip(&self.areas) {
             triangle.iter().for_each(|&v| side[v as usize].z -= HANGING * area / 3.0);
         }
     }
 
-    /// Right side: Σ A ∇ᵀ R + m x'.
+    /// Right-hand side: Σ A ∇ᵀ R + m x'.
     fn right_side(&self, x: &[DVec3], nearest: fn(DVec3, DVec3) -> [DVec3; 2]) -> Vec<DVec3> {
-        let mut side: Vec<DVec3> = x.iter().map(|x| STAY * *x).collect();
+        let mut side: Vec<DVec3> = x.iter().map(|x| PROXIMAL * *x).collect();
         for ((triangle, of), area) in self.triangles.iter().zip(&self.gradients).zip(&self.areas) {
             let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
             for (&i, of) in triangle.iter().zip(of) {
@@ -134,7 +135,7 @@ fn nearest_isometry(u: DVec3, v: DVec3) -> [DVec3; 2] {
     let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
     let root = (a * c - b * b).max(0.0).sqrt();
     let trace = (a + c + 2.0 * root).sqrt();
-    // S⁻¹ = (FᵀF + √det)⁻¹ · trace; a triangle folded to a line takes the nearest there is.
+    // S⁻¹ = (FᵀF + √det)⁻¹ · trace; a triangle folded to a line takes its normalised edges.
     let (p, q) = (a + root, c + root);
     let determinant = p * q - b * b;
     if determinant <= 1e-18 * (p * q).max(1e-300) {
@@ -144,88 +145,88 @@ fn nearest_isometry(u: DVec3, v: DVec3) -> [DVec3; 2] {
     [(u * q - v * b) * scale, (v * p - u * b) * scale]
 }
 
-/// Draws a garment at `start` (m) shut; returns where its vertices come to lie and how many steps that took.
+/// Closes the seams of a garment at `start` (m); returns the positions and the number of steps.
 pub(super) fn close(
     mesh: &TriMesh,
     rest: &RestShape,
     body: &Body,
     start: &[DVec3],
-    how: Closing<'_>,
+    options: Closing<'_>,
 ) -> (Vec<DVec3>, usize) {
     let n = start.len();
-    let mut shape = Shape::new(mesh, rest, how.held);
+    let mut system = System::new(mesh, rest, options.held);
     let diagonal: Vec<usize> =
-        (shape.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
-    let own: Vec<f64> = diagonal.iter().map(|&i| shape.entries[i].val).collect();
+        (system.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
+    let own: Vec<f64> = diagonal.iter().map(|&i| system.entries[i].val).collect();
     let mut x = start.to_vec();
     let mut symbolic: Option<SymbolicLlt<u32>> = None;
-    for step in 0..how.steps {
-        let mut side = shape.right_side(&x, nearest_isometry);
-        how.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
-        if !how.held.is_empty() {
-            shape.hang(&mut side);
+    for step in 0..options.max_steps {
+        let mut side = system.right_side(&x, nearest_isometry);
+        options.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
+        if !options.held.is_empty() {
+            system.hang(&mut side);
         }
         for (v, near) in body.nearest_all(&x).iter().enumerate() {
-            let touches = near.signed_distance < how.gap;
-            shape.entries[diagonal[v]].val = own[v] + if touches { CONTACT } else { 0.0 };
+            let touches = near.signed_distance < options.gap;
+            system.entries[diagonal[v]].val = own[v] + if touches { CONTACT } else { 0.0 };
             if touches {
-                side[v] += CONTACT * (near.point + how.gap * near.normal);
+                side[v] += CONTACT * (near.point + options.gap * near.normal);
             }
         }
-        let Some(solved) = solve(&shape.entries, n, &side, &mut symbolic) else { return (x, step) };
+        let Some(solved) = solve(&system.entries, n, &side, &mut symbolic) else { return (x, step) };
         let mut farthest = 0.0_f64;
         for (x, to) in x.iter_mut().zip(solved) {
-            let way = (to - *x).clamp_length_max(LONGEST_STEP);
-            farthest = farthest.max(way.length());
-            *x += way;
+            let displacement = (to - *x).clamp_length_max(MAX_STEP);
+            farthest = farthest.max(displacement.length());
+            *x += displacement;
         }
-        if farthest < how.still {
+        if farthest < options.converged {
             return (x, step + 1);
         }
     }
-    (x, how.steps)
+    (x, options.max_steps)
 }
 
-/// A surface laid flat as isometrically as possible: E without contacts, from places in the plane z = 0 (m), with the nearest turns
-/// in the plane for R, which open out what the start has turned over.
+/// A surface flattened as isometrically as possible: E without contacts, from positions in the plane z = 0 (m), with the nearest
+/// rotations in the plane for R, which unfold triangles that the start has inverted.
 #[must_use]
-pub fn laid_flat(mesh: &TriMesh, rest: &RestShape, start: &[DVec3]) -> Vec<DVec3> {
-    let shape = Shape::new(mesh, rest, &[]);
+pub(crate) fn laid_flat(mesh: &TriMesh, rest: &RestShape, start: &[DVec3]) -> Vec<DVec3> {
+    let system = System::new(mesh, rest, &[]);
     let mut x = start.to_vec();
     let mut symbolic = None;
-    for _ in 0..FLATTENING.0 {
-        let side = shape.right_side(&x, nearest_turn);
-        let Some(next) = solve(&shape.entries, x.len(), &side, &mut symbolic) else { return x };
+    for _ in 0..MAX_FLATTENING_STEPS {
+        let side = system.right_side(&x, nearest_rotation);
+        let Some(next) = solve(&system.entries, x.len(), &side, &mut symbolic) else { return x };
         let farthest = x.iter().zip(&next).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         x = next;
-        if farthest < FLATTENING.1 {
+        if farthest < FLAT_CONVERGED {
             break;
         }
     }
     x
 }
 
-/// The turn in the plane nearest to F: its angle is that of (tr F, F₂₁ − F₁₂).
-fn nearest_turn(u: DVec3, v: DVec3) -> [DVec3; 2] {
+/// The rotation in the plane nearest to F: its angle is that of (tr F, F₂₁ − F₁₂).
+fn nearest_rotation(u: DVec3, v: DVec3) -> [DVec3; 2] {
     let turn = DVec2::new(u.x + v.y, u.y - v.x).normalize_or(DVec2::X);
     [turn.extend(0.0), turn.perp().extend(0.0)]
 }
 
-/// A surface with less of its waves: (M + ℓ² L) y = M x, one implicit step of its heat, with areas M and stiffness L of the rest shape; ℓ (m)
-/// is what waves are worn down under.
+/// A smoothed surface: (M + ℓ² L) y = M x, one implicit step of the heat equation, with areas M and stiffness L of the rest
+/// shape. Waves shorter than ℓ (m) are damped.
 pub(super) fn faired(mesh: &TriMesh, rest: &RestShape, x: &[DVec3], length: f64) -> Vec<DVec3> {
-    let mut shape = Shape::new(mesh, rest, &[]);
+    let mut system = System::new(mesh, rest, &[]);
     let mut mass = vec![0.0; x.len()];
-    for (triangle, area) in mesh.triangles.iter().zip(&shape.areas) {
+    for (triangle, area) in mesh.triangles.iter().zip(&system.areas) {
         triangle.iter().for_each(|&v| mass[v as usize] += area / (3.0 * length * length));
     }
-    let diagonal = shape.entries.iter_mut().filter(|e| e.row == e.col);
+    let diagonal = system.entries.iter_mut().filter(|e| e.row == e.col);
     diagonal.zip(&mass).for_each(|(entry, mass)| entry.val += mass);
-    let side: Vec<DVec3> = x.iter().zip(&mass).map(|(x, mass)| (STAY + mass) * *x).collect();
-    solve(&shape.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
+    let side: Vec<DVec3> = x.iter().zip(&mass).map(|(x, mass)| (PROXIMAL + mass) * *x).collect();
+    solve(&system.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
 }
 
-/// One solve for three right sides; `None` where the matrix is not positive.
+/// One solve with three right-hand sides; `None` where the matrix is not positive definite.
 fn solve(
     entries: &[Triplet<u32, u32, f64>],
     n: usize,
@@ -248,10 +249,10 @@ mod tests {
     use crate::mesh::samples::sheet;
 
     #[test]
-    fn a_strip_of_a_cylinder_lies_flat_at_its_own_lengths() {
+    fn a_strip_of_a_cylinder_is_flattened_without_strain() {
         // A third of a cylinder of 10 cm, as the eye sees it from the front, a few triangles turned over.
         let flat = sheet(12, 8, |i, j| DVec3::new(0.2 * (i / 12.0 - 0.5), 0.02 * j, 0.0));
-        let rest = RestShape::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
+        let rest = RestSystem::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
         let around = |p: &DVec3| DVec3::new(0.1 * (p.x / 0.1).sin(), -0.1 * (p.x / 0.1).cos(), p.y);
         let mesh = flat.with_positions(flat.positions.iter().map(around).collect());
         let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
@@ -267,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_isometry_is_one_and_leaves_rotations_alone() {
+    fn the_nearest_isometry_of_a_rotation_is_itself_and_of_r_s_is_r() {
         let turned = [DVec3::new(0.0, 0.6, 0.8), DVec3::new(1.0, 0.0, 0.0)];
         let [u, v] = nearest_isometry(turned[0], turned[1]);
         assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-14);

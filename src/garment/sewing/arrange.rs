@@ -1,30 +1,31 @@
-//! Panels moved from where the file has them to where this body is.
+//! Panels moved from the placement in the file to this body.
 //!
-//! A pattern is placed for one body. On another one the garment goes up or down until its shoulder seams (or its waist, where it has
-//! none) lie as they would there, sleeves turn to the slope of the arms, and everything turns to where the toes point.
+//! A pattern is placed for one body. For another one the garment moves up or down until its shoulder seams (or its waist, where
+//! it has none) are at the body's, sleeves turn to the slope of the arms, and all panels turn to the direction of the toes.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::landmarks::Landmarks;
-use crate::garment::pattern::SewingPattern;
+use crate::garment::pattern::{EdgeAt, PatternPanel, SewingPattern};
 
-/// Shoulder seams are placed this far above the shoulder's neck end, m: high, and the garment comes down on its shoulders. GarmentCode's own
-/// placement on its own body is 3.8 cm lower, and six patterns drawn shut from there are stretched half as much again.
+/// Height of the shoulder seams above the shoulder's neck end, m. From above, the garment comes down on its shoulders.
+/// GarmentCode's placement on its own body is 3.8 cm lower, and six patterns closed from there are stretched half as much again.
 const ABOVE_SHOULDER: f64 = 0.0;
-/// A waist is placed this far above the body's smallest girth, m: where GarmentCode's are on its own body.
+/// Height of a waist above the body's smallest girth, m, as GarmentCode has it on its own body.
 const ABOVE_WAIST: f64 = -0.022;
 
-/// Shoulder seams are not farther below the armpits than this, m: what is, is a circle skirt's side.
-const BELOW_ARMPITS: f64 = 0.1;
+/// Largest distance of a shoulder seam below the armpits, m; a seam below that is the side of a circle skirt.
+const MAX_BELOW_ARMPITS: f64 = 0.1;
 
-/// Less than this is let be, m and radians: the file's own placement is better than our landmarks are.
-const LEAST_SHIFT: f64 = 0.02;
-const LEAST_TURN: f64 = 0.05;
+/// Smallest shift, m, and turn of the sleeves, radians, that are applied; below, the file's placement is more accurate than the
+/// landmarks.
+const MIN_SHIFT: f64 = 0.02;
+const MIN_TURN: f64 = 0.05;
 
-/// A panel is a sleeve's if its plane is turned by at least this about the front axis, radians.
-const SLEEVE: f64 = 0.15;
+/// Least turn of a sleeve's plane about the front axis, radians.
+const MIN_SLEEVE_TURN: f64 = 0.15;
 
-/// What was done.
+/// The moves of the panels.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Arranged {
     /// Upwards, m.
@@ -35,37 +36,37 @@ pub struct Arranged {
     pub turned: f64,
 }
 
-/// Where a pattern expects a body's marks, m.
+/// The body landmarks that a pattern was placed for.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Expected {
-    /// Height of the neck end of the shoulder seams.
-    pub(super) shoulder_z: Option<f64>,
-    /// Height of the waist: edges labelled `lower_interface`, or the top of what has no shoulders.
-    pub(super) waist_z: f64,
-    /// How far the sleeves point below the horizontal, radians.
-    pub(super) arm_fall: Option<f64>,
+struct Expected {
+    /// Height of the neck end of the shoulder seams, m.
+    shoulder_z: Option<f64>,
+    /// Height of the waist, m: edges labelled `lower_interface`, or the top of a garment without shoulders.
+    waist_z: f64,
+    /// Angle of the sleeves below the horizontal, radians.
+    arm_fall: Option<f64>,
 }
 
-/// Which panels are sleeves, and how far each points below the horizontal, radians.
+/// For each panel that is a sleeve, its angle below the horizontal, radians.
 fn sleeves(pattern: &SewingPattern) -> Vec<Option<f64>> {
-    let of = |panel: &crate::garment::pattern::PatternPanel| {
+    let of = |panel: &PatternPanel| {
         let along = panel.rotation * DVec3::X;
         let fall = along.z.abs().atan2(along.x.hypot(along.y));
         // A hood's panels are turned about the vertical, which leaves their x level.
-        (fall > SLEEVE).then_some(fall)
+        (fall > MIN_SLEEVE_TURN).then_some(fall)
     };
     pattern.panels.iter().map(of).collect()
 }
 
-/// Mean of the placed points of an edge, and its highest.
-fn placed(pattern: &SewingPattern, at: crate::garment::pattern::EdgeAt) -> (DVec3, f64) {
+/// Mean of the placed points of an edge, m, and their greatest height.
+fn placed(pattern: &SewingPattern, at: EdgeAt) -> (DVec3, f64) {
     let points = pattern.edge(at).curve.divided(8);
     let placed: Vec<DVec3> = points.iter().map(|p| pattern.panels[at.panel].place(*p)).collect();
     let top = placed.iter().fold(f64::NEG_INFINITY, |top, p| top.max(p.z));
     (placed.iter().sum::<DVec3>() / placed.len() as f64, top)
 }
 
-pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
+fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
     let sleeves = sleeves(pattern);
     let falls: Vec<f64> = sleeves.iter().flatten().copied().collect();
     let arm_fall = (!falls.is_empty()).then(|| falls.iter().sum::<f64>() / falls.len() as f64);
@@ -81,12 +82,12 @@ pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
             shoulder_z = Some(shoulder_z.map_or(top, |z| z.max(top)));
         }
     }
-    shoulder_z = shoulder_z.filter(|z| *z > armpit_z - BELOW_ARMPITS);
+    shoulder_z = shoulder_z.filter(|z| *z > armpit_z - MAX_BELOW_ARMPITS);
     let mut waist = Vec::new();
     let mut top = f64::NEG_INFINITY;
     for (panel, of) in pattern.panels.iter().enumerate() {
         for (edge, e) in of.edges.iter().enumerate() {
-            let (mean, highest) = placed(pattern, crate::garment::pattern::EdgeAt { panel, edge });
+            let (mean, highest) = placed(pattern, EdgeAt { panel, edge });
             top = top.max(highest);
             if e.label.as_deref() == Some("lower_interface") {
                 waist.push(mean.z);
@@ -97,7 +98,7 @@ pub(super) fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
     Expected { shoulder_z, waist_z, arm_fall }
 }
 
-/// Moves the panels to a body; returns how, and whether the garment has shoulder seams.
+/// Moves the panels to a body; returns the moves and whether the garment has shoulder seams.
 pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arranged, bool) {
     let armpit_z = body.armpit_z.or(body.shoulder_z).unwrap_or(f64::INFINITY);
     let expected = expected(pattern, armpit_z);
@@ -107,11 +108,11 @@ pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arrange
         (None, _, Some(waist)) => waist + ABOVE_WAIST - expected.waist_z,
         _ => 0.0,
     };
-    if raised.abs() > LEAST_SHIFT {
+    if raised.abs() > MIN_SHIFT {
         done.raised = raised;
     }
     if let (Some(own), Some(arms)) = (expected.arm_fall, body.arm_fall)
-        && (arms - own).abs() > LEAST_TURN
+        && (arms - own).abs() > MIN_TURN
     {
         done.sleeves = arms - own;
         turn_sleeves(pattern, done.sleeves);
@@ -125,7 +126,7 @@ pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arrange
     (done, expected.shoulder_z.is_some())
 }
 
-/// Turns each side's sleeves by this much downwards about the middle of the edges that hold them.
+/// Turns each side's sleeves downwards about the middle of the edges that join them to the bodice.
 fn turn_sleeves(pattern: &mut SewingPattern, down: f64) {
     let is_sleeve: Vec<bool> = sleeves(pattern).iter().map(Option::is_some).collect();
     let mut pivots = [(DVec2::ZERO, 0.0); 2];

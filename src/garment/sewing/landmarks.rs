@@ -1,12 +1,12 @@
-//! Where a standing body has its middle, neck, bust, waist, hip, crotch, armpits and arms, found from its shape.
+//! Landmarks of a standing body, found from its shape: middle, neck, bust, waist, hip, crotch, armpits and arms.
 //!
-//! The body is cut by level planes a centimetre apart. The curve that goes round the middle is the trunk (or the neck, or the head),
-//! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck
-//! end the first height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between
-//! crotch and armpit, hip and bust the largest below and above it; arms are straight lines through the middles of their curves. Toes tell the front.
+//! The body is cut by horizontal planes a centimetre apart. The curve around the middle is the trunk (or the neck, or the head);
+//! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck end the first
+//! height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between crotch and armpit, hip and
+//! bust the largest below and above it. Arms are straight lines through the centres of their curves. The toes give the front.
 //!
-//! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk; what is not found is `None`, and then
-//! nothing is moved to it.
+//! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk. A landmark that is
+//! not found is `None`, and nothing is moved to it.
 
 use glam::{DVec2, DVec3};
 
@@ -14,25 +14,25 @@ use crate::base::quantiles::extremes;
 use crate::body::girth::{Plane, SectionLoop, section};
 use crate::mesh::{TriMesh, box_about};
 
-/// Between two planes, m.
+/// Distance between two planes, m.
 const STEP: f64 = 0.01;
-/// What is taller is nobody's body, and would be cut for hours, m.
-const TALLEST: f64 = 5.0;
-/// How much wider than the neck a curve is where the shoulder begins.
+/// Tallest body that is searched, m; a taller one has a wrong unit and would be cut for hours.
+const MAX_HEIGHT: f64 = 5.0;
+/// Width of the curve at the start of the shoulder over that of the neck. A heuristic.
 const SPREAD: f64 = 1.5;
-/// Arms are told from fingers by their girth, m.
-const LEAST_ARM: f64 = 0.1;
-/// What is farther beside the trunk than this is an arm's, m.
-const BESIDE: f64 = 0.01;
-/// So many curves make an arm.
-const LEAST_CURVES: usize = 6;
+/// Least girth of an arm, m; fingers have less.
+const MIN_ARM_GIRTH: f64 = 0.1;
+/// Least distance of an arm from the side of the trunk, m.
+const MIN_BESIDE: f64 = 0.01;
+/// Least number of curves of an arm.
+const MIN_CURVES: usize = 6;
 
-/// Heights and places of a standing body, m.
+/// Landmarks of a standing body, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Landmarks {
     /// Middle of the trunk in x and y.
     pub middle: DVec2,
-    /// Angle from −y to where the toes point, radians, a multiple of a right angle.
+    /// Angle from −y to the direction of the toes, radians, a multiple of a right angle.
     pub facing: f64,
     /// Height of the shoulder's neck end.
     pub shoulder_z: Option<f64>,
@@ -44,38 +44,33 @@ pub struct Landmarks {
     pub bust_z: Option<f64>,
     /// Height of the armpits: where the arms' curves join the trunk's.
     pub armpit_z: Option<f64>,
-    /// How far the arms point below the horizontal, radians.
+    /// Angle of the arms below the horizontal, radians.
     pub arm_fall: Option<f64>,
-    /// Heights, and half the width of the trunk there.
+    /// Heights, and half the width of the trunk at each.
     trunk: Vec<(f64, f64)>,
 }
 
-/// One level.
+/// The curves in one plane.
 struct Level {
     z: f64,
-    /// The curve round the middle.
+    /// The curve around the middle.
     trunk: Option<SectionLoop>,
-    /// Middles of the largest curve on each side, if it is an arm's.
+    /// Centre of the largest curve on each side, if it is an arm.
     beside: [Option<DVec3>; 2],
 }
 
 impl Landmarks {
-    /// Finds them.
+    /// Finds the landmarks of a body.
     #[must_use]
     pub fn of(body: &TriMesh) -> Self {
         let (low, high) = body.bounds().unwrap_or_default();
         let height = high.z - low.z;
         let middle = middle(body, low.z, height);
         let facing = facing(body, low.z, height);
-        // Left and right as the body has them.
+        // From the body's right to its left.
         let across = DVec2::from_angle(facing);
-        let count = if height <= TALLEST { (height / STEP) as usize } else { 0 };
-        let levels: Vec<Level> = (1..count)
-            .map(|i| {
-                let z = low.z + STEP * i as f64;
-                level(body, z, middle, across)
-            })
-            .collect();
+        let count = if height <= MAX_HEIGHT { (height / STEP) as usize } else { 0 };
+        let levels: Vec<Level> = (1..count).map(|i| level(body, low.z + STEP * i as f64, middle, across)).collect();
         let between = |from: f64, to: f64| {
             levels.iter().filter(move |l| l.z >= low.z + from * height && l.z <= low.z + to * height)
         };
@@ -93,7 +88,7 @@ impl Landmarks {
         let from = crotch.unwrap_or(0.45);
         let arms: Vec<&Level> =
             between(from, 1.0).filter(|l| l.z < top && l.beside.iter().all(Option::is_some)).collect();
-        let armpit_z = arms.last().filter(|_| arms.len() >= LEAST_CURVES).map(|l| l.z);
+        let armpit_z = arms.last().filter(|_| arms.len() >= MIN_CURVES).map(|l| l.z);
         let arm_fall = armpit_z.and_then(|_| arm_fall(&arms, across));
         let waist_to = armpit_z.map_or(0.7, |z| (z - low.z) / height - 0.03);
         let waist_z = narrowest(from + 0.06, waist_to).map(|l| l.z);
@@ -105,8 +100,7 @@ impl Landmarks {
         Self { middle, facing, shoulder_z, waist_z, hip_z, bust_z, armpit_z, arm_fall, trunk }
     }
 
-    /// The body without its arms, open where they were: what is worn below them hangs inside of them. `None` for a body without arms that
-    /// were found.
+    /// The body without its arms, open where they were, for garments that hang between the arms. `None` where no arms were found.
     pub(super) fn without_arms(&self, body: &TriMesh) -> Option<TriMesh> {
         let armpit = self.armpit_z?;
         let across = DVec2::from_angle(self.facing);
@@ -116,7 +110,7 @@ impl Landmarks {
             let aside = (p.truncate() - self.middle).dot(across).abs();
             let trunk = self.trunk.get(((p.z - lowest) / STEP).round() as usize);
             let half = if p.z < lowest { hips } else { trunk.map_or(hips, |t| t.1) };
-            p.z < armpit && aside > half + BESIDE
+            p.z < armpit && aside > half + MIN_BESIDE
         };
         let arm: Vec<bool> = body.positions.iter().map(of_arm).collect();
         let kept = |t: &&[u32; 3]| !t.iter().any(|&v| arm[v as usize]);
@@ -124,7 +118,7 @@ impl Landmarks {
     }
 }
 
-/// Of the largest curve a little above the middle of the height.
+/// Centre of the largest curve a little above half the height, in x and y.
 fn middle(body: &TriMesh, low: f64, height: f64) -> DVec2 {
     let curves = section(body, Plane::horizontal(low + 0.6 * height));
     let largest = curves.into_iter().filter(|c| c.closed).max_by(|a, b| a.length().total_cmp(&b.length()));
@@ -135,7 +129,7 @@ fn middle(body: &TriMesh, low: f64, height: f64) -> DVec2 {
     largest.map_or(DVec2::ZERO, box_of)
 }
 
-/// From the ankles to the feet, as the nearest quarter turn from −y.
+/// Direction from the ankles to the feet as the nearest quarter turn from −y, radians.
 fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
     let mean = |from: f64, to: f64| {
         let inside = |p: &&DVec3| p.z >= low + from * height && p.z <= low + to * height;
@@ -151,19 +145,20 @@ fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
     (angle / std::f64::consts::FRAC_PI_2).round() * std::f64::consts::FRAC_PI_2
 }
 
+/// Width of a curve, m.
 fn extent(curve: &SectionLoop, across: DVec2) -> f64 {
     let (low, high) = extremes(curve.points.iter().map(|p| p.truncate().dot(across)));
     high - low
 }
 
-/// How far a curve reaches to the farther side of the middle.
+/// Distance of a curve's farther side from the middle, m.
 fn extent_from(curve: &SectionLoop, middle: DVec2, across: DVec2) -> f64 {
     curve.points.iter().fold(0.0, |most: f64, p| most.max((p.truncate() - middle).dot(across).abs()))
 }
 
 fn level(body: &TriMesh, z: f64, middle: DVec2, across: DVec2) -> Level {
     let mut found = Level { z, trunk: None, beside: [None, None] };
-    let mut girths = [LEAST_ARM; 2];
+    let mut girths = [MIN_ARM_GIRTH; 2];
     for curve in section(body, Plane::horizontal(z)).into_iter().filter(|c| c.closed) {
         let along = |p: &DVec3| (p.truncate() - middle).dot(across);
         let (low, high) = extremes(curve.points.iter().map(along));
@@ -183,7 +178,7 @@ fn level(body: &TriMesh, z: f64, middle: DVec2, across: DVec2) -> Level {
     found
 }
 
-/// Mean slope of both arms: how fast their middles go outward as the level falls, by least squares.
+/// Mean angle of both arms below the horizontal, from their centres by least squares.
 fn arm_fall(arms: &[&Level], across: DVec2) -> Option<f64> {
     let n = arms.len() as f64;
     let out = |l: &Level| {
