@@ -1,15 +1,46 @@
 //! The named measurements of a body.
 //!
 //! Defaults are ANSUR II (women, n = 1,986) regressed on stature 168, bust 88, waist 72 and hip 96 cm, which is the European
-//! size 38; underbust and knee girths, which ANSUR II does not have, are the mean of the drop to a B cup (13 cm) and the calf's.
-//! Heights and lengths that are not given grow with stature. Centimetres outside, metres inside.
+//! size 38. ANSUR II has neither underbust nor knee girth: the underbust is the bust less the 13 cm of a B cup, the knee equals
+//! the calf. Heights and lengths that are not given are proportional to stature. [`BodySpec`] is in centimetres, [`Measures`] in
+//! metres.
 
 use serde::{Deserialize, Serialize};
 
-use super::ShapeError;
+/// Measurements and descriptions that no mesh can be made of.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message says what each field is")]
+pub enum ShapeError {
+    /// A spec that cannot be parsed.
+    #[error("the spec cannot be read: {0}")]
+    Spec(String),
+    /// A measurement out of range.
+    #[error("{name} is {found_cm} cm; a body's is from {low_cm:.0} to {high_cm:.0} cm")]
+    Measurement { name: &'static str, found_cm: f64, low_cm: f64, high_cm: f64 },
+    /// A length of a garment out of range.
+    #[error("{name} is {found}; it must be from {low} to {high}")]
+    Length { name: &'static str, found: f64, low: f64, high: f64 },
+    /// Heights that do not ascend.
+    #[error(
+        "{upper} is {upper_cm:.1} cm, expected {gap_cm:.0} cm or more above {lower} at {lower_cm:.1} cm; give both heights, or neither"
+    )]
+    Order { lower: &'static str, lower_cm: f64, upper: &'static str, upper_cm: f64, gap_cm: f64 },
+    /// Too few triangles or vertices.
+    #[error("{found} {what} are too few to make out its shape; ask for {least} or more")]
+    TooFew { what: &'static str, found: usize, least: usize },
+    /// Too many triangles or vertices.
+    #[error("{found} {what} are too many; ask for {most} or fewer")]
+    TooMany { what: &'static str, found: usize, most: usize },
+    /// An unknown name of a garment.
+    #[error("there is no garment called {found:?}; the built-in ones are {known}")]
+    Unknown { found: String, known: String },
+    /// A surface that is not a manifold, which the ranges above should exclude.
+    #[error("the {what} has no manifold surface at these measurements; bring them nearer to each other")]
+    NotManifold { what: &'static str },
+}
 
-/// What a body is made from, in centimetres. Whatever is left out of a file is European size 38; heights and lengths
-/// left out are in proportion to stature.
+/// The measurements of a body, in centimetres. Defaults are European size 38; heights and lengths that are not given are
+/// proportional to stature.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BodySpec {
@@ -37,10 +68,10 @@ pub struct BodySpec {
     pub biceps_cm: f64,
     /// Girth of the wrist, across the arm.
     pub wrist_cm: f64,
-    /// From the neck's side to the end of the shoulder.
+    /// Distance from the side of the neck to the end of the shoulder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shoulder_length_cm: Option<f64>,
-    /// From the end of the shoulder to the wrist.
+    /// Distance from the end of the shoulder to the wrist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm_length_cm: Option<f64>,
     /// Height of the vertebra at the nape.
@@ -99,7 +130,7 @@ impl Default for BodySpec {
 }
 
 impl BodySpec {
-    /// Reads a spec from TOML.
+    /// Parses TOML.
     pub fn from_toml(text: &str) -> Result<Self, ShapeError> {
         toml::from_str(text).map_err(|e| ShapeError::Spec(e.to_string()))
     }
@@ -112,11 +143,10 @@ impl BodySpec {
         table.try_into().map_err(|e| fault(&e))
     }
 
-    /// The measurements in metres, with the heights and lengths that follow from stature.
+    /// The measurements in metres, complete.
     ///
     /// # Errors
-    /// [`ShapeError::Measurement`] for one that is not a length a body can have, [`ShapeError::Order`] for heights out of
-    /// order.
+    /// [`ShapeError::Measurement`] for one out of range, [`ShapeError::Order`] for heights out of order.
     pub fn measures(&self) -> Result<Measures, ShapeError> {
         let in_range = |name: &'static str, cm: f64, low: f64, high: f64| {
             if (low..=high).contains(&cm) {

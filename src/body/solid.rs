@@ -1,23 +1,104 @@
-//! Solids as fields: negative inside, positive outside, near the surface the distance in metres.
+//! Implicit solids: fields that are negative inside, positive outside, and near the surface the distance in metres.
 //!
-//! A swept superellipse has at coordinate t along its axis the section (|u−c_u|/a)ⁿ + (|v−c_v|/b)ⁿ = 1, b being b₋ for
-//! v < c_v and b₊ for v > c_v. With r the left side to the power 1/n and ρ the distance from the section's centre, ρ (1 − 1/r) is the
+//! A swept superellipse has at coordinate t along its axis the section (|u−c_u|/a)ⁿ + (|v−c_v|/b)ⁿ = 1, with b = b₋ for v < c_v and
+//! b₊ for v > c_v. With r the left-hand side to the power 1/n and ρ the distance from the section's centre, ρ (1 − 1/r) is the
 //! distance along the ray from the centre; divided by the length of its gradient it is the distance to first order.
 //! An ellipsoid is |p/r| (|p/r| − 1) / |p/r²| (I. Quilez). Solids are joined by the smooth minimum of [`Jet`].
+//!
+//! The sizes of the sections are a [`Profile`]: between stations s_i < s_{i+1} each channel is the cubic Hermite polynomial with
+//! the values of the two stations and the tangents of the parabola through three neighbouring stations (Bessel's; de Boor, "A
+//! Practical Guide to Splines", ch. IV), so the curve is C¹ and reproduces parabolas. Beyond the ends it is constant.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | a, b₋, b₊ | half breadth, half depths to the negative and positive side of v | m |
 //! | n | exponent, 2 for an ellipse | – |
 //!
-//! Limits: away from the surface the value is only of the right sign and order, not the distance.
+//! Limits: away from the surface the value has the right sign and order of magnitude only.
 
 use glam::DVec3;
 
 use super::jet::Jet;
-use super::profile::Profile;
 
-/// Anything with a signed field.
+/// One segment: its start and the four coefficients of each channel.
+#[derive(Debug, Clone)]
+struct Segment<const K: usize> {
+    start: f64,
+    coefficients: [[f64; 4]; K],
+}
+
+/// K channels as smooth functions of one coordinate.
+#[derive(Debug, Clone)]
+pub(crate) struct Profile<const K: usize> {
+    segments: Vec<Segment<K>>,
+    first: f64,
+    last: f64,
+}
+
+impl<const K: usize> Profile<K> {
+    /// The curve through `stations` (coordinate, values); coordinates must ascend. Fewer than two stations make a
+    /// constant.
+    pub(crate) fn new(stations: &[(f64, [f64; K])]) -> Self {
+        let n = stations.len();
+        let slope = |i: usize, c: usize| -> f64 {
+            (stations[i + 1].1[c] - stations[i].1[c]) / (stations[i + 1].0 - stations[i].0)
+        };
+        let tangent = |i: usize, c: usize| -> f64 {
+            if n < 2 {
+                0.0
+            } else if i == 0 {
+                slope(0, c)
+            } else if i == n - 1 {
+                slope(n - 2, c)
+            } else {
+                let (before, after) = (stations[i].0 - stations[i - 1].0, stations[i + 1].0 - stations[i].0);
+                (slope(i - 1, c) * after + slope(i, c) * before) / (before + after)
+            }
+        };
+        let segments = (0..n.saturating_sub(1))
+            .map(|i| {
+                let h = stations[i + 1].0 - stations[i].0;
+                let coefficients = std::array::from_fn(|c| {
+                    let (p, s, m0, m1) = (stations[i].1[c], slope(i, c), tangent(i, c), tangent(i + 1, c));
+                    [p, m0, (3.0 * s - 2.0 * m0 - m1) / h, (m0 + m1 - 2.0 * s) / (h * h)]
+                });
+                Segment { start: stations[i].0, coefficients }
+            })
+            .collect();
+        Self { segments, first: stations.first().map_or(0.0, |s| s.0), last: stations.last().map_or(0.0, |s| s.0) }
+    }
+
+    /// Whether each station's coordinate is above the one before.
+    fn ascends(&self) -> bool {
+        let starts = self.segments.iter().map(|segment| segment.start);
+        starts.chain([self.last]).is_sorted_by(|a, b| a < b)
+    }
+
+    /// First and last coordinate.
+    pub(crate) fn range(&self) -> (f64, f64) {
+        (self.first, self.last)
+    }
+
+    /// All channels at `s`, with gradients.
+    pub(crate) fn at(&self, s: Jet) -> [Jet; K] {
+        let clamped = s.value.clamp(self.first, self.last);
+        let slope = if clamped == s.value { s.gradient } else { DVec3::ZERO };
+        let index = self.segments.partition_point(|g| g.start <= clamped).saturating_sub(1);
+        let Some(segment) = self.segments.get(index) else { return [Jet::constant(0.0); K] };
+        let x = clamped - segment.start;
+        std::array::from_fn(|c| {
+            let [p0, p1, p2, p3] = segment.coefficients[c];
+            Jet::new(p0 + x * (p1 + x * (p2 + x * p3)), slope * (p1 + x * (2.0 * p2 + x * 3.0 * p3)))
+        })
+    }
+
+    /// All channels at `s`.
+    pub(crate) fn values(&self, s: f64) -> [f64; K] {
+        self.at(Jet::constant(s)).map(|j| j.value)
+    }
+}
+
+/// A solid given by a signed field.
 pub(crate) trait Solid: Sync {
     /// The field and its gradient at `p`, m.
     fn at(&self, p: DVec3) -> Jet;
@@ -28,8 +109,8 @@ pub(crate) trait Solid: Sync {
         0.0
     }
 
-    /// `field` joined with this solid over the width `k`, the solid left out where it is too far to matter: where its
-    /// least distance is over one and a half times what could, for the field is a distance only to first order.
+    /// `field` joined with this solid over the width `k`. The solid is skipped where it is too far to matter, with a margin of one
+    /// half, since the field is a distance only to first order.
     fn join(&self, field: Jet, p: DVec3, k: f64) -> Jet {
         if self.at_least(p) > 1.5 * (field.value.max(0.0) + k) { field } else { field.smooth_min(self.at(p), k) }
     }
@@ -55,7 +136,7 @@ pub(crate) struct Sweep {
     box_high: DVec3,
 }
 
-/// The box of the stations' sections in the sweep's frame, with a tenth more for what the curve does between them.
+/// The box of the stations' sections in the sweep's frame, a tenth larger to contain the curve between them.
 fn section_box(stations: &[(f64, Section)]) -> (DVec3, DVec3) {
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
@@ -137,7 +218,7 @@ impl Solid for Sweep {
             (x.abs_powf(n) + y.abs_powf(n)).abs_powf(1.0 / n)
         };
         let side = if r.value < 0.05 {
-            // Near the axis the quotient below is undefined; all that matters there is that it is inside.
+            // Near the axis the quotient below is undefined; any inside value will do.
             Jet::constant(-0.9 * a.value.min(b.value))
         } else {
             let rho = (u.square() + v.square()).sqrt();
@@ -244,5 +325,15 @@ mod tests {
         for p in [DVec3::new(0.1, 0.0, 0.0), DVec3::new(0.0, 0.2, 0.0), DVec3::new(0.0, 0.06, 0.3)] {
             assert!(e.at(p).value.abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn profiles_reproduce_parabolas_inside_and_are_constant_beyond() {
+        let stations: Vec<(f64, [f64; 1])> = [0.0, 1.0, 2.5, 3.0, 4.0].iter().map(|&s| (s, [s * s])).collect();
+        let profile = Profile::new(&stations);
+        assert!((profile.values(1.7)[0] - 1.7 * 1.7).abs() < 1e-12);
+        assert!((profile.values(2.8)[0] - 2.8 * 2.8).abs() < 1e-12);
+        assert_eq!(profile.values(9.0), [16.0]);
+        assert_eq!(profile.values(-1.0), [0.0]);
     }
 }

@@ -142,9 +142,11 @@ impl Fabric {
         let density = "kilograms per square metre, 0.0001 to 100; most cloth has 0.05 to 0.6";
         let stiffness = "newtons per metre, 0.001 to 1e9; most cloth has 5 to 10,000";
         let bending = "newton metres, 1e-12 to 1000; most cloth has 1e-6 to 1e-3";
+        // Thicker cloth is upholstery, and probably has a wrong unit.
+        let thickness = "metres, at most 0.02; is it in millimetres?";
         let constants = [
             ("density_kg_per_m2", self.density_kg_per_m2, 1e-4..=1e2, density),
-            ("thickness_m", self.thickness_m, 0.0..=f64::MAX, positive),
+            ("thickness_m", self.thickness_m, 0.0..=0.02, thickness),
             ("stretch_weft_n_per_m", self.stretch_weft_n_per_m, 1e-3..=1e9, stiffness),
             ("stretch_warp_n_per_m", self.stretch_warp_n_per_m, 1e-3..=1e9, stiffness),
             ("shear_n_per_m", self.shear_n_per_m, 1e-3..=1e9, stiffness),
@@ -156,8 +158,6 @@ impl Fabric {
             // Beyond √(k_u k_v) the membrane energy would have no lower bound; one half is the isotropic limit.
             ("poisson", self.poisson, 0.0..=0.5, "0 to 0.5"),
             ("friction", self.friction, 0.0..=10.0, "0 (none) to 10"),
-            // Thicker than this is upholstery, and probably a wrong unit.
-            ("thickness_m", self.thickness_m, 0.0..=0.02, "metres, at most 0.02; is it in millimetres?"),
         ];
         let wrong = |key, found, expected| FabricError::Constant { file: file.to_owned(), key, found, expected };
         if let Some(&(key, value, ..)) = constants.iter().find(|(_, value, ..)| !(value.is_finite() && *value > 0.0)) {

@@ -1,28 +1,26 @@
-//! A garment's surface before it is cut: the body at a finger's distance, joined with the tubes of skirt, bodice and sleeves.
+//! A garment's surface before it is clipped: an offset surface of the body joined with the tubes of skirt, bodice and sleeves.
 //!
-//! The tubes are superellipses around the body's own breadth and depths at each level, widened until their girth is the
-//! body's plus the ease; below the hip they widen evenly by the flare. Where the body comes nearer than [`CLEARANCE`], the
-//! surface follows the body at that distance instead, smoothly; so none of the garment is inside the body, by construction.
+//! The sections of the tubes are superellipses around the body's breadth and depths at each height, widened until their girth
+//! is the body's plus the ease; below the hip they widen evenly by the flare. Where the body is nearer than [`CLEARANCE`], the
+//! surface follows it smoothly at that distance, so no part of the garment is inside the body.
 
 use glam::DVec3;
 
 use super::spec::{GarmentSpec, Sleeves, Support};
 use crate::body::anatomy::{Anatomy, underbust_height};
-use crate::body::dress_form::DressForm;
-use crate::body::fitting::ray;
+use crate::body::dress_form::{DressForm, ray};
 use crate::body::jet::Jet;
-use crate::body::profile::Profile;
-use crate::body::solid::{Section, Sided, Solid, Sweep};
+use crate::body::solid::{Profile, Section, Sided, Solid, Sweep};
 
-/// Least distance between the undraped garment and the body, m. The field is off by up to a third at the shoulders, and a mesh's
-/// chords cut corners, so that 3 mm remain everywhere.
+/// Least distance between the undraped garment and the body, m. The field is wrong by up to a third at the shoulders, and the
+/// mesh's chords are nearer than the surface, so that 3 mm remain everywhere.
 pub(super) const CLEARANCE: f64 = 0.006;
-/// Width over which body and tubes are joined, m.
+/// Width of the smooth joint of body and tubes, m. A heuristic.
 const BLEND: f64 = 0.015;
 /// Exponent of the tubes' sections, near an ellipse.
 const EXPONENT: f64 = 2.2;
-/// What the tubes extend beyond their last opening, m, so that the opening cuts them cleanly.
-const BEYOND: f64 = 0.08;
+/// Length of the tubes beyond their last opening, m, so that the opening cuts the tube and not its end.
+const OVERLAP: f64 = 0.08;
 
 /// The uncut surface of a garment.
 #[derive(Debug, Clone)]
@@ -91,7 +89,7 @@ fn extents(anatomy: &Anatomy, z: f64, lowest: f64) -> Section {
     let under = Under { form: anatomy, arms: false };
     let centre = anatomy.trunk.centre(z);
     let reach = |direction: DVec3| ray(&under, centre, direction, 0.11);
-    // Between the breasts and between the buttocks the body is nearer than what a tape touches: look to the sides too.
+    // A tape spans the hollows between the breasts and between the buttocks, so the depth is the greatest of three.
     let deep = |sign: f64| {
         [0.0, 0.04, 0.07]
             .iter()
@@ -143,13 +141,13 @@ fn around(section: Section, anatomy: &Anatomy, z: f64) -> Section {
     [cu, cv, scale * a, scale * front, scale * back]
 }
 
-/// Stations of a skirt from beyond the hem up to just below `from` at height `z0`: it opens linearly until its girth
-/// has grown by the flare, and the more flare the rounder the hem.
+/// Stations of a skirt from beyond the hem up to just below `from` at height `z0`. Its girth grows linearly by the flare, and
+/// the hem is rounder with more flare.
 fn skirt(from: Section, z0: f64, hem: f64, flare: f64) -> Vec<(f64, Section)> {
     let round = (perimeter(from) + flare) / std::f64::consts::TAU;
-    // A flare of 60 cm makes the hem a circle; less leaves it the body's oval.
+    // A flare of 60 cm makes the hem a circle; with less it keeps part of the body's oval.
     let roundness = (flare / 0.6).min(1.0);
-    let low = hem - BEYOND;
+    let low = hem - OVERLAP;
     (0..5)
         .map(|i| {
             let z = low + (z0 - low) * f64::from(i) / 5.0;
@@ -170,10 +168,10 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch + 0.03), girth);
     let flare = spec.flare_cm / 100.0;
     let waist = section(m.waist_height, m.waist + ease.waist_cm / 100.0);
-    // Hip and seat stay inside, so that the cloth falls from them without showing them.
+    // Hip and seat stay inside, so that the cloth falls over them.
     let hip = around(section(m.hip_height, m.hip + ease.hip_cm / 100.0), anatomy, m.hip_height);
     if spec.carried_by == Support::Waist {
-        // A straight line from waist to hem, unless hip or seat stand out of it.
+        // A straight line from waist to hem, except where hip or seat are wider.
         let seat_z = m.hip_height + 0.035;
         let line = skirt(waist, m.waist_height, hem, flare);
         let straight = Profile::new(&[line[0], (m.waist_height, waist)]);
@@ -192,12 +190,12 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let mut stations = if hem < m.hip_height - 0.10 {
         skirt(hip, m.hip_height - 0.02, hem, flare)
     } else {
-        vec![(hem.min(m.hip_height) - BEYOND, hip)]
+        vec![(hem.min(m.hip_height) - OVERLAP, hip)]
     };
     let under_z = underbust_height(m);
     let bust = section(m.bust_height, m.bust + ease.bust_cm / 100.0);
     let mut underbust = section(under_z, m.underbust + 0.5 * (ease.bust_cm + ease.waist_cm) / 100.0);
-    // Cloth hangs off the bust: below it, it comes back only part of the way.
+    // Cloth hangs from the bust: below it the tube narrows only part of the way.
     underbust[3] = underbust[3].max(0.5 * (underbust[3] + bust[3]));
     let axilla_z = m.axilla - 0.01;
     let axilla = section(
@@ -215,7 +213,7 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     Sweep::upright(EXPONENT, &stations, [0.005, 0.02])
 }
 
-/// Where the high hip is: a little over half the way from the hip up to the waist.
+/// Height of the high hip, m: a little over half the way from the hip up to the waist.
 fn high_hip(hip: f64, waist: f64) -> f64 {
     hip + (waist - hip) * 0.6
 }
@@ -226,20 +224,20 @@ fn sleeve(s: &Sleeves, anatomy: &Anatomy, arm_length: f64) -> Sweep {
     let (upper, lower) = (s.ease_cm / 100.0 / std::f64::consts::TAU, s.cuff_ease_cm / 100.0 / std::f64::consts::TAU);
     let stations: Vec<(f64, Section)> = (0..10)
         .map(|i| {
-            let t = 0.03 + (end + BEYOND - 0.03) * f64::from(i) / 9.0;
+            let t = 0.03 + (end + OVERLAP - 0.03) * f64::from(i) / 9.0;
             // Past the wrist the sleeve does not widen with the hand.
             let [cu, cv, a, below, above] = anatomy.arm.section(t.min(anatomy.wrist_at));
             let by = upper + (lower - upper) * (t / end).min(1.0);
             let round = 0.5 * (a + 0.5 * (below + above));
             let soft = |r: f64| 0.5 * (r + round) + by;
-            // It lies on top of the arm and hangs below it, so that its head does not stand off the shoulder.
+            // It touches the arm on top and hangs below it, so that its head is close to the shoulder.
             (t, [cu - 0.75 * (by - CLEARANCE), cv, soft(a), soft(below), soft(above)])
         })
         .collect();
     anatomy.arm.with_stations(&stations, [0.01, 0.005])
 }
 
-/// Where along the arm's axis a sleeve ends, m.
+/// Coordinate along the arm's axis at which a sleeve ends, m.
 pub(super) fn sleeve_end(s: &Sleeves, anatomy: &Anatomy, arm_length: f64) -> f64 {
     anatomy.wrist_at - (1.0 - s.length) * arm_length
 }

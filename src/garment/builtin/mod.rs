@@ -1,34 +1,41 @@
 //! Garments placed around the dress form, undraped.
 //!
-//! A [`GarmentSpec`] (a few lengths and eases) becomes a surface around the form (`cloth`), which is contoured, cut at its
-//! openings (`opening`), remeshed to even triangles without a preferred diagonal, and laid flat triangle by triangle for its rest shape (`flat`).
-//! Sleeves and bodice are one surface, so there is no seam between them. Positions are metres in the frame of the form.
+//! A [`GarmentSpec`] (a few lengths and eases) becomes a surface around the form (`cloth`), which is contoured, clipped at its
+//! openings (`opening`), remeshed to even triangles without a preferred diagonal, and flattened triangle by triangle for its
+//! rest shape. Sleeves and bodice are one surface without a seam. Positions are metres in the frame of the form.
+//!
+//! # Rest shape
+//! Each triangle is flattened in its own frame, x along the weft, y along the warp. The warp runs up the garment: along z on
+//! bodice and skirt, along the arm on a sleeve, projected into the triangle; the weft is warp × n, so that weft × warp = n. On
+//! the shoulders, where the projection of z is short, the weft is taken along x. Without fullness the flat triangle is congruent
+//! to the placed one. With fullness φ an edge's weft component is s times as long, s = 1 + φ (z_top − z)/length at the edge's
+//! middle z, and the three lengths make the flat triangle. Neighbouring triangles agree on the length of their common edge
+//! exactly.
 
 mod cloth;
-mod flat;
 mod opening;
-pub mod spec;
+mod spec;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use crate::body::ShapeError;
-use crate::body::contour::contour;
-use crate::body::cut::{CLOSE, clip, onto_edge, onto_surface};
+use crate::body::contour::{CONVERGED, clip, contour, onto_edge, onto_surface};
 use crate::body::dress_form::DressForm;
-use crate::body::measures::BodySpec;
+use crate::body::measures::{BodySpec, ShapeError};
 use crate::mesh::remesh::{Density, Surface, remesh};
 use crate::mesh::{RestShape, TriMesh};
 use cloth::Cloth;
-use flat::{Fullness, lay_flat};
 use opening::Opening;
 pub use spec::{BUILT_IN, Ease, GarmentRequest, GarmentSpec, Neckline, Sleeves, Support, TABLE_4_SIZES};
 
-/// Spacing of the first contour, m: a fraction of the narrowest part, a strap or a sleeve.
+/// Grid spacing of the contour, m: a fraction of the narrowest part, a strap or a sleeve.
 const SPACING: f64 = 0.02;
-/// Vertices of a garment whose spec names neither a number nor an edge length: about that of the paper's.
+/// Default number of vertices, about that of the paper's garments.
 const DEFAULT_VERTICES: usize = 5_000;
-/// A garment has at least and at most so many vertices.
-const LIMITS: [usize; 2] = [400, 1_000_000];
+/// Least and largest number of vertices.
+const VERTEX_RANGE: [usize; 2] = [400, 1_000_000];
+
+/// n_z² above which a triangle has its weft along x. A heuristic.
+const LEVEL: f64 = 0.5;
 
 /// A garment around the form, not yet draped.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,11 +47,11 @@ pub struct PlacedGarment {
     pub mesh: TriMesh,
     /// Each triangle laid flat, m: x along the weft, y along the warp, up the garment and up the sleeve.
     pub rest: RestShape,
-    /// Vertices that stay where they are worn: a skirt's upper edge. Empty where the shoulders carry.
+    /// Vertices that keep their positions: a skirt's upper edge. Empty for garments that hang from the shoulders.
     pub held: Vec<u32>,
 }
 
-/// The surface the remesher works on.
+/// The clipped surface, for the remesher.
 struct Cut<'a> {
     cloth: &'a Cloth<'a>,
     openings: &'a [Opening<'a>],
@@ -54,17 +61,17 @@ impl Surface for Cut<'_> {
     fn project(&self, p: DVec3, tag: u8) -> DVec3 {
         match self.openings.get(usize::from(tag).wrapping_sub(1)) {
             Some(opening) => onto_edge(self.cloth, |p| opening.at(p), p),
-            None => onto_surface(self.cloth, p, CLOSE),
+            None => onto_surface(self.cloth, p, CONVERGED),
         }
     }
 }
 
-/// The garment `spec` around the form of `body`, with `vertices` of them if that is given.
+/// The garment `spec` around the form of `body`; `vertices` overrides the number in the spec.
 pub fn garment(spec: &GarmentSpec, body: &BodySpec, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     garment_on(spec, &DressForm::new(body)?, vertices)
 }
 
-/// [`garment`] around a form that is made already.
+/// [`garment`] around an existing form.
 pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>) -> Result<PlacedGarment, ShapeError> {
     spec.check()?;
     let cloth = Cloth::new(spec, form);
@@ -79,18 +86,18 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
     };
     if let Density::Vertices(found) = density {
         let what = "vertices of the garment";
-        if found < LIMITS[0] {
-            return Err(ShapeError::TooFew { what, found, least: LIMITS[0] });
+        if found < VERTEX_RANGE[0] {
+            return Err(ShapeError::TooFew { what, found, least: VERTEX_RANGE[0] });
         }
-        if found > LIMITS[1] {
-            return Err(ShapeError::TooMany { what, found, most: LIMITS[1] });
+        if found > VERTEX_RANGE[1] {
+            return Err(ShapeError::TooMany { what, found, most: VERTEX_RANGE[1] });
         }
     }
     let openings = Opening::all(spec, form, &cloth);
     let m = &form.measures;
     let reach = form.anatomy.arm.centre(form.anatomy.wrist_at + 0.05).x.max(0.5 + 0.002 * spec.flare_cm);
     let depth = 0.30 + 0.0020 * spec.flare_cm + 0.15 * m.hip.max(m.bust).max(m.waist);
-    // The grid is off centre, so that left and right are not meshed alike: an even mesh would fold evenly.
+    // The grid is off centre, so that left and right are meshed differently: a symmetric mesh would fold symmetrically.
     let low = DVec3::new(-reach - 0.0073, -depth - 0.0031, cloth.hem - 0.045);
     let high =
         DVec3::new(reach, depth, if spec.carried_by == Support::Waist { cloth.top + 0.03 } else { cloth.top + 0.1 });
@@ -108,13 +115,11 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
         hem: cloth.hem,
         axis: cloth.centre(m.waist_height),
     };
-    let sleeve = mesh.groups.iter().position(|g| g == "sleeve").map(|g| g as u32);
     let arm = form.anatomy.arm.direction();
-    let corners = lay_flat(
+    let corners = flattened(
         &mesh,
         |t| {
-            let cuff = mesh.groups[mesh.triangle_group[t] as usize] == "cuffs";
-            if Some(mesh.triangle_group[t]) == sleeve || cuff {
+            if ["sleeve", "cuffs"].contains(&mesh.groups[mesh.triangle_group[t] as usize].as_str()) {
                 let side = mesh.corners(t).iter().map(|p| p.x).sum::<f64>().signum();
                 -arm * DVec3::new(side, 1.0, 1.0)
             } else {
@@ -128,7 +133,7 @@ pub fn garment_on(spec: &GarmentSpec, form: &DressForm, vertices: Option<usize>)
     Ok(PlacedGarment { name: spec.name.clone(), mesh, rest: RestShape::new(corners), held })
 }
 
-/// Where a skirt's fullness begins, m: at the waist, or at a dress's hip.
+/// Height at which the fullness starts, m: the waist of a skirt, the hip of a dress.
 fn top_of_skirt(spec: &GarmentSpec, form: &DressForm) -> f64 {
     match spec.carried_by {
         Support::Waist => form.measures.waist_height,
@@ -136,7 +141,7 @@ fn top_of_skirt(spec: &GarmentSpec, form: &DressForm) -> f64 {
     }
 }
 
-/// Names each triangle: by the opening it touches, else `body` or `sleeve`.
+/// Groups the triangles: by the opening they touch, else `body` or `sleeve`.
 fn group(mesh: &mut TriMesh, tags: &[u8], openings: &[Opening<'_>], form: &DressForm, spec: &GarmentSpec) {
     mesh.groups = std::iter::once("body").chain(openings.iter().map(Opening::name)).map(str::to_owned).collect();
     let sleeve = mesh.groups.len() as u32;
@@ -144,7 +149,7 @@ fn group(mesh: &mut TriMesh, tags: &[u8], openings: &[Opening<'_>], form: &Dress
         mesh.groups.push("sleeve".to_owned());
     }
     let arm = &form.anatomy.arm;
-    // The sleeve begins where the arm leaves the chest: past the armpit, beyond the end of the shoulder.
+    // The sleeve starts where the arm leaves the chest: past the armpit, beyond the end of the shoulder.
     let root = arm.centre(0.03).x;
     mesh.triangle_group = mesh
         .triangles
@@ -154,11 +159,90 @@ fn group(mesh: &mut TriMesh, tags: &[u8], openings: &[Opening<'_>], form: &Dress
             if tag > 0 {
                 return u32::from(tag);
             }
-            let middle = triangle.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / 3.0;
-            let left = DVec3::new(middle.x.abs(), middle.y, middle.z);
+            let centroid = triangle.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / 3.0;
+            let left = DVec3::new(centroid.x.abs(), centroid.y, centroid.z);
             let t = arm.along(left);
             let near = left.distance(arm.centre(t)) < 0.14;
             if spec.sleeves.is_some() && left.x > root && t > 0.03 && near { sleeve } else { 0 }
         })
         .collect();
+}
+
+/// The excess of the rest shape over the placed garment.
+#[derive(Debug, Clone, Copy)]
+struct Fullness {
+    /// φ, excess width of the hem as a share.
+    share: f64,
+    /// Height at which it starts, m.
+    top: f64,
+    /// Height at which it is reached, m.
+    hem: f64,
+    /// Axis of the skirt: the weft runs around it.
+    axis: DVec3,
+}
+
+/// The flat corners of every triangle, m. `up` is the warp direction of each triangle before projection.
+fn flattened(mesh: &TriMesh, up: impl Fn(usize) -> DVec3, fullness: Fullness) -> Vec<[DVec2; 3]> {
+    (0..mesh.triangles.len())
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            let n = (b - a).cross(c - a).normalize_or_zero();
+            let warp = if n.z * n.z > LEVEL {
+                n.cross(DVec3::X).normalize_or_zero()
+            } else {
+                let d = up(t);
+                (d - d.dot(n) * n).normalize_or_zero()
+            };
+            let weft = warp.cross(n);
+            let flat = |p: DVec3| DVec2::new((p - a).dot(weft), (p - a).dot(warp));
+            let placed = [DVec2::ZERO, flat(b), flat(c)];
+            if fullness.share <= 0.0 {
+                return placed;
+            }
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| fullness.edge(p, q));
+            // p₀ at the origin, p₁ along x, p₂ from the three lengths (law of cosines), rotated to the direction of the placed edge.
+            let x = (ab * ab + ca * ca - bc * bc) / (2.0 * ab);
+            let y = (ca * ca - x * x).max(0.0).sqrt();
+            let s = fullness.stretch(0.5 * (a.z + b.z));
+            let turn = DVec2::new(placed[1].x * s, placed[1].y).normalize_or(DVec2::X);
+            [DVec2::ZERO, turn * ab, turn.rotate(DVec2::new(x, y))]
+        })
+        .collect()
+}
+
+impl Fullness {
+    fn stretch(&self, z: f64) -> f64 {
+        1.0 + self.share * ((self.top - z) / (self.top - self.hem)).clamp(0.0, 1.0)
+    }
+
+    /// Rest length of an edge.
+    fn edge(&self, p: DVec3, q: DVec3) -> f64 {
+        let middle = 0.5 * (p + q) - self.axis;
+        let around = DVec3::new(-middle.y, middle.x, 0.0).normalize_or_zero();
+        let (d, s) = (q - p, self.stretch(0.5 * (p.z + q.z)));
+        (d.length_squared() + (s * s - 1.0) * d.dot(around).powi(2)).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_without_fullness_are_congruent_and_with_it_wider() {
+        let (a, b, c) = (DVec3::new(1.0, 0.0, 0.5), DVec3::new(1.0, 0.1, 0.5), DVec3::new(1.0, 0.0, 0.6));
+        let mesh = TriMesh::new(vec![a, b, c], vec![[0, 1, 2]]);
+        let none = Fullness { share: 0.0, top: 1.0, hem: 0.0, axis: DVec3::ZERO };
+        let flat = flattened(&mesh, |_| DVec3::Z, none)[0];
+        for (i, (p, q)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
+            assert!((flat[i].distance(flat[(i + 1) % 3]) - p.distance(q)).abs() < 1e-12);
+        }
+        // The warp runs up: the upper corner has the larger y; the winding stays.
+        assert!(flat[2].y > flat[0].y + 0.09);
+        assert!((flat[1] - flat[0]).perp_dot(flat[2] - flat[0]) > 0.0);
+        let full = flattened(&mesh, |_| DVec3::Z, Fullness { share: 0.4, ..none })[0];
+        // Half way down, 0.4 of fullness is 0.2: the horizontal edge grows by it (to the cosine of half its angle).
+        assert!((full[0].distance(full[1]) - 0.12).abs() < 1e-4);
+        assert!((full[0].distance(full[2]) - 0.1).abs() < 1e-12);
+    }
 }

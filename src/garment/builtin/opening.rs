@@ -1,4 +1,4 @@
-//! The openings of a garment as regions that are taken away: h > 0 where there is no cloth, h about a distance in metres.
+//! The openings of a garment as implicit regions: h > 0 where cloth is removed, h approximately a distance in metres.
 
 use glam::DVec3;
 
@@ -10,10 +10,10 @@ use crate::body::jet::Jet;
 
 /// Exponent of a neckline's outline: 2 is an ellipse, more is squarer.
 const NECKLINE_EXPONENT: f64 = 2.2;
-/// Half the width over which a neckline's depth goes over from front to back, m: the shoulder's thickness.
+/// Half the width over which a neckline's depth changes from front to back, m: half the shoulder's thickness.
 const SHOULDER_HALF: f64 = 0.035;
 
-/// How far an armhole stands off the arm's own radius where it leaves the shoulder, m.
+/// Distance of an armhole from the arm where it leaves the shoulder, m.
 const ARMHOLE_ROOM: f64 = 0.03;
 
 /// One opening.
@@ -25,7 +25,7 @@ pub(super) enum Opening<'a> {
     Waistband(f64),
     /// Around the neck.
     Neckline { half_width: f64, front: f64, back: f64, shoulder: DVec3 },
-    /// Around each arm's root, without sleeves: beyond a slanted plane, and not far from the arm.
+    /// Around each arm's root, without sleeves: beyond a slanted plane, near the arm.
     Armholes { form: &'a Anatomy, point: DVec3, normal: DVec3, radius: f64 },
     /// Around each arm: beyond a distance along it, near it.
     Cuffs { form: &'a Anatomy, end: f64, radius: f64 },
@@ -51,7 +51,7 @@ impl<'a> Opening<'a> {
         }
         if let Some(sleeves) = &spec.sleeves {
             let end = sleeve_end(sleeves, anatomy, m.arm_length);
-            // The sleeve hangs below the arm by most of its ease; past the end nothing else may come this near.
+            // The sleeve hangs below the arm by most of its ease; past its end nothing else may be this near.
             let [.., wide] = anatomy.arm.section(end);
             let radius = wide.max(0.045) + 1.75 * sleeves.cuff_ease_cm / 100.0 / std::f64::consts::TAU + 0.03;
             openings.push(Self::Cuffs { form: anatomy, end, radius });
@@ -59,7 +59,7 @@ impl<'a> Opening<'a> {
             let width = spec.neckline.map_or(0.18, |n| n.width_cm / 100.0);
             let strap = spec.strap_cm.unwrap_or(4.0) / 100.0;
             let upper = DVec3::new(0.5 * width + strap, 0.0, cloth.top);
-            // Under the arm the opening begins a little below the armpit, outside the chest.
+            // Under the arm the opening starts a little below the armpit, outside the chest.
             let chest = anatomy.trunk.section(m.axilla)[2];
             let along = DVec3::new(chest + 0.016, 0.0, m.axilla - 0.035) - upper;
             let normal = DVec3::new(-along.z, 0.0, along.x).normalize();
@@ -70,7 +70,7 @@ impl<'a> Opening<'a> {
         openings
     }
 
-    /// The name of the group of triangles along its edge.
+    /// Name of the group of triangles along its edge.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Hem(_) => "hem",
@@ -89,7 +89,7 @@ impl<'a> Opening<'a> {
             Self::Hem(z) => Jet::constant(*z) - Jet::new(p.z, DVec3::Z),
             Self::Waistband(z) => Jet::new(p.z - z, DVec3::Z),
             Self::Neckline { half_width, front, back, shoulder } => {
-                // Depth goes from front to back by the smooth step 3s² − 2s³ over the shoulder.
+                // Over the shoulder the depth changes from front to back by the smooth step 3s² − 2s³.
                 let s = ((p.y - shoulder.y) / (2.0 * SHOULDER_HALF) + 0.5).clamp(0.0, 1.0);
                 let slope = 6.0 * s * (1.0 - s) / (2.0 * SHOULDER_HALF);
                 let depth =

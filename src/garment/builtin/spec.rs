@@ -1,10 +1,10 @@
-//! What a garment is described by: a few lengths and eases, in centimetres.
+//! Descriptions of garments: a few lengths and eases, in centimetres.
 
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::body::ShapeError;
+use crate::body::measures::ShapeError;
 
 /// The names of the built-in garments, in the order of the paper's Table 4.
 pub const BUILT_IN: [&str; 5] = ["pullover-1", "pullover-2", "flared-skirt", "low-cut-dress", "long-sleeved-dress"];
@@ -21,17 +21,17 @@ const SPECS: [&str; 5] = [
     include_str!("../../../assets/garments/long-sleeved-dress.toml"),
 ];
 
-/// What carries a garment.
+/// The support of a garment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Support {
-    /// It rests on the shoulders.
+    /// It hangs from the shoulders.
     Shoulders,
     /// Its upper edge is held at the waist.
     Waist,
 }
 
-/// How much wider than the body, girth less girth.
+/// Excess girth of the garment over the body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Ease {
@@ -55,9 +55,9 @@ impl Default for Ease {
 pub struct Neckline {
     /// From shoulder to shoulder, cm.
     pub width_cm: f64,
-    /// How far below the shoulder it reaches in front, cm.
+    /// Depth below the shoulder in front, cm.
     pub front_depth_cm: f64,
-    /// How far below the shoulder it reaches behind, cm.
+    /// Depth below the shoulder behind, cm.
     pub back_depth_cm: f64,
 }
 
@@ -67,9 +67,9 @@ pub struct Neckline {
 pub struct Sleeves {
     /// From the end of the shoulder, as a share of the arm's length to the wrist.
     pub length: f64,
-    /// Ease at the upper arm, girth less girth, cm.
+    /// Excess girth at the upper arm, cm.
     pub ease_cm: f64,
-    /// Ease at the lower end, cm.
+    /// Excess girth at the lower end, cm.
     pub cuff_ease_cm: f64,
 }
 
@@ -79,7 +79,7 @@ pub struct Sleeves {
 pub struct GarmentSpec {
     /// Its name.
     pub name: String,
-    /// What carries it.
+    /// Its support.
     pub carried_by: Support,
     /// From the shoulder at the neck, or from the waist, down to the hem, cm.
     pub length_cm: f64,
@@ -89,16 +89,16 @@ pub struct GarmentSpec {
     /// Girth of the hem less the garment's girth at the hip (from the waist: at the waist), cm.
     #[serde(default)]
     pub flare_cm: f64,
-    /// Extra cloth in the hem of the rest shape as a share of the placed hem, growing from none at the top; it folds when draped.
+    /// Excess width of the hem in the rest shape as a share of the placed hem, falling to none at the top; it folds when draped.
     #[serde(default)]
     pub fullness: f64,
-    /// How many vertices it is made with, unless asked otherwise.
+    /// Default number of vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertices: Option<usize>,
-    /// Length of the triangles' edges in place of a number of vertices, cm.
+    /// Edge length of the triangles instead of a number of vertices, cm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_length_cm: Option<f64>,
-    /// The opening for the head; needed by what the shoulders carry.
+    /// The opening for the head; required with `carried_by = "shoulders"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub neckline: Option<Neckline>,
     /// Sleeves; without them there are armholes.
@@ -156,12 +156,12 @@ impl GarmentSpec {
     }
 }
 
-/// A garment asked for as `NAME` or `NAME@VERTICES`.
+/// A garment as `NAME` or `NAME@VERTICES`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GarmentRequest {
     /// The name.
     pub name: String,
-    /// How many vertices; `None` leaves it to the spec.
+    /// The number of vertices; `None` takes the spec's.
     pub vertices: Option<usize>,
 }
 
