@@ -252,7 +252,7 @@ mod tests {
     fn a_strip_of_a_cylinder_is_flattened_without_strain() {
         // A third of a cylinder of 10 cm, as the eye sees it from the front, a few triangles turned over.
         let flat = sheet(12, 8, |i, j| DVec3::new(0.2 * (i / 12.0 - 0.5), 0.02 * j, 0.0));
-        let rest = RestSystem::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
+        let rest = RestShape::new((0..flat.triangles.len()).map(|t| flat.corners(t).map(DVec3::truncate)).collect());
         let around = |p: &DVec3| DVec3::new(0.1 * (p.x / 0.1).sin(), -0.1 * (p.x / 0.1).cos(), p.y);
         let mesh = flat.with_positions(flat.positions.iter().map(around).collect());
         let mut seen: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(p.x, p.z, 0.0)).collect();
