@@ -8,7 +8,7 @@ use crate::Job;
 use crate::live::{Limits, LiveError, LiveOptions, LiveServer, random_token};
 use crate::record::RecordSummary;
 use crate::scene::FileRole;
-use crate::session::{Session, Workshop};
+use crate::session::{Session, Worker};
 use clap::Args;
 
 use super::runtime::use_threads;
@@ -82,8 +82,8 @@ impl LiveArgs {
         let server = self.serve(&session, &options)?;
         self.print(server.address(), &options);
         let worker = {
-            let (session, mut workshop) = (session.clone(), Workshop::new(self.input.meshes()));
-            std::thread::spawn(move || session.work(&mut workshop))
+            let (session, mut worker) = (session.clone(), Worker::new(self.input.meshes()));
+            std::thread::spawn(move || worker.run(&session))
         };
         let (recorder, shower) = (self.keep(&session), self.show(&session));
         let mut shown = None;

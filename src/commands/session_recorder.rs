@@ -73,7 +73,7 @@ fn follow(session: &Session, sinks: &SinkArgs, attached: &mut dyn FnMut()) -> an
         last = finished.state;
         let job = Job { accuracy: Against::None, ..(*now.job).clone() };
         let measured =
-            job.measure(&finished.ground.loaded.scene, &finished.drape, None, &mut crate::drape::unobserved)?;
+            job.measure(&finished.loaded_scene.input.scene, &finished.drape, None, &mut crate::drape::unobserved)?;
         let mut solved = Solved::of_session(&job, finished, measured)?;
         let recorder = match &mut recorder {
             Some(recorder) => recorder,

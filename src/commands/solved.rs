@@ -37,9 +37,9 @@ pub(super) struct Snapshot {
 impl Solved {
     /// A state of a session, and what was measured of it.
     pub(super) fn of_session(job: &Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
-        let (loaded, drape) = (finished.ground.loaded.clone(), finished.drape.clone());
+        let (loaded, drape) = (finished.loaded_scene.input.clone(), finished.drape.clone());
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
-        summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.ground.load_ms));
+        summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.loaded_scene.load_ms));
         Ok(Self { loaded, drape, measured, snapshots: BTreeMap::new(), summary })
     }
 

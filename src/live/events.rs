@@ -26,7 +26,7 @@ pub(super) fn events(site: &Arc<Site>, permit: OwnedSemaphorePermit) -> Receiver
     let mut known = None;
     flow(site, permit, site.news.clone(), b": still here\n\n", move |site| {
         let snapshot = site.session.snapshot();
-        let generation = Some(snapshot.ground.as_ref().map(|ground| ground.generation));
+        let generation = Some(snapshot.loaded_scene.as_ref().map(|loaded_scene| loaded_scene.generation));
         // Histogram and trail are large, and are sent when the garment is new to this client.
         let whole = std::mem::replace(&mut known, generation) != generation;
         let state = if whole { report::state(&snapshot) } else { report::event(&snapshot) };

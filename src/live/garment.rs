@@ -12,14 +12,14 @@ use crate::session::{LoadedScene, Snapshot};
 /// The garment as OBJ: `of=rest`, `of=preview`, `pin=ID`, or by default the newest drape.
 pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
     let none = |what: &str| (StatusCode::CONFLICT, format!("no {what} yet; wait for an event that has one"));
-    let rest = snapshot.rest.as_ref().map(|rest| (&rest.ground, &rest.positions));
-    let preview = snapshot.preview.as_ref().map(|preview| (&preview.ground, &preview.positions));
-    let (ground, positions) = match (query(uri, "pin").as_deref(), query(uri, "of").as_deref()) {
+    let rest = snapshot.rest.as_ref().map(|rest| (&rest.loaded_scene, &rest.positions));
+    let preview = snapshot.preview.as_ref().map(|preview| (&preview.loaded_scene, &preview.positions));
+    let (loaded_scene, positions) = match (query(uri, "pin").as_deref(), query(uri, "of").as_deref()) {
         (Some(id), _) => {
             let pin = snapshot.pins.iter().find(|pin| pin.id.to_string() == id);
             let pin =
                 pin.ok_or_else(|| (StatusCode::NOT_FOUND, format!("found pin={id}, expected the number of a pin")))?;
-            (&pin.ground, &pin.positions)
+            (&pin.loaded_scene, &pin.positions)
         }
         (None, None) => rest.or(preview).ok_or_else(|| none("drape"))?,
         (None, Some("rest")) => rest.ok_or_else(|| none("drape at rest"))?,
@@ -29,21 +29,21 @@ pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
     let failed = |e: &dyn std::fmt::Display| (StatusCode::INTERNAL_SERVER_ERROR, format!("cannot write it: {e}"));
     let folder = tempfile::tempdir().map_err(|e| failed(&e))?;
     let path = folder.path().join("drape.obj");
-    ground.loaded.write(&path, positions).map_err(|e| failed(&e))?;
+    loaded_scene.input.write(&path, positions).map_err(|e| failed(&e))?;
     read_own(&path).map_err(|e| failed(&e))
 }
 
 /// A PART and its results: `number=N`, or the PART nearest the point `at=x,y,z`, m, of the garment `on=parts`, `preview` or `rest`.
 pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
     let bad = |sentence: String| (StatusCode::BAD_REQUEST, sentence);
-    let found = snapshot.sectioned.as_ref();
+    let found = snapshot.segmented.as_ref();
     let found =
         found.ok_or_else(|| (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned()))?;
-    let ground: &LoadedScene = &found.ground;
-    let of_this = |other: &LoadedScene| other.generation == ground.generation;
-    let placed = &ground.loaded.scene.garment.positions;
-    let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.ground));
-    let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.ground)).map(|r| &*r.positions);
+    let loaded_scene: &LoadedScene = &found.loaded_scene;
+    let of_this = |other: &LoadedScene| other.generation == loaded_scene.generation;
+    let placed = &loaded_scene.input.scene.garment.positions;
+    let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.loaded_scene));
+    let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.loaded_scene)).map(|r| &*r.positions);
     let number = if let Some(text) = query(uri, "number") {
         text.parse().map_err(|_| bad(format!("found number={text}, expected a PART's number from 0")))?
     } else {
@@ -72,7 +72,7 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
         let moved = part.vertices.iter().map(|&v| to[v as usize] - placed[v as usize]).sum::<DVec3>();
         1e3 * (moved / part.vertices.len() as f64)
     };
-    let areas = ground.loaded.scene.garment.vertex_areas();
+    let areas = loaded_scene.input.scene.garment.vertex_areas();
     let level = found.table.effective_levels().get(part.level as usize).copied();
     let force_n = found.force_n.get(number as usize);
     Ok(json!({

@@ -136,19 +136,26 @@ fn encode(
     now: &Snapshot,
 ) -> Result<[Option<Vec<u8>>; 4], RecordError> {
     let mut made = [None, None, None, None];
-    let Some(ground) = &now.ground else { return Ok(made) };
-    let (generation, scene) = (ground.generation, &ground.loaded.scene);
+    let Some(loaded_scene) = &now.loaded_scene else { return Ok(made) };
+    let (generation, scene) = (loaded_scene.generation, &loaded_scene.input.scene);
     let base = Some((generation, now.pins.iter().map(|pin| pin.id).collect()));
     if encoded.base != base {
-        let draped: Vec<TriMesh> =
-            now.pins.iter().map(|pin| pin.ground.loaded.scene.garment.with_positions(pin.positions.to_vec())).collect();
+        let draped: Vec<TriMesh> = now
+            .pins
+            .iter()
+            .map(|pin| pin.loaded_scene.input.scene.garment.with_positions(pin.positions.to_vec()))
+            .collect();
         let pins: Vec<PinnedView<'_>> = (now.pins.iter().zip(&draped))
-            .map(|(pin, draped)| PinnedView { label: &pin.label, body: pin.ground.loaded.scene.body.mesh(), draped })
+            .map(|(pin, draped)| PinnedView {
+                label: &pin.label,
+                body: pin.loaded_scene.input.scene.body.mesh(),
+                draped,
+            })
             .collect();
         made[0] = Some(encoder.base(scene.body.mesh(), &scene.garment, &pins)?);
         *encoded = Encoded { base, ..Encoded::default() };
     }
-    if let Some(found) = now.sectioned.as_ref().filter(|s| s.ground.generation == generation) {
+    if let Some(found) = now.segmented.as_ref().filter(|s| s.loaded_scene.generation == generation) {
         let known = encoded.parts.as_ref();
         if !known.is_some_and(|(p, f)| Arc::ptr_eq(p, &found.parts) && Arc::ptr_eq(f, &found.force_n)) {
             let levels = LevelCount::all(&found.table, &found.parts);
@@ -156,8 +163,8 @@ fn encode(
             encoded.parts = Some((Arc::clone(&found.parts), Arc::clone(&found.force_n)));
         }
     }
-    let preview = now.preview.as_ref().filter(|p| p.ground.generation == generation).map(|p| &p.positions);
-    let rest = now.rest.as_ref().filter(|r| r.ground.generation == generation).map(|r| &r.positions);
+    let preview = now.preview.as_ref().filter(|p| p.loaded_scene.generation == generation).map(|p| &p.positions);
+    let rest = now.rest.as_ref().filter(|r| r.loaded_scene.generation == generation).map(|r| &r.positions);
     for (slot, which, found, known) in
         [(2, LiveShape::Preview, preview, &mut encoded.preview), (3, LiveShape::Rest, rest, &mut encoded.rest)]
     {

@@ -19,7 +19,8 @@ const BARS: usize = 80;
 pub(super) fn state(snapshot: &Snapshot) -> Value {
     let mut all = event(snapshot);
     all["trail"] = json!(*snapshot.trail);
-    all["histogram"] = snapshot.ground.as_ref().map_or(Value::Null, |ground| histogram(ground.distance_m()));
+    all["histogram"] =
+        snapshot.loaded_scene.as_ref().map_or(Value::Null, |loaded_scene| histogram(loaded_scene.distance_m()));
     all
 }
 
@@ -30,8 +31,8 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
         "serial": snapshot.serial,
         "idle": snapshot.idle,
         "job": job(&snapshot.job),
-        "garment": snapshot.ground.as_deref().map(garment),
-        "parts": snapshot.sectioned.as_deref().map(sectioned),
+        "garment": snapshot.loaded_scene.as_deref().map(garment),
+        "parts": snapshot.segmented.as_deref().map(segmented),
         "preview": snapshot.preview.as_deref().map(preview),
         "rest": snapshot.rest.as_deref().map(rest),
         "figures": snapshot.finished.as_deref().map(figures),
@@ -95,21 +96,21 @@ pub(super) fn unusable_file(file: &str) -> String {
     format!("{file} cannot be used with this edit; the terminal of the program shows the reason")
 }
 
-fn garment(ground: &LoadedScene) -> Value {
-    let scene = &ground.loaded.scene;
+fn garment(loaded_scene: &LoadedScene) -> Value {
+    let scene = &loaded_scene.input.scene;
     json!({
-        "generation": ground.generation,
-        "name": ground.loaded.garment_name,
-        "body": ground.loaded.body_name,
+        "generation": loaded_scene.generation,
+        "name": loaded_scene.input.garment_name,
+        "body": loaded_scene.input.body_name,
         "vertices": scene.garment.vertex_count(),
         "triangles": scene.garment.triangles.len(),
-        "load_ms": ground.load_ms,
-        "notes": ground.loaded.notes(),
-        "warnings": ground.loaded.warnings(),
+        "load_ms": loaded_scene.load_ms,
+        "notes": loaded_scene.input.notes(),
+        "warnings": loaded_scene.input.warnings(),
     })
 }
 
-fn sectioned(found: &Segmented) -> Value {
+fn segmented(found: &Segmented) -> Value {
     let levels = LevelCount::all(&found.table, &found.parts);
     let css = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
     let colours: Vec<String> = level_colours(&levels).into_iter().map(css).collect();
@@ -136,7 +137,7 @@ fn preview(found: &Preview) -> Value {
 
 fn rest(found: &AtRest) -> Value {
     json!({
-        "state": found.state, "done": found.done, "balanced": found.balanced, "kept": found.kept, "warm": found.warm,
+        "state": found.state, "done": found.done, "balanced": found.balanced, "kept": found.reused, "warm": found.warm,
         "residual_over_weight": found.residual_over_weight, "steps": found.steps,
         "ms": found.ms, "after_ms": found.after_ms,
     })
@@ -148,7 +149,7 @@ fn figures(found: &Finished) -> Value {
     all["preview_error_mm"] = json!(found.preview_error_mm);
     all["bound_mm"] = json!(found.bound_mm);
     all["let_go"] = json!(found.drape.let_go.map(|let_go| let_go.to_string()));
-    all["warnings"] = json!([found.ground.loaded.warnings(), found.drape.warnings.clone()].concat());
+    all["warnings"] = json!([found.loaded_scene.input.warnings(), found.drape.warnings.clone()].concat());
     all
 }
 

@@ -254,7 +254,7 @@ async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
                 let text = sweep_file("pinned states", &pins);
                 Ok(toml(text.map_err(|e| Refusal(StatusCode::CONFLICT, e.to_string()))?))
             }
-            _ => match &snapshot.sectioned {
+            _ => match &snapshot.segmented {
                 Some(found) => Ok(toml(found.table.to_toml())),
                 None => Err(Refusal(StatusCode::CONFLICT, "no table yet: the garment is still being made".to_owned())),
             },

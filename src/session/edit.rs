@@ -1,4 +1,4 @@
-//! An edit: what somebody wants changed of a job, as plain data that reads from JSON; and the job that comes of it.
+//! An edit of a job, as plain data that is parsed from JSON; and the range tables that an edit can name.
 
 use std::collections::BTreeMap;
 
@@ -6,36 +6,69 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use super::presets;
 use crate::base::files::names_a_file;
 use crate::body::ShapeError;
 use crate::drape::{DrapeError, Model, Refine};
 use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::coupled::Motion;
-use crate::parts::range_table::{GapRule, RangeTable, TableError, TableRule};
+use crate::parts::range_table::{GapRule, RangeTable, TABLE_3, TableError, TableRule};
 use crate::scene::{FileRole, SceneError};
 use crate::study::job::Job;
 
-/// Why an edit was refused: the session stays as it was.
+/// The files of `assets/tuned/`, compiled in.
+macro_rules! tuned {
+    ($($name:literal)*) => { &[$(($name, include_str!(concat!("../../assets/tuned/", $name, ".toml")))),*] };
+}
+
+const TUNED: &[(&str, &str)] = tuned![
+    "pullover-1-levels" "pullover-1-levels-and-extents"
+    "pullover-2-levels" "pullover-2-levels-and-extents"
+    "flared-skirt-levels" "flared-skirt-levels-and-extents"
+    "low-cut-dress-levels" "low-cut-dress-levels-and-extents"
+    "long-sleeved-dress-levels" "long-sleeved-dress-levels-and-extents"
+];
+
+/// The names of the built-in range tables: the paper's, `table-3`, first, then the results of the table search.
+#[must_use]
+pub fn preset_names() -> Vec<&'static str> {
+    std::iter::once(TABLE_3).chain(TUNED.iter().map(|(name, _)| *name)).collect()
+}
+
+/// A built-in range table, or one from a TOML file.
+fn table_by_name(name: &str) -> Result<RangeTable, TableError> {
+    if let Some((known, text)) = TUNED.iter().find(|(known, _)| *known == name) {
+        return RangeTable::parse(text, known);
+    }
+    if name == TABLE_3 || names_a_file(name) {
+        return RangeTable::by_name(name);
+    }
+    Err(TableError::Value {
+        what: "table".to_owned(),
+        found: format!("\"{name}\""),
+        expected: "table-3, a tuned table such as \"low-cut-dress-levels\", or rows {\"levels\": [[lower, upper], ...]}",
+    })
+}
+
+/// Why an edit was refused; the session is unchanged.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the message says what each field is")]
+#[allow(missing_docs, reason = "the message names each field")]
 pub enum EditError {
-    /// The range table.
+    /// An invalid range table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// The fabric.
+    /// An invalid fabric.
     #[error(transparent)]
     Fabric(#[from] FabricError),
-    /// Body or garment.
+    /// An invalid body or garment.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The measurements.
+    /// Invalid measurements.
     #[error(transparent)]
     Measurements(#[from] ShapeError),
-    /// There is no drape.
+    /// The drape failed.
     #[error(transparent)]
     Drape(#[from] DrapeError),
-    /// Any other value.
+    /// Any other invalid value.
     #[error("{what}: found {found}, expected {expected}")]
     Value { what: &'static str, found: String, expected: String },
 }
@@ -46,12 +79,12 @@ impl EditError {
     }
 }
 
-/// The range table an edit asks for.
+/// The range table of an edit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TableEdit {
-    /// A preset (see [`preset_names`](super::preset_names)) or a TOML file.
+    /// A built-in table (see [`preset_names`]) or a TOML file.
     Name(String),
-    /// Rows, or a rule that makes them.
+    /// Rows, or a rule that generates them.
     Rule(TableRule),
 }
 
@@ -77,12 +110,12 @@ impl<'de> Deserialize<'de> for TableEdit {
     }
 }
 
-/// The fabric an edit asks for.
+/// The fabric of an edit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FabricEdit {
-    /// A built-in one or a TOML file.
+    /// A built-in fabric or a TOML file.
     Name(String),
-    /// All its constants.
+    /// All constants of a fabric.
     Constants(Box<Fabric>),
 }
 
@@ -97,11 +130,11 @@ impl<'de> Deserialize<'de> for FabricEdit {
     }
 }
 
-/// What is to change; whatever is left out stays.
+/// Changes to a job; a field that is left out keeps its value.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Edit {
-    /// `form`, or a file.
+    /// `form`, or a mesh file.
     pub body: Option<String>,
     /// A built-in garment, `name` or `name@vertices`, or a file.
     pub garment: Option<String>,
@@ -109,26 +142,26 @@ pub struct Edit {
     pub measurements: Option<BTreeMap<String, f64>>,
     /// The range table.
     pub table: Option<TableEdit>,
-    /// Who takes a hole between two of its levels.
+    /// The level that takes the distances in a gap between two levels.
     pub gap: Option<GapRule>,
     /// The fabric.
     pub fabric: Option<FabricEdit>,
-    /// PARTs with fewer vertices join a neighbour.
+    /// PARTs with fewer vertices than this join a neighbour.
     pub min_part: Option<usize>,
-    /// Extents PARTs are cut to, coarse to fine; none, or 0, for PARTs as the table makes them.
+    /// Extents that PARTs are cut to, cm, coarse to fine; none, or 0, leaves PARTs uncut.
     pub max_extent_cm: Option<Vec<f64>>,
-    /// `affine` or `translation`.
+    /// Motion of a PART: `affine` or `translation`.
     pub motion: Option<Motion>,
-    /// `coupled` or `paper`, with its defaults.
+    /// Model of stage two: `coupled` or `paper`, with its defaults.
     pub model: Option<String>,
-    /// `"converged"`, or `{"steps": n}` at full resolution.
+    /// Steps at full resolution: `"converged"` or `{"steps": n}`.
     pub refine: Option<Refine>,
-    /// Whether steps at full resolution keep cloth off cloth.
+    /// Whether steps at full resolution resolve self-contact.
     pub self_contact: Option<bool>,
 }
 
 impl Edit {
-    /// Every value that is opened as a file, with the field it stands in. A new field does not compile until it is listed here.
+    /// Every value that is opened as a file, with its field. A new field does not compile until it is listed here.
     #[must_use]
     pub(crate) fn file_names(&self) -> Vec<(FileRole, &str)> {
         let Self {
@@ -155,17 +188,14 @@ impl Edit {
         named.map(|(role, name)| (role, name.as_str())).filter(|(_, name)| names_a_file(name)).collect()
     }
 
-    /// `job` with the edit.
-    ///
-    /// # Errors
-    /// [`EditError`] says what was found and expected.
+    /// `job` with this edit applied.
     pub(crate) fn applied(&self, job: &Job) -> Result<Job, EditError> {
         let mut job = job.clone();
         self.change_scene(&mut job)?;
         let settings = &mut job.settings;
         match &self.table {
             None => {}
-            Some(TableEdit::Name(name)) => settings.table = presets::table(name)?.into(),
+            Some(TableEdit::Name(name)) => settings.table = table_by_name(name)?.into(),
             Some(TableEdit::Rule(rule)) => settings.table = rule.clone(),
         }
         if let (Some(gap), TableRule::Rows(table)) = (self.gap, &mut settings.table) {
@@ -185,10 +215,10 @@ impl Edit {
             settings.min_part = min_part.max(1);
         }
         if let Some(name) = &self.model {
-            let kept = (settings.model.extents_cm(), settings.model.motion());
             let model =
                 Model::by_name(name).ok_or_else(|| EditError::value("model", name, "\"coupled\" or \"paper\""))?;
-            settings.model = model.with_extents_cm(&kept.0).with_motion(kept.1);
+            let (extents_cm, motion) = (settings.model.extents_cm(), settings.model.motion());
+            settings.model = model.with_extents_cm(&extents_cm).with_motion(motion);
         }
         if let Some(extents) = &self.max_extent_cm {
             let cuts: Vec<f64> = extents.iter().copied().filter(|cm| *cm != 0.0).collect();
@@ -242,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_stays() {
+    fn fields_left_out_keep_their_values() {
         assert_eq!(edit("{}").unwrap(), Job::default());
         let job = edit(r#"{"table": {"levels": [[0, 1.5], [1.5, "inf"]]}, "fabric": "denim", "max_extent_cm": [12]}"#);
         let job = job.unwrap();
@@ -254,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_told_with_what_was_expected() {
+    fn an_invalid_edit_is_refused_with_the_expected_values() {
         for (json, words) in [
             (r#"{"tabel": "table-3"}"#, "tabel"),
             (r#"{"table": {"levels": [[0, 2], [1, 3]]}}"#, "row 2 starts at 1"),
@@ -270,8 +300,15 @@ mod tests {
             (r#"{"min_part": -1}"#, "-1"),
             (r#"{"body": "no-body"}"#, "no-body"),
         ] {
-            let said = edit(json).unwrap_err();
-            assert!(said.contains(words), "{json}: {said}");
+            let error = edit(json).unwrap_err();
+            assert!(error.contains(words), "{json}: {error}");
+        }
+    }
+
+    #[test]
+    fn every_built_in_table_is_valid() {
+        for name in preset_names() {
+            assert!(table_by_name(name).unwrap().levels.len() > 1, "{name}");
         }
     }
 }

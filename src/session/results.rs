@@ -1,19 +1,19 @@
-//! What a session has found so far, piece by piece; every piece says which state it belongs to.
+//! The results of a session, one struct for each step. Every result names the state that it belongs to.
 //!
-//! | field | of every piece that has it |
+//! | field | meaning in every result that has it |
 //! |---|---|
-//! | `state` | the state it belongs to |
-//! | `ground` | body and garment, what was cut or draped |
-//! | `positions` | the garment, m |
-//! | `ms`, `after_ms` | milliseconds of its steps, and from the edit to here |
+//! | `state` | number of the state that the result belongs to |
+//! | `loaded_scene` | body and garment that were segmented or draped |
+//! | `positions` | vertices of the garment, m |
+//! | `ms`, `after_ms` | milliseconds of the computation, and from the edit to the result |
 
-#![allow(missing_docs, reason = "the table above says what the fields are that have no text of their own")]
+#![allow(missing_docs, reason = "the table above describes the fields without a comment of their own")]
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::drape::{ClothState, Distances, Drape, LetGo, PartOutcome, Refine};
+use crate::drape::{ClothState, Distances, Drape, LetGo, PartOutcome, Refine, Settings};
 use crate::garment::fabric::Fabric;
 use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
@@ -21,16 +21,16 @@ use crate::scene::{Loaded, SceneSpec};
 use crate::study::job::Job;
 use crate::study::metrics::Metrics;
 
-/// Body and garment, and how far apart they are: what stays while tables and fabrics change.
+/// Body and garment, and the distances between them. Edits of table and fabric keep them.
 #[derive(Debug)]
 pub struct LoadedScene {
-    /// Counts bodies and garments up from 1.
+    /// Number of this pair of body and garment, from 1.
     pub generation: u64,
-    /// What was loaded.
+    /// The specification that was loaded.
     pub spec: SceneSpec,
-    /// The scene with its origin.
-    pub loaded: Loaded,
-    /// Milliseconds it took to load.
+    /// The scene with the reports of its files.
+    pub input: Loaded,
+    /// Milliseconds of loading.
     pub load_ms: f64,
     pub(crate) distances: Distances,
     pub(crate) distance_ms: f64,
@@ -48,14 +48,14 @@ impl LoadedScene {
 #[derive(Debug, Clone)]
 pub struct Segmented {
     pub state: u64,
-    pub ground: Arc<LoadedScene>,
-    /// The table, with the rows its rule made.
+    pub loaded_scene: Arc<LoadedScene>,
+    /// The range table, with the rows that its rule generated.
     pub table: Arc<RangeTable>,
     /// The PARTs.
     pub parts: Arc<Parts>,
-    /// The body's reaction on each PART in the drape at hand, N; empty where there is none yet.
+    /// Reaction of the body on each PART in the current drape, N; empty before there is one.
     pub force_n: Arc<Vec<DVec3>>,
-    /// Milliseconds of the cut.
+    /// Milliseconds of the segmentation.
     pub segment_ms: f64,
     pub after_ms: f64,
     pub(crate) min_part: usize,
@@ -65,102 +65,115 @@ pub struct Segmented {
 #[derive(Debug, Clone)]
 pub struct Preview {
     pub state: u64,
-    pub ground: Arc<LoadedScene>,
-    /// Whether it went on from the preview before, in which case the two stages from the undraped garment are still to come.
+    pub loaded_scene: Arc<LoadedScene>,
+    /// Whether it continued from the previous preview. Both stages from the undraped garment are then still to come.
     pub warm: bool,
-    /// Whether its steps are done.
+    /// Whether its last step is done.
     pub done: bool,
     /// The PARTs that moved: those of stage one, or cut to the extent of the run.
     pub parts: Arc<Parts>,
-    /// What each did; empty before the steps are done.
+    /// Force and displacement of each PART; empty before the last step is done.
     pub outcomes: Arc<Vec<PartOutcome>>,
     pub positions: Arc<Vec<DVec3>>,
     pub ms: f64,
     pub after_ms: f64,
-    /// What the user should know.
     pub warnings: Vec<String>,
 }
 
-/// The garment at full resolution, on its way to rest or there.
+/// The settings that a drape at rest depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RestInputs {
+    fabric: Fabric,
+    pub(super) refine: Refine,
+    self_contact: bool,
+}
+
+impl RestInputs {
+    pub(super) fn of(settings: &Settings) -> Self {
+        Self { fabric: settings.fabric.clone(), refine: settings.refine, self_contact: settings.self_contact }
+    }
+}
+
+/// The garment at full resolution, on its way to rest or at rest.
 #[derive(Debug, Clone)]
 pub struct AtRest {
     pub state: u64,
-    pub ground: Arc<LoadedScene>,
-    /// Whether no step is left to take: where its forces balance, it was looked at that this lasts.
+    pub loaded_scene: Arc<LoadedScene>,
+    /// Whether the solver has ended. If the forces balance, the rest was then also tested for stability.
     pub done: bool,
-    /// Whether its forces balance; that it lasts may yet be looked at, which moves little.
+    /// Whether the forces balance. The test for stability that may follow moves the garment little.
     pub balanced: bool,
-    /// Whether it is the drape of an earlier state: where a cloth rests does not depend on the table, and a fabric that it was in before
-    /// hangs as it did.
-    pub kept: bool,
-    /// Whether it began at the drape before.
+    /// Whether it is the drape of an earlier state: a rest does not depend on the table, and the last few fabrics keep theirs.
+    pub reused: bool,
+    /// Whether it continued from the previous drape.
     pub warm: bool,
     pub positions: Arc<Vec<DVec3>>,
-    /// ‖∇E‖ over the weight.
+    /// Residual ‖∇E‖ over the weight of the cloth.
     pub residual_over_weight: f64,
-    /// Steps at full resolution.
+    /// Newton steps at full resolution.
     pub steps: usize,
     pub ms: f64,
     pub after_ms: f64,
-    /// What came of letting go what was held until it rested.
+    /// Outcome of releasing the vertices that were held until the garment rested.
     pub let_go: Option<LetGo>,
+    /// Reaction of the body on each vertex, N.
     pub(crate) reaction_n: Arc<Vec<DVec3>>,
-    pub(crate) told: Option<Arc<ClothState>>,
-    pub(crate) of: (Fabric, Refine, bool),
-    /// Where the next drape goes on from: what is let go at the end is held there.
-    pub(crate) held: Arc<Vec<DVec3>>,
+    pub(crate) cloth_state: Option<Arc<ClothState>>,
+    pub(crate) inputs: RestInputs,
+    /// Positions before the release, from which the next drape continues.
+    pub(crate) held_positions: Arc<Vec<DVec3>>,
 }
 
-/// A state with nothing left to compute.
+/// A complete state.
 #[derive(Debug)]
 pub struct Finished {
     pub state: u64,
-    pub ground: Arc<LoadedScene>,
-    /// All of it.
+    pub loaded_scene: Arc<LoadedScene>,
+    /// The drape.
     pub drape: Drape,
-    /// Its figures.
+    /// Its metrics.
     pub metrics: Metrics,
-    /// RMS distance of the two stages alone from where the garment rests, mm, where it was refined.
+    /// RMS distance of the preview from the drape at rest, mm; none without steps at full resolution.
     pub preview_error_mm: Option<f64>,
-    /// What affine maps of these PARTs, blended over the seams, could hold that to, mm.
+    /// Least RMS distance, mm, that affine maps of these PARTs, blended over the seams, could reach.
     pub bound_mm: Option<f64>,
 }
 
-/// An edit that turned out to be impossible when it was tried.
+/// An edit that was accepted and whose computation failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The state it made.
+    /// The state that the edit made.
     pub state: u64,
-    /// Why it cannot be.
+    /// The error message.
     pub sentence: String,
-    /// The first of the files that it read body or garment from, where these are the reason: the sentence may quote it.
+    /// The first file of body or garment, if these are the cause: the message may quote it.
     pub file: Option<String>,
-    /// The state that stands instead; none where there was no good one yet.
+    /// The state that replaces it; none before the first good one.
     pub back_to: Option<u64>,
 }
 
-/// A state that was kept beside those after it.
+/// A state that is kept beside later ones.
 #[derive(Debug, Clone)]
 pub struct Pin {
-    /// Its number among the pins.
+    /// Number of the pin.
     pub id: u64,
-    /// What it is called.
+    /// Label in the viewer.
     pub label: String,
     pub state: u64,
-    /// Its job.
+    /// The job of the state.
     pub job: Arc<Job>,
-    /// Its drape: at rest where it had come to rest, else as previewed.
+    /// The drape: at rest if there was one, else the preview.
     pub positions: Arc<Vec<DVec3>>,
-    pub ground: Arc<LoadedScene>,
-    /// Its numbers.
+    pub loaded_scene: Arc<LoadedScene>,
+    /// The trail's point of the state.
     pub numbers: TrailPoint,
 }
 
-/// The numbers of a state, for lines over the edits.
+/// The numbers of a state, plotted over the edits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct TrailPoint {
     pub state: u64,
-    /// Its PARTs.
+    /// Number of PARTs.
     pub parts: usize,
     /// Milliseconds of stage one.
     pub segment_ms: f64,
@@ -168,43 +181,43 @@ pub struct TrailPoint {
     pub two_stages_ms: Option<f64>,
     /// Milliseconds at full resolution.
     pub rest_ms: Option<f64>,
-    /// RMS distance of the two stages alone from where the garment rests, mm.
+    /// RMS distance of the preview from the drape at rest, mm.
     pub preview_error_mm: Option<f64>,
-    /// What affine maps of the PARTs could hold that to, mm.
+    /// Least RMS distance, mm, that affine maps of the PARTs could reach.
     pub bound_mm: Option<f64>,
 }
 
-/// All that is known at one moment.
+/// All results at one moment. Each result is the newest of its kind and may belong to an earlier state.
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
-    /// Grows with everything that becomes known.
+    /// Grows with every new result.
     pub serial: u64,
-    /// The newest state.
+    /// Number of the newest state.
     pub state: u64,
-    /// Its job.
+    /// Job of the newest state.
     pub job: Arc<Job>,
-    /// Whether there is nothing left to compute for it.
+    /// Whether the newest state is complete.
     pub idle: bool,
-    /// The newest body and garment.
-    pub ground: Option<Arc<LoadedScene>>,
-    /// The newest stage one.
-    pub sectioned: Option<Arc<Segmented>>,
-    /// The newest stage two.
+    /// Body and garment.
+    pub loaded_scene: Option<Arc<LoadedScene>>,
+    /// Stage one.
+    pub segmented: Option<Arc<Segmented>>,
+    /// Stage two.
     pub preview: Option<Arc<Preview>>,
-    /// The newest drape at full resolution.
+    /// The drape at full resolution.
     pub rest: Option<Arc<AtRest>>,
-    /// The newest state that was finished.
+    /// The newest complete state.
     pub finished: Option<Arc<Finished>>,
-    /// The last edit that could not be.
+    /// The last edit whose computation failed.
     pub refused: Option<Arc<Refusal>>,
-    /// What was pinned, in order.
+    /// Pinned states, oldest first.
     pub pins: Arc<Vec<Arc<Pin>>>,
-    /// The numbers of the last states, oldest first.
+    /// Numbers of the last states, oldest first.
     pub trail: Arc<Vec<TrailPoint>>,
-    /// Steps that can be taken back.
+    /// Number of edits that can be undone.
     pub undo: usize,
-    /// Steps that can be taken on again.
+    /// Number of edits that can be redone.
     pub redo: usize,
-    /// States that a newer edit overtook before they were finished.
+    /// Number of states that a newer edit replaced before they were complete.
     pub superseded: u64,
 }

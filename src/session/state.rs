@@ -1,187 +1,183 @@
-//! What a session knows, and what each edit does to it. No threads, no waiting: the state machine itself.
+//! The state machine of a session: its results, and the effect of each edit on them. No threads, no waiting.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
 
-use super::history::History;
-use super::results::{AtRest, LoadedScene, Refusal, Segmented, Snapshot, TrailPoint};
-use super::{Edit, EditError};
-use crate::drape::{Refine, Settings, stage_one};
+use super::edit::{Edit, EditError};
+use super::results::{AtRest, LoadedScene, Pin, Refusal, RestInputs, Segmented, Snapshot, TrailPoint};
+use crate::drape::{Refine, stage_one};
 use crate::parts::{Parts, UNASSIGNED};
 use crate::scene::SceneSpec;
 use crate::study::job::Job;
 
-/// States that the trail remembers.
-const TRAIL: usize = 300;
+/// Points of the trail.
+const MAX_TRAIL: usize = 300;
 
-/// Drapes at rest that are remembered: at ten thousand vertices three lists of vectors, a quarter of a megabyte each, and what the figures tell.
-const RESTS: usize = 8;
+/// Drapes at rest that can be reused. At 10,000 vertices each has three lists of vectors of a quarter of a megabyte, and its [`ClothState`](crate::drape::ClothState).
+const MAX_RESTS: usize = 8;
 
-/// What is known, and what is needed to go on.
-pub(super) struct Desk {
-    pub(super) view: Snapshot,
+/// States that can be pinned.
+const MAX_PINS: usize = 8;
+
+/// Jobs that can be undone.
+const MAX_JOBS: usize = 200;
+
+/// The results so far, and the data that later edits need.
+pub(super) struct SessionState {
+    pub(super) snapshot: Snapshot,
     pub(super) warm: bool,
     /// When the newest state was accepted.
     pub(super) accepted: Instant,
-    /// The state that failed, after which there is nothing to go back to.
+    /// The state that failed without a good one to return to.
     pub(super) failed: Option<u64>,
-    pub(super) history: History,
-    good_scene: Option<SceneSpec>,
-    good_job: Option<Arc<Job>>,
+    history: History,
+    last_good_scene: Option<SceneSpec>,
+    last_good_job: Option<Arc<Job>>,
     /// Body and garment while their files are read again.
-    before: Option<Arc<LoadedScene>>,
-    pub(super) pins_made: u64,
-    /// Drapes of the body and garment at hand that came to rest, the newest last.
+    before_reload: Option<Arc<LoadedScene>>,
+    last_pin_id: u64,
+    /// Drapes of the current body and garment that came to rest, the newest last.
     rests: Vec<Arc<AtRest>>,
 }
 
-impl Desk {
+impl SessionState {
     pub(super) fn new(job: Job, warm: bool) -> Self {
         let job = Arc::new(job);
         Self {
-            view: Snapshot { serial: 1, state: 1, job: Arc::clone(&job), ..Snapshot::default() },
+            snapshot: Snapshot { serial: 1, state: 1, job: Arc::clone(&job), ..Snapshot::default() },
             warm,
             accepted: Instant::now(),
             failed: None,
-            history: History::new(job),
-            good_scene: None,
-            good_job: None,
-            before: None,
-            pins_made: 0,
+            history: History { jobs: vec![job], current: 0, gesture: None },
+            last_good_scene: None,
+            last_good_job: None,
+            before_reload: None,
+            last_pin_id: 0,
             rests: Vec::new(),
         }
     }
 
-    /// Takes the next job, unless it is the one that stands.
-    pub(super) fn take(&mut self, job: Job, gesture: Option<u64>) -> Result<u64, EditError> {
-        if job == *self.view.job {
-            return Ok(self.view.state);
+    /// Makes `job` the newest state, unless it is already.
+    pub(super) fn submit(&mut self, job: Job, gesture: Option<u64>) -> Result<u64, EditError> {
+        if job == *self.snapshot.job {
+            return Ok(self.snapshot.state);
         }
         let job = Arc::new(job);
-        let state = self.stand(Arc::clone(&job))?;
+        let state = self.enter(Arc::clone(&job))?;
         self.history.push(job, gesture);
-        self.view.refused = None;
+        self.snapshot.refused = None;
         Ok(state)
     }
 
-    /// Takes the next job, whose body and garment are to be read again.
-    pub(super) fn take_anew(&mut self, job: Job) -> Result<u64, EditError> {
-        let (job, ground) = (Arc::new(job), self.view.ground.take());
-        let stood = self.stand(Arc::clone(&job));
-        if stood.is_err() {
-            self.view.ground = ground;
+    /// Makes `job` the newest state, and has its body and garment read again.
+    pub(super) fn reload(&mut self, job: Job) -> Result<u64, EditError> {
+        let (job, loaded_scene) = (Arc::new(job), self.snapshot.loaded_scene.take());
+        let entered = self.enter(Arc::clone(&job));
+        if entered.is_err() {
+            self.snapshot.loaded_scene = loaded_scene;
         } else {
             self.history.push(job, None);
-            self.view.refused = None;
-            self.before = ground.or(self.before.take());
+            self.snapshot.refused = None;
+            self.before_reload = loaded_scene.or(self.before_reload.take());
         }
-        stood
+        entered
     }
 
-    /// A step back or on.
-    pub(super) fn go(&mut self, by: isize) -> Result<u64, EditError> {
-        let Some(job) = self.history.beside(by) else {
+    /// Undoes (`by` = −1) or redoes (1) an edit.
+    pub(super) fn step_history(&mut self, by: isize) -> Result<u64, EditError> {
+        let Some(job) = self.history.peek(by) else {
             let (what, expected) =
-                if by < 0 { ("undo", "an edit to take back") } else { ("redo", "an edit to take on") };
+                if by < 0 { ("undo", "an edit to undo") } else { ("redo", "an edit that was undone") };
             return Err(EditError::value(what, "none", expected));
         };
-        let state = self.stand(job)?;
-        self.history.stand(by);
-        self.view.refused = None;
+        let state = self.enter(job)?;
+        self.history.move_by(by);
+        self.snapshot.refused = None;
         Ok(state)
     }
 
-    /// Makes `job` the newest state: what it does not touch is carried over, and stage one is done at once.
-    fn stand(&mut self, job: Arc<Job>) -> Result<u64, EditError> {
+    /// Makes `job` the newest state: keeps the results that it does not affect, and computes stage one.
+    fn enter(&mut self, job: Arc<Job>) -> Result<u64, EditError> {
         let now = Instant::now();
-        let state = self.view.state + 1;
-        let ground = self.view.ground.clone().filter(|ground| ground.spec == job.scene);
-        let sectioned = match ground {
-            Some(ground) => Some(self.section(&ground, &job, state, now)?),
-            None => None,
-        };
-        self.view.superseded += u64::from(!self.view.idle);
-        self.view.idle = false;
-        self.view.state = state;
-        self.view.job = job;
+        let state = self.snapshot.state + 1;
+        let loaded_scene = self.snapshot.loaded_scene.clone().filter(|scene| scene.spec == job.scene);
+        let segmented = loaded_scene.map(|scene| self.segment(&scene, &job, state, now)).transpose()?;
+        self.snapshot.superseded += u64::from(!self.snapshot.idle);
+        self.snapshot.idle = false;
+        self.snapshot.state = state;
+        self.snapshot.job = job;
         self.accepted = now;
         self.failed = None;
-        if let Some(sectioned) = sectioned {
-            self.show(sectioned);
-            self.keep_rest();
+        if let Some(segmented) = segmented {
+            self.set_segmented(segmented);
+            self.reuse_rest();
         }
         Ok(state)
     }
 
-    /// Body and garment of `state` are there.
-    pub(super) fn found_ground(&mut self, ground: Arc<LoadedScene>) -> Result<(), EditError> {
-        let (job, state, accepted) = (Arc::clone(&self.view.job), self.view.state, self.accepted);
-        self.view.rest = None;
+    /// Sets body and garment of the newest state, and computes stage one.
+    pub(super) fn set_loaded_scene(&mut self, scene: Arc<LoadedScene>) -> Result<(), EditError> {
+        let (job, state, accepted) = (Arc::clone(&self.snapshot.job), self.snapshot.state, self.accepted);
+        self.snapshot.rest = None;
         self.rests.clear();
-        let sectioned = self.section(&ground, &job, state, accepted)?;
-        self.good_scene = Some(ground.spec.clone());
-        self.view.ground = Some(ground);
-        self.before = None;
-        self.view.preview = None;
-        self.show(sectioned);
+        let segmented = self.segment(&scene, &job, state, accepted)?;
+        self.last_good_scene = Some(scene.spec.clone());
+        self.snapshot.loaded_scene = Some(scene);
+        self.before_reload = None;
+        self.snapshot.preview = None;
+        self.set_segmented(segmented);
         Ok(())
     }
 
-    /// The garment has come to rest, which tells the forces anew.
-    pub(super) fn found_rest(&mut self, rest: Arc<AtRest>) {
-        if let Some(sectioned) = &mut self.view.sectioned {
-            let force_n = Arc::new(sums(&sectioned.parts, &rest.reaction_n));
-            *sectioned = Arc::new(Segmented { force_n, ..Segmented::clone(sectioned) });
+    /// Sets the drape at rest, and the PARTs' forces in it.
+    pub(super) fn set_rest(&mut self, rest: Arc<AtRest>) {
+        if let Some(segmented) = &mut self.snapshot.segmented {
+            let force_n = Arc::new(sum_by_part(&segmented.parts, &rest.reaction_n));
+            *segmented = Arc::new(Segmented { force_n, ..Segmented::clone(segmented) });
         }
         if rest.balanced {
-            self.rests.retain(|other| other.of != rest.of);
+            self.rests.retain(|other| other.inputs != rest.inputs);
             self.rests.push(Arc::clone(&rest));
-            self.rests.drain(..self.rests.len().saturating_sub(RESTS));
+            self.rests.drain(..self.rests.len().saturating_sub(MAX_RESTS));
         }
-        self.view.rest = Some(rest);
+        self.snapshot.rest = Some(rest);
     }
 
-    fn show(&mut self, sectioned: Segmented) {
+    fn set_segmented(&mut self, segmented: Segmented) {
         let point = TrailPoint {
-            state: sectioned.state,
-            parts: sectioned.parts.len(),
-            segment_ms: sectioned.segment_ms,
+            state: segmented.state,
+            parts: segmented.parts.len(),
+            segment_ms: segmented.segment_ms,
             ..TrailPoint::default()
         };
-        let trail = Arc::make_mut(&mut self.view.trail);
+        let trail = Arc::make_mut(&mut self.snapshot.trail);
         trail.push(point);
-        trail.drain(..trail.len().saturating_sub(TRAIL));
-        self.view.sectioned = Some(Arc::new(sectioned));
+        trail.drain(..trail.len().saturating_sub(MAX_TRAIL));
+        self.snapshot.segmented = Some(Arc::new(segmented));
     }
 
-    /// Adds to the numbers of the newest state.
-    pub(super) fn add_to_trail(&mut self, add: impl FnOnce(&mut TrailPoint)) {
-        let newest = self.view.state;
-        if let Some(point) = Arc::make_mut(&mut self.view.trail).last_mut().filter(|point| point.state == newest) {
-            add(point);
+    /// Changes the trail's point of the newest state.
+    pub(super) fn update_trail(&mut self, update: impl FnOnce(&mut TrailPoint)) {
+        let newest = self.snapshot.state;
+        if let Some(point) = Arc::make_mut(&mut self.snapshot.trail).last_mut().filter(|point| point.state == newest) {
+            update(point);
         }
     }
 
-    /// Stage one; the PARTs at hand stay where nothing they depend on changed.
-    fn section(
-        &self,
-        ground: &Arc<LoadedScene>,
-        job: &Job,
-        state: u64,
-        since: Instant,
-    ) -> Result<Segmented, EditError> {
+    /// Stage one. Keeps the current PARTs if scene, table and smallest PART are the same.
+    fn segment(&self, scene: &Arc<LoadedScene>, job: &Job, state: u64, since: Instant) -> Result<Segmented, EditError> {
         let began = Instant::now();
         let settings = &job.settings;
-        let table = settings.table.resolve(ground.distance_m())?;
-        let kept = self.view.sectioned.as_ref().filter(|old| {
-            old.ground.generation == ground.generation && *old.table == table && old.min_part == settings.min_part
+        let table = settings.table.resolve(scene.distance_m())?;
+        let kept = self.snapshot.segmented.as_ref().filter(|old| {
+            old.loaded_scene.generation == scene.generation && *old.table == table && old.min_part == settings.min_part
         });
         let (table, parts) = match kept {
             Some(old) => (Arc::clone(&old.table), Arc::clone(&old.parts)),
             None => {
-                let parts = stage_one(&ground.loaded.scene, settings.min_part, &table, ground.distance_m());
+                let parts = stage_one(&scene.input.scene, settings.min_part, &table, scene.distance_m());
                 (Arc::new(table), Arc::new(parts))
             }
         };
@@ -189,11 +185,11 @@ impl Desk {
             let expected = "levels that hold some of the garment: widen its first or last row";
             return Err(EditError::value("table", "none of the garment's vertices in any level", expected));
         }
-        let rest = self.view.rest.as_ref().filter(|rest| rest.ground.generation == ground.generation);
-        let force_n = rest.map_or_else(Vec::new, |rest| sums(&parts, &rest.reaction_n));
+        let rest = self.snapshot.rest.as_ref().filter(|rest| rest.loaded_scene.generation == scene.generation);
+        let force_n = rest.map_or_else(Vec::new, |rest| sum_by_part(&parts, &rest.reaction_n));
         Ok(Segmented {
             state,
-            ground: Arc::clone(ground),
+            loaded_scene: Arc::clone(scene),
             table,
             parts,
             force_n: Arc::new(force_n),
@@ -203,73 +199,158 @@ impl Desk {
         })
     }
 
-    /// Refuses a fabric that nothing is cut from.
+    /// Refuses an edit of the fabric where every panel has a fabric of its own.
     pub(super) fn check_fabric(&self, edit: &Edit, job: &Job) -> Result<(), EditError> {
-        let Some(ground) = self.view.ground.as_ref().filter(|ground| ground.spec == job.scene) else { return Ok(()) };
-        if edit.fabric.is_none() || ground.loaded.scene.takes_the_settings_fabric() {
+        let loaded_scene = self.snapshot.loaded_scene.as_ref().filter(|scene| scene.spec == job.scene);
+        if edit.fabric.is_none() || loaded_scene.is_none_or(|scene| scene.input.scene.takes_the_settings_fabric()) {
             return Ok(());
         }
         let found = "one for a garment whose panels all have their own";
         Err(EditError::value("fabric", found, "a change of the file that names their fabrics"))
     }
 
-    /// Where the cloth rests does not depend on the table: an edit that touches neither garment nor fabric leaves the drape, and a fabric
-    /// that it was in before hangs as it did.
-    fn keep_rest(&mut self) {
-        let Settings { fabric, refine, self_contact, .. } = &self.view.job.settings;
-        let same = |rest: &&Arc<AtRest>| (&rest.of.0, rest.of.1, rest.of.2) == (fabric, *refine, *self_contact);
-        let newest = self.view.rest.as_ref().filter(|rest| rest.done);
-        let known = newest.filter(same).or_else(|| self.rests.iter().find(same));
-        let Some(rest) = known.filter(|_| self.warm && *refine == Refine::Converged) else { return };
-        let (state, after_ms) = (self.view.state, ms_since(self.accepted));
-        self.found_rest(Arc::new(AtRest { state, kept: true, steps: 0, ms: 0.0, after_ms, ..AtRest::clone(rest) }));
+    /// Reuses the current drape at rest if the edit changed neither garment nor fabric, or an earlier one in the same fabric. A rest
+    /// does not depend on the table.
+    fn reuse_rest(&mut self) {
+        let inputs = RestInputs::of(&self.snapshot.job.settings);
+        let newest = self.snapshot.rest.as_ref().filter(|rest| rest.done);
+        let same = newest.into_iter().chain(&self.rests).find(|rest| rest.inputs == inputs);
+        let Some(rest) = same.filter(|_| self.warm && inputs.refine == Refine::Converged) else { return };
+        let (state, after_ms) = (self.snapshot.state, ms_since(self.accepted));
+        self.set_rest(Arc::new(AtRest { state, reused: true, steps: 0, ms: 0.0, after_ms, ..AtRest::clone(rest) }));
     }
 
-    /// `state` cannot be: back to the last good one. `scene` says that body or garment were to blame.
+    /// Refuses `state` and returns to the last good one. `scene`: body or garment are the cause.
     pub(super) fn refuse(&mut self, state: u64, sentence: String, scene: bool) {
-        let bad = Arc::clone(&self.view.job);
-        let back = if let (true, Some(before)) = (scene, self.before.take()) {
-            let scene = before.spec.clone();
-            self.view.ground = Some(before);
-            Some(Arc::new(Job { scene, ..Job::clone(&bad) }))
-        } else if scene {
-            let good = self.good_scene.clone().filter(|good| *good != bad.scene);
-            good.map(|good| Arc::new(Job { scene: good, ..Job::clone(&bad) }))
+        let bad = Arc::clone(&self.snapshot.job);
+        let before_reload = self.before_reload.take();
+        let with_scene = |scene: SceneSpec| Arc::new(Job { scene, ..Job::clone(&bad) });
+        let good = if !scene {
+            self.last_good_job.clone().filter(|good| *good != bad)
+        } else if let Some(before) = before_reload {
+            let spec = before.spec.clone();
+            self.snapshot.loaded_scene = Some(before);
+            Some(with_scene(spec))
         } else {
-            self.good_job.clone().filter(|good| *good != bad)
+            self.last_good_scene.clone().filter(|good| *good != bad.scene).map(with_scene)
         };
-        let back_to = back.and_then(|back| {
-            let to = self.stand(Arc::clone(&back)).ok()?;
+        let back_to = good.and_then(|good| {
+            let to = self.enter(Arc::clone(&good)).ok()?;
             if scene {
-                let good = &back.scene;
-                self.history.mend(|job| job.scene == bad.scene, |job| Job { scene: good.clone(), ..job.clone() });
+                let spec = &good.scene;
+                self.history.replace(|job| job.scene == bad.scene, |job| Job { scene: spec.clone(), ..job.clone() });
             } else {
-                self.history.mend(|job| *job == *bad, |_| Job::clone(&back));
+                self.history.replace(|job| *job == *bad, |_| Job::clone(&good));
             }
             Some(to)
         });
         if back_to.is_none() {
             self.failed = Some(state);
-            self.view.idle = true;
+            self.snapshot.idle = true;
         }
         let file = bad.file_names().first().filter(|_| scene).map(|(_, name)| (*name).to_owned());
-        self.view.refused = Some(Arc::new(Refusal { state, sentence, file, back_to }));
+        self.snapshot.refused = Some(Arc::new(Refusal { state, sentence, file, back_to }));
     }
 
-    /// Nothing is left to compute for the newest state.
+    /// Marks the newest state as complete.
     pub(super) fn finish(&mut self) {
-        self.good_job = Some(Arc::clone(&self.view.job));
-        self.view.idle = true;
+        self.last_good_job = Some(Arc::clone(&self.snapshot.job));
+        self.snapshot.idle = true;
+    }
+
+    /// Numbers a change for the clients.
+    pub(super) fn count_change(&mut self) {
+        self.snapshot.serial += 1;
+        (self.snapshot.undo, self.snapshot.redo) = self.history.depth();
+    }
+
+    pub(super) fn pin(&mut self, label: Option<String>) -> Result<u64, EditError> {
+        let snapshot = &mut self.snapshot;
+        if snapshot.pins.len() >= MAX_PINS {
+            return Err(EditError::value("pin", format!("{MAX_PINS} pinned states"), "fewer; unpin one first"));
+        }
+        let state = snapshot.state;
+        let rest = snapshot.rest.as_ref().filter(|rest| rest.state == state && rest.done);
+        let preview = snapshot.preview.as_ref().filter(|preview| preview.state == state && preview.done);
+        let drape = rest.map(|rest| (&rest.positions, &rest.loaded_scene));
+        let Some((positions, scene)) = drape.or(preview.map(|p| (&p.positions, &p.loaded_scene))) else {
+            return Err(EditError::value("pin", format!("no drape of state {state} yet"), "one; wait a moment"));
+        };
+        self.last_pin_id += 1;
+        let pin = Pin {
+            id: self.last_pin_id,
+            label: label.unwrap_or_else(|| format!("state {state}")),
+            state,
+            job: Arc::clone(&snapshot.job),
+            positions: Arc::clone(positions),
+            loaded_scene: Arc::clone(scene),
+            numbers: snapshot.trail.last().copied().filter(|point| point.state == state).unwrap_or_default(),
+        };
+        Arc::make_mut(&mut snapshot.pins).push(Arc::new(pin));
+        Ok(self.last_pin_id)
+    }
+
+    pub(super) fn unpin(&mut self, id: u64) -> bool {
+        let pins = Arc::make_mut(&mut self.snapshot.pins);
+        let before = pins.len();
+        pins.retain(|pin| pin.id != id);
+        pins.len() < before
     }
 }
 
-/// Milliseconds since then.
-pub(super) fn ms_since(then: Instant) -> f64 {
-    then.elapsed().as_secs_f64() * 1e3
+/// Undo and redo: the jobs of a session, and the index of the current one.
+#[derive(Debug)]
+struct History {
+    jobs: Vec<Arc<Job>>,
+    current: usize,
+    gesture: Option<u64>,
 }
 
-/// Sums over the vertices of each PART.
-pub(super) fn sums(parts: &Parts, of_vertex: &[DVec3]) -> Vec<DVec3> {
+impl History {
+    /// Adds the next job; those of one gesture are a single step.
+    fn push(&mut self, job: Arc<Job>, gesture: Option<u64>) {
+        self.jobs.truncate(self.current + 1);
+        if gesture.is_some() && gesture == self.gesture && self.current > 0 {
+            self.jobs[self.current] = job;
+        } else {
+            self.jobs.push(job);
+            self.jobs.drain(..self.jobs.len().saturating_sub(MAX_JOBS));
+            self.current = self.jobs.len() - 1;
+        }
+        self.gesture = gesture;
+    }
+
+    /// The job one step back (−1) or forward (1).
+    fn peek(&self, by: isize) -> Option<Arc<Job>> {
+        self.jobs.get(self.current.checked_add_signed(by)?).cloned()
+    }
+
+    fn move_by(&mut self, by: isize) {
+        self.current = self.current.saturating_add_signed(by).min(self.jobs.len() - 1);
+        self.gesture = None;
+    }
+
+    /// Replaces every job that failed.
+    fn replace(&mut self, bad: impl Fn(&Job) -> bool, good: impl Fn(&Job) -> Job) {
+        for job in self.jobs.iter_mut().filter(|job| bad(job)) {
+            *job = Arc::new(good(job));
+        }
+        self.gesture = None;
+    }
+
+    /// How many steps can be undone and redone.
+    fn depth(&self) -> (usize, usize) {
+        (self.current, self.jobs.len() - 1 - self.current)
+    }
+}
+
+/// Milliseconds since an instant.
+pub(super) fn ms_since(instant: Instant) -> f64 {
+    instant.elapsed().as_secs_f64() * 1e3
+}
+
+/// Sum of a vertex quantity over each PART.
+pub(super) fn sum_by_part(parts: &Parts, of_vertex: &[DVec3]) -> Vec<DVec3> {
     let mut sums = vec![DVec3::ZERO; parts.len()];
     for (&part, &value) in parts.part_of_vertex.iter().zip(of_vertex).filter(|(part, _)| **part != UNASSIGNED) {
         sums[part as usize] += value;

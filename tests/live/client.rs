@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use partwise::garment::MeshCache;
 use partwise::live::{Limits, LiveOptions, LiveServer};
-use partwise::session::{Session, Workshop};
+use partwise::session::{Session, Worker};
 use partwise::{DVec3, Job, SceneSpec};
 use serde_json::Value;
 
@@ -40,7 +40,7 @@ impl Live {
         let session = Session::new(Job { scene: SceneSpec::new("form", GARMENT), ..Job::default() }, true);
         let server = LiveServer::start(&session, options).unwrap();
         let working = session.clone();
-        let worker = std::thread::spawn(move || working.work(&mut Workshop::new(MeshCache::in_user_cache())));
+        let worker = std::thread::spawn(move || Worker::new(MeshCache::in_user_cache()).run(&working));
         let live = Self { address: server.address(), session, server: Some(server), worker: Some(worker) };
         live.idle();
         live

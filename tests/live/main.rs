@@ -69,7 +69,7 @@ fn edits_answer_with_the_state_and_results_follow() {
     assert!(part["force_size_n"].is_number() && part["rest_displacement_mm"][2].is_number());
     let first = obj.lines().find(|line| line.starts_with("v ")).unwrap()[2..].replace(' ', ",");
     let at = live.get(&format!("/api/part?on=rest&at={first}")).1;
-    let of_first = live.session.snapshot().sectioned.unwrap().parts.part_of_vertex[0];
+    let of_first = live.session.snapshot().segmented.unwrap().parts.part_of_vertex[0];
     assert_eq!(at["part"], of_first);
 
     let pinned = live.ask("POST", "/api/pins", &["Content-Type: application/json"], r#"{"label": "as it was"}"#).1;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::Job;
 use crate::record::Recorder;
-use crate::session::{Finished, Session, Snapshot, Workshop};
+use crate::session::{Finished, Session, Snapshot, Worker};
 use crate::study::accuracy::rms_mm;
 use crate::study::job::{Against, Measured};
 
@@ -51,9 +51,9 @@ impl RunArgs {
         // What cannot be from the start is an error, as without --watch.
         self.stages.dials.cloth.check_used(&self.input.load(&job.scene)?)?;
         let session = Session::new(job, true);
-        let mut workshop = Workshop::new(self.input.meshes());
+        let mut session_worker = Worker::new(self.input.meshes());
         let working = session.clone();
-        let worker = std::thread::spawn(move || working.work(&mut workshop));
+        let worker = std::thread::spawn(move || session_worker.run(&working));
         interrupt::keep();
         let mut told = Told::default();
         let mut serial = 0;
@@ -139,7 +139,7 @@ impl RunArgs {
             let stale = interrupt::requested() || session.snapshot().state != state;
             if stale { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let scene = &finished.ground.loaded.scene;
+        let scene = &finished.loaded_scene.input.scene;
         match job.measure(scene, &finished.drape, cache(self.cache.as_ref()).as_ref(), &mut go_on) {
             Ok(measured) => Ok(Some(measured)),
             Err(crate::study::evaluate::EvaluateError::Interrupted) if interrupt::requested() => {
@@ -159,7 +159,7 @@ fn since(before: &Finished, now: &Finished) -> String {
         (before, now) => format!("{now} PARTs after {before}"),
     };
     let [was, is] = [&before.drape.positions, &now.drape.positions];
-    if before.ground.loaded.scene.garment.triangles != now.ground.loaded.scene.garment.triangles {
+    if before.loaded_scene.input.scene.garment.triangles != now.loaded_scene.input.scene.garment.triangles {
         return format!("{parts}; another garment");
     }
     let most = was.iter().zip(is).map(|(a, b)| 1e3 * a.distance(*b)).fold(0.0, f64::max);

@@ -1,0 +1,149 @@
+//! A task of the worker: the state that it computes, and the results that are published on the way.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::handle::Session;
+use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented};
+use super::state::{SessionState, ms_since};
+use crate::drape::{Drape, ENOUGH, Levels, Settings};
+use crate::mechanics::coupled::{self, CoupledOptions, Hints, Motion};
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::parts::Parts;
+use crate::scene::Scene;
+use crate::study::accuracy::representable::representable;
+use crate::study::job::Job;
+
+/// Steps of a warm preview on the coarser cloth.
+pub(super) const COARSE_STEPS: usize = 2;
+
+/// The newest state, and the results that already belong to it.
+pub(super) struct Target {
+    pub(super) state: u64,
+    pub(super) job: Arc<Job>,
+    pub(super) warm: bool,
+    pub(super) accepted: Instant,
+    pub(super) segmented: Option<Arc<Segmented>>,
+    pub(super) rest: Option<Arc<AtRest>>,
+}
+
+/// A part of the computation of a state whose PARTs are known.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub(super) session: &'a Session,
+    pub(super) target: &'a Target,
+    pub(super) segmented: &'a Segmented,
+}
+
+impl<'a> Task<'a> {
+    pub(super) fn settings(self) -> &'a Settings {
+        &self.target.job.settings
+    }
+
+    pub(super) fn loaded_scene(self) -> &'a Arc<LoadedScene> {
+        &self.segmented.loaded_scene
+    }
+
+    pub(super) fn scene(self) -> &'a Scene {
+        &self.loaded_scene().input.scene
+    }
+
+    /// Breaks once the state is no longer the newest.
+    pub(super) fn check(self) -> ControlFlow<()> {
+        if self.session.is_superseded(self.target.state) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Publishes a result of the state, if it is still the newest.
+    pub(super) fn publish(self, add: impl FnOnce(&mut SessionState)) {
+        self.session.publish(self.target.state, add);
+    }
+
+    /// A cold preview that is not done, of `parts` at `positions` (m) after `ms` milliseconds.
+    pub(super) fn preview(self, parts: Arc<Parts>, positions: Vec<DVec3>, ms: f64) -> Preview {
+        Preview {
+            state: self.target.state,
+            loaded_scene: Arc::clone(self.loaded_scene()),
+            warm: false,
+            done: false,
+            parts,
+            outcomes: Arc::default(),
+            positions: Arc::new(positions),
+            ms,
+            after_ms: ms_since(self.target.accepted),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Coarse steps of the preview on a cloth of a quarter of the vertices, which take a quarter of the time. None if that
+    /// cloth has too few vertices for each PART, or the steps fail.
+    pub(super) fn coarse_steps(
+        self,
+        levels: &Levels,
+        parts: &Parts,
+        start: &[DVec3],
+        options: &CoupledOptions,
+    ) -> Option<Vec<DVec3>> {
+        let level = levels.coarser.first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
+        let options = CoupledOptions { max_steps: COARSE_STEPS, ..options.clone() };
+        let (coarse, parts) = (levels.restrict(1, start), levels.parts(1, parts));
+        let (garment, body) = (level.garment(), &self.scene().body);
+        let mut check = |_: &[DVec3]| self.check();
+        let solved = coupled::solve_given(&garment, body, &parts, &coarse, Hints::default(), &options, &mut check);
+        solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
+    }
+
+    /// Least RMS distance from the drape at rest, mm, that the PARTs' maps could reach.
+    pub(super) fn bound_mm(self, drape: &Drape) -> f64 {
+        let scene = self.scene();
+        let placed = &scene.garment.positions;
+        let best = representable(&scene.topology, &drape.parts, &scene.is_held(), placed, &drape.positions);
+        match self.settings().model.motion() {
+            Motion::Affine => best.blended_affine_rms_mm,
+            Motion::Translation => best.blended_translation_rms_mm,
+        }
+    }
+}
+
+/// A computation at full resolution.
+pub(super) struct Refinement<'a> {
+    pub(super) task: Task<'a>,
+    pub(super) warm: bool,
+    pub(super) began: Instant,
+}
+
+impl Refinement<'_> {
+    /// The garment after `steps` steps, not yet at rest.
+    pub(super) fn at(&self, positions: &[DVec3], residual_over_weight: f64, steps: usize) -> AtRest {
+        let Self { task, warm, began } = *self;
+        AtRest {
+            state: task.target.state,
+            loaded_scene: Arc::clone(task.loaded_scene()),
+            done: false,
+            balanced: false,
+            reused: false,
+            warm,
+            positions: Arc::new(positions.to_vec()),
+            residual_over_weight,
+            steps,
+            ms: ms_since(began),
+            after_ms: ms_since(task.target.accepted),
+            reaction_n: Arc::default(),
+            cloth_state: None,
+            let_go: None,
+            inputs: RestInputs::of(task.settings()),
+            held_positions: Arc::default(),
+        }
+    }
+}
+
+/// Force of the body on each vertex in contact where the cloth rests, friction included, N: the gradient of the cloth's own
+/// energy, which contact balances.
+pub(super) fn reactions(cloth: &Cloth, positions: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
+    let mut gradient = Vec::new();
+    cloth.gradient(positions, &Contacts::none(), &mut gradient);
+    let carried = cloth.held.iter().zip(pressure_kpa).map(|(held, kpa)| !held && *kpa > 0.0);
+    gradient.iter().zip(carried).map(|(g, carried)| if carried { *g } else { DVec3::ZERO }).collect()
+}
