@@ -105,7 +105,7 @@ impl LiveArgs {
             anyhow::bail!("the session broke off; this is a mistake of the program");
         }
         if let Some(Ok(summary)) = recorded {
-            console::notes(summary?.said().as_slice());
+            console::notes(summary?.file_line().as_slice());
         }
         Ok(())
     }

@@ -86,7 +86,7 @@ fn show(recorder: Recorder) -> anyhow::Result<()> {
         console::note(&format!("look at it: {url}"));
     }
     interrupt::wait();
-    console::notes(recorder.finish()?.said().as_slice());
+    console::notes(recorder.finish()?.file_line().as_slice());
     Ok(())
 }
 
@@ -116,7 +116,7 @@ impl RunArgs {
             show(recorder)?;
         } else {
             let finished = Instant::now();
-            solved.summary.outputs.extend(recorder.finish()?.said());
+            solved.summary.outputs.extend(recorder.finish()?.file_line());
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }

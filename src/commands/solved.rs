@@ -93,7 +93,7 @@ impl Solved {
         recorder.body(index, scene.body.mesh())?;
         recorder.garment(index, &scene.garment)?;
         if scene.layers.len() == 1 && scene.own_fabrics.len() > 1 {
-            recorder.cut_from(index, &scene.fabric_of_vertices())?;
+            recorder.fabrics(index, &scene.fabric_of_vertices())?;
         }
         let forces: Vec<DVec3> = self.drape.outcomes.iter().map(|o| o.force_n).collect();
         let mut scalars = self.summary.metrics.scalars();

@@ -2,7 +2,7 @@
 //!
 //! OKLab: B. Ottosson, "A perceptual color space for image processing" (2020). With L the lightness (0–1), C the chroma and
 //! h the hue (degrees): a = C cos h, b = C sin h; (l, m, s)^⅓ = M₁ (L, a, b); linear RGB = M₂ (l, m, s), then the sRGB curve.
-//! Equal steps of L look like equal steps of brightness, so a map whose L rises evenly neither hides nor invents a border.
+//! Equal steps of L are perceived as equal steps of brightness, so a map whose L rises evenly has no false borders.
 //!
 //! Limits: a colour outside sRGB is clipped channel by channel.
 
@@ -36,7 +36,7 @@ fn gamma(linear: f64) -> u8 {
     (v.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// A colour map: lightness rises evenly while the hue turns.
+/// A colour map: lightness and hue change linearly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ColourMap {
     lightness: (f64, f64),
@@ -49,54 +49,53 @@ impl ColourMap {
     pub(super) const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
     /// Dark violet over red to pale yellow: forces.
     pub(super) const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
-    /// Pale grey over orange to dark red: errors, strains and pressures, where much is bad.
+    /// Pale grey over orange to dark red: errors, strains and pressures.
     pub(super) const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
 
-    /// The colour at `t` in 0–1; outside it the end's, and grey for what is not a number.
+    /// The colour at `t` in 0–1; beyond them that of the end, and grey for NaN.
     pub(super) fn at(&self, t: f64) -> Rgb {
         if t.is_nan() {
             return [128, 128, 128];
         }
         let t = t.clamp(0.0, 1.0);
         let mix = |(a, b): (f64, f64)| a + (b - a) * t;
-        // Towards both ends of the lightness sRGB holds less chroma; without this the ends clip to another hue.
+        // Near both ends of the lightness sRGB has less chroma; without this factor the ends would clip to another hue.
         let lightness = mix(self.lightness);
         let room = 1.0 - ((lightness - 0.66) / 0.42).powi(4);
         oklch(lightness, mix(self.chroma) * room.max(0.25), mix(self.hue_deg))
     }
 
-    /// The colours of many values over `range`.
+    /// The colours of values over `range`.
     pub(super) fn colours(&self, values: &[f64], range: Range) -> Vec<Rgb> {
-        values.iter().map(|&v| self.at(range.place(v))).collect()
+        values.iter().map(|&v| self.at(range.position(v))).collect()
     }
 }
 
-/// The values that the two ends of a colour map stand for.
+/// The values at the two ends of a colour map.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub(crate) struct Range {
     /// Value of the first colour.
-    pub low: f64,
+    pub(crate) low: f64,
     /// Value of the last colour.
-    pub high: f64,
+    pub(crate) high: f64,
 }
 
 impl Range {
-    /// From zero to a round number at or above the `share` quantile of the finite values (1.0 = the largest). A few
-    /// outliers (a PART of one vertex, say) would else press all others into the first colour.
+    /// From zero to a round number at or above the `share` quantile of the finite values (1.0 = the largest). With a few outliers
+    /// above it, such as a PART of one vertex, the others still have different colours.
     #[must_use]
     pub(crate) fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
         let finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
         Self { low: 0.0, high: round_up(nearest_rank(&finite, share)) }
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end.
-    #[must_use]
-    pub(crate) fn place(&self, value: f64) -> f64 {
+    /// Relative position of `value`: 0 at the low end, 1 at the high end.
+    fn position(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 }
 
-/// The next of 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8 × 10ⁿ at or above `value`; 1 for what is not positive.
+/// The next of 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8 × 10ⁿ at or above `value`; 1 if it is not positive.
 fn round_up(value: f64) -> f64 {
     if value.is_nan() || value <= 0.0 {
         return 1.0;
@@ -114,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn oklab_hits_white_black_and_srgb_red() {
+    fn oklab_gives_white_black_and_srgb_red() {
         assert_eq!(oklab(1.0, 0.0, 0.0), [255, 255, 255]);
         assert_eq!(oklab(0.0, 0.0, 0.0), [0, 0, 0]);
         // OKLab of sRGB red, from Ottosson's page: L 0.628, a 0.2249, b 0.1258.

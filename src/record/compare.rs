@@ -1,81 +1,83 @@
-//! Comparing range tables: the chosen few side by side.
+//! Results side by side: the drapes of a few range tables or methods.
 
 use glam::DVec3;
 
-use super::colour_map::ColourMap;
+use super::colour_map::{ColourMap, Range};
+use super::colours::{colour_parts, with_outside};
+use super::error::RecordError;
 use super::legend::{Legend, caption};
-use super::step::covering;
-use super::{Open, Overlay, Range, RecordError, colours, meshes, paths};
+use super::meshes::{self, CellMesh, rerun_colours};
+use super::open_recording::OpenRecording;
+use super::overlay::Overlay;
+use super::paths;
 use crate::parts::UNASSIGNED;
 use crate::study::metrics::LevelCount;
 
-/// One of two to six results shown side by side, each in a view of its own with the same eye.
+/// One of two to six results side by side, each in a view of its own with the same eye.
 #[derive(Debug, Clone, Copy)]
-pub struct Chosen<'a> {
-    /// Step of the timeline `table` it belongs to.
-    pub index: i64,
-    /// Place from the left, from 0; the layout's `compare` names it.
-    pub slot: usize,
-    /// What is written below it (`86 PARTs · 1.2 ms · 12 mm`); nothing where it is empty.
-    pub caption: &'a str,
-    /// Displaced vertices, m.
-    pub draped: &'a [DVec3],
-    /// What it is coloured by.
-    pub colours: Colours<'a>,
+pub(crate) struct Compared<'a> {
+    /// Step of the timeline `table`.
+    pub(crate) index: i64,
+    /// Place from the left, from 0; its title is in the layout's `compare`.
+    pub(crate) slot: usize,
+    /// Text below the view (`86 PARTs · 1.2 ms · 12 mm`), or empty.
+    pub(crate) caption: &'a str,
+    /// Draped vertices, m.
+    pub(crate) draped: &'a [DVec3],
+    /// Colours of the garment.
+    pub(crate) colours: Colours<'a>,
 }
 
-/// What a garment shown side by side with others is coloured by.
+/// The colours of a garment beside others.
 #[derive(Debug, Clone, Copy)]
-pub enum Colours<'a> {
-    /// Its PARTs.
+pub(crate) enum Colours<'a> {
+    /// By PART.
     Parts {
         /// PART of each vertex.
         part_of_vertex: &'a [u32],
-        /// The levels that made them, for their hues.
+        /// Their levels, which determine the hues.
         levels: &'a [LevelCount],
     },
-    /// A value per vertex, over the range the caller shares between the slots.
+    /// By a value per vertex, over a range that all slots share.
     Overlay(Overlay<'a>, Range),
 }
 
-pub(super) fn chosen(open: &Open, chosen: &Chosen<'_>) -> Result<(), RecordError> {
-    let (what, values) = match &chosen.colours {
+/// Logs one of the results.
+pub(super) fn log(recording: &OpenRecording, compared: &Compared<'_>) -> Result<(), RecordError> {
+    let (what, values) = match &compared.colours {
         Colours::Parts { part_of_vertex, .. } => ("PART numbers", part_of_vertex.len()),
         Colours::Overlay(overlay, _) => (overlay.name, overlay.values.len()),
     };
-    let lists = [("positions", chosen.draped.len()), (what, values)];
-    RecordError::unless_per_vertex(open.garment.positions.len(), &lists)?;
-    let [columns, _] = open.layout().captions(&open.eye);
-    let path = format!("{}/{}/garment", paths::COMPARE, chosen.slot);
-    let draped = open.garment.with_positions(chosen.draped.to_vec());
-    open.at(chosen.index, 6);
-    match chosen.colours {
+    recording.check_lengths(&[("positions", compared.draped.len()), (what, values)])?;
+    let [columns, _] = recording.layout().captions(&recording.eye);
+    let path = format!("{}/{}/garment", paths::COMPARE, compared.slot);
+    let draped = recording.garment.with_positions(compared.draped.to_vec());
+    recording.at(compared.index, 6);
+    match compared.colours {
         Colours::Overlay(overlay, range) => {
-            open.triangles_once(&path)?;
-            let shades = ColourMap::ALARM.colours(overlay.values, range);
-            open.log(&path, &meshes::shape(&draped).with_vertex_colors(meshes::rerun_colours(shades)))?;
+            recording.triangles_once(&path)?;
+            let map = ColourMap::ALARM;
+            let colours = rerun_colours(map.colours(overlay.values, range));
+            recording.log(&path, &meshes::shape(&draped).with_vertex_colors(colours))?;
             let bar = format!("{}/colours", paths::COMPARE_CAPTIONS);
-            if open.first_use(&bar) {
-                let Overlay { name: title, unit, .. } = overlay;
-                let legend = Legend { title, unit, map: ColourMap::ALARM, range, open_end: true };
-                legend.log(open, &bar, [0, 0])?;
+            if recording.first_use(&bar) {
+                let legend = Legend { title: overlay.name, unit: overlay.unit, map, range, open_end: true };
+                legend.log(recording, &bar, [0, 0])?;
             }
         }
         Colours::Parts { part_of_vertex, levels } => {
-            let cells = meshes::CellMesh::new(&draped);
-            let known = part_of_vertex.iter().filter(|p| **p != UNASSIGNED);
-            let part_of_vertex = covering(part_of_vertex, known.max().map_or(0, |&p| p as usize + 1));
-            let parts = part_of_vertex.iter().max().map_or(0, |&p| p as usize + 1);
-            let triangles = &open.garment.triangles;
-            let of_part = colours::colour_parts(&part_of_vertex, parts, levels, triangles, &open.vertex_shade);
-            let shade = |v: u32| of_part.colour[part_of_vertex[v as usize] as usize];
-            let shades = meshes::rerun_colours(cells.owner.iter().map(|&v| shade(v)));
-            open.log(&path, &cells.shape().with_vertex_colors(shades))?;
+            let count = |parts: &[u32]| parts.iter().filter(|p| **p != UNASSIGNED).max().map_or(0, |&p| p as usize + 1);
+            let part_of_vertex = with_outside(part_of_vertex, count(part_of_vertex));
+            let (parts, triangles) = (count(&part_of_vertex), &recording.garment.triangles);
+            let chosen = colour_parts(&part_of_vertex, parts, levels, triangles, &recording.vertex_shade);
+            let cells = CellMesh::new(&draped);
+            let colours = rerun_colours(cells.of_vertices(&chosen.of_vertices));
+            recording.log(&path, &cells.shape().with_vertex_colors(colours))?;
         }
     }
-    if chosen.caption.is_empty() {
+    if compared.caption.is_empty() {
         return Ok(());
     }
-    let place = [chosen.slot % columns, chosen.slot / columns];
-    caption(open, &format!("{}/{}", paths::COMPARE_CAPTIONS, chosen.slot), chosen.caption, place)
+    let place = [compared.slot % columns, compared.slot / columns];
+    caption(recording, &format!("{}/{}", paths::COMPARE_CAPTIONS, compared.slot), compared.caption, place)
 }

@@ -1,9 +1,9 @@
-//! Where the 3D views look from: the front, slightly above and to one side, with the whole garment in the view.
+//! The eye of the 3D views: in front of the garment, slightly above and to one side, with the whole garment in the view.
 //!
-//! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of what must be seen, m; a = width over
+//! Symbols: θ = 55°, the viewer's vertical field of view; w, h = width and height of the garment in the view, m; a = width over
 //! height of the view on screen. Distance = max(h/2, w/2a) / tan(θ/2) + a quarter of the depth.
 //!
-//! Limits: the viewer's views have any shape; a is what the layout gives them in a window of 16:10.
+//! Limits: a is that of the layout in a window of 16:10; the user may resize views.
 
 use glam::DVec3;
 
@@ -11,24 +11,25 @@ use crate::mesh::TriMesh;
 
 /// The viewer's own field of view (`Eye::DEFAULT_FOV_Y`, Rerun 0.36), degrees.
 const FIELD_OF_VIEW_DEG: f64 = 55.0;
-/// How far above the horizontal the eye stands, degrees.
+/// Elevation of the eye above the horizontal, degrees.
 const ELEVATION_DEG: f64 = 7.0;
-/// How far to the garment's left the eye stands, degrees: enough to see depth.
+/// Angle of the eye to the garment's left, degrees, so that depth is visible.
 const AZIMUTH_DEG: f64 = 18.0;
-/// Air around what must be seen.
+/// Size of the view over that of the garment.
 const MARGIN: f64 = 1.14;
-/// A garment is widest near its middle depth: so much of half its depth the eye steps back for what is nearer.
+/// Share of half the garment's depth by which the eye moves back, since a garment is widest near its middle depth.
 const BULGE: f64 = 0.5;
-/// An eye and what it sees.
+
+/// An eye and the extent of the garment in its view.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Eye {
-    /// Where it stands, m.
+    /// Position, m.
     pub position: DVec3,
-    /// What it looks at, m.
+    /// Point that it looks at, m.
     pub target: DVec3,
-    /// Half the garment's width in its picture, m.
+    /// Half the garment's width in the view, m.
     pub half_width: f64,
-    /// Half the garment's height in its picture, m.
+    /// Half the garment's height in the view, m.
     pub half_height: f64,
     /// Unit vector from the garment to the eye.
     pub toward: DVec3,
@@ -67,12 +68,12 @@ impl Eye {
         Some(eye.through(aspect))
     }
 
-    /// Half the height that is in the picture at the target, m.
+    /// Half the height that is visible at the target, m.
     pub(crate) fn half_seen(&self) -> f64 {
         self.position.distance(self.target) * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan()
     }
 
-    /// The same, as near as a view of this width over height allows.
+    /// The same eye, as near as a view of this width over height allows.
     pub(crate) fn through(&self, aspect: f64) -> Self {
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();
         let fit = (self.half_height / tan).max(self.half_width / (tan * aspect));

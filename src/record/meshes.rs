@@ -1,4 +1,4 @@
-//! Meshes as Rerun draws them: single precision, always with normals (without them a mesh is drawn unlit).
+//! Meshes as Rerun's archetypes: single precision, always with normals, without which a mesh is drawn unlit.
 
 use glam::DVec3;
 use rerun::{Color, Mesh3D, Rgba32};
@@ -6,66 +6,66 @@ use rerun::{Color, Mesh3D, Rgba32};
 use super::colour_map::Rgb;
 use crate::mesh::TriMesh;
 
-/// A point or direction in single precision, as the viewer wants it.
-pub(crate) fn single(p: DVec3) -> [f32; 3] {
+/// A point or direction in single precision.
+pub(super) fn single(p: DVec3) -> [f32; 3] {
     p.as_vec3().to_array()
 }
 
-/// Many points or directions in single precision.
-pub(crate) fn singles(points: &[DVec3]) -> Vec<[f32; 3]> {
+/// Points or directions in single precision.
+pub(super) fn singles(points: &[DVec3]) -> Vec<[f32; 3]> {
     points.iter().copied().map(single).collect()
 }
 
-/// Rerun's colour.
-pub(crate) fn colour([r, g, b]: Rgb) -> Color {
+/// An sRGB colour as Rerun's.
+pub(super) fn colour([r, g, b]: Rgb) -> Color {
     Color::from_rgb(r, g, b)
 }
 
-/// Rerun's colours.
-pub(crate) fn rerun_colours(colours: impl IntoIterator<Item = Rgb>) -> Vec<Color> {
+/// sRGB colours as Rerun's.
+pub(super) fn rerun_colours(colours: impl IntoIterator<Item = Rgb>) -> Vec<Color> {
     colours.into_iter().map(colour).collect()
 }
 
 /// A mesh with its triangles.
-pub(crate) fn whole(mesh: &TriMesh) -> Mesh3D {
+pub(super) fn whole(mesh: &TriMesh) -> Mesh3D {
     shape(mesh).with_triangle_indices(mesh.triangles.iter().copied())
 }
 
 /// A mesh in one colour.
-pub(crate) fn plain(mesh: &TriMesh, [r, g, b]: Rgb) -> Mesh3D {
+pub(super) fn plain(mesh: &TriMesh, [r, g, b]: Rgb) -> Mesh3D {
     whole(mesh).with_albedo_factor(Rgba32::from_rgb(r, g, b))
 }
 
-/// Positions and normals alone: what changes when a garment of known triangles moves.
-pub(crate) fn shape(mesh: &TriMesh) -> Mesh3D {
+/// Positions and normals alone, for a mesh whose triangles are logged already.
+pub(super) fn shape(mesh: &TriMesh) -> Mesh3D {
     Mesh3D::update_fields()
         .with_vertex_positions(singles(&mesh.positions))
         .with_vertex_normals(singles(&mesh.vertex_normals()))
 }
 
 /// Colours alone.
-pub(crate) fn colours(colours: impl IntoIterator<Item = Rgb>) -> Mesh3D {
+pub(super) fn colours(colours: impl IntoIterator<Item = Rgb>) -> Mesh3D {
     Mesh3D::update_fields().with_vertex_colors(rerun_colours(colours))
 }
 
-/// A garment cut into one cell a vertex, so that each vertex shows its own colour up to a crisp border.
+/// A garment divided into one cell per vertex, so that each vertex has its own colour up to a sharp border.
 ///
 /// Every triangle is split through its centroid and the midpoints of its sides into three quadrilaterals, one for each
-/// corner (the barycentric dual). A PART is a set of vertices; coloured by triangles, one of a single vertex would
-/// not be seen at all.
+/// corner (the barycentric dual). A PART is a set of vertices; with colours per triangle, a PART of one vertex would be
+/// invisible.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CellMesh {
-    /// The garment's vertex that each vertex of the cells belongs to, ascending.
-    pub(crate) owner: Vec<u32>,
-    /// The cells' own triangles, positions and normals.
-    pub(crate) mesh: TriMesh,
+pub(super) struct CellMesh {
+    /// The garment's vertex of each vertex of the cells, ascending.
+    owner: Vec<u32>,
+    /// Positions and triangles of the cells.
+    mesh: TriMesh,
     normals: Vec<DVec3>,
 }
 
 impl CellMesh {
-    /// Cuts `garment` into cells.
-    pub(crate) fn new(garment: &TriMesh) -> Self {
-        // A cell's vertex is its owner and what it is: the vertex itself, the midpoint towards another, or a centroid.
+    /// Divides `garment` into cells.
+    pub(super) fn new(garment: &TriMesh) -> Self {
+        // The key of a cell's vertex: the owner, and the owner itself (0), the midpoint towards another vertex, or a centroid.
         const MIDPOINT: u64 = 1;
         const CENTROID: u64 = 1 << 33;
         let mut keys: Vec<(u32, u64)> = (0..garment.positions.len() as u32).map(|v| (v, 0)).collect();
@@ -91,14 +91,14 @@ impl CellMesh {
         }
         let place = |values: &[DVec3]| -> Vec<DVec3> {
             keys.iter()
-                .map(|&(v, what)| {
+                .map(|&(v, kind)| {
                     let own = values[v as usize];
-                    if what == 0 {
+                    if kind == 0 {
                         own
-                    } else if what < CENTROID {
-                        0.5 * (own + values[(what - MIDPOINT) as usize])
+                    } else if kind < CENTROID {
+                        0.5 * (own + values[(kind - MIDPOINT) as usize])
                     } else {
-                        let corners = garment.triangles[(what - CENTROID) as usize];
+                        let corners = garment.triangles[(kind - CENTROID) as usize];
                         corners.iter().map(|&c| values[c as usize]).sum::<DVec3>() / 3.0
                     }
                 })
@@ -109,21 +109,21 @@ impl CellMesh {
         Self { owner: keys.into_iter().map(|(v, _)| v).collect(), mesh, normals }
     }
 
-    /// What is logged once: triangles, positions, normals.
-    pub(crate) fn shape(&self) -> Mesh3D {
+    /// Triangles, positions and normals, which are logged once.
+    pub(super) fn shape(&self) -> Mesh3D {
         Mesh3D::new(singles(&self.mesh.positions))
             .with_triangle_indices(self.mesh.triangles.iter().copied())
             .with_vertex_normals(singles(&self.normals))
     }
 
-    /// What is logged each step: a colour per vertex of the garment.
-    pub(crate) fn colours(&self, of_vertex: impl Fn(u32) -> Rgb) -> Mesh3D {
-        colours(self.of_vertices(of_vertex))
+    /// The colours alone, from one per vertex of the garment.
+    pub(super) fn colours(&self, of_garment: &[Rgb]) -> Mesh3D {
+        colours(self.of_vertices(of_garment))
     }
 
-    /// What each vertex of the cells has of its owner.
-    pub(crate) fn of_vertices(&self, of_vertex: impl Fn(u32) -> Rgb) -> Vec<Rgb> {
-        self.owner.iter().map(|&v| of_vertex(v)).collect()
+    /// The colour of each vertex of the cells, from one per vertex of the garment.
+    pub(super) fn of_vertices(&self, of_garment: &[Rgb]) -> Vec<Rgb> {
+        self.owner.iter().map(|&v| of_garment[v as usize]).collect()
     }
 }
 
@@ -147,7 +147,7 @@ mod tests {
         }
         // Vertex 0: itself, three midpoints, two centroids.
         assert_eq!(cells.owner.iter().filter(|&&o| o == 0).count(), 6);
-        // Winding is kept.
+        // The winding is the same.
         let flat = |t: usize| cells.mesh.double_area_vector(t).normalize_or_zero();
         assert!(flat(0).dot(mesh.double_area_vector(0)) > 0.0);
     }

@@ -1,17 +1,26 @@
-//! Values on the draped garment, in colours that stand for the same from step to step.
+//! Per-vertex values in colours: on the draped garment, on the flat panels of its pattern, and in exported meshes.
 
-use super::colour_map::ColourMap;
+use glam::DVec3;
+
+use super::colour_map::{ColourMap, Range};
+use super::colours::{CLOTH, opaque};
+use super::error::RecordError;
+use super::layout::{PANELS_ASPECT, Tab};
 use super::legend::{Cell, Legend};
-use super::{Open, Range, RecordError, meshes};
+use super::meshes::{self, CellMesh, rerun_colours};
+use super::open_recording::OpenRecording;
+use super::paths;
 use crate::mesh::TriMesh;
 
 /// Values above this quantile share the last colour.
 pub(super) const QUANTILE: f64 = 0.99;
+/// Share of a view's height or width that flat panels fill.
+const PANELS_FILL: f64 = 0.95;
 
 /// A value per vertex of the draped garment.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlay<'a> {
-    /// `error`, or what the recording's layout lists under fit (`strain`, `pressure`).
+    /// `error`, or a name of [`Layout::fit`](super::Layout::fit) (`strain`, `pressure`).
     pub name: &'a str,
     /// Unit of the values.
     pub unit: &'a str,
@@ -19,58 +28,122 @@ pub struct Overlay<'a> {
     pub values: &'a [f64],
 }
 
-/// The least that a colour map's upper end stands for: under it a small value would look like a large one.
-fn least(quantity: &str) -> f64 {
-    match quantity {
-        "error" => 10.0,
-        "strain" => 5.0,
-        "folds" => 10.0,
-        "pressure" => 0.1,
-        _ => 0.0,
+impl Overlay<'_> {
+    /// The range of the colour map. It has a lower bound, so that a small value does not look like a large one.
+    fn own_range(&self) -> Range {
+        let least = match self.name {
+            "error" | "folds" => 10.0,
+            "strain" => 5.0,
+            "pressure" => 0.1,
+            _ => 0.0,
+        };
+        let own = Range::to_quantile(self.values.iter().copied(), QUANTILE);
+        Range { high: own.high.max(least), ..own }
+    }
+
+    /// The range of the colour map in a recording, fixed by the first step.
+    fn range(&self, recording: &OpenRecording) -> Range {
+        recording.range(self.name, || self.own_range())
+    }
+
+    /// Colour of each vertex of an exported mesh: red, green, blue and opacity.
+    pub(crate) fn vertex_colours(&self) -> Vec<[u8; 4]> {
+        ColourMap::ALARM.colours(self.values, self.own_range()).into_iter().map(opaque).collect()
     }
 }
 
-/// The range of an overlay's colours, fixed by its first step.
-pub(super) fn scale(open: &Open, overlay: &Overlay<'_>) -> Range {
-    open.scale(overlay.name, || own_range(overlay))
-}
-
-/// The range that an overlay would have alone.
-pub(super) fn own_range(overlay: &Overlay<'_>) -> Range {
-    let own = Range::to_quantile(overlay.values.iter().copied(), QUANTILE);
-    Range { high: own.high.max(least(overlay.name)), ..own }
-}
-
-/// Values on the draped garment: `{branch}/garment`, and a colour bar where `legend` says.
-pub(super) fn overlay(
-    open: &Open,
+/// Logs values on the draped garment, `{branch}/garment`, and their colour bar, `legend`, in a cell of its drawing.
+pub(super) fn log_overlay(
+    recording: &OpenRecording,
     branch: &str,
     draped: &TriMesh,
     overlay: &Overlay<'_>,
-    (legend, cell): (&str, Cell),
+    legend: &str,
+    cell: Cell,
 ) -> Result<(), RecordError> {
     let path = format!("{branch}/garment");
-    open.triangles_once(&path)?;
-    let range = scale(open, overlay);
+    recording.triangles_once(&path)?;
+    let range = overlay.range(recording);
     let map = ColourMap::ALARM;
-    let coloured = meshes::shape(draped).with_vertex_colors(meshes::rerun_colours(map.colours(overlay.values, range)));
-    open.log(&path, &coloured)?;
+    let colours = rerun_colours(map.colours(overlay.values, range));
+    recording.log(&path, &meshes::shape(draped).with_vertex_colors(colours))?;
     let open_end = overlay.values.iter().any(|&v| v > range.high);
-    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(open, legend, cell)
+    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(recording, legend, cell)
+}
+
+/// The flat panels of a sewing pattern.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PatternView<'a> {
+    /// Step of the timeline `table`.
+    pub(crate) index: i64,
+    /// The panels side by side, unsewn, m: x to the right and z up.
+    pub(crate) flat: &'a TriMesh,
+    /// The garment's vertex of each vertex of the panels.
+    pub(crate) garment_vertex: &'a [u32],
+    /// Values at the garment's vertices.
+    pub(crate) overlays: &'a [Overlay<'a>],
+}
+
+/// Logs the panels in the colours of the last step: by PART, and by each overlay.
+pub(super) fn log_pattern(recording: &OpenRecording, view: &PatternView<'_>) -> Result<(), RecordError> {
+    let lists: Vec<(&str, usize)> = view.overlays.iter().map(|o| (o.name, o.values.len())).collect();
+    recording.check_lengths(&lists)?;
+    let vertices = [("the garment's vertices", view.garment_vertex.len())];
+    RecordError::unless_per_vertex(view.flat.vertex_count(), &vertices)?;
+    let Some(flat) = facing_the_eye(recording, view.flat) else { return Ok(()) };
+    recording.at(view.index, 6);
+    let cells = CellMesh::new(&flat);
+    let part = |&v: &u32| recording.vertex_colour.get(v as usize).copied().unwrap_or(CLOTH);
+    let parts: Vec<_> = view.garment_vertex.iter().map(part).collect();
+    let panels = cells.shape().with_vertex_colors(rerun_colours(cells.of_vertices(&parts)));
+    recording.log(&format!("{}/parts/panels", paths::PATTERN), &panels)?;
+    let shape = meshes::whole(&flat);
+    for overlay in view.overlays {
+        let values: Vec<f64> = view.garment_vertex.iter().map(|&v| overlay.values[v as usize]).collect();
+        let colours = ColourMap::ALARM.colours(&values, overlay.range(recording));
+        let panels = shape.clone().with_vertex_colors(rerun_colours(colours));
+        recording.log(&format!("{}/{}/panels", paths::PATTERN, overlay.name), &panels)?;
+    }
+    Ok(())
+}
+
+/// The panels at the garment's place, perpendicular to the view, as large as the view allows.
+fn facing_the_eye(recording: &OpenRecording, flat: &TriMesh) -> Option<TriMesh> {
+    let (low, high) = flat.bounds()?;
+    let (middle, size) = (0.5 * (low + high), high - low);
+    let eye = &recording.eye;
+    let half = recording.layout().eye(Tab::Pattern, eye).half_seen();
+    let scale = PANELS_FILL * (2.0 * half / size.z).min(2.0 * half * PANELS_ASPECT / size.x);
+    let right = DVec3::Z.cross(eye.toward).normalize_or(DVec3::X);
+    let up = eye.toward.cross(right);
+    let place = |p: &DVec3| {
+        let d = (*p - middle) * scale;
+        eye.target + d.x * right + d.z * up
+    };
+    Some(flat.with_positions(flat.positions.iter().map(place).collect()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::RecordOptions;
+    use crate::record::open_recording::RecordOptions;
 
     #[test]
-    fn colours_stand_for_the_same_in_every_step_and_a_small_error_is_no_alarm() {
-        let open = Open::new(RecordOptions::default()).unwrap();
+    fn colours_are_comparable_from_step_to_step_and_a_small_error_is_pale() {
+        let recording = OpenRecording::new(RecordOptions::default()).unwrap();
         let error = |values| Overlay { name: "error", unit: "mm", values };
-        let first = scale(&open, &error(&[0.0, 40.0]));
+        let first = error(&[0.0, 40.0]).range(&recording);
         assert!(first.high >= 40.0);
-        assert_eq!(scale(&open, &error(&[0.0, 0.4])), first);
-        assert!(own_range(&error(&[0.0, 0.4])).high >= 10.0, "0.4 mm would be painted red");
+        assert_eq!(error(&[0.0, 0.4]).range(&recording), first);
+        assert!(error(&[0.0, 0.4]).own_range().high >= 10.0, "0.4 mm would be red");
+    }
+
+    #[test]
+    fn exported_colours_differ_with_the_strain_and_a_small_strain_is_pale() {
+        let colours = |values| Overlay { name: "strain", unit: "%", values }.vertex_colours();
+        let strain = colours(&[0.0, 2.0, 4.0, 40.0]);
+        assert!(strain.windows(2).all(|two| two[0] != two[1]) && strain.iter().all(|c| c[3] == 255), "{strain:?}");
+        let small = colours(&[0.0, 0.1, 0.0, 0.1]);
+        assert!(small[1][0].abs_diff(small[0][0]) < 16, "{small:?}");
     }
 }

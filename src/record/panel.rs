@@ -1,31 +1,28 @@
-//! The text panel: what was run, on what, with which result and how fast, as Markdown.
+//! The text panel of a recording: inputs, result and timings as Markdown.
 
 use std::fmt::Write as _;
 
-use super::legend::number;
+use super::error::RERUN_VERSION;
 use crate::study::metrics::LevelCount;
 
-/// Version of the viewer the recording is made for.
-pub(super) const RERUN_VERSION: &str = "0.36.3";
-
-/// Everything the text panel shows. Empty pieces are left out.
+/// The contents of the text panel. Empty sections are left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Panel {
-    /// Headline: garment and body.
+    /// Heading: garment and body.
     pub title: String,
     /// Name of the range table.
     pub table: String,
-    /// Its levels, nearest first.
+    /// Levels of the table, nearest first.
     pub levels: Vec<LevelCount>,
     /// Facts in two columns: vertices, PARTs, singletons, model, error, ...
     pub facts: Vec<(String, String)>,
-    /// The fabric: constant and value with unit.
+    /// Constants of the fabric, values with units.
     pub fabric: Vec<(String, String)>,
     /// Time of each stage, ms.
     pub timings_ms: Vec<(String, f64)>,
-    /// What the user should know.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// The command that makes this recording.
+    /// The command that reproduces this recording.
     pub command_line: String,
 }
 
@@ -40,18 +37,18 @@ impl Panel {
         for warning in &self.warnings {
             line(&mut text, format_args!("> ⚠ {warning}\n"));
         }
-        // First, so that it is seen without scrolling in a window of 1280 × 800.
+        // First, so that it is visible without scrolling in a window of 1280 × 800.
         if !self.levels.is_empty() {
             line(&mut text, format_args!("**{}**\n", self.table));
             // Only tables with extents get a column for them.
-            let own = self.levels.iter().any(|row| row.extent.is_some());
-            let (head, rule) = if own { (" cut to, cm |", "--:|") } else { ("", "") };
+            let with_extents = self.levels.iter().any(|row| row.extent.is_some());
+            let (head, rule) = if with_extents { (" cut to, cm |", "--:|") } else { ("", "") };
             line(&mut text, format_args!("| level | cm | vertices | PARTs |{head}\n|--:|:--|--:|--:|{rule}"));
-            // An empty level says nothing; the others keep their numbers.
+            // Empty levels are left out; the others keep their numbers.
             for row in self.levels.iter().filter(|row| row.vertices > 0) {
                 let (level, range) = (row.level, range_cm(row.lower_cm, row.upper_cm));
                 let extent = row.extent.map_or_else(String::new, |e| e.to_string());
-                let extent = if own { format!(" {extent} |") } else { String::new() };
+                let extent = if with_extents { format!(" {extent} |") } else { String::new() };
                 line(&mut text, format_args!("| {level} | {range} | {} | {} |{extent}", row.vertices, row.parts));
             }
             text.push('\n');
@@ -66,15 +63,14 @@ impl Panel {
         if !self.command_line.is_empty() {
             line(&mut text, format_args!("**Command**\n\n```\n{}\n```\n", self.command_line));
         }
-        let own = env!("CARGO_PKG_VERSION");
-        line(&mut text, format_args!("partwise {own} · Rerun {RERUN_VERSION}"));
+        line(&mut text, format_args!("partwise {} · Rerun {RERUN_VERSION}", env!("CARGO_PKG_VERSION")));
         text
     }
 }
 
-/// A range in centimetres as the paper prints it.
+/// A range in centimetres, in the paper's notation.
 pub(super) fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
-    // A scaled bound has a long tail; a micrometre is far below any bound.
+    // Rounded to a micrometre: a scaled bound has many digits.
     let cm = |cm: f64| number((cm * 1e4).round() / 1e4);
     if upper_cm.is_finite() {
         format!("{} – {}", cm(lower_cm), cm(upper_cm))
@@ -83,7 +79,7 @@ pub(super) fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
     }
 }
 
-/// Whether a fact fits beside others in the panel's width. A table's columns do not wrap: what is longer is text.
+/// Whether a fact fits in the columns of a table, which do not wrap; longer facts are text.
 fn fits(name: &str, value: &str) -> bool {
     name.chars().count() <= 15 && value.chars().count() <= 20
 }
@@ -100,9 +96,23 @@ fn two_columns<'a>(text: &mut String, title: &str, unit: &str, rows: impl Iterat
     text.push('\n');
 }
 
+/// Appends a line.
 fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     // Writing to a String cannot fail.
     let _ = writeln!(text, "{content}");
+}
+
+/// Three significant digits, without trailing zeros.
+pub(crate) fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    if digits == 9 {
+        return format!("{value:.2e}");
+    }
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 #[cfg(test)]
@@ -111,7 +121,7 @@ mod tests {
     use crate::parts::range_table::Extent;
 
     #[test]
-    fn the_panel_holds_what_it_is_given_and_no_empty_tables() {
+    fn the_panel_contains_every_section_and_no_empty_tables() {
         let panel = Panel {
             title: "skirt on body".into(),
             table: "Table 3".into(),
@@ -146,6 +156,21 @@ mod tests {
         let text = cut.markdown();
         for piece in ["| PARTs | cut to, cm |", "| 4 | 2 | 6 × 12 |", "| 9 | 1 | not cut |"] {
             assert!(text.contains(piece), "{piece} in {text}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.25, "1.25"),
+            (12.5, "12.5"),
+            (2500.0, "2500"),
+            (0.015, "0.015"),
+            (3.0, "3"),
+            (1e-9, "1.00e-9"),
+        ] {
+            assert_eq!(number(value), text);
         }
     }
 }

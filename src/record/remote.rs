@@ -1,7 +1,7 @@
-//! A viewer elsewhere that may be slow, silent or gone.
+//! The sink of a remote viewer, with time limits.
 //!
-//! Rerun's client waits for ever, when it is dropped too, for a server that accepts a connection and says nothing. Here it
-//! lives in a thread of its own that nobody waits for longer than the patience of the caller.
+//! Rerun's client waits for ever, also when it is dropped, for a server that accepts a connection and does not answer. Here it
+//! runs in a thread of its own, and every wait for that thread has a time limit.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
@@ -12,87 +12,88 @@ use rerun::external::re_uri::ProxyUri;
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink, SinkFlushError};
 
-/// How long the last data may take to reach a viewer.
-const LAST: Duration = Duration::from_secs(10);
+/// Longest wait for a viewer to take the last data.
+const LAST_FLUSH: Duration = Duration::from_secs(10);
 
-enum Order {
+/// A request to the thread of the client.
+enum Request {
     Send(LogMsg),
     Flush(Duration, Sender<Result<(), String>>),
 }
 
-/// A viewer elsewhere.
+/// A remote viewer.
 pub(super) struct Remote {
-    orders: Mutex<Option<Sender<Order>>>,
+    requests: Mutex<Option<Sender<Request>>>,
     ended: Mutex<Receiver<()>>,
 }
 
 impl Remote {
-    /// Begins to connect.
+    /// Starts to connect.
     pub(super) fn new(uri: ProxyUri) -> Self {
-        let (orders, taken) = channel();
+        let (requests, received) = channel();
         let (end, ended) = channel();
-        // Left behind where the viewer never answers: it ends with the program.
+        // If the viewer never answers, the thread ends with the program.
         thread::spawn(move || {
             let sink = GrpcSink::new(uri);
-            for order in taken {
-                match order {
-                    Order::Send(message) => sink.send(message),
-                    Order::Flush(patience, done) => {
-                        let _ = done.send(sink.flush_blocking(patience).map_err(|e| e.to_string()));
+            for request in received {
+                match request {
+                    Request::Send(message) => sink.send(message),
+                    Request::Flush(timeout, done) => {
+                        let _ = done.send(sink.flush_blocking(timeout).map_err(|e| e.to_string()));
                     }
                 }
             }
             drop(sink);
             let _ = end.send(());
         });
-        Self { orders: Mutex::new(Some(orders)), ended: Mutex::new(ended) }
+        Self { requests: Mutex::new(Some(requests)), ended: Mutex::new(ended) }
     }
 
-    fn order(&self, order: Order) -> bool {
-        let orders = self.orders.lock().unwrap_or_else(PoisonError::into_inner);
-        orders.as_ref().is_some_and(|orders| orders.send(order).is_ok())
+    fn request(&self, request: Request) -> bool {
+        let requests = self.requests.lock().unwrap_or_else(PoisonError::into_inner);
+        requests.as_ref().is_some_and(|requests| requests.send(request).is_ok())
     }
 
-    /// Sends no more: nobody takes it.
+    /// Sends no more data.
     fn give_up(&self) {
-        self.orders.lock().unwrap_or_else(PoisonError::into_inner).take();
+        self.requests.lock().unwrap_or_else(PoisonError::into_inner).take();
     }
 }
 
 impl LogSink for Remote {
     fn send(&self, message: LogMsg) {
-        self.order(Order::Send(message));
+        self.request(Request::Send(message));
     }
 
-    fn flush_blocking(&self, patience: Duration) -> Result<(), SinkFlushError> {
-        // Rerun itself would wait for ever when it changes sinks.
-        let patience = patience.min(LAST);
+    fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
+        // Rerun passes no limit when it changes sinks.
+        let timeout = timeout.min(LAST_FLUSH);
         let (done, answer) = channel();
-        if !self.order(Order::Flush(patience, done)) {
-            return Err(SinkFlushError::failed("the viewer went away"));
+        if !self.request(Request::Flush(timeout, done)) {
+            return Err(SinkFlushError::failed("the viewer was closed"));
         }
-        match answer.recv_timeout(patience) {
+        match answer.recv_timeout(timeout) {
             Ok(Ok(())) => Ok(()),
             Ok(Err(reason)) => {
                 self.give_up();
                 Err(SinkFlushError::failed(reason))
             }
             Err(RecvTimeoutError::Timeout) => {
-                // What is left would pile up in memory.
+                // Further data would accumulate in memory.
                 self.give_up();
                 Err(SinkFlushError::Timeout)
             }
-            Err(RecvTimeoutError::Disconnected) => Err(SinkFlushError::failed("the viewer went away")),
+            Err(RecvTimeoutError::Disconnected) => Err(SinkFlushError::failed("the viewer was closed")),
         }
     }
 }
 
 impl Drop for Remote {
     fn drop(&mut self) {
-        let given_up = self.orders.get_mut().unwrap_or_else(PoisonError::into_inner).take().is_none();
+        let given_up = self.requests.get_mut().unwrap_or_else(PoisonError::into_inner).take().is_none();
         if !given_up {
             let ended = self.ended.get_mut().unwrap_or_else(PoisonError::into_inner);
-            let _ = ended.recv_timeout(LAST);
+            let _ = ended.recv_timeout(LAST_FLUSH);
         }
     }
 }

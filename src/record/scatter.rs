@@ -1,57 +1,64 @@
-//! One number over another, drawn in the plane: cost against error, a dot for each table; both axes logarithmic.
+//! A scatter plot of one number over another, both axes logarithmic, a dot for each table or method.
 //!
-//! The viewer has no plot of one number over another, so that axes, numbers and names are lines and points of a 2D view.
+//! The viewer has no such plot, so axes, numbers and names are lines and points of a 2D view. Each name covers no dot and no
+//! other name; a line leads to its dot if they are apart. Places are tried from near to far, below and above, right and left; the first free one
+//! is taken. Lengths are in units of the picture, y upwards.
+//!
+//! Limits: the viewer's texts have a fixed size on screen, so that names may overlap after zooming out. Widths are estimated from the
+//! number of letters.
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::labels::{Labels, Rect};
-use super::legend::{number, texts};
-use super::{Open, RecordError, colours, meshes, paths};
+use super::error::RecordError;
+use super::legend::texts;
+use super::open_recording::OpenRecording;
+use super::panel::number;
+use super::{colours, meshes, paths};
 
-/// A picture: where it lies and what its axes are called.
+/// Path and axis titles of a scatter plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Picture<'a> {
-    /// Its path: [`paths::SCATTER`] or [`paths::GROWTH`].
-    pub path: &'a str,
+pub(crate) struct Picture<'a> {
+    /// [`paths::SCATTER`] or [`paths::GROWTH`].
+    pub(crate) path: &'a str,
     /// Title of the horizontal axis, with its unit (`time, ms`).
-    pub x: &'a str,
+    pub(crate) x: &'a str,
     /// Title of the vertical axis.
-    pub y: &'a str,
+    pub(crate) y: &'a str,
 }
 
 impl<'a> Picture<'a> {
-    /// What something costs against its error.
+    /// Error over cost.
     #[must_use]
-    pub fn of_error(cost: &'a str) -> Self {
+    pub(crate) fn of_error(cost: &'a str) -> Self {
         Self { path: paths::SCATTER, x: cost, y: "error, mm" }
     }
 
-    /// How times grow.
+    /// Time over number of vertices.
     #[must_use]
     pub(crate) fn of_growth() -> Self {
         Self { path: paths::GROWTH, x: "vertices", y: "time, ms" }
     }
 }
 
-/// One table, or any other setting, in a picture.
+/// A table or method in a scatter plot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ScatterPoint<'a> {
-    /// Its name.
-    pub label: &'a str,
-    /// Where it lies along the horizontal axis: what it costs.
-    pub x: f64,
-    /// Along the vertical one: its error.
-    pub y: f64,
-    /// Points of one group share a colour; the front, say, against the rest.
-    pub group: usize,
-    /// Whether its name is written beside it, where there is room.
-    pub named: bool,
+pub(crate) struct ScatterPoint<'a> {
+    /// Name of the table or method.
+    pub(crate) label: &'a str,
+    /// Horizontal coordinate: the cost.
+    pub(crate) x: f64,
+    /// Vertical coordinate: the error.
+    pub(crate) y: f64,
+    /// Points of one group share a colour, such as those of the Pareto front.
+    pub(crate) group: usize,
+    /// Whether the name is written beside the dot, if there is room.
+    pub(crate) named: bool,
 }
 
-/// Width and height of the picture, in its own units: about two pixels of the view.
+/// Width and height of the plot, in units of about two pixels of the view.
 const PICTURE: [f64; 2] = [400.0, 170.0];
-/// What the view shows of the plane when the recording opens: x and y, the picture and the numbers around it.
-pub(crate) const VISIBLE: [[f64; 2]; 2] = [[-42.0, 428.0], [-PICTURE[1] - 22.0, 32.0]];
+/// The visible part of the plane, x and y, when the recording opens: the plot with the numbers around it.
+pub(super) const VISIBLE: [[f64; 2]; 2] = [[-42.0, 428.0], [-PICTURE[1] - 22.0, 32.0]];
 /// Radius of a dot.
 const DOT: f64 = 2.6;
 
@@ -64,7 +71,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// The axis that holds all values, with a little air; a decade where there are none.
+    /// The axis that contains all values with a margin; a decade if there are none.
     fn around(values: impl Iterator<Item = f64>, length: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if low > high {
@@ -78,7 +85,7 @@ impl Axis {
         (value / self.low).log10() / (self.high / self.low).log10() * self.length
     }
 
-    /// 1 to 9 times each power of ten, as far as the axis goes, with the multiple.
+    /// The multiples, 1 to 9, of each power of ten on the axis, with their values.
     fn ticks(&self) -> impl Iterator<Item = (i32, f64)> {
         let (first, last) = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
         let (low, high) = (self.low * 0.999, self.high * 1.001);
@@ -99,27 +106,27 @@ fn round(value: f64, up: bool) -> f64 {
     }
 }
 
-/// Points that are not positive and finite cannot be placed and are left out.
-pub(super) fn scatter(
-    open: &Open,
+/// Logs a scatter plot. Points whose coordinates are not positive and finite are left out.
+pub(super) fn log(
+    recording: &OpenRecording,
     index: i64,
     picture: Picture<'_>,
     points: &[ScatterPoint<'_>],
 ) -> Result<(), RecordError> {
     let path = picture.path;
-    open.at(index, 6);
+    recording.at(index, 6);
     let placed: Vec<&ScatterPoint<'_>> =
         points.iter().filter(|p| p.x.is_finite() && p.y.is_finite() && p.x > 0.0 && p.y > 0.0).collect();
     let along = Axis::around(placed.iter().map(|p| p.x), PICTURE[0]);
     let up = Axis::around(placed.iter().map(|p| p.y), PICTURE[1]);
-    axes(open, [&along, &up], picture)?;
+    log_axes(recording, [&along, &up], picture)?;
     let place = |p: &ScatterPoint<'_>| [along.place(p.x), up.place(p.y)];
     let palette = colours::palette();
     let dots = Points2D::new(placed.iter().map(|p| plane(place(p))))
         .with_colors(meshes::rerun_colours(placed.iter().map(|p| palette[p.group % palette.len()])))
         .with_radii([DOT as f32])
         .with_draw_order(30.0);
-    open.log(&format!("{path}/points"), &dots)?;
+    recording.log(&format!("{path}/points"), &dots)?;
     let frame = Rect { low: [0.0, 0.0], high: PICTURE };
     let mut labels = Labels::new(frame, placed.iter().map(|p| place(p)), DOT);
     let named = placed.iter().filter(|p| p.named && !p.label.is_empty());
@@ -132,18 +139,18 @@ pub(super) fn scatter(
         }
     }
     let leaders = LineStrips2D::new(leaders).with_colors([Color::from_rgb(150, 156, 165)]).with_radii([0.25]);
-    open.log(&format!("{path}/leaders"), &leaders)?;
-    open.log(&format!("{path}/names"), &texts(anchors, names))
+    recording.log(&format!("{path}/leaders"), &leaders)?;
+    recording.log(&format!("{path}/names"), &texts(anchors, names))
 }
 
-/// The grid, the numbers at it, and what they count.
-fn axes(open: &Open, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<(), RecordError> {
+/// Logs the grid, its numbers, and the titles of the axes.
+fn log_axes(recording: &OpenRecording, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<(), RecordError> {
     let [width, height] = PICTURE;
     let mut lines = Vec::new();
     let mut shades = Vec::new();
     let mut places = vec![plane([0.5 * width, -13.0]), plane([0.0, height + 16.0])];
     let mut labels = vec![picture.x.to_owned(), picture.y.to_owned()];
-    // The line of each tick, and where its number stands.
+    // The line of each tick, and the place of its number.
     let upright = along.ticks().map(|(multiple, value)| {
         let x = along.place(value);
         (multiple, value, [[x, 0.0], [x, height]], [x, -1.0])
@@ -161,21 +168,135 @@ fn axes(open: &Open, [along, up]: [&Axis; 2], picture: Picture<'_>) -> Result<()
         }
     }
     let axes = LineStrips2D::new(lines).with_colors(shades).with_radii([0.25]);
-    open.log(&format!("{}/axes", picture.path), &axes)?;
-    open.log(&format!("{}/ticks", picture.path), &texts(places, labels))
+    recording.log(&format!("{}/axes", picture.path), &axes)?;
+    recording.log(&format!("{}/ticks", picture.path), &texts(places, labels))
 }
 
-/// The viewer's plane has y downwards.
+/// A point of the viewer's plane, which has y downwards.
 fn plane([x, y]: [f64; 2]) -> [f32; 2] {
     [x as f32, -y as f32]
 }
 
+/// Width of a letter and height of a line of text, including the viewer's box around it.
+const LETTER: f64 = 3.5;
+const LINE: f64 = 12.5;
+/// Padding of the box, both sides together.
+const PADDING: f64 = 6.0;
+/// Distance of a text's box below its anchor in the viewer.
+const DROP: f64 = 0.5;
+/// Spacing of the samples of a leader line.
+const SAMPLE: f64 = 2.0;
+/// Rings of places around a dot.
+const RINGS: i32 = 9;
+
+/// An axis-parallel rectangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Rect {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Rect {
+    fn around([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Self {
+        Self { low: [x - 0.5 * width, y - 0.5 * height], high: [x + 0.5 * width, y + 0.5 * height] }
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        (0..2).all(|i| self.low[i] < other.high[i] && other.low[i] < self.high[i])
+    }
+
+    fn within(&self, other: &Self) -> bool {
+        (0..2).all(|i| self.low[i] >= other.low[i] && self.high[i] <= other.high[i])
+    }
+
+    /// The nearest point to `p`.
+    fn nearest(&self, p: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| p[i].clamp(self.low[i], self.high[i]))
+    }
+}
+
+/// The place of a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spot {
+    /// The anchor, below which the viewer draws the text.
+    anchor: [f64; 2],
+    /// End of the leader line from the dot, if there is one.
+    leader: Option<[f64; 2]>,
+}
+
+/// The names placed so far.
+#[derive(Debug)]
+struct Labels {
+    frame: Rect,
+    dots: Vec<Rect>,
+    names: Vec<Rect>,
+    lines: Vec<Rect>,
+    radius: f64,
+}
+
+impl Labels {
+    /// No names yet, in `frame`, among dots of this radius.
+    fn new(frame: Rect, dots: impl Iterator<Item = [f64; 2]>, radius: f64) -> Self {
+        let dots = dots.map(|dot| Rect::around(dot, [2.0 * radius; 2])).collect();
+        Self { frame, dots, names: Vec::new(), lines: Vec::new(), radius }
+    }
+
+    /// Finds a place for the name of a dot, if there is one. Leader lines cross nothing while there is room; beyond that they run
+    /// below names.
+    fn place(&mut self, dot: [f64; 2], name: &str) -> Option<Spot> {
+        let size = [LETTER * name.chars().count() as f64 + PADDING, LINE];
+        let free = |rect: &Rect| !self.dots.iter().chain(&self.names).any(|other| rect.overlaps(other));
+        let clear_of_lines = |rect: &Rect| !self.lines.iter().any(|other| rect.overlaps(other));
+        let fits = |rect: &Rect| rect.within(&self.frame) && free(rect);
+        let tidy =
+            |rect: &Rect| clear_of_lines(rect) && self.leader(dot, rect).iter().all(|b| free(b) && clear_of_lines(b));
+        let spots = |rings| self.spots(dot, size, rings).filter(fits);
+        let next_to = spots(0..1).find(clear_of_lines);
+        let in_a_ring = || spots(1..RINGS).find(tidy);
+        let rect = next_to.or_else(in_a_ring).or_else(|| spots(1..RINGS).next())?;
+        let leader = next_to.is_none().then(|| rect.nearest(dot));
+        if leader.is_some() {
+            let samples = self.leader(dot, &rect);
+            self.lines.extend(samples);
+        }
+        self.names.push(rect);
+        Some(Spot { anchor: [0.5 * (rect.low[0] + rect.high[0]), rect.high[1] + DROP], leader })
+    }
+
+    /// The places around a dot, ring by ring.
+    fn spots(&self, dot: [f64; 2], size: [f64; 2], rings: std::ops::Range<i32>) -> impl Iterator<Item = Rect> + Clone {
+        let radius = self.radius + 1.0;
+        rings.flat_map(move |ring| {
+            let far = f64::from(ring) * 0.8 * LINE;
+            let (aside, above) = (0.5 * size[0] + radius + far, 0.5 * LINE + radius + far);
+            let half = 0.5 * aside;
+            [[0.0, -above], [aside, 0.0], [0.0, above], [-aside, 0.0]]
+                .into_iter()
+                .chain([[half, -above], [-half, -above], [half, above], [-half, above]])
+                .chain([[aside, -above], [-aside, -above], [aside, above], [-aside, above]])
+                .map(move |[x, y]| Rect::around([dot[0] + x, dot[1] + y], size))
+        })
+    }
+
+    /// Samples of the line from a dot to its name, without those on either.
+    fn leader(&self, dot: [f64; 2], name: &Rect) -> Vec<Rect> {
+        let end = name.nearest(dot);
+        let length = (end[0] - dot[0]).hypot(end[1] - dot[1]);
+        let samples = (length / SAMPLE).floor();
+        (1..samples as i32)
+            .map(|i| f64::from(i) / samples)
+            .filter(|along| along * length > self.radius + SAMPLE)
+            .map(|along| Rect::around([0, 1].map(|i| dot[i] + along * (end[i] - dot[i])), [0.5 * SAMPLE; 2]))
+            .collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Axis;
+    use super::*;
 
     #[test]
-    fn axes_hold_all_values_between_round_numbers() {
+    fn axes_contain_all_values_between_round_numbers() {
         let ends = |values: &[f64]| {
             let axis = Axis::around(values.iter().copied(), 100.0);
             for &value in values {
@@ -189,5 +310,31 @@ mod tests {
         assert_eq!(ends(&[]), [1.0, 10.0]);
         let ticks: Vec<f64> = Axis::around([3.0, 15.0].into_iter(), 1.0).ticks().map(|t| t.1).collect();
         assert_eq!(ticks, [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 20.0]);
+    }
+
+    const FRAME: Rect = Rect { low: [0.0, 0.0], high: [400.0, 170.0] };
+
+    #[test]
+    fn names_are_below_their_dots_and_do_not_overlap() {
+        let mut alone = Labels::new(FRAME, [[200.0, 100.0]].into_iter(), 2.0);
+        let spot = alone.place([200.0, 100.0], "table-3").unwrap();
+        assert_eq!(spot.anchor[0], 200.0);
+        assert!(spot.anchor[1] < 98.0 && spot.leader.is_none());
+
+        let dots: Vec<[f64; 2]> = (0..8).map(|i| [200.0 + 3.0 * f64::from(i), 90.0 + f64::from(i % 3)]).collect();
+        let mut labels = Labels::new(FRAME, dots.iter().copied(), 2.0);
+        let spots: Vec<Spot> = dots.iter().filter_map(|&dot| labels.place(dot, "table-3 x0.75")).collect();
+        assert_eq!(spots.len(), 8, "there is room for all");
+        assert!(spots.iter().any(|s| s.leader.is_some()));
+        for (i, a) in labels.names.iter().enumerate() {
+            assert!(a.within(&FRAME));
+            assert!(labels.dots.iter().chain(&labels.names[..i]).all(|b| !a.overlaps(b)));
+        }
+    }
+
+    #[test]
+    fn a_name_without_room_is_left_out() {
+        let mut labels = Labels::new(Rect { low: [0.0; 2], high: [20.0; 2] }, [[10.0; 2]].into_iter(), 2.0);
+        assert!(labels.place([10.0; 2], "far too long a name").is_none());
     }
 }

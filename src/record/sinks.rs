@@ -1,4 +1,4 @@
-//! Where a recording goes: a file, the native viewer, a viewer elsewhere, a browser; several at once.
+//! The sinks of a recording: a file, the native viewer, a remote viewer, a browser; several at once.
 //!
 //! Rerun's own sinks report most failures late or only to the log, so each is tried before the first result is sent: a
 //! port is bound, an address is dialled, a file is created. Servers listen on 127.0.0.1 alone. A file is written whole or not
@@ -12,26 +12,26 @@ use std::time::Duration;
 use rerun::external::re_uri::{ProxyUri, Scheme};
 use rerun::sink::LogSink;
 
-use super::panel::RERUN_VERSION;
+use super::error::RecordError;
+use super::native;
 use super::remote::Remote;
 use super::web::WebViewer;
 use super::writer::RrdWriter;
-use super::{RecordError, native};
 use crate::base::atomic_file::{WholeFile, folder_of};
 
-/// How long a viewer has to answer.
+/// Longest wait for a viewer's answer.
 const ANSWER: Duration = Duration::from_secs(3);
 /// Port of a spawned native viewer: Rerun's own default.
 const VIEWER_PORT: u16 = 9876;
 
-/// One place a recording goes to.
+/// A destination of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sink {
-    /// An `.rrd` file; missing folders of a relative path are made.
+    /// An `.rrd` file; missing folders of a relative path are created.
     File(PathBuf),
     /// The native viewer, started if none listens on Rerun's port yet.
     Spawn,
-    /// A viewer elsewhere, `rerun+http://HOST:PORT/proxy`.
+    /// A remote viewer, `rerun+http://HOST:PORT/proxy`.
     Connect(String),
     /// The bundled web viewer on 127.0.0.1.
     Serve {
@@ -45,13 +45,13 @@ pub enum Sink {
 }
 
 impl Sink {
-    /// Whether a file could begin where this sink writes one, before anything is computed for it; nothing is left behind.
+    /// Checks that the sink's file can be created, before its contents are computed; leaves no file.
     ///
     /// # Errors
     /// As [`Recorder::open`](super::Recorder::open).
     pub(crate) fn check(&self) -> Result<(), RecordError> {
         let Self::File(path) = self else { return Ok(()) };
-        // Folders that a relative path lacks will be made.
+        // Missing folders of a relative path will be created.
         if path.is_relative() && !folder_of(path).exists() {
             return Ok(());
         }
@@ -59,15 +59,23 @@ impl Sink {
     }
 }
 
-/// A file in the making.
+/// A file that is being written.
 pub(crate) struct Target {
     /// Its encoder.
     pub(super) writer: RrdWriter<WholeFile>,
-    /// Where it goes when complete.
+    /// Path of the complete file.
     pub(super) path: PathBuf,
 }
 
-/// All sinks of a recording, open.
+impl Target {
+    /// The error for a file that could not be completed.
+    pub(super) fn incomplete(&self, reason: &str) -> RecordError {
+        let path = self.path.display();
+        RecordError::Incomplete { reason: format!("{path}: {reason}; make room, or choose another place with --save") }
+    }
+}
+
+/// All open sinks of a recording.
 #[derive(Default)]
 pub(crate) struct OpenSinks {
     pub(crate) sinks: Vec<Box<dyn LogSink>>,
@@ -76,7 +84,7 @@ pub(crate) struct OpenSinks {
 }
 
 impl OpenSinks {
-    /// Opens every sink, or none: on an error what was begun goes as it is dropped.
+    /// Opens every sink, or none: on an error, dropping the first ones removes their files.
     pub(crate) fn open(sinks: &[Sink]) -> Result<Self, RecordError> {
         let mut open = Self::default();
         sinks.iter().try_for_each(|sink| open.add(sink))?;
@@ -119,7 +127,7 @@ fn file(path: &Path) -> Result<Target, RecordError> {
 fn spawn() -> Result<Remote, RecordError> {
     native::start(VIEWER_PORT)?;
     connect(&format!("rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"))
-        .map_err(|error| RecordError::NoViewer { reason: error.to_string(), version: RERUN_VERSION })
+        .map_err(|error| RecordError::NoViewer { reason: error.to_string() })
 }
 
 fn connect(url: &str) -> Result<Remote, RecordError> {
@@ -136,7 +144,7 @@ fn connect(url: &str) -> Result<Remote, RecordError> {
         let tried: Vec<String> = addresses.iter().map(ToString::to_string).collect();
         return Err(unreachable(format!("nothing listens at {}", tried.join(", "))));
     };
-    let silent = |why: String| unreachable(format!("something listens, but does not answer as a viewer does ({why})"));
+    let silent = |why: String| unreachable(format!("the server there does not answer as a viewer does ({why})"));
     if uri.origin.scheme == Scheme::RerunHttp {
         greet(dialled).map_err(|e| silent(e.to_string()))?;
     }
@@ -160,5 +168,5 @@ fn greet(mut stream: TcpStream) -> std::io::Result<()> {
         ErrorKind::WouldBlock | ErrorKind::TimedOut => std::io::Error::other(format!("silent for {ANSWER:?}")),
         _ => e,
     })?;
-    if answer[3] == SETTINGS { Ok(()) } else { Err(std::io::Error::other("it speaks something else")) }
+    if answer[3] == SETTINGS { Ok(()) } else { Err(std::io::Error::other("it does not speak HTTP/2")) }
 }

@@ -1,7 +1,7 @@
-//! The recording's file, written by us.
+//! The sink of a recording's file.
 //!
-//! Rerun's own file sink opens its file by name, ends its thread silently when the disk is full, and then blocks whoever
-//! waits for it. Here the first failure is kept, nothing more is written, and the end says what it was.
+//! Rerun's own file sink opens its file by name, ends its thread silently when the disk is full, and then blocks its callers.
+//! This one keeps the first failure, writes no more, and reports it at the end.
 
 use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,7 +11,7 @@ use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
-/// A writer of `.rrd` bytes; each clone writes to the same place.
+/// A writer of `.rrd` bytes; clones write to the same file.
 pub(super) struct RrdWriter<W: Write>(Arc<Mutex<State<W>>>);
 
 impl<W: Write> Clone for RrdWriter<W> {
@@ -22,7 +22,7 @@ impl<W: Write> Clone for RrdWriter<W> {
 
 enum State<W: Write> {
     Open(Box<Encoder<W>>),
-    /// Why it is no longer.
+    /// Writing failed, for this reason.
     Broken(String),
     Ended,
 }
@@ -34,7 +34,7 @@ impl<W: Write> RrdWriter<W> {
         Ok(Self(Arc::new(Mutex::new(State::Open(Box::new(encoder.map_err(text)?))))))
     }
 
-    /// What went wrong, if anything did.
+    /// Fails if writing has failed.
     pub(super) fn check(&self) -> Result<(), String> {
         match &*self.state() {
             State::Broken(reason) => Err(reason.clone()),
@@ -42,21 +42,21 @@ impl<W: Write> RrdWriter<W> {
         }
     }
 
-    /// Ends the recording and gives back what it was written to.
+    /// Ends the recording and returns its file.
     pub(super) fn end(&self) -> Result<W, String> {
         match std::mem::replace(&mut *self.state(), State::Ended) {
             State::Open(mut encoder) => {
                 let finished = encoder.finish().map_err(text);
-                // Taken out in any case: an encoder that is dropped whole tries to write its end once more.
+                // Taken out in any case: an encoder that is dropped tries to write its end again.
                 let mut to = encoder.into_inner().map_err(text)?;
                 finished.and_then(|()| to.flush().map_err(text)).map(|()| to)
             }
             State::Broken(reason) => Err(reason),
-            State::Ended => Err("it was ended before".to_owned()),
+            State::Ended => Err("it has already ended".to_owned()),
         }
     }
 
-    /// Ends it as it is: nothing more is written.
+    /// Ends the recording without writing more.
     pub(super) fn discard(&self) {
         if let State::Open(encoder) = std::mem::replace(&mut *self.state(), State::Ended) {
             let _ = encoder.into_inner();
@@ -89,7 +89,7 @@ fn text(error: impl std::fmt::Display) -> String {
 
 impl<W: Write + Send + 'static> LogSink for RrdWriter<W> {
     fn send(&self, message: LogMsg) {
-        // What went wrong is kept, and told by the next flush and at the end.
+        // A failure is kept, and reported by the next flush and at the end.
         let _ = self.attempt(|encoder| encoder.append(&message).map(|_| ()));
     }
 

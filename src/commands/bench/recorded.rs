@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::record::{Chosen, Colours, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
+use crate::record::{Colours, Compared, Layout, Overlay, Picture, Range, RecordOptions, Recorder, ScatterPoint, Sink};
 use crate::scene::Scene;
 use crate::study::accuracy::vertex_errors;
 use crate::study::table4::{ComparedMethod, DrapedRow, METHODS, MethodResult, Table4Row};
@@ -44,7 +44,7 @@ pub(super) fn record(
     for (slot, (x, off_mm)) in draped.iter().zip(&off_mm).enumerate() {
         let (Some(x), Some(values)) = (x, off_mm) else { continue };
         let colours = Colours::Overlay(Overlay { name: "distance", unit: "mm", values }, range);
-        recorder.compare(&Chosen { index: 0, slot, caption: "", draped: x, colours })?;
+        recorder.compare(&Compared { index: 0, slot, caption: "", draped: x, colours })?;
     }
     let points = |of: &Table4Row, place: fn(&Table4Row, usize) -> [f64; 2], named: bool| {
         let ran = (0..of.entries.len()).filter(|&i| of.entries[i].error.is_none());

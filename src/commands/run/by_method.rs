@@ -143,7 +143,7 @@ impl RunArgs {
         }
         let mut served = Some(recorder);
         if let Some(recorder) = served.take_if(|recorder| recorder.web_url().is_none()) {
-            outputs.extend(recorder.finish()?.said());
+            outputs.extend(recorder.finish()?.file_line());
         }
         timings.push(("total", ms(began.elapsed())));
         console::notes(&[loaded.notes(), drape.notes.clone()].concat());
@@ -199,7 +199,7 @@ impl RunArgs {
             // The mesh every so often; speed at every step.
             let step = i64::try_from(*step).unwrap_or(i64::MAX);
             if !self.no_iterations {
-                recorder.moment(step, *speed, mesh.as_deref())?;
+                recorder.time_step(step, *speed, mesh.as_deref())?;
             }
         }
         let facts = [("method".to_owned(), self.method.to_owned())];

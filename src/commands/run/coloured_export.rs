@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::mesh::glb::write_glb;
-use crate::record::vertex_colours::{by_parts, by_values};
+use crate::record::{Overlay, by_parts};
 use clap::ValueEnum;
 
 use super::super::solved::Solved;
@@ -41,7 +41,7 @@ pub(super) fn write(solved: &Solved, path: &Path, colours: Option<ExportColours>
     let overlays = solved.overlays();
     let of = |name: &str| {
         let overlay = overlays.iter().find(|overlay| overlay.name == name);
-        overlay.map(by_values).ok_or_else(|| {
+        overlay.map(Overlay::vertex_colours).ok_or_else(|| {
             UserError::new(format!(
                 "{}: found no {name} to colour it by, which this model does not tell; expected --export-colours parts, or --model coupled",
                 path.display()

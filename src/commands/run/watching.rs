@@ -76,7 +76,7 @@ impl RunArgs {
             outcome = outcome.and(Err(anyhow::anyhow!("the session broke off; this is a mistake of the program")));
         }
         outcome?;
-        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.said()) {
+        match told.recorder.map(Recorder::finish).transpose()?.and_then(|summary| summary.file_line()) {
             Some(said) => console::note(&said),
             None if told.recorded == 0 => console::note("interrupted before the first drape: nothing is recorded"),
             None => {}

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::base::quantiles::nearest_rank;
 use crate::record::{
-    Chosen, Colours, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
+    Colours, Compared, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
     Sink, StepView, Tab,
 };
 use crate::study::metrics::Metrics;
@@ -91,8 +91,8 @@ pub(crate) fn record(
     let points: Vec<KeptPoint> = rows.iter().filter_map(|row| store.point(&row.point)).collect();
     let share = |of: fn(&KeptPoint) -> f64| Range::to_quantile(points.iter().map(of), 0.75);
     let error = share(|point| nearest_rank(&point.error_mm, 0.99).max(LEAST_ERROR_MM));
-    recorder.scale("error", error);
-    recorder.scale("force", share(|point| nearest_rank(&point.force_of_vertex(), 0.95)));
+    recorder.set_range("error", error);
+    recorder.set_range("force", share(|point| nearest_rank(&point.force_of_vertex(), 0.95)));
     drop(points);
     recorder.body(0, &scene.body)?;
     recorder.garment(0, &scene.garment)?;
@@ -118,7 +118,7 @@ pub(crate) fn record(
     if chosen.len() > 1 {
         for (slot, &i) in chosen.iter().enumerate() {
             let Some(point) = store.point(&rows[i].point) else { continue };
-            recorder.compare(&Chosen {
+            recorder.compare(&Compared {
                 index: 0,
                 slot,
                 caption: &caption(rows[i]),

@@ -89,7 +89,7 @@ impl Report<'_> {
 
 /// A recording, its size and its cost in a line.
 pub(crate) fn line(recording: &RecordSummary) -> String {
-    let Some(said) = recording.said() else { return String::new() };
+    let Some(said) = recording.file_line() else { return String::new() };
     let [bytes, raw] = [recording.bytes, recording.raw_bytes.max(1)].map(|bytes| bytes as f64);
     let (mb, share, seconds) = (bytes / 1e6, bytes / raw, recording.log_ms / 1e3);
     format!("{said} ({mb:.1} MB, {share:.2} of the bytes that changed, {seconds:.1} s)\n")

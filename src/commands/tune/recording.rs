@@ -5,7 +5,7 @@
 use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
 use crate::record::{
-    Chosen, Colours, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
+    Colours, Compared, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
     StepView,
 };
 use crate::study::accuracy::vertex_errors;
@@ -35,8 +35,14 @@ pub(super) fn record(
 ) -> anyhow::Result<RecordSummary> {
     let titles =
         std::iter::once("table-3".to_owned()).chain(taken.iter().map(|(kind, _)| (*kind).to_owned())).collect();
-    let layout =
-        Layout { several_tables: true, held: true, error: true, compare: titles, scatter: true, ..Layout::default() };
+    let layout = Layout {
+        several_tables: true,
+        without_mechanics: true,
+        error: true,
+        compare: titles,
+        scatter: true,
+        ..Layout::default()
+    };
     let name = format!("{}: search", garment.name);
     let mut recorder = Recorder::open(RecordOptions { sinks, name, layout, ..RecordOptions::default() })?;
     recorder.body(0, garment.scene.body.mesh())?;
@@ -107,7 +113,7 @@ fn slot(
 ) -> anyhow::Result<()> {
     let parts = garment.parts(shown.table);
     let holds = garment.holds(shown.table);
-    recorder.compare(&Chosen {
+    recorder.compare(&Compared {
         index: shown.index,
         slot,
         caption: &format!("{} PARTs · holds to {:.1} mm · model {model_mm:.1} mm", holds.parts, holds.rms_mm),

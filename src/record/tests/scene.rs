@@ -1,11 +1,11 @@
 //! A dress form and a flared dress in closed form, with PARTs, forces and a drape that look like the real ones: enough to
 //! see a recording, independent of the solver.
 
+use crate::body::distance::Body;
+use crate::mesh::{Topology, TriMesh};
+use crate::record::Panel;
+use crate::study::metrics::LevelCount;
 use glam::DVec3;
-use partwise::body::distance::Body;
-use partwise::mesh::{Topology, TriMesh};
-use partwise::record::Panel;
-use partwise::study::metrics::LevelCount;
 
 /// Height, half width and half depth of the form, m.
 const FORM: [[f64; 3]; 19] = [

@@ -1,12 +1,11 @@
-//! Recordings that are looked at while they are made, or from a file.
+//! Recordings in the web viewer, while they grow and from a file.
 
-use partwise::record::{Layout, RecordError, Recorder, Sink, paths, web};
-
+use super::super::web;
 use super::scene::{PAPER_LIKE, Scene};
-use super::{Folder, inspect, options, record_one, step};
+use super::{Folder, Layout, RecordError, Recorder, Sink, inspect, options, paths, record_one, step};
 
 #[test]
-fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
+fn a_served_recording_has_a_page_and_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.rrd");
     let serve = Sink::Serve { web_port: None, grpc_port: None, history_bytes: 1 << 28 };
@@ -27,7 +26,7 @@ fn a_served_recording_reaches_a_viewer_that_connects_and_the_page_is_there() {
 }
 
 #[test]
-fn any_recording_is_served_and_what_is_none_is_refused() {
+fn recordings_are_served_and_other_files_are_refused() {
     let folder = Folder::new();
     let path = folder.file("viewed.rrd");
     record_one(&path, 1);

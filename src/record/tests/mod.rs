@@ -1,25 +1,22 @@
-//! What a recording holds, and what happens where it cannot be written.
+//! The contents of recordings.
 //!
-//! With `PARTWISE_KEEP=FOLDER` the recordings stay there to be looked at.
+//! With `PARTWISE_KEEP=FOLDER` the recordings are kept there for inspection.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
-#![cfg(feature = "viewer")]
-
-#[path = "../inspect/mod.rs"]
+#[path = "../../../tests/inspect/mod.rs"]
 mod inspect;
-#[path = "../scene/mod.rs"]
 mod scene;
 mod served;
 
 use std::path::{Path, PathBuf};
 
-use partwise::record::{
-    Chosen, Colours, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
-    StepView, Tab, WrinkleView, paths,
+use super::wrinkles::WrinkleView;
+use super::{
+    Colours, Compared, Layout, Overlay, Picture, RecordError, RecordOptions, RecordSummary, Recorder, ScatterPoint,
+    Sink, StepView, Tab, paths,
 };
 use scene::{PAPER_LIKE, Scene, Solved};
 
-/// A folder that goes away with the test, or the one asked for.
+/// A temporary folder, or that of `PARTWISE_KEEP`.
 struct Folder {
     path: PathBuf,
     _temporary: tempfile::TempDir,
@@ -70,7 +67,7 @@ fn record_one(path: &Path, fineness: u32) -> RecordSummary {
 }
 
 #[test]
-fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
+fn a_recording_has_every_documented_path_the_timelines_and_a_blueprint() {
     let folder = Folder::new();
     let path = folder.file("one.rrd");
     let summary = record_one(&path, 2);
@@ -103,13 +100,13 @@ fn a_recording_holds_every_documented_path_the_timelines_and_a_blueprint() {
     }
     let timelines = &contents.entities[paths::DRAPE].timelines;
     assert!([paths::TABLE, paths::STAGE].iter().all(|&t| timelines.contains(t)), "{timelines:?}");
-    assert!(contents.entities[paths::BODY].timelines.is_empty(), "the body is logged once for all");
+    assert!(contents.entities[paths::BODY].timelines.is_empty(), "the body is static");
     let all = contents.entities.values().flat_map(|e| &e.timelines);
     assert!(all.clone().all(|t| t == paths::TABLE || t == paths::STAGE), "{:?}", all.collect::<Vec<_>>());
 }
 
 #[test]
-fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
+fn a_sweep_logs_the_triangles_once_and_has_all_tables() {
     let folder = Folder::new();
     let scene = Scene::new(2);
     let tables: Vec<(String, Vec<f64>)> = [1.0, 0.7, 0.4, 1.6]
@@ -147,14 +144,14 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
             let (draped, part_of_vertex) = (&scene.draped, &solved.part_of_vertex);
             if i < 4 {
                 let levels = &solved.panel.levels;
-                let chosen = Chosen {
+                let compared = Compared {
                     index: 0,
                     slot: i,
                     caption: &caption,
                     draped,
                     colours: Colours::Parts { part_of_vertex, levels },
                 };
-                recorder.compare(&chosen).unwrap();
+                recorder.compare(&compared).unwrap();
             }
             points.push(ScatterPoint { label: name, x: ms, y: rms, group: 0, named: true });
         }
@@ -182,15 +179,15 @@ fn a_sweep_sends_the_triangles_once_and_holds_all_tables() {
         assert!(contents.entities.contains_key(&format!("{}/{slot}/garment", paths::COMPARE)));
     }
     assert!(contents.entities.contains_key("/scatter/points"));
-    // A vertex of a further table costs its drape (24 bytes) and colours; triangles and positions as loaded are 24 + 24
-    // for each of five meshes and thirteen times that for the cells, and must not come again.
+    // Each further table logs a vertex's drape (24 bytes) and colours. Triangles and positions as loaded, 24 + 24 bytes for each of five
+    // meshes and thirteen times that for the cells, are not logged again.
     let per_vertex = (five.raw_bytes - one.raw_bytes) / (4 * scene.garment.positions.len() as u64);
     assert!(per_vertex < 700, "{per_vertex} bytes a vertex and table");
     assert!(five.bytes as f64 <= 1.3 * five.raw_bytes as f64, "{} of {} bytes", five.bytes, five.raw_bytes);
 }
 
 #[test]
-fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legends() {
+fn all_stages_are_on_the_solvers_timeline_and_overlays_have_legends() {
     let folder = Folder::new();
     let scene = Scene::new(2);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
@@ -234,12 +231,12 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
         assert_eq!(contents.entities[path].rows, 40);
         assert_eq!(contents.entities[path].timelines.iter().collect::<Vec<_>>(), [paths::ITERATION]);
     }
-    // Every tab shows something on the timeline the recording opens on.
+    // Every tab has data on the timeline that the recording opens on.
     for path in [paths::PARTS, paths::FORCE, paths::REPORT, "/fit/strain/garment"] {
         assert!(contents.entities[path].timelines.contains(paths::ITERATION), "{path}");
     }
     assert!(contents.entities[paths::DRAPE].timelines.contains(paths::ITERATION));
-    // A mesh at every fourth iteration, the step's, and the result at the last.
+    // A mesh at every fourth iteration, that of the step, and the result at the last iteration.
     assert_eq!(contents.entities[paths::DRAPE].rows, 10 + 1 + 1);
     for name in ["strain", "pressure"] {
         assert!(contents.entities.contains_key(&format!("{}/{name}/garment", paths::FIT)), "{name}");
@@ -250,23 +247,7 @@ fn the_solver_and_all_stages_share_a_timeline_and_fit_garments_have_their_legend
 }
 
 #[test]
-fn a_garment_that_rests_on_coarser_ones_first_has_one_point_an_iteration() {
-    let folder = Folder::new();
-    let path = folder.file("large.rrd");
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_partwise"));
-    command.args(["--garment", "flared-skirt@6000", "--format", "json", "--save"]).arg(&path);
-    let done = command.output().unwrap();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    let steps = told["refine_steps"].as_u64().unwrap();
-    let contents = inspect::read(&path);
-    for plot in [paths::ENERGY, paths::RESIDUAL_LOG10] {
-        assert_eq!(contents.entities[plot].rows as u64, steps + 1, "{plot}");
-    }
-}
-
-#[test]
-fn a_watched_recording_takes_new_steps_and_new_meshes() {
+fn a_watched_recording_accepts_new_steps_and_new_meshes() {
     let folder = Folder::new();
     let (small, large) = (Scene::new(1), Scene::new(2));
     let mut options = options(&folder.file("watched.rrd"), Layout { several_tables: true, ..Layout::default() });
@@ -281,14 +262,14 @@ fn a_watched_recording_takes_new_steps_and_new_meshes() {
     }
     recorder.notice(2, "table.toml, line 4: upper value 3 below lower value 5").unwrap();
     let contents = inspect::read(&recorder.finish().unwrap().path.unwrap());
-    assert_eq!(contents.entities[paths::BODY].rows, 1, "the body stayed");
+    assert_eq!(contents.entities[paths::BODY].rows, 1, "the body is unchanged");
     assert_eq!(contents.entities[paths::GARMENT].rows, 2, "the garment changed once");
-    assert_eq!(contents.entities[paths::DRAPE].fixed_rows, 0, "what is static cannot be replaced at a step");
+    assert_eq!(contents.entities[paths::DRAPE].fixed_rows, 0, "static data cannot be replaced at a step");
     assert_eq!(contents.entities[paths::REPORT].rows, 4, "three steps and the message");
 }
 
 #[test]
-fn without_a_sink_nothing_is_made() {
+fn without_a_sink_nothing_is_recorded() {
     let scene = Scene::new(1);
     let solved = scene.solve("Table 3", &PAPER_LIKE);
     let mut recorder = Recorder::open(RecordOptions::default()).unwrap();
