@@ -27,16 +27,16 @@ pub fn said(error: &(dyn Error + 'static), joint: &str) -> String {
 /// A sentence as it may be told: [`plain`], its middle left out where it is long.
 #[must_use]
 pub(crate) fn short(sentence: &str) -> String {
-    plain(&shortened(sentence)).into_owned()
+    plain(&shortened(sentence, LONGEST)).into_owned()
 }
 
-fn shortened(cause: &str) -> Cow<'_, str> {
-    let [start, end] = LONGEST;
-    if cause.len() <= start + end {
-        return cause.into();
+/// A text with its middle left out where it is longer than so many bytes at its start and at its end.
+pub(crate) fn shortened(text: &str, [start, end]: [usize; 2]) -> Cow<'_, str> {
+    if text.len() <= start + end {
+        return text.into();
     }
-    let (start, end) = (cause.floor_char_boundary(start), cause.ceil_char_boundary(cause.len() - end));
-    format!("{} ... ({} bytes in all) ... {}", &cause[..start], cause.len(), &cause[end..]).into()
+    let (start, end) = (text.floor_char_boundary(start), text.ceil_char_boundary(text.len() - end));
+    format!("{} ... ({} bytes in all) ... {}", &text[..start], text.len(), &text[end..]).into()
 }
 
 /// A text without control characters but for the ends of its lines and tabs.

@@ -3,11 +3,14 @@
 //! Every read of the crate goes through this module (`clippy.toml` refuses the functions of `std::fs` elsewhere). A pipe or a
 //! device is refused before it is opened, because opening a pipe waits for its writer and a device may have no end.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+
+use super::error_text::shortened;
 
 /// Most bytes of a text that is read: tables, fabrics, patterns and sweep files have thousands.
 pub(crate) const MOST_TEXT: u64 = 64 << 20;
@@ -138,7 +141,8 @@ pub(crate) fn listed(names: &[String]) -> String {
 /// Names in a sentence, the first so many of more.
 #[must_use]
 pub(crate) fn first_of(names: &[String], most: usize) -> String {
-    let shown = names[..names.len().min(most)].join(", ");
+    let shown: Vec<Cow<'_, str>> = names.iter().take(most).map(|name| shortened(name, [60, 20])).collect();
+    let shown = shown.join(", ");
     match names.len().saturating_sub(most) {
         0 => shown,
         more => format!("{shown} and {more} more"),

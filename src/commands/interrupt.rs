@@ -28,6 +28,20 @@ pub(crate) fn listen() {
     });
 }
 
+/// Makes a write beyond `ulimit -f` an error, as on a full disk. Its signal would end the program, with files in the making left behind.
+pub(crate) fn outlive_file_limits() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        /// Its number on Linux (but for MIPS), macOS and the BSDs.
+        const SIGXFSZ: i32 = 25;
+        // Tokio's handler stays for good, whether or not anybody listens.
+        if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_io().build() {
+            let _ = runtime.block_on(async { signal(SignalKind::from_raw(SIGXFSZ)) });
+        }
+    }
+}
+
 /// From now on there is something to keep: work in hand looks at [`requested`].
 pub(crate) fn keep() {
     KEEPING.store(true, Ordering::SeqCst);

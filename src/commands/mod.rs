@@ -30,6 +30,7 @@ mod view;
 mod watch;
 
 use std::process::ExitCode;
+use std::time::SystemTime;
 
 use crate::base::{atomic_file, files};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -122,10 +123,11 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::from_arg_matches(&with_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
     interrupt::listen();
+    interrupt::outlive_file_limits();
     if !cli.force {
         files::protect_inputs();
     }
-    let outcome = match cli.command {
+    let outcome = clock_is_set(SystemTime::now()).and_then(|()| match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Live(args)) => args.execute(),
@@ -139,7 +141,7 @@ pub fn main() -> ExitCode {
         Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(cli.force),
         Some(Command::View(args)) => args.execute(),
-    };
+    });
     // A thread that still writes dies with the program.
     atomic_file::abandon_all();
     match outcome {
@@ -153,7 +155,31 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Refuses a clock that stands before 1970: recordings carry the time since then, and Rerun panics without one.
+fn clock_is_set(now: SystemTime) -> anyhow::Result<()> {
+    if now >= SystemTime::UNIX_EPOCH {
+        return Ok(());
+    }
+    Err(UserError::new(
+        "found the clock of this machine before 1970, expected today's date: recordings carry it; set the clock",
+    ))
+}
+
 /// `--edge-length -1` is a number that will not do, not a flag that nobody knows.
 fn with_negatives(command: clap::Command) -> clap::Command {
     command.allow_negative_numbers(true).mut_subcommands(with_negatives)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_clock_before_1970_is_refused() {
+        clock_is_set(SystemTime::UNIX_EPOCH).unwrap();
+        let said = clock_is_set(SystemTime::UNIX_EPOCH - Duration::from_secs(1)).unwrap_err().to_string();
+        assert!(said.contains("before 1970") && said.contains("set the clock"), "{said}");
+    }
 }

@@ -135,6 +135,35 @@ impl Fabric {
         Ok(fabric)
     }
 
+    /// Constants that can be used and that no cloth has: most likely slips of the unit.
+    #[must_use]
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        // Least and most that pass without a warning, ten times and more beyond those of the built-in fabrics, which follow.
+        let [weft, bias, warp] = self.bending_nm;
+        let (stretch, bending) = ([3.0, 5e4, 30.0, 5e3], [2e-7, 5e-3, 2e-6, 1.3e-4]);
+        let constants = [
+            ("density_kg_per_m2", self.density_kg_per_m2, [0.01, 3.0, 0.09, 0.33]),
+            ("thickness_m", self.thickness_m, [1e-5, 1e-2, 1.5e-4, 1e-3]),
+            ("stretch_weft_n_per_m", self.stretch_weft_n_per_m, stretch),
+            ("stretch_warp_n_per_m", self.stretch_warp_n_per_m, stretch),
+            ("shear_n_per_m", self.shear_n_per_m, [0.7, 5e3, 7.0, 52.0]),
+            ("bending_nm, weft", weft, bending),
+            ("bending_nm, bias", bias, bending),
+            ("bending_nm, warp", warp, bending),
+            ("friction", self.friction, [0.0, 3.0, 0.3, 0.3]),
+        ];
+        let odd = constants.into_iter().filter(|(_, found, [low, high, ..])| !(low..=high).contains(&found));
+        odd.map(|(key, found, [_, _, least, most])| {
+            let (name, found) = (&self.name, plain(found));
+            format!(
+                "fabric {name}: {key} is {found}, which no cloth has (the built-in fabrics have {} to {}); is it in another unit?",
+                plain(least),
+                plain(most)
+            )
+        })
+        .collect()
+    }
+
     /// Checks every constant; `file` is named in errors.
     pub(crate) fn check(&self, file: &str) -> Result<(), FabricError> {
         let positive = "a positive, finite number";
@@ -211,6 +240,18 @@ mod tests {
         for name in BUILT_IN {
             assert_eq!(Fabric::by_name(name).unwrap().name, name);
         }
+    }
+
+    #[test]
+    fn constants_of_no_cloth_are_warned_of_and_those_of_cloth_are_not() {
+        for name in BUILT_IN {
+            assert_eq!(Fabric::by_name(name).unwrap().warnings(), [""; 0], "{name}");
+        }
+        let stiff = Fabric { bending_nm: [1e-5, 1e-5, 100.0], thickness_m: 0.015, ..Fabric::default() };
+        let [thick, bending] = stiff.warnings().try_into().unwrap();
+        assert!(thick.contains("thickness_m is 0.015") && thick.contains("0.00015 to 0.001"), "{thick}");
+        assert!(bending.contains("interlock: bending_nm, warp is 100, which no cloth has"), "{bending}");
+        assert!(bending.contains("0.000002 to 0.00013"), "{bending}");
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! Limits: the viewer's texts have a fixed size on screen, so that names may overlap after zooming out. Widths are estimated from the
 //! number of letters.
 
+use std::ops::RangeInclusive;
+
 use rerun::{Color, LineStrips2D, Points2D};
 
 use super::error::RecordError;
@@ -106,7 +108,11 @@ fn round(value: f64, up: bool) -> f64 {
     }
 }
 
-/// Logs a scatter plot. Points whose coordinates are not positive and finite are left out.
+/// Values that are drawn. An axis has 24 decades of ticks at most; without a bound, 5e-324 or 1e308 gives an axis without end,
+/// whose ticks take all memory.
+const DRAWN: RangeInclusive<f64> = 1e-12..=1e12;
+
+/// Logs a scatter plot. Points with a coordinate outside [`DRAWN`] are left out.
 pub(super) fn log(
     recording: &OpenRecording,
     index: i64,
@@ -116,7 +122,7 @@ pub(super) fn log(
     let path = picture.path;
     recording.at(index, 6);
     let placed: Vec<&ScatterPoint<'_>> =
-        points.iter().filter(|p| p.x.is_finite() && p.y.is_finite() && p.x > 0.0 && p.y > 0.0).collect();
+        points.iter().filter(|p| DRAWN.contains(&p.x) && DRAWN.contains(&p.y)).collect();
     let along = Axis::around(placed.iter().map(|p| p.x), PICTURE[0]);
     let up = Axis::around(placed.iter().map(|p| p.y), PICTURE[1]);
     log_axes(recording, [&along, &up], picture)?;
@@ -294,6 +300,14 @@ impl Labels {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_ticks_of_all_that_is_drawn_come_to_an_end() {
+        let (low, high) = DRAWN.into_inner();
+        let axis = Axis::around([low, high].into_iter(), 100.0);
+        assert!((200..300).contains(&axis.ticks().count()));
+        assert!(!DRAWN.contains(&5e-324) && !DRAWN.contains(&1e308) && !DRAWN.contains(&f64::NAN));
+    }
 
     #[test]
     fn axes_contain_all_values_between_round_numbers() {

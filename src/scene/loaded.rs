@@ -39,6 +39,8 @@ pub struct Loaded {
     /// The fabrics that were assigned.
     pub swatches: Vec<Swatch>,
     pub(super) imported: Option<Imported>,
+    /// Notes on the names of held edges.
+    pub(super) hold_notes: Vec<String>,
 }
 
 /// A garment made of a sewing pattern.
@@ -68,6 +70,7 @@ impl Loaded {
             let of_both = pattern.notes.iter().cloned().chain(put_on.notes());
             notes.extend(of_both.map(|note| format!("{}: {note}", self.garment_name)));
         }
+        notes.extend(self.hold_notes.iter().cloned());
         notes.extend(self.swatches.iter().map(|swatch| format!("cut: {swatch}")));
         if self.pushed_out.is_clean() && (self.pushed_out.found_inside > 0 || self.pushed_out.off_ends_m > 0.0) {
             notes.push(self.pushed_out.to_string());

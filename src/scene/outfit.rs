@@ -286,10 +286,28 @@ impl Scene {
     /// # Errors
     /// As [`edge`](Self::edge).
     pub fn edges(&self, names: &str) -> Result<Vec<u32>, SceneError> {
-        let known = self.garment.groups.iter().any(|g| g == names);
-        let names: Vec<&str> = if known { vec![names] } else { names.split(',').map(str::trim).collect() };
-        let edges = names.into_iter().map(|name| self.edge(name)).collect::<Result<Vec<_>, _>>()?;
+        let edges = self.edge_names(names).into_iter().map(|name| self.edge(name)).collect::<Result<Vec<_>, _>>()?;
         Ok(each_once(edges.into_iter().flatten()))
+    }
+
+    /// The names of several edges, one by one.
+    fn edge_names<'a>(&self, names: &'a str) -> Vec<&'a str> {
+        let known = self.garment.groups.iter().any(|g| g == names);
+        if known { vec![names] } else { names.split(',').map(str::trim).collect() }
+    }
+
+    /// Notes on names that mean both a group of the garment and its highest edge: [`edge`](Self::edge) takes the group.
+    pub(super) fn ambiguous_edges(&self, names: &str) -> Vec<String> {
+        let is_both = |name: &&str| {
+            (*name == "top" || name.starts_with("top:")) && self.garment.groups.iter().any(|group| group == *name)
+        };
+        let note = |name| {
+            format!(
+                "--hold {name}: the group `{name}` of the garment is held, not the highest edge, which has the same name; rename the \
+                 group to hold that edge"
+            )
+        };
+        self.edge_names(names).into_iter().filter(is_both).map(note).collect()
     }
 
     /// The vertices of the garment's highest edge (`top`), of the highest edge of one of its connected parts (`top:2`,

@@ -307,6 +307,7 @@ impl SceneSpec {
         }
         let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
         let reports = imported_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
+        let hold_notes = self.hold.as_ref().map(|names| scene.ambiguous_edges(names)).unwrap_or_default();
         Ok(Loaded {
             scene,
             body_name: stem(&self.body),
@@ -318,6 +319,7 @@ impl SceneSpec {
             swatches: unplaced.cut.swatches,
             girths_at_m: form.map(|m| [m.bust_height, m.waist_height, m.hip_height]),
             imported: unplaced.imported,
+            hold_notes,
         })
     }
 

@@ -4,14 +4,18 @@
 //! `compare`, a script that sends JSON. `Job::default()` is `partwise run` without a flag.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::base::serde_name::word;
-use crate::drape::{Drape, DrapeError, Refine, Settings, drape};
-use crate::mechanics::refine::Observer;
+use crate::drape::{Drape, DrapeError, Model, Refine, Settings, drape};
+use crate::garment::fabric::Fabric;
+use crate::mechanics::coupled::CoupledOptions;
+use crate::mechanics::paper::{BodyForce, LineForce, PaperOptions};
+use crate::mechanics::refine::{Observer, STEP_LIMIT};
 use crate::parts::range_table::TABLE_3;
 use crate::scene::{FileRole, Scene, SceneSpec};
 use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
@@ -63,9 +67,15 @@ pub struct Job {
     pub spread_starts: u64,
 }
 
-/// Settings whose extents can cut something: no range table checks those of the model.
+/// Settings whose numbers can be computed with. Those of a job come from anywhere; those of flags are checked as flags.
 fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
     let settings = Settings::deserialize(from)?;
+    let wrong = numbers(&settings.model).into_iter().find(|(_, found, range)| !range.contains(found));
+    if let Some((key, found, range)) = wrong {
+        let (low, high) = range.into_inner();
+        return Err(D::Error::custom(format!("settings.model: {key}: found {found:?}, expected {low:?} to {high:?}")));
+    }
+    settings.fabric.check("settings.fabric").map_err(D::Error::custom)?;
     let extents = settings.model.extents_cm();
     let falls = extents.is_sorted_by(|a, b| a > b);
     if falls && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
@@ -73,6 +83,56 @@ fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
     }
     let expected = "finite extents above 0, from coarse to fine, or none for PARTs as the table makes them";
     Err(D::Error::custom(format!("settings.model: found extents of {extents:?} cm, expected {expected}")))
+}
+
+/// The numbers of a model, each with the range it can have. A new field does not compile until it is listed here.
+fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
+    match model {
+        Model::Coupled(options) => {
+            let CoupledOptions {
+                motion: _,
+                extents_m: _,
+                max_steps,
+                least_move_m,
+                damping,
+                soft_strain,
+                relaxing,
+                relaxing_trial,
+            } = options;
+            vec![
+                ("max_steps", *max_steps as f64, 0.0..=STEP_LIMIT as f64),
+                ("least_move_m", *least_move_m, 0.0..=1.0),
+                ("damping", *damping, 0.0..=1e6),
+                ("soft_strain", *soft_strain, 0.0..=1.0),
+                ("relaxing", *relaxing as f64, 0.0..=1e4),
+                ("relaxing_trial", *relaxing_trial as f64, 0.0..=1e4),
+            ]
+        }
+        Model::Paper(options) => {
+            let PaperOptions {
+                volume: _,
+                cosine: _,
+                clearance: _,
+                contactless: _,
+                untouched: _,
+                body_force,
+                line_force,
+                contact_distance_m,
+                degenerate_below,
+            } = options;
+            let mut numbers = vec![
+                ("contact_distance_m", *contact_distance_m, 0.0..=1.0),
+                ("degenerate_below", *degenerate_below, 0.0..=1.0),
+            ];
+            if let BodyForce::Given(force) = body_force {
+                numbers.push(("body_force", *force, 0.0..=1e12));
+            }
+            if let LineForce::Given(force) = line_force {
+                numbers.push(("line_force", *force, 0.0..=1e12));
+            }
+            numbers
+        }
+    }
 }
 
 /// What was measured of a drape.
@@ -132,7 +192,8 @@ impl Job {
         observer: Observer<'_>,
     ) -> Result<Measured, EvaluateError> {
         let metrics = Metrics::of(scene, drape);
-        let warnings = metrics.warnings(scene);
+        let of_fabrics = scene.fabrics(&self.settings.fabric).iter().flat_map(Fabric::warnings).collect();
+        let warnings = [metrics.warnings(scene), of_fabrics].concat();
         let options = EvaluateOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
         let (reference, evaluation, of_reference) = match self.accuracy {
             Against::None => {
@@ -184,6 +245,72 @@ mod tests {
         assert_eq!((short.scene.body.as_str(), short.accuracy), ("form", Against::None));
         let said = serde_json::from_str::<Job>(r#"{"scene": {"colour": 3}}"#).unwrap_err().to_string();
         assert!(said.contains("colour"), "{said}");
+    }
+
+    /// Puts each of `values` in the place of each number below `at` of the same type, and hands the whole to `see`.
+    fn each_number(
+        whole: &toml::Value,
+        at: &[String],
+        values: &[toml::Value],
+        see: &mut dyn FnMut(&str, &toml::Value),
+    ) {
+        let here =
+            at.iter().fold(whole, |value, key| key.parse().map_or_else(|_| &value[key.as_str()], |i: usize| &value[i]));
+        let below: Vec<String> = match here {
+            toml::Value::Table(table) => table.keys().cloned().collect(),
+            toml::Value::Array(list) => (0..list.len()).map(|i| i.to_string()).collect(),
+            _ => Vec::new(),
+        };
+        for key in below {
+            each_number(whole, &[at, &[key]].concat(), values, see);
+        }
+        for value in values.iter().filter(|value| value.same_type(here)) {
+            let mut edited = whole.clone();
+            let slot = at.iter().fold(&mut edited, |value, key| match key.parse::<usize>() {
+                Ok(i) => &mut value[i],
+                Err(_) => &mut value[key.as_str()],
+            });
+            *slot = value.clone();
+            see(&at.join("."), &edited);
+        }
+    }
+
+    #[test]
+    fn no_number_of_the_settings_is_taken_out_of_its_range() {
+        let paper = PaperOptions {
+            body_force: BodyForce::Given(3.0),
+            line_force: LineForce::Given(4.0),
+            ..PaperOptions::default()
+        };
+        let mut tried = Vec::new();
+        for model in [Model::default().with_extents_cm(&[12.0, 6.0]), Model::Paper(paper)] {
+            let settings = Settings { model, refine: Refine::Steps(3), ..Settings::default() };
+            let whole = toml::Value::try_from(Job { settings, ..Job::default() }).unwrap();
+            assert!(whole.clone().try_into::<Job>().is_ok());
+            let whole = toml::Value::Table([("settings".to_owned(), whole["settings"].clone())].into_iter().collect());
+            let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e308, 1e308, -1.0].map(toml::Value::Float);
+            each_number(&whole, &[], &[&bad[..], &[toml::Value::Integer(-1)]].concat(), &mut |place, edited| {
+                // Distances in the body are negative, and the last level may reach to infinity.
+                if !place.starts_with("settings.table") {
+                    assert!(edited.clone().try_into::<Job>().is_err(), "{place}: {edited}");
+                }
+                tried.push(place.to_owned());
+            });
+            let nan = [toml::Value::Float(f64::NAN)];
+            each_number(&whole, &[], &nan, &mut |place, edited| {
+                assert!(edited.clone().try_into::<Job>().is_err(), "{place}");
+            });
+        }
+        for place in [
+            "model.coupled.soft_strain",
+            "model.coupled.max_steps",
+            "model.paper.line_force.given",
+            "fabric.bending_nm.2",
+        ] {
+            assert!(tried.contains(&format!("settings.{place}")), "{place} is not among {tried:?}");
+        }
+        let said = toml::from_str::<Job>("[settings.model.coupled]\nsoft_strain = nan\n").unwrap_err().to_string();
+        assert!(said.contains("soft_strain: found NaN, expected 0.0 to 1.0"), "{said}");
     }
 
     #[test]

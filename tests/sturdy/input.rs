@@ -171,6 +171,65 @@ fn an_input_beyond_its_bound_is_refused_before_it_fills_the_memory() {
     bench.run(&["merge", "rows", "--out", "none"]).with(2, &["rows/plan.json", "more than 2048 MB"]);
 }
 
+/// Puts `number` in the place of every number of a row but its index.
+fn all_numbers(row: &mut serde_json::Value, number: f64) {
+    match row {
+        serde_json::Value::Object(object) => {
+            object.iter_mut().filter(|(key, _)| *key != "index").for_each(|(_, value)| all_numbers(value, number));
+        }
+        serde_json::Value::Array(list) => list.iter_mut().for_each(|value| all_numbers(value, number)),
+        serde_json::Value::Number(found) if found.is_f64() => *row = number.into(),
+        _ => {}
+    }
+}
+
+#[test]
+fn figures_beyond_all_measure_in_a_row_are_merged_in_little_memory() {
+    let bench = Bench::new();
+    bench.write(
+        "s.toml",
+        "name = \"s\"\nrepeats = 1\n[base]\ngarment = \"flared-skirt@400\"\n[grid]\ntables = [\"table-3\", { quantile = 4 }]\n",
+    );
+    bench.run(&["sweep", "s.toml", "--out", "s", "--no-save"]).with(0, &[]);
+    let rows = fs::read_to_string(bench.path("s/rows.jsonl")).unwrap();
+    for (i, number) in [1e308, 5e-324, 1e300, 1e-300].into_iter().enumerate() {
+        let (first, rest) = rows.split_once('\n').unwrap();
+        let mut row: serde_json::Value = serde_json::from_str(first).unwrap();
+        all_numbers(&mut row, number);
+        bench.write("s/rows.jsonl", &format!("{row}\n{rest}"));
+        let script = format!("ulimit -v 16000000; exec {} merge s --out m{i}", env!("CARGO_BIN_EXE_partwise"));
+        let mut command = Command::new("sh");
+        ended(command.current_dir(bench.0.path()).arg("-c").arg(script)).with(0, &[]);
+        let left = bench.names();
+        assert!(!left.iter().any(|name| name.ends_with(".part")), "{number}: {left:?}");
+    }
+}
+
+#[test]
+fn a_group_by_the_name_of_an_edge_is_held_and_said_and_a_long_name_is_cut() {
+    let bench = Bench::new();
+    bench.write("named.obj", &GARMENT.replacen("f 1 2 5", "g top\nf 1 2 5\ng rest", 1));
+    let named =
+        ["--body", "body.obj", "--garment", "named.obj", "--unit", "m", "--up", "z", "--no-save", "--refine", "0"];
+    bench.run(&[&named[..], &["--hold", "top"]].concat()).with(0, &["--hold top: the group `top`", "rename the group"]);
+    bench.write("long.obj", &GARMENT.replacen("f 1 2 5", &format!("g {}\nf 1 2 5\ng rest", "x".repeat(2_000_000)), 1));
+    let long = ["--body", "body.obj", "--garment", "long.obj", "--unit", "m", "--up", "z", "--no-save"];
+    let refused = bench.run(&[&long[..], &["--hold", "cuff"]].concat());
+    refused.with(2, &["cuff", "bytes in all", "rest"]);
+    assert!(refused.said.len() < 1000, "{} bytes", refused.said.len());
+}
+
+#[test]
+fn constants_of_no_cloth_are_warned_of() {
+    let bench = Bench::new();
+    let denim = include_str!("../../assets/fabrics/denim.toml");
+    let line = denim.lines().find(|line| line.starts_with("bending_nm")).unwrap();
+    bench.write("stiff.toml", &denim.replace(line, "bending_nm = [100, 100, 100]"));
+    bench
+        .drape(&["--no-save", "--fabric", "stiff.toml", "--refine", "0"])
+        .with(0, &["bending_nm, warp is 100, which no cloth has"]);
+}
+
 #[test]
 fn a_number_below_zero_is_told_what_it_may_be() {
     let bench = Bench::new();

@@ -126,7 +126,7 @@ impl RunArgs {
         let mut timings = vec![("load", ms(load))];
         timings.extend(drape.times.iter().map(|(name, time)| (*name, ms(*time))));
         timings.extend([("method", ms(drape.total)), ("measure", ms(measured.elapsed()))]);
-        let mut warnings = [loaded.warnings(), metrics.warnings(&dressing)].concat();
+        let mut warnings = [loaded.warnings(), metrics.warnings(&dressing), fabric.warnings()].concat();
         if scene.let_go && !scene.held.is_empty() {
             warnings.push(format!("{} does not let go: what is held stays held", self.method));
         }

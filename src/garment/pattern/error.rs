@@ -70,6 +70,6 @@ pub enum PatternError {
     #[error("found an edge length of {found_cm} cm, expected {low_cm} to {high_cm} cm")]
     EdgeLength { found_cm: f64, low_cm: f64, high_cm: f64 },
     /// A panel that cannot be triangulated.
-    #[error("panel {panel}: it cannot be meshed: {reason}; is it very thin somewhere?")]
+    #[error("panel {panel}: it cannot be meshed: {reason}")]
     NoMesh { panel: String, reason: String },
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 use spade::handles::FixedVertexHandle;
-use spade::{AngleLimit, Point2, RefinementParameters, Triangulation as _};
+use spade::{AngleLimit, InsertionError, Point2, RefinementParameters, Triangulation as _};
 
 use super::panels::{PatternPanel, SewingPattern, Stitch};
 use crate::mesh::each_once;
@@ -107,6 +107,14 @@ fn find(root: &[u32], mut v: u32) -> u32 {
 /// Points (the outline's first) and triangles, counter-clockwise.
 pub(super) type Meshed = (Vec<DVec2>, Vec<[u32; 3]>);
 
+/// Why a point cannot be taken into a triangulation.
+fn unusable(error: InsertionError) -> String {
+    match error {
+        InsertionError::TooSmall => "a coordinate is nearer to 0 than can be computed with; write 0 for it".to_owned(),
+        InsertionError::TooLarge | InsertionError::NAN => "a coordinate is no finite length".to_owned(),
+    }
+}
+
 /// Meshes the inside of a counter-clockwise `outline`; vertices of one `class` become one vertex when sewn.
 pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Meshed, String> {
     let n = outline.len();
@@ -115,9 +123,11 @@ pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Mesh
     let all = places.len();
     let mut crossed = false;
     let sides = (0..n).map(|i| [i, (i + 1) % n]).collect();
-    let mut plane = Plane::try_bulk_load_cdt(places, sides, |_| crossed = true).map_err(|e| e.to_string())?;
+    let mut plane = Plane::try_bulk_load_cdt(places, sides, |_| crossed = true).map_err(unusable)?;
     if crossed || plane.num_vertices() != all {
-        return Err("its outline meets itself once it is divided into straight edges".to_owned());
+        return Err(
+            "its outline meets itself once it is divided into straight edges; is it very thin somewhere?".to_owned()
+        );
     }
     let even = 3.0_f64.sqrt() / 4.0 * edge_m * edge_m;
     let parameters = RefinementParameters::new()
@@ -134,7 +144,7 @@ pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Mesh
             break;
         }
         for middle in chords {
-            plane.insert(middle).map_err(|e| e.to_string())?;
+            plane.insert(middle).map_err(unusable)?;
         }
     }
     let faces = inside(&plane, n)?;
