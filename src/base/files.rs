@@ -259,7 +259,7 @@ mod tests {
         for name in ["garment.obj", "link.obj", "below/hard.obj", "below/../garment.obj"] {
             for refused in [read.output(&path(name)), written.input(&path(name))] {
                 let said = refused.unwrap_err().to_string();
-                assert!(said.contains("garment.obj") && said.contains("--force"), "{name}: {said}");
+                assert!(said.contains("reads and writes") && said.contains("--force"), "{name}: {said}");
             }
             read.input(&path(name)).unwrap();
             written.output(&path(name)).unwrap();
@@ -279,7 +279,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe.obj");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        for path in [&*pipe, Path::new("/dev/zero"), Path::new("/dev/stdin/..")] {
+        for path in [&*pipe, Path::new("/dev/zero"), folder.path()] {
             let said = read_text(path).unwrap_err().to_string();
             assert!(said.contains("expected a") && said.contains("file"), "{said}");
             assert!(!said.contains("permissions"), "{said}");

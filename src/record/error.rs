@@ -11,7 +11,7 @@ pub(super) const RERUN_VERSION: &str = "0.36.3";
 pub enum RecordError {
     /// The recording's file cannot be written.
     #[error(
-        "cannot write the recording to {path}: {source}; choose a folder that exists and is writable (--save FILE)"
+        "cannot write the recording to {path}: {source}; choose a folder that exists, is writable and has room (--save FILE)"
     )]
     Unwritable { path: PathBuf, source: std::io::Error },
     /// A port is in use.
@@ -41,7 +41,7 @@ pub enum RecordError {
         "{path} is not a Rerun recording: {reason}; expected an .rrd file, as `partwise run --save FILE.rrd` writes"
     )]
     NotARecording { path: PathBuf, reason: String },
-    /// Writing failed: a full disk, a closed viewer.
+    /// A viewer did not take the data.
     #[error("the recording is incomplete: {reason}")]
     Incomplete { reason: String },
     /// Two inputs of a step have different lengths.
@@ -72,6 +72,6 @@ impl RecordError {
     /// Whether another input avoids the error (exit code 2) or not (1).
     #[must_use]
     pub fn is_users(&self) -> bool {
-        !matches!(self, Self::Mismatch { .. } | Self::Rerun(_))
+        !matches!(self, Self::Incomplete { .. } | Self::Mismatch { .. } | Self::Rerun(_))
     }
 }

@@ -243,7 +243,7 @@ impl OpenRecording {
         }
         let flushed = self.stream.flush_with_timeout(LAST_FLUSH);
         for target in &self.targets {
-            target.writer.check().map_err(|reason| target.incomplete(&reason))?;
+            target.writer.check().map_err(|reason| target.unwritable(&reason))?;
         }
         if self.targets.is_empty() { flushed.map_err(not_taken) } else { Ok(()) }
     }
@@ -267,8 +267,8 @@ impl OpenRecording {
         self.stream.disconnect();
         let mut summary = RecordSummary::default();
         for target in std::mem::take(&mut self.targets) {
-            let file = target.writer.end().map_err(|reason| target.incomplete(&reason))?;
-            summary.bytes = file.finish().map_err(|error| target.incomplete(&error.to_string()))?;
+            let file = target.writer.end().map_err(|reason| target.unwritable(&reason))?;
+            summary.bytes = file.finish().map_err(|error| target.unwritable(&error.to_string()))?;
             summary.path = Some(target.path);
         }
         flushed.map_err(not_taken)?;

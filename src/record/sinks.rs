@@ -69,9 +69,8 @@ pub(crate) struct Target {
 
 impl Target {
     /// The error for a file that could not be completed.
-    pub(super) fn incomplete(&self, reason: &str) -> RecordError {
-        let path = self.path.display();
-        RecordError::Incomplete { reason: format!("{path}: {reason}; make room, or choose another place with --save") }
+    pub(super) fn unwritable(&self, reason: &str) -> RecordError {
+        RecordError::Unwritable { path: self.path.clone(), source: std::io::Error::other(reason) }
     }
 }
 
