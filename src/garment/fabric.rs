@@ -135,10 +135,11 @@ impl Fabric {
         Ok(fabric)
     }
 
-    /// Constants that can be used and that no cloth has: most likely slips of the unit.
+    /// Warnings of constants that can be used but that no cloth has: most often they are in another unit.
     #[must_use]
     pub(crate) fn warnings(&self) -> Vec<String> {
-        // Least and most that pass without a warning, ten times and more beyond those of the built-in fabrics, which follow.
+        // Four numbers each: the range without a warning, at least ten times as wide at each end as that of the built-in fabrics, and
+        // the latter.
         let [weft, bias, warp] = self.bending_nm;
         let (stretch, bending) = ([3.0, 5e4, 30.0, 5e3], [2e-7, 5e-3, 2e-6, 1.3e-4]);
         let constants = [

@@ -108,8 +108,8 @@ fn what_is_not_understood_is_said() {
 fn a_coordinate_that_underflows_is_named_in_a_sentence() {
     let mut panel = straight(&SQUARE, 20.0);
     panel["vertices"][0] = json!([1e-300, 0.0]);
-    let read = SewingPattern::parse(&pattern(&json!({ "left": panel }), &json!([])), "test").unwrap();
-    let said = read.sew(0.02).unwrap_err().to_string();
+    let read = partwise::garment::pattern::parse(&pattern(&json!({ "left": panel }), &json!([])), "test").unwrap();
+    let said = sew(&read, 0.02).unwrap_err().to_string();
     names(&said, &["panel left", "nearer to 0", "write 0 for it"]);
     assert!(!said.contains("TooSmall"), "{said}");
 }
