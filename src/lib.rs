@@ -36,7 +36,10 @@
 //! reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the hundred, [`session`]
 //! keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
 
-#![cfg_attr(not(feature = "cli"), allow(dead_code, reason = "the command line uses what the library does not export"))]
+#![cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, unused_imports, reason = "the command line uses what the library does not export")
+)]
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod base;

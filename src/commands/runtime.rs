@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::atomic_file::WholeFile;
 use crate::mechanics::refine::Observer;
-use crate::study::accuracy::reference::ReferenceCache;
+use crate::study::accuracy::ReferenceCache;
 
 use super::{UserError, console, interrupt};
 

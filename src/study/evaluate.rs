@@ -68,7 +68,7 @@ pub(crate) struct EvaluateOptions {
 
 /// A drape, assessed.
 #[derive(Debug, Clone)]
-pub struct Evaluation {
+pub(crate) struct Evaluation {
     /// All figures.
     pub accuracy: Accuracy,
     /// Distance of each vertex to its own continuation, mm.

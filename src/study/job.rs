@@ -143,7 +143,7 @@ pub struct Measured {
     /// Distance of each vertex to the reference it is judged by, mm; empty where none was asked for.
     pub error_mm: Vec<f64>,
     /// The whole comparison with its own continuation, where it was asked for.
-    pub evaluation: Option<Evaluation>,
+    pub(crate) evaluation: Option<Evaluation>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }

@@ -2,11 +2,11 @@
 
 pub mod accuracy;
 pub mod certificate;
-pub mod drape_test;
+pub(crate) mod drape_test;
 pub mod evaluate;
 pub mod job;
 pub mod metrics;
 pub mod sweep;
-pub mod table4;
-pub mod table_search;
-pub mod wrinkles;
+pub(crate) mod table4;
+pub(crate) mod table_search;
+pub(crate) mod wrinkles;

@@ -23,7 +23,7 @@ use crate::parts::Parts;
 
 /// Both measures of one seam.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SeamWrinkle {
+pub(crate) struct SeamWrinkle {
     /// The two PARTs.
     pub parts: [u32; 2],
     /// |D_p − D_q|, mm.
@@ -34,7 +34,7 @@ pub struct SeamWrinkle {
 
 /// Wrinkles of a drape.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Wrinkles {
+pub(crate) struct Wrinkles {
     /// One entry per seam, in the order of [`Parts::seams`].
     pub seams: Vec<SeamWrinkle>,
     /// H of each vertex, 1/m.
@@ -46,7 +46,7 @@ pub struct Wrinkles {
 
 /// Measures the drape at `positions` (m) with one displacement `part_displacement` (m) a PART.
 #[must_use]
-pub fn measure(
+pub(crate) fn measure(
     mesh: &TriMesh,
     topology: &Topology,
     parts: &Parts,
@@ -75,7 +75,7 @@ pub fn measure(
 
 /// H of each vertex, 1/m; zero for a vertex of no triangle.
 #[must_use]
-pub fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
+pub(crate) fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     let mut laplacian = vec![DVec3::ZERO; mesh.vertex_count()];
     let mut areas = vec![0.0; mesh.vertex_count()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
@@ -132,7 +132,7 @@ fn mixed_areas(corners: [DVec3; 3]) -> [f64; 3] {
 
 /// Spearman's rank correlation, ties at their mean rank.
 #[must_use]
-pub fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+pub(crate) fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     if a.len() != b.len() || a.len() < 3 {
         return None;
     }

@@ -5,7 +5,6 @@
 mod bench;
 mod cantilever;
 mod crease;
-mod cusick;
 mod fit;
 mod friction;
 mod strip;

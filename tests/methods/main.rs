@@ -4,6 +4,5 @@
 
 mod gross2003;
 mod scenes;
-mod table4;
 mod thomaszewski2006;
 mod zhu2016;

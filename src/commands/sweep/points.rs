@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::garment::MeshCache;
-use crate::study::accuracy::reference::ReferenceCache;
+use crate::study::accuracy::ReferenceCache;
 use crate::study::sweep::{Bench, Point, PointError, Row};
 
 use super::store::{KeptPoint, PointStore};

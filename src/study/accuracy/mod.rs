@@ -10,19 +10,20 @@
 //! Limits: no figure tells whether either drape is *the* drape of a real cloth; that is what the drape tests are for.
 
 pub(crate) mod moments;
-pub mod reference;
-pub mod representable;
-pub mod shape;
-pub mod state;
-pub mod summary;
+pub(crate) mod reference;
+pub(crate) mod representable;
+pub(crate) mod shape;
+pub(crate) mod state;
+pub(crate) mod summary;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-pub use representable::Representable;
-pub use shape::SectionGirth;
-pub use state::State;
-pub use summary::ErrorSummary;
+pub use reference::ReferenceCache;
+pub(crate) use representable::Representable;
+pub(crate) use shape::SectionGirth;
+pub(crate) use state::State;
+pub(crate) use summary::ErrorSummary;
 
 use crate::body::distance::{Body, DistanceError};
 use crate::mechanics::energy::Cloth;
@@ -51,7 +52,7 @@ pub enum AccuracyError {
 
 /// What is compared.
 #[derive(Debug, Clone, Copy)]
-pub struct Comparison<'a> {
+pub(crate) struct Comparison<'a> {
     /// The garment; its positions are not used.
     pub mesh: &'a TriMesh,
     /// Its connectivity.
@@ -72,7 +73,7 @@ pub struct Comparison<'a> {
 
 /// A drape's errors. Serialised names carry their units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Accuracy {
+pub(crate) struct Accuracy {
     /// Vertex error over the whole garment; its fields are written on this level (`rms_mm`, ...).
     #[serde(flatten)]
     pub vertices: ErrorSummary,
@@ -118,7 +119,7 @@ pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 /// Measures a result against a reference. `canonical_*` stay empty: they need a second one, see [`rms_mm`].
-pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
+pub(crate) fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
     let expected = c.mesh.vertex_count();
     for (what, list) in [("the start", c.start), ("the result", c.result), ("the reference", c.reference)] {
         if list.len() != expected {
@@ -159,3 +160,6 @@ pub fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
         representable,
     })
 }
+
+#[cfg(test)]
+mod tests;

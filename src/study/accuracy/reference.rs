@@ -24,7 +24,7 @@ const KIND: &Kind = b"PWREF\x004\n";
 
 /// What a reference depends on.
 #[derive(Debug, Clone, Copy)]
-pub struct ReferenceInput<'a> {
+pub(crate) struct ReferenceInput<'a> {
     /// The garment.
     pub garment: &'a TriMesh,
     /// Its rest shape.
@@ -43,12 +43,12 @@ pub struct ReferenceInput<'a> {
 
 /// The name of a reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReferenceKey(blake3::Hash);
+pub(crate) struct ReferenceKey(blake3::Hash);
 
 impl ReferenceKey {
     /// Hashes everything a reference depends on.
     #[must_use]
-    pub fn new(input: &ReferenceInput<'_>) -> Self {
+    pub(crate) fn new(input: &ReferenceInput<'_>) -> Self {
         fn mesh(mesh: &TriMesh) -> (&[DVec3], &[[u32; 3]]) {
             (&mesh.positions, &mesh.triangles)
         }
@@ -67,14 +67,14 @@ impl ReferenceKey {
 
     /// File name in the cache.
     #[must_use]
-    pub fn file_name(&self) -> String {
+    pub(crate) fn file_name(&self) -> String {
         format!("{}.drape", self.0.to_hex())
     }
 }
 
 /// A converged drape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Reference {
+pub(crate) struct Reference {
     /// Vertex positions, m.
     pub positions: Vec<DVec3>,
     /// Energy, J.
@@ -89,7 +89,7 @@ pub struct Reference {
 
 /// A reference and how it was come by.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub(crate) struct Found {
     /// The reference.
     pub reference: Reference,
     /// Whether it was on disk.
@@ -121,7 +121,7 @@ impl ReferenceCache {
     ///
     /// # Errors
     /// Whatever `compute` fails with; the disk's failures are warnings.
-    pub fn get_or_compute<E>(
+    pub(crate) fn get_or_compute<E>(
         &self,
         key: &ReferenceKey,
         vertices: usize,

@@ -22,7 +22,7 @@ use crate::parts::{Parts, UNASSIGNED};
 
 /// What the best motion of each kind leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Representable {
+pub(crate) struct Representable {
     /// RMS with one translation a PART, mm.
     pub translation_rms_mm: f64,
     /// RMS with one affine displacement a PART, mm.
@@ -36,7 +36,7 @@ pub struct Representable {
 /// The errors of `parts` for the displacement from `start` to `reference`. A vertex in no PART keeps still, or where motions are blended,
 /// goes with the nearest; one that is `held` keeps still.
 #[must_use]
-pub fn representable(
+pub(crate) fn representable(
     topology: &Topology,
     parts: &Parts,
     held: &[bool],
@@ -76,7 +76,7 @@ pub(crate) fn blended(
 /// The error, m, that remains of the displacement `u` from `start` (m) with a motion of each PART's own; 0 for a garment without
 /// vertices.
 #[must_use]
-pub fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
+pub(crate) fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
     let squared = |vertices: &[u32]| {
         let mut sums = Moments::default();
         Moments::of_each(vertices, start, u).iter().for_each(|m| sums += m);

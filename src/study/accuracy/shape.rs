@@ -19,7 +19,7 @@ const SECTIONS: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 
 /// One horizontal section through both drapes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SectionGirth {
+pub(crate) struct SectionGirth {
     /// Height of the plane, m.
     pub height_m: f64,
     /// Length of the cut through the result, mm.
@@ -29,7 +29,7 @@ pub struct SectionGirth {
 }
 
 /// Symmetric Hausdorff distance of two positions of one mesh, m.
-pub fn hausdorff(mesh: &TriMesh, a: &[DVec3], b: &[DVec3]) -> Result<f64, DistanceError> {
+pub(crate) fn hausdorff(mesh: &TriMesh, a: &[DVec3], b: &[DVec3]) -> Result<f64, DistanceError> {
     let one_way = |from: &[DVec3], to: &[DVec3]| -> Result<f64, DistanceError> {
         // The sign means nothing here, so an open surface will do.
         let surface = Body::new_open(&mesh.with_positions(to.to_vec()))?;
@@ -56,7 +56,7 @@ pub(crate) fn mean_normal_angle_deg(result: &TriMesh, reference: &TriMesh) -> f6
 
 /// Length of the cut of a mesh with the plane z = `height`, m.
 #[must_use]
-pub fn section_length(mesh: &TriMesh, height: f64) -> f64 {
+pub(crate) fn section_length(mesh: &TriMesh, height: f64) -> f64 {
     (0..mesh.triangles.len())
         .map(|t| {
             let corners = mesh.corners(t);
@@ -92,7 +92,7 @@ pub(crate) fn section_girths(result: &TriMesh, reference: &TriMesh) -> Vec<Secti
 /// Mean height of the boundary loop that lies lowest in `reference`, in both: (result, reference), m. `None` for a
 /// garment without an edge.
 #[must_use]
-pub fn hem_heights(topology: &Topology, result: &[DVec3], reference: &[DVec3]) -> Option<(f64, f64)> {
+pub(crate) fn hem_heights(topology: &Topology, result: &[DVec3], reference: &[DVec3]) -> Option<(f64, f64)> {
     let mean = |x: &[DVec3], hem: &[u32]| hem.iter().map(|&v| x[v as usize].z).sum::<f64>() / hem.len() as f64;
     let loops = topology.boundary_loops();
     let lowest = loops.iter().min_by(|a, b| mean(reference, a).total_cmp(&mean(reference, b)))?;

@@ -22,7 +22,7 @@ use crate::mechanics::reactions::grant_beside;
 
 /// Metrics of one drape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct State {
+pub(crate) struct State {
     /// E, J.
     pub energy_j: f64,
     /// r.
@@ -40,7 +40,7 @@ pub struct State {
 impl State {
     /// Metrics of `cloth` on `body` at `x`.
     #[must_use]
-    pub fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
+    pub(crate) fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
         let contacts = cloth.contacts(body, x);
         let mut gradient = Vec::new();
         // Fresh contacts have fresh anchors: no friction force yet.

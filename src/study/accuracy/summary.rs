@@ -10,7 +10,7 @@ pub(crate) const MM_PER_M: f64 = 1e3;
 /// Distances between matching vertices of two drapes; `p95` is the 95th percentile, by nearest rank.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "named as they are; what is not plain is said")]
-pub struct ErrorSummary {
+pub(crate) struct ErrorSummary {
     pub vertices: usize,
     pub mean_mm: f64,
     pub rms_mm: f64,

@@ -28,8 +28,8 @@ use crate::mechanics::refine::{RefineOptions, SolveError, Stop, refine_with};
 use crate::mesh::rest::RestError;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
-pub use shadow::shadow_area;
-pub use specimen::{Specimen, specimen};
+pub(crate) use shadow::shadow_area;
+pub(crate) use specimen::specimen;
 
 /// Radius of the specimen, m.
 pub(crate) const SPECIMEN_RADIUS: f64 = 0.15;
@@ -42,7 +42,7 @@ const TARGETS: &str = include_str!("../../../assets/cusick/targets.csv");
 
 /// Why a drape test failed.
 #[derive(Debug, thiserror::Error)]
-pub enum CusickError {
+pub(crate) enum CusickError {
     /// Too coarse to fold.
     #[error("{rows} rows of cells across the rim cannot fold; expected at least 4")]
     TooCoarse {
@@ -68,7 +68,7 @@ pub enum CusickError {
 
 /// One simulated drape test.
 #[derive(Debug, Clone)]
-pub struct CusickResult {
+pub(crate) struct CusickResult {
     /// Name of the fabric.
     pub fabric: String,
     /// Drape coefficient DC, 0 to 1.
@@ -89,7 +89,7 @@ pub struct CusickResult {
 ///
 /// # Errors
 /// [`CusickError`] says what could not be set up.
-pub fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
+pub(crate) fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
     if rows < 4 {
         return Err(CusickError::TooCoarse { rows });
     }
@@ -117,7 +117,7 @@ pub fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
 
 /// A published band.
 #[derive(Debug, Clone, Deserialize)]
-pub struct Target {
+pub(crate) struct Target {
     /// Name of a built-in fabric.
     pub fabric: String,
     /// Least published coefficient, percent.
@@ -134,7 +134,7 @@ pub struct Target {
 ///
 /// # Errors
 /// [`CusickError::Csv`] if the table does not parse.
-pub fn targets() -> Result<Vec<Target>, CusickError> {
+pub(crate) fn targets() -> Result<Vec<Target>, CusickError> {
     Ok(csv::Reader::from_reader(TARGETS.as_bytes()).deserialize().collect::<Result<_, _>>()?)
 }
 
@@ -142,7 +142,7 @@ pub fn targets() -> Result<Vec<Target>, CusickError> {
 ///
 /// # Errors
 /// As [`run`], and [`FabricError`] for an unknown name or a file that is none of a fabric.
-pub fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
+pub(crate) fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
     let targets = targets()?;
     let mut csv = String::from(
         "fabric,coefficient_percent,low_percent,high_percent,calibrated_to,verdict,folds,residual_over_weight,steps\n",
@@ -193,16 +193,4 @@ fn maxima(radii: &[f64]) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn folds_are_counted_once_around() {
-        let wave = |n: f64| {
-            (0..200).map(|i| 0.12 + 0.01 * (n * std::f64::consts::TAU * f64::from(i) / 200.0).cos()).collect::<Vec<_>>()
-        };
-        assert_eq!(maxima(&wave(6.0)), 6);
-        assert_eq!(maxima(&wave(1.0)), 1);
-        assert_eq!(maxima(&[0.12; 50]), 0);
-    }
-}
+mod tests;

@@ -10,7 +10,7 @@ use crate::mesh::TriMesh;
 
 /// The flat specimen.
 #[derive(Debug, Clone)]
-pub struct Specimen {
+pub(crate) struct Specimen {
     /// Its mesh, at z = 0.
     pub mesh: TriMesh,
     /// The vertices between the plates.
@@ -24,7 +24,7 @@ pub struct Specimen {
 /// The last held ring lies half a cell outside the plates' edge: a ring of vertices bends for half a cell to either
 /// side, so the clamp of the discrete cloth is where that of the test is.
 #[must_use]
-pub fn specimen(rows: usize) -> Specimen {
+pub(crate) fn specimen(rows: usize) -> Specimen {
     let cell = (SPECIMEN_RADIUS - PLATE_RADIUS) / (rows as f64 + 0.5);
     let mut mesh = TriMesh::default();
     let mut rings: Vec<Range<usize>> = Vec::new();

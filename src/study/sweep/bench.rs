@@ -17,7 +17,7 @@ use crate::drape::{Drape, StageTimes};
 use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
 use crate::scene::{Fallen, Loaded};
-use crate::study::accuracy::reference::ReferenceCache;
+use crate::study::accuracy::ReferenceCache;
 use crate::study::evaluate::EvaluateError;
 use crate::study::job::Measured;
 use crate::study::metrics::Metrics;
@@ -49,7 +49,7 @@ impl PointError {
 
 /// The outcome of one pass over a point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pass<T> {
+pub(crate) struct Pass<T> {
     /// What is measured afterwards, untimed.
     pub value: T,
     /// How long the stages took.
@@ -71,7 +71,7 @@ pub fn result_hash(positions: &[DVec3]) -> String {
 }
 
 /// The row of a point: so many passes before, so many timed, the figures of the last; `None` if it was interrupted.
-pub fn row_of<T>(
+pub(crate) fn row_of<T>(
     point: &Point,
     (warm_up, repeats): (usize, usize),
     pass: impl Fn() -> Result<Pass<T>, PointError>,

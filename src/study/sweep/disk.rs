@@ -10,7 +10,7 @@ use crate::base::atomic_file::WholeFile;
 use crate::base::files::read_own;
 
 /// Where lines are appended: a file, or what a test puts in its place.
-pub trait Append: Send {
+pub(crate) trait Append: Send {
     /// Appends and returns once the bytes are on the disk, not before.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
 }
 
 /// Makes the media rows are appended to from opened files.
-pub type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;
+pub(crate) type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;
 
 /// A file that grows by whole lines.
 pub(super) struct Journal {

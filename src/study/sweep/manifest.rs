@@ -7,8 +7,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::point::VERSION;
 use super::point::content_id;
-use super::{Plan, PlanError, StoreError, VERSION, disk};
+use super::{Plan, PlanError, StoreError, disk};
 
 /// Name of the manifest in a sweep's folder.
 pub(super) const MANIFEST: &str = "plan.json";
@@ -35,7 +36,7 @@ impl Shard {
 
     /// Whether the point of this number is in the share.
     #[must_use]
-    pub fn holds(self, point: usize) -> bool {
+    pub(crate) fn holds(self, point: usize) -> bool {
         point % self.count == self.index - 1
     }
 }
@@ -99,7 +100,7 @@ pub struct Manifest {
 
 /// Whether a text is a content hash as points and scenes have them: hexadecimal, hence good for a file name.
 #[must_use]
-pub fn is_id(text: &str) -> bool {
+pub(crate) fn is_id(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
 

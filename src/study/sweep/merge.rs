@@ -15,7 +15,7 @@ const LISTED: usize = 10;
 /// # Errors
 /// [`MergeError`]: folders of different sweeps or versions, points that are missing or on which two disagree, rows already
 /// in `out`.
-pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<Row>, MergeError> {
+pub(crate) fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<Row>, MergeError> {
     let (manifest, rows) = join(folders)?;
     let mut store = Store::open(out, manifest, Existing::Refuse)?;
     store.extend(rows)?;

@@ -17,7 +17,7 @@ use crate::base::files::read_text;
 use crate::study::job::Job;
 
 /// Timed passes, and passes before them, that a point can be asked for: a median of more says nothing more, and takes for ever.
-pub const MOST_PASSES: usize = 100;
+pub(crate) const MOST_PASSES: usize = 100;
 
 /// All points of a sweep, in order.
 #[derive(Debug, Clone, PartialEq)]

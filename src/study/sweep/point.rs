@@ -15,7 +15,7 @@ use crate::scene::SceneSpec;
 use crate::study::job::Job;
 
 /// The version that computes; rows of different versions are never mixed.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// One point of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +58,7 @@ impl Point {
 
     /// The extents as the rows have them: `none`, `5`, or `12>6>3` for a cascade.
     #[must_use]
-    pub fn extent_text(&self) -> String {
+    pub(crate) fn extent_text(&self) -> String {
         let extents = self.job.settings.model.extents_cm();
         if extents.is_empty() {
             return "none".to_owned();
@@ -68,13 +68,13 @@ impl Point {
 
     /// The options as the rows have them: `a=1 b=2`, what it is measured against always among them.
     #[must_use]
-    pub fn options_text(&self) -> String {
+    pub(crate) fn options_text(&self) -> String {
         self.options.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
     }
 
     /// All that tells this point from others, in one line.
     #[must_use]
-    pub fn label(&self) -> String {
+    pub(crate) fn label(&self) -> String {
         let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
         let Settings { model, table, min_part, refine, fabric, .. } = settings;
         let (fabric, table, extent) = (&fabric.name, table.name(), self.extent_text());
@@ -89,7 +89,7 @@ impl Point {
     /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one
     /// fabric their references.
     #[must_use]
-    pub fn scene_id(&self) -> String {
+    pub(crate) fn scene_id(&self) -> String {
         content_id(&self.scene_key())
     }
 

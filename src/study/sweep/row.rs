@@ -104,13 +104,13 @@ impl Row {
 
     /// The row without what differs from run to run.
     #[must_use]
-    pub fn without_times(&self) -> Self {
+    pub(crate) fn without_times(&self) -> Self {
         Self { timing: None, ..self.clone() }
     }
 
     /// Names of the columns, timings aside, in which two rows differ.
     #[must_use]
-    pub fn differences(&self, other: &Self) -> Vec<String> {
+    pub(crate) fn differences(&self, other: &Self) -> Vec<String> {
         let (mine, theirs) = (cells(&self.without_times()), cells(&other.without_times()));
         columns().into_iter().filter(|name| mine.get(name) != theirs.get(name)).collect()
     }
@@ -118,7 +118,7 @@ impl Row {
 
 /// The columns, in order.
 #[must_use]
-pub fn columns() -> Vec<String> {
+pub(crate) fn columns() -> Vec<String> {
     let full = Row { metrics: Some(Metrics::default()), timing: Some(Timing::default()), ..Row::default() };
     cells(&full).into_keys().collect()
 }
@@ -139,7 +139,7 @@ pub fn csv_text(rows: &[Row]) -> Vec<u8> {
 
 /// A value of JSON as a cell of a CSV; nothing for null.
 #[must_use]
-pub fn cell(value: Option<&Value>) -> String {
+pub(crate) fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
         Some(Value::String(text)) => text.clone(),

@@ -33,7 +33,7 @@ pub struct Run<'a> {
 
 /// Makes the row of a point; `None` where it was interrupted. Called from several threads at once where there are several
 /// jobs; not from rayon's, so that it may hold a lock around work that rayon spreads.
-pub type Maker<'a> = dyn Fn(&Point) -> Option<Row> + Sync + 'a;
+pub(crate) type Maker<'a> = dyn Fn(&Point) -> Option<Row> + Sync + 'a;
 
 /// What became of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +86,7 @@ pub fn sweep(
 ///
 /// # Errors
 /// [`StoreError::Write`] when a row cannot be written; the points in hand are then lost, the rows before are not.
-pub fn run_missing(plan: &Plan, store: &mut Store, run: &Run<'_>, row: &Maker<'_>) -> Result<(), StoreError> {
+pub(crate) fn run_missing(plan: &Plan, store: &mut Store, run: &Run<'_>, row: &Maker<'_>) -> Result<(), StoreError> {
     let todo: Vec<_> = plan.points.iter().filter(|p| store.lacks(p.index)).collect();
     let (total, done) = (store.manifest().share(), store.rows().len());
     let progress = SweepProgress { total, done, failed: count_failed(store.rows()), row: None };

@@ -69,7 +69,7 @@ impl Store {
     }
 
     /// As [`open`](Self::open), on media other than plain files.
-    pub fn open_on(
+    pub(crate) fn open_on(
         folder: &Path,
         manifest: Manifest,
         existing: Existing,
@@ -105,13 +105,13 @@ impl Store {
 
     /// The rows so far, in the order in which they were written.
     #[must_use]
-    pub fn rows(&self) -> &[Row] {
+    pub(crate) fn rows(&self) -> &[Row] {
         &self.rows
     }
 
     /// Whether the point of this number belongs here and has no row yet.
     #[must_use]
-    pub fn lacks(&self, point: usize) -> bool {
+    pub(crate) fn lacks(&self, point: usize) -> bool {
         self.manifest.holds(point) && self.done.get(point) == Some(&false)
     }
 
@@ -140,7 +140,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Io`]; the rows stay as they were.
-    pub fn finish(mut self) -> Result<Vec<Row>, StoreError> {
+    pub(crate) fn finish(mut self) -> Result<Vec<Row>, StoreError> {
         self.rows.sort_by_key(|r| r.index);
         make(&self.journal.path, &json_text(&self.rows))?;
         make(&self.folder.join(CSV), &csv_text(&self.rows))?;
@@ -149,7 +149,7 @@ impl Store {
 }
 
 /// The manifest and rows of a folder nobody need be writing; a torn last line is left out.
-pub fn read(folder: &Path) -> Result<(Manifest, Vec<Row>), StoreError> {
+pub(crate) fn read(folder: &Path) -> Result<(Manifest, Vec<Row>), StoreError> {
     let manifest = Manifest::read(folder)?.ok_or_else(|| StoreError::Missing { path: folder.join(MANIFEST) })?;
     let rows = read_rows(&folder.join(JSON_LINES), &manifest)?;
     Ok((manifest, rows))

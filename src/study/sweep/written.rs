@@ -22,7 +22,7 @@ use crate::study::job::Job;
 ///
 /// # Errors
 /// [`PlanError`] naming the first job that a sweep file cannot say.
-pub fn sweep_file(name: &str, jobs: &[(String, Job)]) -> Result<String, PlanError> {
+pub(crate) fn sweep_file(name: &str, jobs: &[(String, Job)]) -> Result<String, PlanError> {
     let mut written: Vec<(&str, BTreeMap<&str, Value>)> = Vec::with_capacity(jobs.len());
     let mut tables: Vec<&TableRule> = Vec::new();
     for (label, job) in jobs {

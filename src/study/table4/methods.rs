@@ -5,7 +5,7 @@ use crate::methods::{gross2003, thomaszewski2006, zhu2016};
 
 /// A way to drape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ComparedMethod {
+pub(crate) enum ComparedMethod {
     /// A reference method, by its name.
     Reference(&'static str),
     /// The paper's equations.
@@ -19,7 +19,7 @@ pub enum ComparedMethod {
 impl ComparedMethod {
     /// Its name in tables and files.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Reference(name) => name,
             Self::Paper => "paper",
@@ -43,7 +43,7 @@ impl ComparedMethod {
 }
 
 /// In the order of the columns.
-pub const METHODS: [ComparedMethod; 6] = [
+pub(crate) const METHODS: [ComparedMethod; 6] = [
     ComparedMethod::Reference(zhu2016::NAME),
     ComparedMethod::Reference(gross2003::NAME),
     ComparedMethod::Reference(thomaszewski2006::NAME),
@@ -53,7 +53,7 @@ pub const METHODS: [ComparedMethod; 6] = [
 ];
 
 /// The ten rows of Table 4: garment and vertices.
-pub const TEN_ROWS: [(&str, usize); 10] = {
+pub(crate) const TEN_ROWS: [(&str, usize); 10] = {
     let mut rows = [("", 0); 10];
     let mut i = 0;
     while i < rows.len() {
@@ -80,7 +80,7 @@ const PRINTED: [[f64; 4]; 10] = [
 /// The paper's figures for a garment of so many vertices, ms: \[19\], \[20\], \[21\], proposed; `None` for what it has no row
 /// for.
 #[must_use]
-pub fn printed_ms(garment: &str, vertices: usize) -> Option<[f64; 4]> {
+pub(crate) fn printed_ms(garment: &str, vertices: usize) -> Option<[f64; 4]> {
     TEN_ROWS.iter().position(|row| *row == (garment, vertices)).map(|i| PRINTED[i])
 }
 

@@ -39,16 +39,16 @@ use crate::methods::RestRule;
 use crate::scene::Scene;
 use crate::study::accuracy::{self, state::State};
 use crate::study::evaluate::perturbed;
-pub use methods::{ComparedMethod, METHODS, TEN_ROWS, printed_ms};
-pub use row_log::{Conditions, RowLog, RowLogError};
+pub(crate) use methods::{ComparedMethod, METHODS, TEN_ROWS, printed_ms};
+pub(crate) use row_log::{Conditions, RowLog, RowLogError};
 use run::{Outcome, run};
-pub use shape::Silhouette;
+pub(crate) use shape::Silhouette;
 use shape::Tape;
-pub use table::{Cells, csv_lines, exponents, tables};
+pub(crate) use table::{Cells, csv_lines, exponents, tables};
 
 /// How a contest is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Table4Options {
+pub(crate) struct Table4Options {
     /// Counted rounds.
     pub rounds: usize,
     /// Rounds before them.
@@ -67,7 +67,7 @@ impl Default for Table4Options {
 
 /// One way to drape one garment, measured.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct MethodResult {
+pub(crate) struct MethodResult {
     /// Its name.
     #[serde(rename = "entrant")]
     pub method: String,
@@ -112,7 +112,7 @@ pub struct MethodResult {
 
 /// A row: a garment at a size, with all entrants.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Table4Row {
+pub(crate) struct Table4Row {
     /// The garment.
     pub garment: String,
     /// Vertices asked for.
@@ -130,7 +130,7 @@ pub struct Table4Row {
 
 /// A row with the drapes it is about.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DrapedRow {
+pub(crate) struct DrapedRow {
     /// The figures.
     pub row: Table4Row,
     /// Vertices of each entrant's last drape, m; `None` for who cannot run.
@@ -141,7 +141,7 @@ pub struct DrapedRow {
 
 /// Why there is no row.
 #[derive(Debug, thiserror::Error)]
-pub enum Table4Error {
+pub(crate) enum Table4Error {
     /// The caller stopped it: no row.
     #[error("interrupted")]
     Interrupted,
@@ -158,7 +158,7 @@ pub(crate) type Listener<'a> = &'a mut (dyn FnMut(usize, usize, &str) -> Control
 ///
 /// # Errors
 /// [`Table4Error`]; an entrant that fails has an entry that says why.
-pub fn row(
+pub(crate) fn row(
     (garment, asked): (&str, usize),
     scene: &Scene,
     fabric: &Fabric,
@@ -245,3 +245,6 @@ pub fn row(
 fn quartiles(list: &[f64]) -> (f64, f64) {
     (interpolated(list, 0.5), interpolated(list, 0.75) - interpolated(list, 0.25))
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,7 +10,7 @@ use crate::base::files::{Unreadable, read_own};
 
 /// What rows must have in common to stand in one table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// Version of the program.
     pub version: String,
     /// The fabric's name.
@@ -66,7 +66,7 @@ impl Conditions {
 
 /// Rows and what they have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RowLog {
+pub(crate) struct RowLog {
     /// What they have in common.
     pub conditions: Conditions,
     /// The rows so far.
@@ -76,7 +76,7 @@ pub struct RowLog {
 /// Why a log cannot be gone on with.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
-pub enum RowLogError {
+pub(crate) enum RowLogError {
     /// It cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),

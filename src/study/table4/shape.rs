@@ -20,7 +20,7 @@ const BELOW_ARMPITS: f64 = 0.08;
 
 /// Where a drape hangs and how wide it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Silhouette {
+pub(crate) struct Silhouette {
     /// Height of the hem, cm; `None` for cloth without an edge.
     pub hem_cm: Option<f64>,
     /// Girths near the hem, half way and near the top, cm; `None` where no closed curve is.

@@ -4,7 +4,7 @@ use super::{METHODS, MethodResult, Silhouette, Table4Row, printed_ms};
 
 /// Text of a table: header and rows of cells.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Cells {
+pub(crate) struct Cells {
     /// What it shows.
     pub title: String,
     /// Names of the columns.
@@ -15,7 +15,7 @@ pub struct Cells {
 
 /// Times and ratios, errors, and state of every row.
 #[must_use]
-pub fn tables(rows: &[Table4Row]) -> Vec<Cells> {
+pub(crate) fn tables(rows: &[Table4Row]) -> Vec<Cells> {
     let cell = |row: &Table4Row, name: &str, text: &dyn Fn(&MethodResult) -> String| {
         let entry = row.entries.iter().find(|e| e.method == name);
         entry.map_or("–".to_owned(), |e| if e.error.is_some() { "–".to_owned() } else { text(e) })
@@ -101,7 +101,7 @@ fn short(x: f64) -> String {
 /// For every garment with three sizes or more: each entrant's exponent p in time ~ verticesᵖ, by least squares in
 /// logarithms.
 #[must_use]
-pub fn exponents(rows: &[Table4Row]) -> Option<Cells> {
+pub(crate) fn exponents(rows: &[Table4Row]) -> Option<Cells> {
     let mut garments: Vec<&str> = rows.iter().map(|r| r.garment.as_str()).collect();
     garments.sort_unstable();
     garments.dedup();
@@ -174,7 +174,7 @@ fn columns(row: &Table4Row, e: &MethodResult) -> [(&'static str, String); 25] {
 ///
 /// # Errors
 /// Those of the CSV writer, which writes to memory.
-pub fn csv_lines(rows: &[Table4Row]) -> Result<String, csv::Error> {
+pub(crate) fn csv_lines(rows: &[Table4Row]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(columns(&Table4Row::default(), &MethodResult::default()).map(|(name, _)| name))?;
     for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {

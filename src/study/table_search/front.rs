@@ -6,7 +6,7 @@ use crate::parts::range_table::{Extent, RangeTable, TableError};
 
 /// A table that no other found beats in both PARTs and error.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrontPoint {
+pub(crate) struct FrontPoint {
     /// PARTs over all garments.
     pub parts: usize,
     /// Representable error, root of the weighted mean square over garments, m.
@@ -35,7 +35,7 @@ impl FrontPoint {
     ///
     /// # Errors
     /// [`TableError`] where the bounds were changed so that they no longer ascend.
-    pub fn table(&self, name: &str, source: &str) -> Result<RangeTable, TableError> {
+    pub(crate) fn table(&self, name: &str, source: &str) -> Result<RangeTable, TableError> {
         let table = RangeTable::from_inner_bounds(name, &self.inner_bounds_cm)?.with_source(source);
         table.with_extents(&self.extents.iter().copied().map(Some).collect::<Vec<_>>())
     }
@@ -43,7 +43,7 @@ impl FrontPoint {
 
 /// Tables by ascending number of PARTs and descending error.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Front {
+pub(crate) struct Front {
     /// The tables.
     pub points: Vec<FrontPoint>,
     /// The table of least error with which every garment is within its limit. For one garment it is the last of `points`; for
@@ -54,13 +54,13 @@ pub struct Front {
 impl Front {
     /// The least error with at most so many PARTs.
     #[must_use]
-    pub fn best_within(&self, max_parts: usize) -> Option<&FrontPoint> {
+    pub(crate) fn best_within(&self, max_parts: usize) -> Option<&FrontPoint> {
         self.points[..self.points.partition_point(|p| p.parts <= max_parts)].last()
     }
 
     /// The fewest PARTs with at most this error, m.
     #[must_use]
-    pub fn coarsest_within(&self, rms_m: f64) -> Option<&FrontPoint> {
+    pub(crate) fn coarsest_within(&self, rms_m: f64) -> Option<&FrontPoint> {
         self.points.iter().find(|p| p.rms_m <= rms_m)
     }
 

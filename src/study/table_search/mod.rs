@@ -40,9 +40,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use error::SearchError;
-pub use front::{Front, FrontPoint};
-pub use options::SearchOptions;
+pub(crate) use error::SearchError;
+pub(crate) use front::{Front, FrontPoint};
+pub(crate) use options::SearchOptions;
 
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Grain;
@@ -54,7 +54,7 @@ use program::Program;
 
 /// One garment to find a table for.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample<'a> {
+pub(crate) struct Sample<'a> {
     /// The garment, undraped.
     pub mesh: &'a TriMesh,
     /// Its connectivity.
@@ -73,7 +73,7 @@ pub struct Sample<'a> {
 
 /// How far a search is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
+pub(crate) struct Progress {
     /// Round, from 1.
     pub round: usize,
     /// Rounds in all.
@@ -86,7 +86,7 @@ pub struct Progress {
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Search {
+pub(crate) struct Search {
     /// The best tables after each round, never worse than the round before.
     pub rounds: Vec<Front>,
     /// Whether every bound was tried: no table with these extents is better then.
@@ -96,7 +96,7 @@ pub struct Search {
 impl Search {
     /// The final front.
     #[must_use]
-    pub fn front(&self) -> &Front {
+    pub(crate) fn front(&self) -> &Front {
         const NONE: &Front = &Front { points: Vec::new(), best: None };
         self.rounds.last().unwrap_or(NONE)
     }
@@ -107,7 +107,7 @@ impl Search {
 ///
 /// # Errors
 /// [`SearchError`] where the samples do not fit together or no table is coarse enough.
-pub fn search(
+pub(crate) fn search(
     samples: &[Sample<'_>],
     options: &SearchOptions,
     progress: &(dyn Fn(Progress) -> ControlFlow<()> + Sync),
@@ -202,3 +202,6 @@ fn one_garment(
         program.paths().iter().map(|path| FrontPoint::on(path, path.parts, &inner_cm, ladder)).collect();
     Some(Front { best: points.last().cloned(), points })
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use crate::parts::range_table::RangeTable;
 
 /// What to search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SearchOptions {
+pub(crate) struct SearchOptions {
     /// How a PART moves: by an affine map, as the coupled model moves it, or as in the paper by a translation.
     pub motion: Motion,
     /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
@@ -55,7 +55,7 @@ impl Default for SearchOptions {
 impl SearchOptions {
     /// Defaults for levels that may each be cut to one of these widths (cm).
     #[must_use]
-    pub fn with_extents(widths_cm: &[f64]) -> Self {
+    pub(crate) fn with_extents(widths_cm: &[f64]) -> Self {
         Self {
             candidates: 120,
             candidates_around: 40,

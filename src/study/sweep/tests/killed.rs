@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use partwise::study::sweep::{Existing, Point, Run, store, sweep};
+use crate::study::sweep::{Existing, Point, Run, store, sweep};
 
 use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 
@@ -31,7 +31,7 @@ fn killed_three_times_and_resumed_it_equals_the_uninterrupted_one() {
     for least in [10, 60, 110] {
         let before = rows();
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "killed::child", "--ignored"])
+            .args(["--exact", "study::sweep::tests::killed::child", "--ignored"])
             .env(FOLDER, folder.path())
             .stdout(Stdio::null())
             .spawn()

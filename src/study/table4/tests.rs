@@ -2,15 +2,15 @@
 
 use std::ops::ControlFlow;
 
-use partwise::SceneSpec;
-use partwise::garment::fabric::Fabric;
-use partwise::study::table4::{DrapedRow, METHODS, Table4Error, Table4Options, row};
+use crate::SceneSpec;
+use crate::garment::fabric::Fabric;
+use crate::study::table4::{DrapedRow, METHODS, Table4Error, Table4Options, row};
 
 const SMALL: Table4Options = Table4Options {
     rounds: 2,
     warm_up: 0,
     starts: 1,
-    rule: partwise::methods::RestRule { speed_m_per_s: 0.01, over_s: 0.25, limit_s: 20.0 },
+    rule: crate::methods::RestRule { speed_m_per_s: 0.01, over_s: 0.25, limit_s: 20.0 },
 };
 
 #[test]
@@ -25,13 +25,13 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
     let vertices = scene.garment.vertex_count();
     assert!(canonical.len() == vertices && draped.len() == METHODS.len());
     for (entry, x) in made.entries.iter().zip(&draped) {
-        let apart = partwise::study::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
+        let apart = crate::study::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
         assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.method);
     }
     assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
     let names: Vec<&str> = made.entries.iter().map(|e| e.method.as_str()).collect();
-    assert_eq!(names, METHODS.map(partwise::study::table4::ComparedMethod::name));
+    assert_eq!(names, METHODS.map(crate::study::table4::ComparedMethod::name));
     for entry in &made.entries {
         assert_eq!(entry.error, None);
         assert_eq!(entry.times_ms.len(), 2);
@@ -55,7 +55,7 @@ fn who_cannot_run_says_why_and_the_others_go_on() {
     let mut scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
-    scene.body = partwise::body::distance::Body::new_open(&open).unwrap();
+    scene.body = crate::body::distance::Body::new_open(&open).unwrap();
     let options = Table4Options { rounds: 1, starts: 0, ..SMALL };
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &options, &mut |_, _, _| ControlFlow::Continue(()));
     let DrapedRow { row: made, draped, .. } = made.unwrap();

@@ -2,18 +2,18 @@
 
 use std::slice::from_ref;
 
+use crate::body::distance::Body;
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::Cloth;
+use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::parts::range_table::RangeTable;
+use crate::parts::segment;
+use crate::study::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
+use crate::study::accuracy::representable::representable;
+use crate::study::accuracy::shape::{hausdorff, hem_heights, section_length};
+use crate::study::accuracy::{AccuracyError, Comparison, compare, rms_mm};
+use crate::study::wrinkles;
 use glam::DVec3;
-use partwise::body::distance::Body;
-use partwise::garment::fabric::Fabric;
-use partwise::mechanics::energy::Cloth;
-use partwise::mesh::{RestShape, Topology, TriMesh};
-use partwise::parts::range_table::RangeTable;
-use partwise::parts::segment;
-use partwise::study::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
-use partwise::study::accuracy::representable::representable;
-use partwise::study::accuracy::shape::{hausdorff, hem_heights, section_length};
-use partwise::study::accuracy::{AccuracyError, Comparison, compare, rms_mm};
-use partwise::study::wrinkles;
 
 /// A tube of radius `r` about the z axis from z = 0 to `height`, `n` vertices around and `m + 1` rings.
 fn tube(r: f64, height: f64, n: u32, m: u32) -> TriMesh {
@@ -113,7 +113,7 @@ fn a_tube_moved_sideways_has_the_errors_of_its_shift() {
     for name in ["rms_mm", "p95_mm", "representable_rms_mm", "canonical_rms_mm", "residual_over_weight", "strain_p95"] {
         assert!(json.get(name).is_some(), "{name} is missing");
     }
-    assert_eq!(serde_json::from_value::<partwise::study::accuracy::Accuracy>(json).unwrap(), a);
+    assert_eq!(serde_json::from_value::<crate::study::accuracy::Accuracy>(json).unwrap(), a);
 }
 
 #[test]
@@ -125,13 +125,13 @@ fn a_free_fall_has_the_weight_for_a_residual() {
     soft.bending_nm = [0.0; 3];
     let cloth = Cloth::new(&mesh, &topology, &rest, &soft, &[]).unwrap();
     let body = Body::new(&sphere(0.05, 6)).unwrap();
-    let state = partwise::study::accuracy::State::of(&cloth, &body, &mesh.positions);
+    let state = crate::study::accuracy::State::of(&cloth, &body, &mesh.positions);
     let norm = cloth.masses.iter().map(|m| m * m).sum::<f64>().sqrt() / cloth.masses.iter().sum::<f64>();
     assert!((state.residual_over_weight - norm).abs() < 1e-9);
     assert_eq!(state.penetrating_vertices, 0);
     // Squeezed into the body: every vertex inside, the strain that of a tube a tenth as wide.
     let inside: Vec<DVec3> = mesh.positions.iter().map(|x| DVec3::new(0.1 * x.x, 0.1 * x.y, 0.01 * x.z)).collect();
-    let state = partwise::study::accuracy::State::of(&cloth, &body, &inside);
+    let state = crate::study::accuracy::State::of(&cloth, &body, &inside);
     assert_eq!(state.penetrating_vertices, mesh.vertex_count());
     assert!(state.penetration_mm > 20.0 && state.strain_max < 0.0);
 }

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use partwise::Job;
-use partwise::drape::Refine;
-use partwise::garment::fabric::Fabric;
-use partwise::parts::range_table::{RangeTable, TableRule};
-use partwise::study::sweep::{Plan, sweep_file};
+use crate::Job;
+use crate::drape::Refine;
+use crate::garment::fabric::Fabric;
+use crate::parts::range_table::{RangeTable, TableRule};
+use crate::study::sweep::{Plan, sweep_file};
 
 fn parse(text: &str) -> Plan {
     Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap()
@@ -77,7 +77,7 @@ fn points_of_one_garment_and_body_share_a_scene() {
     let plan = parse(
         "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { weld = true }]",
     );
-    let scenes: BTreeSet<_> = plan.points.iter().map(partwise::study::sweep::Point::scene_id).collect();
+    let scenes: BTreeSet<_> = plan.points.iter().map(crate::study::sweep::Point::scene_id).collect();
     assert_eq!((plan.points.len(), scenes.len()), (24, 8));
 }
 

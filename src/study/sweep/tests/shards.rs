@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use partwise::Job;
-use partwise::study::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
+use crate::Job;
+use crate::study::sweep::{Existing, MergeError, Plan, Run, Shard, StoreError, merge, sweep};
 
 use super::{files, plan, rows_by, run_all, solve, uninterrupted};
 

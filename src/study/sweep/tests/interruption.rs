@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use partwise::study::sweep::{
+use crate::study::sweep::{
     Append, Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, SweepProgress, store, sweep,
 };
 use proptest::prelude::*;
@@ -164,9 +164,9 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
     let mut held = open(&whole, Existing::Refuse).unwrap();
     assert!(matches!(open(&whole, Existing::RESUME), Err(StoreError::Locked { .. })));
     for point in &whole.points[..10] {
-        held.append(partwise::study::sweep::Row::failed(point, "x")).unwrap();
+        held.append(crate::study::sweep::Row::failed(point, "x")).unwrap();
     }
-    let twice = held.append(partwise::study::sweep::Row::failed(&whole.points[3], "x"));
+    let twice = held.append(crate::study::sweep::Row::failed(&whole.points[3], "x"));
     assert!(matches!(twice, Err(StoreError::Damaged { .. })));
     drop(held);
     let error = open(&whole, Existing::Refuse).unwrap_err().to_string();
@@ -174,7 +174,7 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
 
     // Another plan that has the first four tables of this one, in another order, and two more.
     let text = super::PLAN.replace("\"table-3\", { scale = [0.5, 2] }", "{ scale = [2, 3, 4] }, \"table-3\"");
-    let other = Plan::parse(&text, "other.toml", Path::new(""), &partwise::Job::preview()).unwrap();
+    let other = Plan::parse(&text, "other.toml", Path::new(""), &crate::Job::preview()).unwrap();
     let error = open(&other, Existing::RESUME).unwrap_err();
     assert!(matches!(error, StoreError::OtherPlan { .. }), "{error}");
     let adopted = open(&other, Existing::Resume { retry_failed: false, adopt: true }).unwrap();

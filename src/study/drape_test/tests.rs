@@ -1,7 +1,7 @@
 //! The drape test on a coarse specimen: in order of stiffness, in folds, and inside the published bands where it is.
 
-use partwise::garment::fabric::Fabric;
-use partwise::study::drape_test::{Target, results_csv, run, targets};
+use super::{Target, maxima, results_csv, run, targets};
+use crate::garment::fabric::Fabric;
 
 fn falls_inside(band: &Target) {
     let result = run(&Fabric::by_name(&band.fabric).unwrap(), 8).unwrap();
@@ -50,12 +50,22 @@ fn results_come_as_csv_with_their_bands() {
 #[test]
 fn the_results_beside_the_code_are_what_the_code_gives() {
     // One row is drawn again; all of them would take the better part of a minute.
-    let kept = include_str!("../../assets/cusick/results.csv");
+    let kept = include_str!("../../../assets/cusick/results.csv");
     let drawn = results_csv(&["interlock"], 10).unwrap();
     let row = drawn.lines().nth(1).unwrap();
     assert!(
         kept.lines().any(|line| line == row),
         "assets/cusick/results.csv lacks `{row}`: `partwise cusick --rows 10 --csv` writes it again"
     );
-    assert_eq!(kept.lines().count(), 1 + partwise::garment::fabric::BUILT_IN.len());
+    assert_eq!(kept.lines().count(), 1 + crate::garment::fabric::BUILT_IN.len());
+}
+
+#[test]
+fn folds_are_counted_once_around() {
+    let wave = |n: f64| {
+        (0..200).map(|i| 0.12 + 0.01 * (n * std::f64::consts::TAU * f64::from(i) / 200.0).cos()).collect::<Vec<_>>()
+    };
+    assert_eq!(maxima(&wave(6.0)), 6);
+    assert_eq!(maxima(&wave(1.0)), 1);
+    assert_eq!(maxima(&[0.12; 50]), 0);
 }

@@ -1,12 +1,12 @@
 //! The search against every table there is, on a garment of twenty vertices.
 
+use crate::mechanics::coupled::Motion;
+use crate::mesh::{RestShape, Topology};
+use crate::parts::range_table::{Extent, RangeTable};
+use crate::parts::{Grain, segment};
+use crate::study::accuracy::representable::unblended_rms_m;
+use crate::study::table_search::{Sample, SearchError, SearchOptions, search};
 use glam::DVec3;
-use partwise::mechanics::coupled::Motion;
-use partwise::mesh::{RestShape, Topology};
-use partwise::parts::range_table::{Extent, RangeTable};
-use partwise::parts::{Grain, segment};
-use partwise::study::accuracy::representable::unblended_rms_m;
-use partwise::study::table_search::{Sample, SearchError, SearchOptions, search};
 use proptest::prelude::*;
 
 use super::{is_a_front, sheet, unheard};

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use partwise::drape::StageTimes;
-use partwise::study::metrics::Metrics;
-use partwise::study::sweep::{Row, Status, Timing, columns};
+use crate::drape::StageTimes;
+use crate::study::metrics::Metrics;
+use crate::study::sweep::{Row, Status, Timing, columns};
 use proptest::prelude::*;
 
 use super::{plan, uninterrupted};

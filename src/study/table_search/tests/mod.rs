@@ -1,18 +1,17 @@
 //! The table search: against every table there is on a small garment, and against stage one itself on a larger one.
-#![allow(clippy::unwrap_used)] // in what the tests share, too
 
 mod every_table;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::mechanics::coupled::Motion;
+use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::parts::range_table::RangeTable;
+use crate::parts::{Grain, Parts, segment};
+use crate::study::accuracy::representable::unblended_rms_m;
+use crate::study::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
 use glam::DVec3;
-use partwise::mechanics::coupled::Motion;
-use partwise::mesh::{RestShape, Topology, TriMesh};
-use partwise::parts::range_table::RangeTable;
-use partwise::parts::{Grain, Parts, segment};
-use partwise::study::accuracy::representable::unblended_rms_m;
-use partwise::study::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
 fn sheet(w: usize, h: usize) -> TriMesh {

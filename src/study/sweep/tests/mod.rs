@@ -1,8 +1,5 @@
 //! Sweeps: plans, rows that survive interruption, shards, jobs.
 
-// The lint knows test functions, not what they share.
-#![allow(clippy::unwrap_used)]
-
 mod interruption;
 mod killed;
 mod metrics;
@@ -15,14 +12,14 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use glam::DVec3;
-use partwise::Job;
-use partwise::drape::StageTimes;
-use partwise::study::metrics::Metrics;
-use partwise::study::sweep::{
+use crate::Job;
+use crate::drape::StageTimes;
+use crate::study::metrics::Metrics;
+use crate::study::sweep::{
     Append, Existing, Manifest, Medium, Outcome, Pass, Plan, Point, PointError, Row, Run, Store, StoreError,
     SweepProgress, result_hash, row_of, run_missing, sweep,
 };
+use glam::DVec3;
 
 /// 200 points.
 const PLAN: &str = r#"
