@@ -74,7 +74,7 @@ pub(crate) struct TableFourArgs {
     /// Record each row as it is done into this folder: its drapes side by side, and plots of time
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
-    /// Write a line for every entrant of every row to this file as well
+    /// Write a line for every method of every row to this file as well
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// What to print on stdout
@@ -113,7 +113,7 @@ impl TableFourArgs {
             make_folder(folder)?;
         }
         interrupt::keep();
-        let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| !log.has(name, *n)).collect();
+        let left: Vec<&(String, usize)> = asked.iter().filter(|(name, n)| log.find(name, *n).is_none()).collect();
         let kept = asked.len() - left.len();
         let runs = options.warm_up + options.rounds;
         let bar = console::progress(Some((left.len() * runs * METHODS.len()) as u64), "table 4");
@@ -195,8 +195,7 @@ impl TableFourArgs {
     }
 
     fn report(&self, log: &RowLog, asked: &[(String, usize)], kept: usize) -> anyhow::Result<()> {
-        let find = |(name, n): &(String, usize)| log.rows.iter().find(|row| row.garment == *name && row.asked == *n);
-        let rows: Vec<Table4Row> = asked.iter().filter_map(find).cloned().collect();
+        let rows: Vec<Table4Row> = asked.iter().filter_map(|(name, n)| log.find(name, *n)).cloned().collect();
         let csv = table4::csv_lines(&rows)?;
         if let Some(path) = &self.csv {
             write(path, &csv, "--csv")?;
@@ -225,7 +224,7 @@ impl TableFourArgs {
 
 /// For people.
 fn text(log: &RowLog, rows: &[Table4Row]) -> String {
-    let mut out = log.conditions.said();
+    let mut out = log.conditions.text();
     for cells in table4::tables(rows).into_iter().chain(table4::exponents(rows)) {
         let mut table = console::table(console::RULED, &cells.header, 1..);
         table.add_rows(&cells.rows);

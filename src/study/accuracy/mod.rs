@@ -1,13 +1,13 @@
-//! Accuracy: a drape measured against a reference, and as a state of its own.
+//! Accuracy of a drape: its distance to a reference, and metrics of its own state.
 //!
-//! A garment has several equilibria of nearly the same energy, so one distance to one reference misleads. A result is
-//! compared with its *own continuation*, refined to convergence from that very result ([`Accuracy::vertices`], `rms_mm`); with the
-//! *canonical drape*, refined from the undraped start (`canonical_rms_mm`); and the spread of canonical drapes from perturbed
-//! starts stands beside both (`canonical_spread_mm`). The vertex error e_i = |x_i − x'_i| is split by zone: contact, where the
-//! reference is within [`CONTACT_ZONE`] of the body, and free. [`mod@shape`] compares shapes, [`state`] tells how settled and how
-//! strained, [`representable`] what the PARTs could hold at best, [`mod@reference`] keeps references on disk.
+//! A garment has several equilibria of nearly the same energy, so the distance to a single reference misleads. A result is
+//! compared with its *own continuation*, refined to convergence from the result itself ([`Accuracy::vertices`], `rms_mm`), and with
+//! the *canonical drape*, refined from the undraped start (`canonical_rms_mm`). Both are reported with the spread of canonical drapes
+//! from perturbed starts (`canonical_spread_mm`). The vertex error e_i = |x_i − x'_i| is split by zone: contact, where the
+//! reference is within [`CONTACT_ZONE`] of the body, and free. [`mod@shape`] compares shapes, [`state`] measures residual and
+//! strain, [`representable`] the best drape that the PARTs can represent; [`mod@reference`] caches references on disk.
 //!
-//! Limits: no figure tells whether either drape is *the* drape of a real cloth; that is what the drape tests are for.
+//! Limits: the reference is a drape of the model, not of real cloth; drape tests compare the model with real cloth.
 
 pub(crate) mod moments;
 pub(crate) mod reference;
@@ -23,7 +23,8 @@ pub use reference::ReferenceCache;
 pub(crate) use representable::Representable;
 pub(crate) use shape::SectionGirth;
 pub(crate) use state::State;
-pub(crate) use summary::ErrorSummary;
+pub use summary::rms_mm;
+pub(crate) use summary::{ErrorSummary, rms, vertex_errors, vertex_errors_mm};
 
 use crate::body::distance::{Body, DistanceError};
 use crate::mechanics::energy::Cloth;
@@ -39,21 +40,21 @@ pub(crate) const CONTACT_ZONE: f64 = 0.005;
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum AccuracyError {
-    /// Lists of different meshes.
-    #[error("{what} has {found} vertices and the garment {expected}: both drapes must be of one mesh")]
+    /// The lists belong to different meshes.
+    #[error("{what} has {found} vertices, expected {expected}: both drapes must have the mesh of the garment")]
     Count { what: &'static str, found: usize, expected: usize },
-    /// A coordinate that is not finite.
-    #[error("vertex number {} of {what} is not finite: the solve that made it has failed", .vertex + 1)]
+    /// A coordinate is not finite.
+    #[error("vertex number {} of {what} is not finite: the solver that computed it failed", .vertex + 1)]
     NotFinite { what: &'static str, vertex: usize },
-    /// No surface to measure to.
-    #[error("the drapes cannot be searched: {0}")]
+    /// A drape is not a valid surface.
+    #[error("the distance between the drapes cannot be computed: {0}")]
     Distance(#[from] DistanceError),
 }
 
-/// What is compared.
+/// A drape, its reference and their common garment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Comparison<'a> {
-    /// The garment; its positions are not used.
+    /// Mesh of the garment; its positions are not used.
     pub mesh: &'a TriMesh,
     /// Its connectivity.
     pub topology: &'a Topology,
@@ -61,29 +62,29 @@ pub(crate) struct Comparison<'a> {
     pub cloth: &'a Cloth,
     /// The body.
     pub body: &'a Body,
-    /// PARTs to judge by what they could hold, if any.
+    /// PARTs whose representable error is measured.
     pub parts: Option<&'a Parts>,
-    /// Undraped vertices, m: where the PARTs' displacements start.
+    /// Undraped positions, from which the PARTs' displacements start, m.
     pub start: &'a [DVec3],
-    /// The drape to judge, m.
+    /// The measured drape, m.
     pub result: &'a [DVec3],
-    /// What it is judged by, m.
+    /// The reference drape, m.
     pub reference: &'a [DVec3],
 }
 
-/// A drape's errors. Serialised names carry their units.
+/// Errors of a drape. Serialised names carry their units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Accuracy {
     /// Vertex error over the whole garment; its fields are written on this level (`rms_mm`, ...).
     #[serde(flatten)]
     pub vertices: ErrorSummary,
-    /// The same where the reference touches the body.
+    /// Vertex error in the contact zone.
     pub contact: ErrorSummary,
-    /// The same where it hangs free.
+    /// Vertex error outside the contact zone.
     pub free: ErrorSummary,
-    /// RMS to the canonical drape, mm; `None` until somebody has one.
+    /// RMS distance to the canonical drape, mm; set by `evaluate`.
     pub canonical_rms_mm: Option<f64>,
-    /// RMS between canonical drapes from perturbed starts, mm.
+    /// RMS distance between canonical drapes from perturbed starts, mm; set by `evaluate`.
     pub canonical_spread_mm: Option<f64>,
     /// Symmetric Hausdorff distance, mm.
     pub hausdorff_mm: f64,
@@ -100,25 +101,13 @@ pub(crate) struct Accuracy {
     /// The result as a state; its fields are written on this level (`residual_over_weight`, `strain_p95`, ...).
     #[serde(flatten)]
     pub state: State,
-    /// RMS left with one translation a PART, mm; `None` without PARTs.
+    /// Representable error with one translation a PART, mm; `None` without PARTs.
     pub representable_rms_mm: Option<f64>,
-    /// All three representable errors.
+    /// All representable errors.
     pub representable: Option<Representable>,
 }
 
-/// Distance of each vertex of `a` to the same vertex of `b`, m.
-#[must_use]
-pub(crate) fn vertex_errors(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
-    a.iter().zip(b).map(|(x, y)| x.distance(*y)).collect()
-}
-
-/// RMS vertex distance, mm.
-#[must_use]
-pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
-    ErrorSummary::of(&vertex_errors(a, b)).rms_mm
-}
-
-/// Measures a result against a reference. `canonical_*` stay empty: they need a second one, see [`rms_mm`].
+/// Measures a result against a reference. `canonical_*` are `None`: they need further references.
 pub(crate) fn compare(c: &Comparison<'_>) -> Result<Accuracy, AccuracyError> {
     let expected = c.mesh.vertex_count();
     for (what, list) in [("the start", c.start), ("the result", c.result), ("the reference", c.reference)] {

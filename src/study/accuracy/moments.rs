@@ -1,4 +1,4 @@
-//! What one motion of its own cannot hold of a piece of cloth, from sums over its vertices.
+//! Squared error of the best motion of a piece of cloth, from sums over its vertices.
 //!
 //! With u the displacements and x the positions of n vertices, ū and x̄ their means, d = x − x̄ and c = u − ū,
 //!
@@ -7,7 +7,7 @@
 //! affine:      e = min over A of Σ|c − A d|² + λ|A|² = Σ|c|² − tr R N⁻¹ Rᵀ,   R = Σ c dᵀ,   N = Σ d dᵀ + λ
 //! ```
 //!
-//! so that e follows from sums that add up when pieces are joined and take away when vertices leave.
+//! so that e follows from sums. These are added when pieces are joined and subtracted when vertices leave.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -16,8 +16,8 @@
 //! | λ | ridge: a share of Σ\|d\|² | m² |
 //! | e | squared error | m² |
 //!
-//! Source: textbook least squares. Limits: as in the coupled model a piece of three vertices or fewer has its translation
-//! alone; differences of sums lose digits far from the origin, so `x` and `u` are given about a middle.
+//! Source: textbook least squares. Limits: as in the coupled model, a piece of at most three vertices translates
+//! only; differences of sums lose digits far from the origin, so `x` and `u` are taken relative to their mean.
 
 use std::ops::{AddAssign, SubAssign};
 
@@ -26,10 +26,10 @@ use glam::{DMat3, DVec3};
 use crate::mechanics::coupled::Motion;
 use crate::mechanics::energy::membrane::outer;
 
-/// Ridge relative to Σ|d|²: it leaves the direction across a flat piece undetermined at no cost to the others.
+/// Ridge λ relative to Σ|d|². It regularises the direction normal to a flat piece; larger values would bias the others.
 const RIDGE: f64 = 1e-9;
 
-/// Vertices of a piece that has its translation alone, as [`Motions`](crate::mechanics::coupled::Motions) has it.
+/// A piece of at most this many vertices translates only, as in [`Motions`](crate::mechanics::coupled::Motions).
 const SMALL: f64 = 3.0;
 
 /// Sums over the vertices of a piece: 1, x, u, |u|², x xᵀ (its upper half), u xᵀ.
@@ -55,7 +55,7 @@ impl SubAssign<&Moments> for Moments {
 }
 
 impl Moments {
-    /// Those of one vertex.
+    /// The sums of one vertex.
     pub(crate) fn of(x: DVec3, u: DVec3) -> Self {
         #[rustfmt::skip]
         let sums = [
@@ -66,7 +66,7 @@ impl Moments {
         Self(sums)
     }
 
-    /// Those of every vertex about the middle of these.
+    /// The sums of each vertex, relative to the mean of all these vertices.
     pub(crate) fn of_each(vertices: &[u32], x: &[DVec3], u: &[DVec3]) -> Vec<Self> {
         let mean =
             |of: &[DVec3]| vertices.iter().map(|&v| of[v as usize]).sum::<DVec3>() / vertices.len().max(1) as f64;
@@ -74,7 +74,7 @@ impl Moments {
         vertices.iter().map(|&v| Self::of(x[v as usize] - x0, u[v as usize] - u0)).collect()
     }
 
-    /// The squared error e of the best motion, m²; none for a single vertex.
+    /// The squared error e of the best motion, m²; 0 for a single vertex.
     pub(crate) fn error(&self, motion: Motion) -> f64 {
         let [n, x0, x1, x2, u0, u1, u2, uu, xx, xy, xz, yy, yz, zz, ref ux @ ..] = self.0;
         if n <= 1.0 {
@@ -92,7 +92,7 @@ impl Moments {
         if ridge <= 0.0 {
             return spread;
         }
-        // N = L D Lᵀ and R = Y Lᵀ: an inverse would lose what a flat piece has across it, this does not.
+        // N = L D Lᵀ and R = Y Lᵀ. The factorisation is accurate for flat pieces, for which the inverse of N is not.
         let n = (normal + DMat3::from_diagonal(DVec3::splat(ridge))).to_cols_array_2d();
         let d0 = n[0][0];
         let (l10, l20) = (n[0][1] / d0, n[0][2] / d0);
@@ -102,9 +102,9 @@ impl Moments {
         let y0 = right.x_axis;
         let y1 = right.y_axis - y0 * l10;
         let y2 = right.z_axis - y0 * l20 - y1 * l21;
-        let held = y0.length_squared() / d0 + y1.length_squared() / d1 + y2.length_squared() / d2;
-        // Of a piece without extent nothing is left but rounding.
-        if held.is_finite() { (spread - held).clamp(0.0, spread) } else { spread }
+        let represented = y0.length_squared() / d0 + y1.length_squared() / d1 + y2.length_squared() / d2;
+        // The pivots of a piece without extent are rounding errors.
+        if represented.is_finite() { (spread - represented).clamp(0.0, spread) } else { spread }
     }
 }
 
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_affine_map_leaves_nothing_and_vertices_can_leave() {
+    fn an_affine_map_has_no_affine_error_and_vertices_can_be_subtracted() {
         let x: Vec<DVec3> =
             (0..40).map(|i| DVec3::new(f64::from(i % 7), f64::from(i / 7), f64::from(i * i % 5))).collect();
         let map = DMat3::from_cols(DVec3::new(0.3, -1.0, 0.2), DVec3::new(0.1, 0.7, 2.0), DVec3::new(-0.4, 0.5, 0.6));
@@ -123,7 +123,7 @@ mod tests {
         let each = Moments::of_each(&all, &x, &u);
         let mut sums = Moments::default();
         each.iter().for_each(|m| sums += m);
-        // The jump remains, and less of it than of the whole movement.
+        // The jump between the two halves remains.
         let jump = sums.error(Motion::Affine);
         assert!(jump > 10.0 && jump < 0.5 * sums.error(Motion::Translation), "{jump}");
         each[30..].iter().for_each(|m| sums -= m);

@@ -1,12 +1,12 @@
-//! References on disk: a converged drape is paid for once.
+//! Cache of reference drapes on disk.
 //!
 //! The key of a reference is the BLAKE3 hash of everything it depends on: the crate's version and the file format's, the
 //! garment's positions and triangles, the rest shape, the fabric, the body, the held vertices, the start and the solver's
-//! options, as [`sealed`] bytes: numbers by their bits, lists with their lengths, so two inputs never share a key.
+//! options, serialised by postcard: numbers by their bits, lists with their lengths, so that different inputs have
+//! different keys.
 //!
-//! A file is the key and the reference, [`sealed`]. It is written whole or not at all, so a reader never sees
-//! half of one. A file that does not match its hash, its key or its garment is no error: the reference is computed again,
-//! and the caller gets a warning to show.
+//! A file holds the key and the reference with a checksum and is written atomically. A file that does not match its
+//! checksum, its key or its garment is no error: the reference is computed again, with a warning.
 
 use std::path::PathBuf;
 
@@ -18,11 +18,11 @@ use crate::base::files::{read_own, user_cache};
 use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, TriMesh};
 
-/// First bytes of a file, and part of every key; the digit goes up with the format and with the mechanics, so that a drape
-/// of an older solver is never taken for the reference of a newer one.
+/// First bytes of a file, and part of every key. Increment the digit with each change of the format or of the mechanics, so
+/// that a drape of an older solver does not serve as reference of a newer one.
 const KIND: &Kind = b"PWREF\x004\n";
 
-/// What a reference depends on.
+/// All inputs of a reference.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReferenceInput<'a> {
     /// The garment.
@@ -33,26 +33,26 @@ pub(crate) struct ReferenceInput<'a> {
     pub fabrics: &'a [Fabric],
     /// The body.
     pub body: &'a TriMesh,
-    /// Vertices that do not move.
+    /// Held vertices.
     pub held: &'a [u32],
-    /// Where the solve starts, m.
+    /// Start positions, m.
     pub start: &'a [DVec3],
     /// The solver's options, written out in full.
     pub options: &'a str,
 }
 
-/// The name of a reference.
+/// Hash of the inputs of a reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ReferenceKey(blake3::Hash);
 
 impl ReferenceKey {
-    /// Hashes everything a reference depends on.
+    /// Hashes all inputs of a reference.
     #[must_use]
     pub(crate) fn new(input: &ReferenceInput<'_>) -> Self {
         fn mesh(mesh: &TriMesh) -> (&[DVec3], &[[u32; 3]]) {
             (&mesh.positions, &mesh.triangles)
         }
-        // What a fabric is called changes nothing.
+        // The name of a fabric does not affect the result.
         let nameless = |fabric: &Fabric| Fabric { name: String::new(), source: String::new(), ..fabric.clone() };
         let fabrics: Vec<Fabric> = input.fabrics.iter().map(nameless).collect();
         let (version, rest) = (env!("CARGO_PKG_VERSION"), &input.rest.corners);
@@ -87,14 +87,14 @@ pub(crate) struct Reference {
     pub seconds: f64,
 }
 
-/// A reference and how it was come by.
+/// A reference, from disk or computed.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
     /// The reference.
     pub reference: Reference,
-    /// Whether it was on disk.
+    /// Whether the reference was read from disk.
     pub cached: bool,
-    /// What went wrong with the disk, if anything: worth showing, not worth stopping for.
+    /// Failures of the disk; they do not stop the computation.
     pub warnings: Vec<String>,
 }
 
@@ -105,22 +105,21 @@ pub struct ReferenceCache {
 }
 
 impl ReferenceCache {
-    /// References in `directory`, which is made when the first is written.
+    /// A cache in `directory`, which is created with the first file.
     #[must_use]
     pub fn new(directory: impl Into<PathBuf>) -> Self {
         Self { directory: directory.into() }
     }
 
-    /// `references` in the user's cache ([`user_cache`]); `None` where the user has no home.
-    #[must_use]
+    /// The folder `references` of the user's cache ([`user_cache`]); `None` without a home folder.
     pub(crate) fn in_user_cache() -> Option<Self> {
         user_cache("references").map(Self::new)
     }
 
-    /// The reference of `key` for a garment of `vertices`: from disk, or else computed and kept.
+    /// Reads the reference of `key` for a garment of `vertices` from disk, or computes and writes it.
     ///
     /// # Errors
-    /// Whatever `compute` fails with; the disk's failures are warnings.
+    /// Errors of `compute`. Failures of the disk are warnings.
     pub(crate) fn get_or_compute<E>(
         &self,
         key: &ReferenceKey,

@@ -1,4 +1,5 @@
-//! Representable error: what one motion per PART cannot hold of a reference, whatever the mechanics.
+//! Representable error: the part of a reference displacement that no motion of the PARTs can represent, independent of the
+//! mechanics.
 //!
 //! With u_i the displacement of vertex i from its start to the reference, and X_i its start,
 //!
@@ -6,21 +7,20 @@
 //! - affine: u_i ≈ b_p + A_p X_i, least squares over the PART, where it has more than three vertices;
 //! - blended: the same two with the coupled model's blending weights, least squares over the whole garment.
 //!
-//! The RMS of the remainder splits a table's fault from a model's. The blended affine one is what the coupled model's PARTs could hold
-//! at best, before its relaxations. Source: design of the accuracy report; the least squares fits are textbook.
+//! The RMS of the remainder separates the error of a range table from the error of a model. The blended affine error is the best
+//! that the coupled model can reach before its relaxation. Source: textbook least squares.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::moments::Moments;
-use super::rms_mm;
-use super::summary::MM_PER_M;
+use super::summary::{MM_PER_M, rms_mm};
 use crate::mechanics::coupled::{Motion, Motions, Weights};
 use crate::mechanics::newton::SolveError;
 use crate::mesh::Topology;
 use crate::parts::{Parts, UNASSIGNED};
 
-/// What the best motion of each kind leaves.
+/// RMS remainders of the best motions, by kind of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Representable {
     /// RMS with one translation a PART, mm.
@@ -33,9 +33,8 @@ pub(crate) struct Representable {
     pub blended_affine_rms_mm: f64,
 }
 
-/// The errors of `parts` for the displacement from `start` to `reference`. A vertex in no PART keeps still, or where motions are blended,
-/// goes with the nearest; one that is `held` keeps still.
-#[must_use]
+/// The representable errors of `parts` for the displacement from `start` to `reference` (m). A vertex in no PART stays in place, or
+/// follows the nearest PARTs where motions are blended. A held vertex stays in place.
 pub(crate) fn representable(
     topology: &Topology,
     parts: &Parts,
@@ -57,10 +56,10 @@ pub(crate) fn representable(
     }
 }
 
-/// The displacement nearest to `u` (m, from `start`) that the PARTs' motions, blended over the seams, can hold.
+/// The displacement nearest to `u` (m, from `start`) that the PARTs' blended motions can represent.
 ///
 /// # Errors
-/// [`SolveError`] where positions are not finite.
+/// [`SolveError`] if positions are not finite.
 pub(crate) fn blended(
     topology: &Topology,
     parts: &Parts,
@@ -73,9 +72,7 @@ pub(crate) fn blended(
     Motions::new(parts, weights, start, motion).nearest(start, u)
 }
 
-/// The error, m, that remains of the displacement `u` from `start` (m) with a motion of each PART's own; 0 for a garment without
-/// vertices.
-#[must_use]
+/// The RMS remainder of the displacement `u` from `start` with one unblended motion per PART, m; 0 for a garment without vertices.
 pub(crate) fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
     let squared = |vertices: &[u32]| {
         let mut sums = Moments::default();

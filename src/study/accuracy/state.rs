@@ -1,4 +1,4 @@
-//! How settled, how strained and how deep in the body a drape is: figures of one state, no reference needed.
+//! Metrics of one state, without a reference: energy, residual, strain and penetration.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -6,9 +6,9 @@
 //! | r | residual force ‖∇E‖₂ over the free vertices, over the weight | – |
 //! | ε | largest principal strain of a triangle, positive in elongation | – |
 //!
-//! Friction holds any tangential force up to μ_f N (Coulomb), and what it holds depends on how the cloth came to rest. A
-//! state by itself has no history, so at a touching vertex friction is taken to hold as much as it can: the tangential part of
-//! the force is shortened by μ_f N, to zero at most. A solver that follows its anchors may report a larger residual.
+//! Friction balances any tangential force up to μ_f N (Coulomb); the actual friction force depends on the history of the
+//! motion. A state has no history, so friction is assumed to balance as much as it can: the tangential force at a touching
+//! vertex is shortened by μ_f N, at most to zero. A solver that follows friction anchors may report a larger residual.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::principal_strain;
 use crate::mechanics::reactions::grant_beside;
 
-/// Metrics of one drape.
+/// Metrics of one state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct State {
     /// E, J.
@@ -38,14 +38,14 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Metrics of `cloth` on `body` at `x`.
+    /// Metrics of `cloth` on `body` at the positions `x` (m).
     #[must_use]
     pub(crate) fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
         let contacts = cloth.contacts(body, x);
         let mut gradient = Vec::new();
-        // Fresh contacts have fresh anchors: no friction force yet.
+        // New contacts have anchors at `x`, so the gradient holds no friction force yet.
         let energy_j = cloth.gradient(x, &contacts, &mut gradient);
-        hold(cloth, &contacts, &mut gradient);
+        subtract_friction(cloth, &contacts, &mut gradient);
         grant_beside(cloth, body, &contacts, x, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
         let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
@@ -61,11 +61,11 @@ impl State {
     }
 }
 
-/// Takes from the gradient what friction can hold.
-fn hold(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
+/// Subtracts the friction force that can balance the gradient at each touching vertex.
+fn subtract_friction(cloth: &Cloth, contacts: &Contacts<'_>, gradient: &mut [DVec3]) {
     for touch in contacts.touches() {
         let g = &mut gradient[touch.vertex as usize];
-        // Flatter in a crease than a distance, where the body pushes less.
+        // In a crease of the smoothed distance the gradient is shorter than 1, and so is the contact force.
         let (normal, slope) = (touch.normal.normalize_or_zero(), touch.normal.length().min(1.0));
         let tangential = *g - normal * normal.dot(*g);
         *g -= tangential.clamp_length_max(cloth.friction[touch.vertex as usize] * touch.force() * slope);

@@ -1,15 +1,15 @@
-//! Summaries of a list of errors: mean, root mean square, 95th percentile, maximum.
+//! Vertex errors and their summary: mean, root mean square, 95th percentile, maximum.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::base::quantiles::nearest_rank;
 
 /// Millimetres in a metre.
-pub(crate) const MM_PER_M: f64 = 1e3;
+pub(super) const MM_PER_M: f64 = 1e3;
 
 /// Distances between matching vertices of two drapes; `p95` is the 95th percentile, by nearest rank.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
 pub(crate) struct ErrorSummary {
     pub vertices: usize,
     pub mean_mm: f64,
@@ -20,7 +20,6 @@ pub(crate) struct ErrorSummary {
 
 impl ErrorSummary {
     /// Summary of errors in metres; all zero for an empty list.
-    #[must_use]
     pub(crate) fn of(errors_m: &[f64]) -> Self {
         if errors_m.is_empty() {
             return Self::default();
@@ -29,11 +28,32 @@ impl ErrorSummary {
         Self {
             vertices: errors_m.len(),
             mean_mm: MM_PER_M * errors_m.iter().sum::<f64>() / n,
-            rms_mm: MM_PER_M * (errors_m.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
+            rms_mm: MM_PER_M * rms(errors_m),
             p95_mm: MM_PER_M * nearest_rank(errors_m, 0.95),
             max_mm: MM_PER_M * errors_m.iter().copied().fold(0.0, f64::max),
         }
     }
+}
+
+/// Root mean square; NaN for an empty list.
+pub(crate) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Distance of each vertex of `a` to the same vertex of `b`, m.
+pub(crate) fn vertex_errors(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x.distance(*y)).collect()
+}
+
+/// Distance of each vertex of `a` to the same vertex of `b`, mm.
+pub(crate) fn vertex_errors_mm(a: &[DVec3], b: &[DVec3]) -> Vec<f64> {
+    vertex_errors(a, b).iter().map(|e| MM_PER_M * e).collect()
+}
+
+/// RMS vertex distance, mm.
+#[must_use]
+pub fn rms_mm(a: &[DVec3], b: &[DVec3]) -> f64 {
+    ErrorSummary::of(&vertex_errors(a, b)).rms_mm
 }
 
 #[cfg(test)]
@@ -41,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_of_twenty_by_hand() {
+    fn the_summary_of_one_to_twenty_is_the_closed_form() {
         let errors: Vec<f64> = (1..=20).rev().map(|i| f64::from(i) * 1e-3).collect();
         let s = ErrorSummary::of(&errors);
         assert_eq!(s.vertices, 20);

@@ -1,9 +1,19 @@
-//! Who takes part, on what, and what the paper printed.
+//! The methods compared in Table 4, one run of each, and the times printed in the paper.
 
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use glam::DVec3;
+
+use crate::drape::{Model, Refine, Settings, StageTimes, drape};
 use crate::garment::builtin::{BUILT_IN, TABLE_4_SIZES};
-use crate::methods::{gross2003, thomaszewski2006, zhu2016};
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::Cloth;
+use crate::mechanics::refine::Stop;
+use crate::methods::{self, Dressing, Ended, RestRule, gross2003, thomaszewski2006, zhu2016};
+use crate::scene::Scene;
 
-/// A way to drape.
+/// A compared method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ComparedMethod {
     /// A reference method, by its name.
@@ -12,13 +22,32 @@ pub(crate) enum ComparedMethod {
     Paper,
     /// The coupled model's two stages alone.
     Preview,
-    /// The coupled model and then to rest.
+    /// The coupled model's two stages, refined to convergence.
     Converged,
 }
 
+/// The compared methods, in the order of the columns.
+pub(crate) const METHODS: [ComparedMethod; 6] = [
+    ComparedMethod::Reference(zhu2016::NAME),
+    ComparedMethod::Reference(gross2003::NAME),
+    ComparedMethod::Reference(thomaszewski2006::NAME),
+    ComparedMethod::Paper,
+    ComparedMethod::Preview,
+    ComparedMethod::Converged,
+];
+
+/// One drape with its time and its end.
+pub(super) struct Outcome {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) time: Duration,
+    pub(super) ended: String,
+    pub(super) steps: usize,
+    pub(super) simulated_s: Option<f64>,
+    pub(super) counts: Vec<(String, u64)>,
+}
+
 impl ComparedMethod {
-    /// Its name in tables and files.
-    #[must_use]
+    /// Name in tables and files.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Reference(name) => name,
@@ -27,8 +56,8 @@ impl ComparedMethod {
             Self::Converged => "converged",
         }
     }
-    /// Its name for people: the paper's number of the reference, first author and year.
-    #[must_use]
+
+    /// Title in recordings: the paper's number of the reference, first author and year.
     pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Reference(zhu2016::NAME) => "[19] Zhu 2016",
@@ -40,17 +69,71 @@ impl ComparedMethod {
             Self::Converged => "Our converged drape",
         }
     }
+
+    /// Drapes the scene once.
+    ///
+    /// # Errors
+    /// The reason why this method cannot drape the scene.
+    pub(super) fn run(
+        self,
+        scene: &Scene,
+        fabric: &Fabric,
+        cloth: &Cloth,
+        rule: &RestRule,
+        go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
+    ) -> Result<Outcome, String> {
+        let (model, refine) = match self {
+            Self::Reference(name) => {
+                return run_reference(name, &Dressing { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
+            }
+            Self::Paper => ("paper", Refine::Steps(0)),
+            Self::Preview => ("coupled", Refine::Steps(0)),
+            Self::Converged => ("coupled", Refine::Converged),
+        };
+        let model = Model::by_name(model).unwrap_or_default();
+        let settings = Settings { model, refine, fabric: fabric.clone(), ..Settings::default() };
+        let drape = drape(scene, &settings, &mut |_| go_on()).map_err(|e| e.to_string())?;
+        let StageTimes { distance, segment, mechanics, refine, .. } = drape.times;
+        let ended = match (self, drape.state.as_ref().map(|s| s.stop)) {
+            (_, Some(Stop::Interrupted)) => "interrupted",
+            (Self::Converged, Some(Stop::Converged)) => "converged",
+            (Self::Converged, Some(Stop::Stalled)) => "stalled",
+            (Self::Converged, _) => "steps-done",
+            _ => "two-stages",
+        };
+        Ok(Outcome {
+            positions: drape.positions,
+            time: distance + segment + mechanics + refine,
+            ended: ended.to_owned(),
+            steps: drape.state.map_or(0, |s| s.steps),
+            simulated_s: None,
+            counts: vec![("PARTs".to_owned(), drape.parts.len() as u64)],
+        })
+    }
 }
 
-/// In the order of the columns.
-pub(crate) const METHODS: [ComparedMethod; 6] = [
-    ComparedMethod::Reference(zhu2016::NAME),
-    ComparedMethod::Reference(gross2003::NAME),
-    ComparedMethod::Reference(thomaszewski2006::NAME),
-    ComparedMethod::Paper,
-    ComparedMethod::Preview,
-    ComparedMethod::Converged,
-];
+fn run_reference(
+    name: &str,
+    dressing: &Dressing<'_>,
+    rule: &RestRule,
+    go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
+) -> Result<Outcome, String> {
+    let method = methods::by_name(name, false, None).ok_or_else(|| format!("there is no method {name}"))?;
+    let drape = method.drape(dressing, rule, &mut |_| go_on()).map_err(|e| e.to_string())?;
+    let ended = match drape.ended {
+        Ended::AtRest => "at-rest",
+        Ended::TimeOver => "time-over",
+        Ended::Interrupted => "interrupted",
+    };
+    Ok(Outcome {
+        positions: drape.positions,
+        time: drape.total,
+        ended: ended.to_owned(),
+        steps: drape.steps,
+        simulated_s: Some(drape.simulated_s),
+        counts: drape.counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
+    })
+}
 
 /// The ten rows of Table 4: garment and vertices.
 pub(crate) const TEN_ROWS: [(&str, usize); 10] = {
@@ -63,7 +146,7 @@ pub(crate) const TEN_ROWS: [(&str, usize); 10] = {
     rows
 };
 
-/// What Table 4 prints, ms: methods \[19\], \[20\], \[21\] and the paper's own, on an Intel Core i5 650 of 2010.
+/// Times printed in Table 4, ms: methods \[19\], \[20\], \[21\] and the paper's own, on an Intel Core i5 650 of 2010.
 const PRINTED: [[f64; 4]; 10] = [
     [1012.0, 1133.0, 1257.0, 898.0],
     [960.0, 1084.0, 1189.0, 834.0],
@@ -77,9 +160,7 @@ const PRINTED: [[f64; 4]; 10] = [
     [1992.0, 2109.0, 2478.0, 1727.0],
 ];
 
-/// The paper's figures for a garment of so many vertices, ms: \[19\], \[20\], \[21\], proposed; `None` for what it has no row
-/// for.
-#[must_use]
+/// The paper's times for a garment of this size, ms: \[19\], \[20\], \[21\], proposed; `None` if the paper has no such row.
 pub(crate) fn printed_ms(garment: &str, vertices: usize) -> Option<[f64; 4]> {
     TEN_ROWS.iter().position(|row| *row == (garment, vertices)).map(|i| PRINTED[i])
 }

@@ -1,45 +1,45 @@
-//! The rows of a contest on disk: written whole after each, so that what is done is kept and the rest can be done later.
+//! The log of finished rows on disk: rewritten atomically after each row, so an interrupted run can be resumed.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{METHODS, Table4Options, Table4Row};
+use super::methods::METHODS;
+use super::row::{Table4Options, Table4Row};
 use crate::base::atomic_file::WholeFile;
 use crate::base::files::{Unreadable, read_own};
 
-/// What rows must have in common to stand in one table.
+/// Conditions of a measurement. Rows of one table have equal conditions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Conditions {
     /// Version of the program.
     pub version: String,
-    /// The fabric's name.
+    /// Name of the fabric.
     pub fabric: String,
     /// Counted rounds.
     pub rounds: usize,
-    /// Rounds before them.
+    /// Uncounted rounds before them.
     pub warm_up: usize,
     /// Perturbed starts.
     pub starts: u64,
-    /// RMS speed under which what moves in time rests, m/s, and for how long, s.
+    /// A simulation over time is at rest when its RMS speed stays below the first value, m/s, for the second, s.
     pub rest: [f64; 2],
     /// Worker threads.
     pub threads: usize,
-    /// What the machine calls itself.
+    /// Name of the processor, or its architecture.
     pub machine: String,
-    /// Who takes part.
+    /// The compared methods.
     #[serde(default, rename = "entrants")]
     pub methods: Vec<String>,
 }
 
 impl Conditions {
-    /// Those of a run on this machine.
-    #[must_use]
+    /// Conditions of a run on this machine.
     pub(crate) fn here(fabric: &str, options: &Table4Options) -> Self {
-        // Only Linux tells without asking a library; elsewhere the architecture must do.
-        let told = read_own(Path::new("/proc/cpuinfo")).unwrap_or_default();
-        let told = String::from_utf8_lossy(&told);
-        let model = told.lines().find_map(|line| line.strip_prefix("model name"));
+        // Linux alone names the processor without a library.
+        let cpu_info = read_own(Path::new("/proc/cpuinfo")).unwrap_or_default();
+        let cpu_info = String::from_utf8_lossy(&cpu_info);
+        let model = cpu_info.lines().find_map(|line| line.strip_prefix("model name"));
         let machine = model.map_or(std::env::consts::ARCH, |m| m.trim_start_matches([' ', '\t', ':'])).to_owned();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -54,9 +54,8 @@ impl Conditions {
         }
     }
 
-    /// In one line.
-    #[must_use]
-    pub(crate) fn said(&self) -> String {
+    /// The conditions in one line.
+    pub(crate) fn text(&self) -> String {
         let Self { machine, threads, fabric, rounds, warm_up, starts, rest: [speed, over], .. } = self;
         let rest = format!("rest: RMS speed under {} cm/s over {over} s", 100.0 * speed);
         let counted = format!("{rounds} counted rounds after {warm_up}; {starts} perturbed starts");
@@ -64,37 +63,37 @@ impl Conditions {
     }
 }
 
-/// Rows and what they have in common.
+/// Finished rows and their conditions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RowLog {
-    /// What they have in common.
+    /// Conditions of all rows.
     pub conditions: Conditions,
-    /// The rows so far.
+    /// Finished rows.
     pub rows: Vec<Table4Row>,
 }
 
-/// Why a log cannot be gone on with.
+/// Why a log cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub(crate) enum RowLogError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// It is no log.
-    #[error("{file}: this is no log of a contest ({reason}); choose another file with --rows-file")]
+    /// The file is not a row log.
+    #[error("{file}: found no row log of Table 4 ({reason}); choose another file with --rows-file")]
     Syntax { file: String, reason: String },
-    /// Its rows were made under other conditions.
+    /// The rows were measured under other conditions.
     #[error(
-        "{file}: its rows were made under other conditions: found {found}, expected {expected}; choose another file with --rows-file"
+        "{file}: the rows were measured under other conditions: found {found}, expected {expected}; choose another file with --rows-file"
     )]
     Other { file: String, found: String, expected: String },
 }
 
 impl RowLog {
-    /// The log in a file, or an empty one where there is none.
+    /// Reads a log; a file that does not exist is an empty log.
     ///
     /// # Errors
-    /// [`RowLogError`] where the file is none, or of other conditions.
+    /// [`RowLogError`] if the file is not a log, or has other conditions.
     pub(crate) fn open(path: &Path, conditions: Conditions) -> Result<Self, RowLogError> {
         if !path.exists() {
             return Ok(Self { conditions, rows: Vec::new() });
@@ -105,22 +104,21 @@ impl RowLog {
             .map_err(|e| RowLogError::Syntax { file: file.clone(), reason: e.to_string() })?;
         if log.conditions != conditions {
             let [found, expected] = [&log.conditions, &conditions]
-                .map(|c| format!("version {}, {}; {}", c.version, c.said(), c.methods.join(", ")));
+                .map(|c| format!("version {}, {}; {}", c.version, c.text(), c.methods.join(", ")));
             return Err(RowLogError::Other { file, found, expected });
         }
         Ok(log)
     }
 
-    /// Whether a row is there.
-    #[must_use]
-    pub(crate) fn has(&self, garment: &str, vertices: usize) -> bool {
-        self.rows.iter().any(|row| row.garment == garment && row.asked == vertices)
+    /// The row of a garment at a requested size.
+    pub(crate) fn find(&self, garment: &str, vertices: usize) -> Option<&Table4Row> {
+        self.rows.iter().find(|row| row.garment == garment && row.asked == vertices)
     }
 
-    /// Writes it whole.
+    /// Writes the log atomically.
     ///
     /// # Errors
-    /// Those of the disk.
+    /// Errors of the disk.
     pub(crate) fn write(&self, path: &Path) -> std::io::Result<()> {
         WholeFile::write(path, serde_json::to_string(self).map_err(std::io::Error::other)?)
     }
@@ -131,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_journal_goes_on_under_its_own_conditions_alone() {
+    fn a_log_is_resumed_under_equal_conditions_only() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rows.json");
         let here = Conditions::here("interlock", &Table4Options::default());
@@ -142,7 +140,7 @@ mod tests {
         log.write(&path).unwrap();
         let again = RowLog::open(&path, here.clone()).unwrap();
         assert_eq!(again, log);
-        assert!(again.has("flared-skirt", 900) && !again.has("flared-skirt", 901));
+        assert!(again.find("flared-skirt", 900).is_some() && again.find("flared-skirt", 901).is_none());
         let other = Conditions { threads: 99, ..here.clone() };
         assert!(matches!(RowLog::open(&path, other), Err(RowLogError::Other { .. })));
         std::fs::write(&path, "{}").unwrap();

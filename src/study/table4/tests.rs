@@ -1,4 +1,4 @@
-//! A row of the contest on a small garment.
+//! A row of Table 4 on a small garment.
 
 use std::ops::ControlFlow;
 
@@ -14,11 +14,11 @@ const SMALL: Table4Options = Table4Options {
 };
 
 #[test]
-fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
+fn a_row_has_every_method_and_ratios_to_the_converged_drape() {
     let scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
-    let mut told = Vec::new();
+    let mut calls = Vec::new();
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &SMALL, &mut |round, _, what| {
-        told.push((round, what.to_owned()));
+        calls.push((round, what.to_owned()));
         ControlFlow::Continue(())
     });
     let DrapedRow { row: made, draped, canonical } = made.unwrap();
@@ -41,17 +41,17 @@ fn a_row_has_every_entrant_and_ratios_to_the_converged_drape() {
     assert_eq!([zhu, pieces, subdivision].map(|e| e.ended.as_str()), ["at-rest"; 3]);
     assert_eq!((paper.ended.as_str(), preview.ended.as_str()), ("two-stages", "two-stages"));
     assert_eq!((converged.ended.as_str(), converged.ratio, converged.ratio_spread), ("converged", 1.0, 0.0));
-    // It is at rest by the common energy, so little is left of its own way, which begins without what keeps skin from showing between
-    // vertices as coarse as these; the paper's equations leave most of it.
+    // The converged drape is at rest by the common energy, so its own error is small. It is not zero, because the continuation starts without
+    // the offsets that keep skin from showing between coarse vertices. The paper's equations leave a larger error.
     assert!(converged.residual_over_weight < 2e-3 && converged.own_rms_mm < 2.0, "{converged:?}");
     assert!(paper.canonical_rms_mm > converged.canonical_rms_mm);
     // Interleaved: each round has all of them before the next begins.
-    let first_of_second = told.iter().position(|(round, _)| *round == 1).unwrap();
-    assert!(METHODS.iter().all(|e| told[..first_of_second].iter().any(|(_, what)| what == e.name())));
+    let first_of_second = calls.iter().position(|(round, _)| *round == 1).unwrap();
+    assert!(METHODS.iter().all(|e| calls[..first_of_second].iter().any(|(_, what)| what == e.name())));
 }
 
 #[test]
-fn who_cannot_run_says_why_and_the_others_go_on() {
+fn a_method_that_cannot_run_reports_why_and_the_others_run() {
     let mut scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
@@ -69,12 +69,12 @@ fn who_cannot_run_says_why_and_the_others_go_on() {
 }
 
 #[test]
-fn an_interrupted_row_is_none() {
+fn an_interrupted_row_is_an_error() {
     let scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
-    let mut asked = 0;
+    let mut calls = 0;
     let made = row(("pullover-1", 600), &scene, &Fabric::default(), &SMALL, &mut |_, _, _| {
-        asked += 1;
-        if asked > 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        calls += 1;
+        if calls > 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert!(matches!(made, Err(Table4Error::Interrupted)));
 }

@@ -1,62 +1,63 @@
-//! Where a drape hangs and how wide it is: what a tailor measures of it, besides distances of vertices.
+//! Hem height and girths of a drape.
 //!
-//! The hem is the garment's lowest edge as placed, its height the mean of its vertices'. Girths are lengths of the largest closed curve
-//! in which a level plane cuts the cloth: [`ABOVE_HEM`] over the hem, half way, and [`BELOW_ARMPITS`] under the armpits, or
-//! [`BELOW_TOP`] under the garment's top where that is lower. The planes are those of the canonical drape for all entrants of a row.
+//! The hem is the garment's lowest edge as placed; its height is the mean height of its vertices. A girth is the length of
+//! the largest closed curve in which a level plane cuts the cloth. The planes lie [`ABOVE_HEM`] over the hem, half way, and
+//! [`BELOW_ARMPITS`] under the armpits, or [`BELOW_TOP`] under the garment's top where that is lower. All methods of a row
+//! are cut at the planes of the canonical drape.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::base::quantiles::extremes;
 use crate::body::girth::{Plane, section};
 use crate::garment::sewing::Landmarks;
 use crate::scene::Scene;
+use crate::study::accuracy::shape::{lowest_edge, mean_height};
 
-/// Height of the first girth over the hem, m.
+/// Height of the first girth over the hem, m. Heuristic: just above the edge, whose folds are the largest.
 const ABOVE_HEM: f64 = 0.02;
-/// Depth of the last girth under the garment's top, m.
+/// Depth of the last girth under the garment's top, m. Heuristic: just below the edge.
 const BELOW_TOP: f64 = 0.03;
-/// Depth of the last girth under the body's armpits, m: a sleeve leaves its bodice lower than the arm its trunk.
+/// Depth of the last girth under the body's armpits, m. A sleeve leaves its bodice lower than the arm leaves the trunk; a
+/// smaller depth would cut the sleeves too.
 const BELOW_ARMPITS: f64 = 0.08;
 
-/// Where a drape hangs and how wide it is.
+/// Hem height and girths of a drape.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Silhouette {
     /// Height of the hem, cm; `None` for cloth without an edge.
     pub hem_cm: Option<f64>,
-    /// Girths near the hem, half way and near the top, cm; `None` where no closed curve is.
+    /// Girths near the hem, half way and near the top, cm; `None` where the plane cuts no closed curve.
     pub girths_cm: [Option<f64>; 3],
 }
 
-/// Where to measure.
+/// The hem and the heights of the planes.
 #[derive(Debug, Clone)]
-pub(super) struct Tape {
-    hem: Vec<u32>,
+pub(super) struct SectionHeights {
+    hem: Option<Vec<u32>>,
     heights: [f64; 3],
 }
 
-impl Tape {
-    /// By the canonical drape (m).
+impl SectionHeights {
+    /// The planes of the canonical drape (m).
     pub(super) fn new(scene: &Scene, canonical: &[DVec3]) -> Self {
-        let mean = |edge: &[u32], x: &[DVec3]| edge.iter().map(|&v| x[v as usize].z).sum::<f64>() / edge.len() as f64;
-        let placed = &scene.garment.positions;
-        let loops = scene.topology.boundary_loops().into_iter().filter(|edge| !edge.is_empty());
-        let hem = loops.min_by(|a, b| mean(a, placed).total_cmp(&mean(b, placed))).unwrap_or_default();
-        let (low, high) =
-            canonical.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.z), h.max(p.z)));
-        let bottom = if hem.is_empty() { low } else { mean(&hem, canonical) } + ABOVE_HEM;
+        let hem = lowest_edge(&scene.topology, &scene.garment.positions);
+        let (low, high) = extremes(canonical.iter().map(|p| p.z));
+        let bottom = hem.as_ref().map_or(low, |hem| mean_height(hem, canonical)) + ABOVE_HEM;
         let armpit = Landmarks::of(scene.body.mesh()).armpit_z.unwrap_or(high);
         let top = (high - BELOW_TOP).min(armpit - BELOW_ARMPITS);
         Self { hem, heights: [bottom, 0.5 * (bottom + top), top] }
     }
 
-    pub(super) fn measure(&self, scene: &Scene, x: &[DVec3]) -> Silhouette {
-        let draped = scene.garment.with_positions(x.to_vec());
-        let hem = self.hem.iter().map(|&v| x[v as usize].z).sum::<f64>() / self.hem.len().max(1) as f64;
+    /// Hem and girths of the garment at `positions` (m).
+    pub(super) fn measure(&self, scene: &Scene, positions: &[DVec3]) -> Silhouette {
+        let draped = scene.garment.with_positions(positions.to_vec());
         let girth = |z: f64| {
             let curves = section(&draped, Plane::horizontal(z)).into_iter().filter(|curve| curve.closed);
             curves.map(|curve| 100.0 * curve.length()).max_by(f64::total_cmp)
         };
-        Silhouette { hem_cm: (!self.hem.is_empty()).then_some(100.0 * hem), girths_cm: self.heights.map(girth) }
+        let hem_cm = self.hem.as_ref().map(|hem| 100.0 * mean_height(hem, positions));
+        Silhouette { hem_cm, girths_cm: self.heights.map(girth) }
     }
 }
 
@@ -89,10 +90,10 @@ mod tests {
         };
         let triangles = (0..rows - 1).flat_map(|j| (0..n).flat_map(move |k| cell(k, j))).collect();
         let scene = Scene::of_meshes(&body, TriMesh::new(positions, triangles)).unwrap();
-        let tape = Tape::new(&scene, &scene.garment.positions);
+        let heights = SectionHeights::new(&scene, &scene.garment.positions);
         let wider: Vec<DVec3> =
             scene.garment.positions.iter().map(|p| DVec3::new(1.1 * p.x, 1.1 * p.y, p.z - 0.01)).collect();
-        let found = tape.measure(&scene, &wider);
+        let found = heights.measure(&scene, &wider);
         assert!((found.hem_cm.unwrap() - 49.0).abs() < 1e-9);
         let round = 100.0 * 0.22 * std::f64::consts::TAU;
         for girth in found.girths_cm {
