@@ -1,10 +1,9 @@
-//! A drape against its references: how far it is from where it would settle, and from the canonical drape.
+//! Evaluation of a drape against its references: its own continuation and the canonical drape.
 //!
-//! The *own continuation* is the drape refined to convergence from the very result (`accuracy.rms_mm`); the *canonical drape*
-//! is refined from the undraped garment (`accuracy.canonical_rms_mm`), and its *spread* is the RMS distance between it and
-//! drapes from starts put on a little differently (`accuracy.canonical_spread_mm`, [`perturbed`]): a garment has several
-//! equilibria, and an error under the spread says nothing. References are kept on disk under their content hash; see
-//! [`reference`](crate::study::accuracy::reference).
+//! The *own continuation* is refined to convergence from the result itself (`accuracy.rms_mm`). The *canonical drape* is
+//! refined from the undraped garment (`accuracy.canonical_rms_mm`). Its *spread* is the RMS distance between it and drapes
+//! from perturbed starts (`accuracy.canonical_spread_mm`, [`perturbed`]). A garment has several equilibria, so an error below
+//! the spread does not rank results. References are cached on disk; see [`reference`](crate::study::accuracy::reference).
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -16,75 +15,75 @@ use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::refine::{Observer, RefineOptions, SolveError, Stop, refine};
 use crate::study::accuracy::reference::{Reference, ReferenceCache, ReferenceInput, ReferenceKey};
-use crate::study::accuracy::{self, Accuracy, AccuracyError, Comparison};
+use crate::study::accuracy::{Accuracy, AccuracyError, Comparison, compare, rms, rms_mm, vertex_errors_mm};
 use crate::study::wrinkles::{self, Wrinkles};
 
-/// RMS of a perturbation, m: what previews by different range tables differ by, and less than two hands would.
+/// RMS of a perturbation, m. Heuristic: about the difference between previews by different range tables, and less than two
+/// dressings of a real garment differ.
 const PERTURBATION: f64 = 5e-3;
 
-/// Wave numbers of a perturbation along each axis, 1/m, are up to this: waves of 20 cm and more, a fold's length.
+/// Largest wave number of a perturbation along an axis, 1/m: waves of at least 20 cm, the length of a fold. Larger values strain the
+/// cloth; the first relaxation removes such waves.
 const WAVE_NUMBER: f64 = 30.0;
 
-/// Plane waves in a perturbation.
+/// Number of plane waves in a perturbation.
 const WAVES: usize = 8;
 
-/// Why a drape could not be assessed.
+/// Why a drape cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
     /// The cloth cannot be set up.
     #[error(transparent)]
     Energy(#[from] EnergyError),
-    /// The reference cannot be solved.
+    /// The solver of the reference failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// The two cannot be compared.
+    /// Drape and reference cannot be compared.
     #[error(transparent)]
     Accuracy(#[from] AccuracyError),
-    /// No drape is everybody's reference.
+    /// The canonical drape of layered garments is not defined.
     #[error(
-        "garments worn over each other have no canonical drape, as each waits for what is below it: found {garments} of them, expected \
-         one; leave --accuracy out, or measure each by itself"
+        "found {garments} layered garments, expected one: each layer drapes over the result of the layer below, so an outfit has no canonical \
+         drape; omit --accuracy, or measure each garment by itself"
     )]
     #[allow(missing_docs, reason = "the message says what it is")]
     Layers { garments: usize },
-    /// Nothing keeps the garment on the body.
-    #[error(
-        "the garment falls off the body where it goes on to rest, so it has no reference; hold an edge of it (--hold)"
-    )]
+    /// The garment falls off the body.
+    #[error("the garment falls off the body before it rests, so it has no reference; hold an edge of it (--hold)")]
     Fallen,
-    /// The caller stopped it.
+    /// The caller interrupted the computation.
     #[error("interrupted while a reference was refined")]
     Interrupted,
 }
 
-/// What is asked of an evaluation.
+/// Options of an evaluation.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct EvaluateOptions {
-    /// Where references are kept; `None` computes them anew.
+    /// Cache of references; `None` computes each reference.
     pub cache: Option<ReferenceCache>,
-    /// Perturbed starts for the spread of the canonical drape.
+    /// Number of perturbed starts for the spread of the canonical drape.
     pub spread_starts: u64,
 }
 
-/// A drape, assessed.
+/// Errors of a drape against its references.
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluation {
-    /// All figures.
+    /// Errors and state.
     pub accuracy: Accuracy,
     /// Distance of each vertex to its own continuation, mm.
     pub error_mm: Vec<f64>,
     /// The canonical drape.
     pub canonical: Reference,
-    /// Both measures of the folds.
+    /// Wrinkle measures of the paper and by curvature.
     pub wrinkles: Wrinkles,
-    /// Spearman's rank correlation, over the vertices, of the excess length in the preview with the mean curvature of where it settles;
-    /// `None` where the model has no excess.
+    /// Spearman's rank correlation over the vertices of the preview's excess length with the mean curvature of the own continuation;
+    /// `None` for a model without excess length.
     pub fold_rank_correlation: Option<f64>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Finds or makes the references of `drape` and measures it against them.
+/// Measures `drape` against its references, which are read from the cache or computed.
 ///
 /// # Errors
 /// [`EvaluateError`]; [`EvaluateError::Interrupted`] where `observer` ends a reference before it has converged.
@@ -95,21 +94,20 @@ pub(crate) fn evaluate(
     options: &EvaluateOptions,
     observer: Observer<'_>,
 ) -> Result<Evaluation, EvaluateError> {
-    of_one_garment(scene)?;
+    require_one_garment(scene)?;
     let cloth =
         Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &scene.held)?;
-    let self_contact = settings.self_contact;
-    let solver = RefineOptions { self_contact, ..RefineOptions::default() };
+    let solver = RefineOptions { self_contact: settings.self_contact, ..RefineOptions::default() };
     let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
     let own = references.from(&drape.positions, observer)?;
     let canonical = references.from(&scene.garment.positions, observer)?;
     let mut spread = Vec::new();
     for seed in 1..=options.spread_starts {
         let start = perturbed(&scene.garment.positions, &scene.held, seed);
-        spread.push(accuracy::rms_mm(&references.from(&start, observer)?.positions, &canonical.positions));
+        spread.push(rms_mm(&references.from(&start, observer)?.positions, &canonical.positions));
     }
     let warnings = references.warnings;
-    let mut measured = accuracy::compare(&Comparison {
+    let mut measured = compare(&Comparison {
         mesh: &scene.garment,
         topology: &scene.topology,
         cloth: &cloth,
@@ -119,16 +117,15 @@ pub(crate) fn evaluate(
         result: &drape.positions,
         reference: &own.positions,
     })?;
-    measured.canonical_rms_mm = Some(accuracy::rms_mm(&drape.positions, &canonical.positions));
-    measured.canonical_spread_mm =
-        (!spread.is_empty()).then(|| (spread.iter().map(|s| s * s).sum::<f64>() / spread.len() as f64).sqrt());
+    measured.canonical_rms_mm = Some(rms_mm(&drape.positions, &canonical.positions));
+    measured.canonical_spread_mm = (!spread.is_empty()).then(|| rms(&spread));
     let settled = scene.garment.with_positions(own.positions.clone());
     let fold_rank_correlation = drape.folds.as_ref().and_then(|folds| {
         wrinkles::rank_correlation(&folds.excess_percent, &wrinkles::mean_curvature(&settled, &scene.topology))
     });
     let moved: Vec<DVec3> = drape.outcomes.iter().map(|o| o.displacement).collect();
     Ok(Evaluation {
-        error_mm: accuracy::vertex_errors(&drape.positions, &own.positions).iter().map(|e| 1e3 * e).collect(),
+        error_mm: vertex_errors_mm(&drape.positions, &own.positions),
         wrinkles: wrinkles::measure(&scene.garment, &scene.topology, &drape.parts, &moved, &drape.positions),
         fold_rank_correlation,
         accuracy: measured,
@@ -137,15 +134,14 @@ pub(crate) fn evaluate(
     })
 }
 
-/// The canonical drape of a scene alone, found or made, and what the user should know about it: what a range table can hold
-/// at best is measured on it.
+/// The canonical drape of a scene, read from the cache or computed, with warnings.
 pub(crate) fn canonical(
     scene: &Scene,
     fabric: &Fabric,
     options: &EvaluateOptions,
     observer: Observer<'_>,
 ) -> Result<(Reference, Vec<String>), EvaluateError> {
-    of_one_garment(scene)?;
+    require_one_garment(scene)?;
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
     let solver = RefineOptions::default();
     let mut references = References { scene, cloth: &cloth, solver, options, warnings: Vec::new() };
@@ -153,20 +149,20 @@ pub(crate) fn canonical(
     Ok((reference, references.warnings))
 }
 
-fn of_one_garment(scene: &Scene) -> Result<(), EvaluateError> {
+fn require_one_garment(scene: &Scene) -> Result<(), EvaluateError> {
     match scene.layers.len() {
         garments @ 2.. => Err(EvaluateError::Layers { garments }),
         _ => Ok(()),
     }
 }
 
-/// Start positions moved as if the garment had been put on a little differently: by a smooth random field of 5 mm RMS, the same
-/// for the same seed. Noise at single vertices would say nothing: the first relaxation takes it off.
+/// Start positions displaced by a smooth random field of 5 mm RMS, equal for equal seeds; held vertices stay in place. White noise
+/// would not change the equilibrium, since the first relaxation removes it.
 #[must_use]
 pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
     let mut state = seed;
     let mut random = || {
-        // SplitMix64 (Steele, Lea, Flood 2014): three lines, the same bits everywhere.
+        // SplitMix64 (Steele, Lea, Flood 2014): equal bits on every platform.
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -187,6 +183,7 @@ pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
     moved
 }
 
+/// Computes references of one garment, or reads them from the cache.
 struct References<'a> {
     scene: &'a Scene,
     cloth: &'a Cloth,
@@ -196,6 +193,7 @@ struct References<'a> {
 }
 
 impl References<'_> {
+    /// The equilibrium that refinement reaches from `start` (m).
     fn from(&mut self, start: &[DVec3], observer: Observer<'_>) -> Result<Reference, EvaluateError> {
         let solver = self.solver.clone();
         let key = ReferenceKey::new(&ReferenceInput {
@@ -209,17 +207,17 @@ impl References<'_> {
         });
         let mut compute = || {
             let began = Instant::now();
-            let mut stopped = false;
+            let mut interrupted = false;
             let refined = refine(self.cloth, &self.scene.body, start.to_vec(), &solver, &mut |step| {
                 if self.scene.fallen(step.positions).is_some() {
                     return ControlFlow::Break(());
                 }
                 let answer = observer(step);
-                stopped |= answer.is_break();
+                interrupted |= answer.is_break();
                 answer
             })?;
             if refined.stop == Stop::Interrupted {
-                return Err(if stopped { EvaluateError::Interrupted } else { EvaluateError::Fallen });
+                return Err(if interrupted { EvaluateError::Interrupted } else { EvaluateError::Fallen });
             }
             Ok(Reference {
                 energy_j: refined.energy,
@@ -239,7 +237,7 @@ impl References<'_> {
         };
         if reference.residual_over_weight >= solver.tolerance {
             self.warnings.push(format!(
-                "a reference stopped at a residual of {:.1e} of the weight, expected under {:.0e}: errors against it are rough",
+                "the solver of a reference stopped at a residual of {:.1e} of the weight, expected less than {:.0e}: errors against it are inexact",
                 reference.residual_over_weight, solver.tolerance
             ));
         }
@@ -252,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_perturbation_is_smooth_of_5_mm_and_the_same_for_its_seed() {
+    fn a_perturbation_is_smooth_of_5_mm_rms_and_equal_for_equal_seeds() {
         let sheet: Vec<DVec3> =
             (0..400).map(|i| DVec3::new(f64::from(i % 20), 0.0, f64::from(i / 20)) * 0.01).collect();
         let moved = perturbed(&sheet, &[7], 3);

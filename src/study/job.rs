@@ -1,7 +1,7 @@
-//! One job: what is draped over what, by which dials, from which start, and what is measured of it.
+//! A job: scene, settings, start and measurements of one drape.
 //!
-//! A [`Job`] is plain data, and the same for everybody who fills one: the flags of `run`, the points of a sweep,
-//! `compare`, a script that sends JSON. `Job::default()` is `partwise run` without a flag.
+//! A [`Job`] is plain data. The flags of `run`, the points of a sweep, `compare` and scripts that send JSON all produce jobs.
+//! `Job::default()` is `partwise run` without flags.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -22,16 +22,16 @@ use crate::study::accuracy::{self, reference::ReferenceCache, representable::rep
 use crate::study::evaluate::{EvaluateError, EvaluateOptions, Evaluation, canonical, evaluate, perturbed};
 use crate::study::metrics::Metrics;
 
-/// What a drape is measured against.
+/// Reference that a drape is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Against {
-    /// Nothing: no error.
+    /// No reference: no error is measured.
     #[default]
     None,
     /// The canonical drape: one reference for each body, garment and fabric.
     Canonical,
-    /// Its own continuation too: a converged drape for every result, seconds each.
+    /// The canonical drape and the result's own continuation. Each result needs a converged drape, which takes seconds.
     Own,
 }
 
@@ -49,25 +49,24 @@ impl FromStr for Against {
     }
 }
 
-/// All that determines a result, and what is measured of it.
+/// All inputs of a drape, and its measurements.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Job {
-    /// What is draped over what.
+    /// Body and garments.
     pub scene: SceneSpec,
-    /// By which dials.
+    /// Settings of the model.
     #[serde(deserialize_with = "checked")]
     pub settings: Settings,
-    /// Seed of a start put on a little differently ([`perturbed`]); 0 is the undisturbed one.
+    /// Seed of a perturbed start ([`perturbed`]); 0 for the unperturbed start.
     pub seed: u64,
-    /// What the result is measured against.
+    /// Reference of the result.
     pub accuracy: Against,
-    /// Canonical drapes from this many perturbed starts, for the spread between equilibria; where measured against its
-    /// own.
+    /// Number of perturbed starts for the spread between equilibria; used with [`Against::Own`].
     pub spread_starts: u64,
 }
 
-/// Settings whose numbers can be computed with. Those of a job come from anywhere; those of flags are checked as flags.
+/// Deserialises settings and validates the numbers of model and fabric. Jobs may come from files or the network.
 fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
     let settings = Settings::deserialize(from)?;
     let wrong = numbers(&settings.model).into_iter().find(|(_, found, range)| !range.contains(found));
@@ -77,11 +76,10 @@ fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
     }
     settings.fabric.check("settings.fabric").map_err(D::Error::custom)?;
     let extents = settings.model.extents_cm();
-    let falls = extents.is_sorted_by(|a, b| a > b);
-    if falls && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
+    if extents.is_sorted_by(|a, b| a > b) && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
         return Ok(settings);
     }
-    let expected = "finite extents above 0, from coarse to fine, or none for PARTs as the table makes them";
+    let expected = "finite extents above 0, from coarse to fine, or no extent to keep the PARTs of the range table";
     Err(D::Error::custom(format!("settings.model: found extents of {extents:?} cm, expected {expected}")))
 }
 
@@ -135,22 +133,22 @@ fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
     }
 }
 
-/// What was measured of a drape.
+/// Measurements of a drape.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// Its figures.
+    /// Metrics of the drape.
     pub metrics: Metrics,
-    /// Distance of each vertex to the reference it is judged by, mm; empty where none was asked for.
+    /// Distance of each vertex to its reference, mm; empty without a reference.
     pub error_mm: Vec<f64>,
-    /// The whole comparison with its own continuation, where it was asked for.
+    /// Comparison with the own continuation, with [`Against::Own`].
     pub(crate) evaluation: Option<Evaluation>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
 impl Job {
-    /// A job that ends after the two stages, which is where range tables differ: what sweeps and comparisons start
-    /// from. Its table goes by the name it would be asked for, as all do there.
+    /// A job that ends after the two stages, where range tables differ. Sweeps and comparisons start from it. Its table has the name
+    /// by which sweep files request it.
     #[must_use]
     pub fn preview() -> Self {
         let Settings { table, .. } = Settings::default();
@@ -168,22 +166,22 @@ impl Job {
         scene.file_names()
     }
 
-    /// Drapes `scene`, which [`SceneSpec::load`] made of the job's own: points of a sweep share it.
+    /// Drapes `scene`, loaded from the job's own by [`SceneSpec::load`]. Points of a sweep share loaded scenes.
     pub fn drape(&self, scene: &Scene, observer: Observer<'_>) -> Result<Drape, DrapeError> {
         if self.seed == 0 {
             return drape(scene, &self.settings, observer);
         }
-        // A table by rule is the undisturbed garment's, so that starts are compared by one table.
+        // A table by rule is resolved on the unperturbed garment, so that all starts have the same table.
         let settings = self.settings.resolved(&scene.distances_m()?)?;
         let positions = perturbed(&scene.garment.positions, &scene.held, self.seed);
         let moved = Scene { garment: scene.garment.with_positions(positions), ..scene.clone() };
         drape(&moved, &settings, observer)
     }
 
-    /// Measures a drape of `scene`; references are kept in `cache`, if there is one.
+    /// Measures a drape of `scene`. References are cached in `cache`.
     ///
     /// # Errors
-    /// As [`evaluate`]; [`EvaluateError::Interrupted`] where `observer` ends a reference before it has converged.
+    /// [`EvaluateError`]; [`EvaluateError::Interrupted`] if `observer` stops the solver of a reference.
     pub fn measure(
         &self,
         scene: &Scene,
@@ -221,7 +219,7 @@ impl Job {
                 metrics = metrics.with_evaluation(found);
                 found.error_mm.clone()
             }
-            None => accuracy::vertex_errors(&drape.positions, &reference).iter().map(|e| 1e3 * e).collect(),
+            None => accuracy::vertex_errors_mm(&drape.positions, &reference),
         };
         Ok(Measured { metrics, error_mm, evaluation, warnings: [warnings, of_reference].concat() })
     }
@@ -233,7 +231,7 @@ mod tests {
     use crate::drape::{DEFAULT_EXTENTS_CM, Model};
 
     #[test]
-    fn a_job_is_json_and_what_is_left_out_is_the_default() {
+    fn a_job_round_trips_through_json_and_omitted_fields_are_defaults() {
         let mut job = Job { seed: 3, accuracy: Against::Own, ..Job::default() };
         job.settings.refine = Refine::Steps(2);
         job.settings.model = Model::default().with_extents_cm(&[12.0, 6.0]);
@@ -243,8 +241,8 @@ mod tests {
         let short: Job = serde_json::from_str(short).unwrap();
         assert_eq!(short.settings.model.extents_cm(), DEFAULT_EXTENTS_CM);
         assert_eq!((short.scene.body.as_str(), short.accuracy), ("form", Against::None));
-        let said = serde_json::from_str::<Job>(r#"{"scene": {"colour": 3}}"#).unwrap_err().to_string();
-        assert!(said.contains("colour"), "{said}");
+        let message = serde_json::from_str::<Job>(r#"{"scene": {"colour": 3}}"#).unwrap_err().to_string();
+        assert!(message.contains("colour"), "{message}");
     }
 
     /// Puts each of `values` in the place of each number below `at` of the same type, and hands the whole to `see`.
@@ -314,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn extents_that_cut_nothing_are_refused() {
+    fn extents_that_are_not_positive_and_falling_are_rejected() {
         let with = |extents: &str| {
             let text = format!("[settings.model.coupled]\nextents_m = {extents}\n");
             toml::from_str::<Job>(&text).map_err(|e| e.to_string())
@@ -322,11 +320,11 @@ mod tests {
         assert_eq!(with("[0.12, 0.06]").unwrap().settings.model.extents_cm(), [12.0, 6.0]);
         assert!(with("[]").is_ok());
         for wrong in ["[-0.1]", "[nan]", "[0.0]", "[inf]", "[0.06, 0.12]", "[0.12, -0.06]"] {
-            let said = with(wrong).unwrap_err();
-            assert!(said.contains("above 0") && said.contains("coarse to fine"), "{wrong}: {said}");
+            let message = with(wrong).unwrap_err();
+            assert!(message.contains("above 0") && message.contains("coarse to fine"), "{wrong}: {message}");
         }
         let json = r#"{"settings": {"model": {"coupled": {"extents_m": [-0.06]}}}}"#;
-        let said = serde_json::from_str::<Job>(json).unwrap_err().to_string();
-        assert!(said.contains("-6"), "{said}");
+        let message = serde_json::from_str::<Job>(json).unwrap_err().to_string();
+        assert!(message.contains("-6"), "{message}");
     }
 }

@@ -1,10 +1,10 @@
-//! Wrinkles: what the paper reads off its PARTs, beside what a fold is.
+//! Wrinkle measures: the paper's displacement difference of adjacent PARTs, and mean curvature.
 //!
-//! The paper takes the difference of the displacements of two adjacent PARTs for a wrinkle at their seam, |D_p − D_q|. A
-//! fold is curvature: the mean curvature of the drape, H_i = |Σ_j (cot α_ij + cot β_ij)(x_i − x_j)| / (4 A_i), with α, β the angles
+//! The paper measures a wrinkle at the seam of two adjacent PARTs by the difference of their displacements, |D_p − D_q|. A
+//! fold has curvature: the mean curvature of the drape, H_i = |Σ_j (cot α_ij + cot β_ij)(x_i − x_j)| / (4 A_i), with α, β the angles
 //! opposite edge i–j and A_i the vertex's mixed area (Meyer, Desbrun, Schröder, Barr: "Discrete differential-geometry operators
 //! for triangulated 2-manifolds", 2003). Both are reported per seam, and Spearman's rank correlation
-//! says how far one tells the other.
+//! states their agreement.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -12,8 +12,8 @@
 //! | H | mean curvature, without sign | 1/m |
 //! | A | mixed area: the vertex's Voronoi cell, cut at obtuse triangles | m² |
 //!
-//! Limits: H counts the body's own roundness too; on the edge of the cloth it is undefined, and taken from the inner
-//! neighbours.
+//! Limits: H includes the curvature of the body below; on the edge of the cloth it is undefined, and the mean of the inner
+//! neighbours is used.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -39,13 +39,12 @@ pub(crate) struct Wrinkles {
     pub seams: Vec<SeamWrinkle>,
     /// H of each vertex, 1/m.
     pub vertex_curvature_per_m: Vec<f64>,
-    /// Spearman's rank correlation of the two measures over the seams; `None` for fewer than three seams or where one
-    /// measure is the same everywhere.
+    /// Spearman's rank correlation of the two measures over the seams; `None` for fewer than three seams or a constant
+    /// measure.
     pub rank_correlation: Option<f64>,
 }
 
 /// Measures the drape at `positions` (m) with one displacement `part_displacement` (m) a PART.
-#[must_use]
 pub(crate) fn measure(
     mesh: &TriMesh,
     topology: &Topology,
@@ -74,7 +73,6 @@ pub(crate) fn measure(
 }
 
 /// H of each vertex, 1/m; zero for a vertex of no triangle.
-#[must_use]
 pub(crate) fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     let mut laplacian = vec![DVec3::ZERO; mesh.vertex_count()];
     let mut areas = vec![0.0; mesh.vertex_count()];
@@ -114,8 +112,8 @@ pub(crate) fn mean_curvature(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
         .collect()
 }
 
-/// What each corner of a triangle owns of it, m²: its Voronoi cell, or where an angle is obtuse half the triangle for that
-/// corner and a quarter for the others.
+/// Mixed area of each corner of a triangle, m²: its Voronoi cell; in an obtuse triangle half the area for the obtuse corner and a
+/// quarter for the others.
 fn mixed_areas(corners: [DVec3; 3]) -> [f64; 3] {
     let side = |i: usize, j: usize| corners[j % 3] - corners[i % 3];
     let area = 0.5 * side(0, 1).cross(side(0, 2)).length();
@@ -131,7 +129,6 @@ fn mixed_areas(corners: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// Spearman's rank correlation, ties at their mean rank.
-#[must_use]
 pub(crate) fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     if a.len() != b.len() || a.len() < 3 {
         return None;

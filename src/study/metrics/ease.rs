@@ -1,14 +1,14 @@
-//! Ease: by how much a garment is wider than the body where a tailor measures both.
+//! Ease: difference of the girths of garment and body at bust, waist and hip.
 //!
-//! At the height of the body's bust, waist and hip (those it is made by, else [`Landmarks`]) the draped garment is cut by a level plane. Of the closed curves round
-//! the trunk the shortest is followed through the triangles' rest shapes, so that what is told is the cloth as it was cut, along the
-//! line where it lies, whatever folds or stretches there:
+//! A level plane cuts the draped garment at the height of the body's bust, waist and hip (from its measurements, else from
+//! [`Landmarks`]). The shortest closed curve around the trunk is measured in the triangles' rest shapes: the length of the cloth as cut,
+//! independent of folds and stretch.
 //!
-//! ease = ∮ cloth at rest − girth of the body by tape.
+//! ease = ∮ cloth at rest − tape girth of the body.
 //!
-//! Negative ease is cloth that has to stretch. Where the curve goes round the arms too, as a pullover's does at the bust if its sleeves join lower,
-//! it is followed under the armholes, where a tailor measures the chest. Limits: for bodies whose landmarks are found; a garment that is open
-//! there, ends there on one side, or goes round the arms as a cape does, has no girth; of garments over each other the innermost is told.
+//! With negative ease the cloth must stretch. If the curve encloses an arm, as at the bust of a pullover whose sleeves join lower, the
+//! plane is lowered until the curve encloses the trunk alone. Limits: the body's landmarks must be found; a garment that is open at the
+//! height, ends there on one side, or encloses the arms as a cape does, has no girth; of layered garments only the innermost is measured.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -20,24 +20,23 @@ use crate::scene::Scene;
 
 /// Body and garment at one height.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GirthEase {
+pub(crate) struct GirthEase {
     /// `bust`, `waist` or `hip`.
     pub at: &'static str,
     /// Height above the body's lowest point, cm.
     pub height_cm: f64,
-    /// Girth of the body, by tape, cm.
+    /// Tape girth of the body, cm.
     pub body_cm: f64,
-    /// Girth of the garment as it was cut, cm; `None` where it does not go round the body there, or round the arms too.
+    /// Girth of the garment as cut, cm; `None` if it does not enclose the trunk, or encloses an arm too.
     pub garment_cm: Option<f64>,
-    /// Height where that was measured, cm: lower than `height_cm` where the sleeves join lower.
+    /// Height of that girth, cm; below `height_cm` if the sleeves join lower.
     pub garment_height_cm: Option<f64>,
-    /// The difference, cm.
+    /// `garment_cm` − `body_cm`, cm.
     pub ease_cm: Option<f64>,
 }
 
 impl GirthEase {
-    /// Bust, waist and hip of a scene draped to `positions` (m), from the top: at these heights (m), or where the body is found to have them.
-    #[must_use]
+    /// Ease at bust, waist and hip of a scene draped to `positions` (m), at `heights_m` or else at the body's landmarks.
     pub(crate) fn all(scene: &Scene, heights_m: Option<[f64; 3]>, positions: &[glam::DVec3]) -> Vec<Self> {
         let body = scene.body.mesh();
         let Some((low, _)) = body.bounds() else { return Vec::new() };
@@ -47,15 +46,15 @@ impl GirthEase {
         let at = |(at, z): (&'static str, Option<f64>)| {
             let z = z?;
             let of_body = section(body, Plane::horizontal(z));
-            let trunk = around(&of_body, marks.middle, SectionLoop::tape_length)?;
+            let trunk = trunk_girth(&of_body, marks.middle)?;
             let steps = if at == "bust" { LOWER_STEPS } else { 0 };
             let girth = (0..=steps).find_map(|step| {
                 let z = z - LOWER_M * f64::from(step);
                 let arms = if step == 0 { &of_body } else { &section(body, Plane::horizontal(z)) };
                 match girth(scene, &garment, (z, marks.middle), arms) {
-                    Girth::OfArmsToo => None,
+                    Girth::WithArm => None,
                     Girth::None => Some(None),
-                    Girth::Of(cm) => Some(Some((cm, z))),
+                    Girth::Trunk(cm) => Some(Some((cm, z))),
                 }
             });
             let girth = girth.flatten();
@@ -68,20 +67,22 @@ impl GirthEase {
     }
 }
 
-/// Where sleeves join below the bust, the garment is looked at lower by so much, m, so many times.
+/// Distance by which the plane at the bust is lowered while the curve encloses an arm, m, and the number of tries: 12 cm reach the
+/// armholes of the built-in garments.
 const LOWER_M: f64 = 0.01;
 const LOWER_STEPS: u32 = 12;
 
-/// What a garment goes round.
+/// Result of a search for the garment's girth.
 enum Girth {
+    /// No closed curve encloses the trunk.
     None,
-    /// The trunk and an arm.
-    OfArmsToo,
-    /// The trunk alone, as cut, cm.
-    Of(f64),
+    /// The curve encloses an arm too.
+    WithArm,
+    /// The girth around the trunk as cut, cm.
+    Trunk(f64),
 }
 
-/// The girth of a draped garment round the `middle` of a body at height `z` (m), given the body's own curves there.
+/// The girth of a draped garment around the `middle` of the body at height `z` (m); `of_body` are the body's curves at that height.
 fn girth(scene: &Scene, garment: &TriMesh, (z, middle): (f64, DVec2), of_body: &[SectionLoop]) -> Girth {
     let draped = cuts(garment, Plane::horizontal(z));
     let x = &garment.positions;
@@ -97,19 +98,19 @@ fn girth(scene: &Scene, garment: &TriMesh, (z, middle): (f64, DVec2), of_body: &
         let inside = flat.iter().filter(|p| encloses(&on, **p)).count();
         curve.closed && !encloses(&flat, middle) && 2 * inside > flat.len()
     };
-    if of_body.iter().any(|curve| arm(&curve)) { Girth::OfArmsToo } else { Girth::Of(cm) }
+    if of_body.iter().any(|curve| arm(&curve)) { Girth::WithArm } else { Girth::Trunk(cm) }
 }
 
-/// The largest of the closed curves round the middle, measured.
-fn around(curves: &[SectionLoop], middle: DVec2, length: impl Fn(&SectionLoop) -> f64) -> Option<f64> {
+/// Tape length of the largest closed curve around the middle, m.
+fn trunk_girth(curves: &[SectionLoop], middle: DVec2) -> Option<f64> {
     let round = |c: &&SectionLoop| {
         let on: Vec<DVec2> = c.points.iter().map(|p| p.truncate()).collect();
         c.closed && encloses(&on, middle)
     };
-    curves.iter().filter(round).map(length).max_by(f64::total_cmp)
+    curves.iter().filter(round).map(SectionLoop::tape_length).max_by(f64::total_cmp)
 }
 
-/// Whether a closed curve goes round a point: an odd number of its sides cross the ray to the right.
+/// Whether a closed curve encloses a point: an odd number of its sides cross the ray to the right.
 fn encloses(on: &[DVec2], point: DVec2) -> bool {
     let sides = on.iter().zip(on.iter().cycle().skip(1));
     let right = |(a, b): &(&DVec2, &DVec2)| {
@@ -118,7 +119,7 @@ fn encloses(on: &[DVec2], point: DVec2) -> bool {
     sides.filter(right).count() % 2 == 1
 }
 
-/// Length of a cut in the triangles as they were cut from the cloth, m.
+/// Length of a cut in the rest shapes of its triangles, m.
 fn at_rest(scene: &Scene, cut: &Cut) -> f64 {
     let ends = cut.crossings.iter().zip(cut.crossings.iter().cycle().skip(1));
     let lengths = cut.triangles.iter().zip(ends).map(|(&t, (from, to))| {
@@ -166,7 +167,7 @@ mod tests {
         for (ease, body_cm) in found.iter().zip([spec.bust_cm, spec.waist_cm, spec.hip_cm]) {
             assert!((ease.body_cm - body_cm).abs() < 0.5, "{ease:?}");
         }
-        // Somebody else's body is asked where it is widest and narrowest.
+        // Without given heights the landmarks of the body are used.
         for (ease, found) in found.iter().zip(GirthEase::all(&scene, None, &placed)) {
             assert!((ease.height_cm - found.height_cm).abs() < 8.0, "{ease:?}, {found:?}");
             assert!((ease.body_cm - found.body_cm).abs() < 5.0, "{ease:?}, {found:?}");

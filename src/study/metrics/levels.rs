@@ -1,4 +1,4 @@
-//! The levels of a range table on a garment: what each holds.
+//! Vertices and PARTs of each level of a range table.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,8 +24,7 @@ pub struct LevelCount {
 }
 
 impl LevelCount {
-    /// The levels of `table`, and what `parts`, made by it, has in each.
-    #[must_use]
+    /// The levels of `table` with the vertices and PARTs of `parts`, which the table made.
     pub(crate) fn all(table: &RangeTable, parts: &Parts) -> Vec<Self> {
         let levels = table.effective_levels();
         let mut counts: Vec<Self> = (levels.iter().enumerate())

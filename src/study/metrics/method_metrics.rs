@@ -1,24 +1,23 @@
-//! The figures of a garment draped by a reference method: those of [`Metrics`] that need no PARTs, taken from where the cloth
-//! lies, and how the run in time ended.
+//! Metrics of a drape by a reference method: those of [`Metrics`] that need no PARTs, and the end of the simulation.
 
 use serde::Serialize;
 
-use super::Metrics;
-use super::warnings::{Slid, sank};
+use super::drape_metrics::Metrics;
+use super::faults::{SlidPart, sinking};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use crate::methods::{Dressing, Ended, MethodDrape};
-use crate::study::accuracy::{self, state::State};
+use crate::study::accuracy::{State, rms_mm};
 
-/// The figures of one such drape. Those named as in [`Metrics`] mean the same, energy and pressure by this project's own.
+/// Metrics of one drape by a reference method. Names shared with [`Metrics`] have the same meaning; energy and pressure are those of
+/// this project's model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "named as in `Metrics`; what is of runs in time alone is said")]
-pub struct MethodMetrics {
+pub(crate) struct MethodMetrics {
     pub vertices: usize,
     pub triangles: usize,
-    /// Why the run in time ended.
+    /// Reason for the end of the simulation.
     pub ended: Ended,
-    /// Steps in time.
+    /// Time steps.
     pub steps: usize,
     /// Simulated time, s.
     pub simulated_s: f64,
@@ -28,11 +27,11 @@ pub struct MethodMetrics {
     pub penetrating_vertices: usize,
     pub penetration_mm: f64,
     pub body_crossing_pairs: usize,
-    /// No reference method keeps cloth off cloth.
+    /// The reference methods have no self-contact.
     pub self_intersecting_pairs: usize,
     pub top_sank_mm: f64,
     #[serde(skip)]
-    pub slid: Vec<Slid>,
+    pub slid: Vec<SlidPart>,
     pub energy_j: f64,
     pub residual_at_rest_over_weight: f64,
     pub strain_p95: f64,
@@ -41,15 +40,14 @@ pub struct MethodMetrics {
 }
 
 impl MethodMetrics {
-    /// What a drape says by itself, and strain and pressure at its vertices.
-    #[must_use]
+    /// Metrics of a drape, and strain and pressure at its vertices.
     pub(crate) fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
         let Dressing { scene, cloth, .. } = dressing;
         let x = &drape.positions;
         let garment = scene.garment.with_positions(x.clone());
         let state = State::of(cloth, &scene.body, x);
         let fit = fit(cloth, cloth.contacts(&scene.body, x), x, cloth.contact_stiffness());
-        let (top_sank_mm, slid) = sank(scene, x);
+        let (top_sank_mm, slid) = sinking(scene, x);
         let metrics = Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
@@ -57,7 +55,7 @@ impl MethodMetrics {
             steps: drape.steps,
             simulated_s: drape.simulated_s,
             rms_speed_m_per_s: drape.rms_speed_m_per_s,
-            displacement_rms_mm: accuracy::rms_mm(x, &scene.garment.positions),
+            displacement_rms_mm: rms_mm(x, &scene.garment.positions),
             penetrating_vertices: state.penetrating_vertices,
             penetration_mm: state.penetration_mm,
             body_crossing_pairs: crossing_pairs(&garment, scene.body.mesh()).len(),
@@ -73,12 +71,11 @@ impl MethodMetrics {
         (metrics, fit)
     }
 
-    /// How it ended, strain and what else was measured, in words: name and value.
-    #[must_use]
+    /// The metrics as pairs of name and text.
     pub(crate) fn findings(&self) -> Vec<(&'static str, String)> {
         let how = match self.ended {
             Ended::AtRest => "at rest",
-            Ended::TimeOver => "given up, still moving",
+            Ended::TimeOver => "time limit reached, still moving",
             Ended::Interrupted => "interrupted",
         };
         let (time, speed) = (self.simulated_s, 100.0 * self.rms_speed_m_per_s);
@@ -91,13 +88,12 @@ impl MethodMetrics {
         found
     }
 
-    /// What of them a user should act upon.
-    #[must_use]
+    /// Warnings for the user.
     pub(crate) fn warnings(&self, dressing: &Dressing<'_>) -> Vec<String> {
         let mut found = self.shared().warnings(dressing.scene);
         if self.ended == Ended::TimeOver {
             found.push(format!(
-                "it does not come to rest: still {:.1} cm/s RMS after {:.0} s",
+                "the cloth does not come to rest: {:.1} cm/s RMS after {:.0} s",
                 100.0 * self.rms_speed_m_per_s,
                 self.simulated_s
             ));
@@ -105,7 +101,7 @@ impl MethodMetrics {
         found
     }
 
-    /// The same where they are told as a drape's by PARTs.
+    /// The metrics shared with drapes by PARTs.
     fn shared(&self) -> Metrics {
         Metrics {
             penetrating_vertices: self.penetrating_vertices,

@@ -1,0 +1,107 @@
+//! Faults of a drape: parts that slid down, openings that are stretched, triangles that bridge open seams.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::mesh::TriMesh;
+use crate::mesh::bridges::Bridges;
+use crate::scene::Scene;
+
+/// A top edge that sinks farther than this has slid, mm. A neckline settles by 10 to 20 mm; a smaller limit would report it.
+pub(super) const SANK_MM: f64 = 100.0;
+
+/// Least ratio of worn to cut length of a stretched opening. Heuristic; a smaller ratio names openings that are merely snug.
+const STRETCHED: f64 = 1.1;
+
+/// A stretched opening of a garment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TightestOpening {
+    /// Length as cut, m.
+    pub cut_m: f64,
+    /// Length as worn, m.
+    pub worn_m: f64,
+    /// Mean height above the lowest point of the body, m.
+    pub height_m: f64,
+}
+
+impl TightestOpening {
+    /// The opening stretched most at `positions` (m); `None` if no opening is stretched by a tenth.
+    pub(super) fn of(scene: &Scene, positions: &[DVec3]) -> Option<Self> {
+        let mut cut = HashMap::new();
+        for (corners, rest) in scene.garment.triangles.iter().zip(&scene.rest.corners) {
+            for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                cut.insert([corners[i].min(corners[j]), corners[i].max(corners[j])], rest[i].distance(rest[j]));
+            }
+        }
+        let (low, _) = scene.body.mesh().bounds()?;
+        let measure = |opening: Vec<u32>| {
+            let sides = || opening.iter().zip(opening.iter().cycle().skip(1));
+            let at = |v: &u32| positions[*v as usize];
+            Self {
+                cut_m: sides().filter_map(|(a, b)| cut.get(&[*a.min(b), *a.max(b)])).sum(),
+                worn_m: sides().map(|(a, b)| at(a).distance(at(b))).sum(),
+                height_m: opening.iter().map(|v| at(v).z).sum::<f64>() / opening.len() as f64 - low.z,
+            }
+        };
+        let all = scene.topology.boundary_loops().into_iter().map(measure);
+        let stretched = all.filter(|o| o.worn_m > STRETCHED * o.cut_m && o.cut_m > 0.0);
+        stretched.max_by(|a, b| (a.worn_m / a.cut_m).total_cmp(&(b.worn_m / b.cut_m)))
+    }
+
+    pub(super) fn text(self) -> String {
+        let [cut, worn, height] = [self.cut_m, self.worn_m, self.height_m].map(|m| 1e2 * m);
+        format!("; its opening at a height of {height:.0} cm, {cut:.1} cm as cut, is stretched to {worn:.1} cm")
+    }
+}
+
+/// A warning about triangles that bridge open seams: contact acts at vertices, so the body passes between their corners.
+pub(super) fn bridges(garment: &TriMesh) -> Option<String> {
+    let Bridges { triangles, longest_m, usual_m } = Bridges::of(garment)?;
+    Some(format!(
+        "{triangles} of its triangles are up to {:.0} cm long, with a usual side of {:.1} cm: they may bridge open seams, and the body passes \
+         between their corners; sew the pattern it was cut by (--pattern), or start with closed seams",
+        1e2 * longest_m,
+        1e2 * usual_m
+    ))
+}
+
+/// A connected part of a garment without held vertices that slid down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidPart {
+    /// Number of the part, from 1, as in `--hold top:2`.
+    pub part: usize,
+    /// Descent of its highest edge since placement, mm; without an edge of its highest tenth.
+    pub sank_mm: f64,
+}
+
+/// Descent of the highest edge of each connected part from its placement to `positions` (m), mm; without an edge of its highest
+/// tenth.
+fn tops_sank_mm(scene: &Scene, positions: &[DVec3]) -> Vec<f64> {
+    let placed = &scene.garment.positions;
+    let (part_of, parts) = scene.topology.components();
+    let mut of_part = vec![Vec::new(); parts];
+    (0_u32..).zip(&part_of).for_each(|(v, &part)| of_part[part as usize].push(v));
+    let sank = |(top, mut all): (Option<Vec<u32>>, Vec<u32>)| {
+        let top = top.unwrap_or_else(|| {
+            all.sort_by(|&a, &b| placed[b as usize].z.total_cmp(&placed[a as usize].z));
+            all.truncate(all.len().div_ceil(10));
+            all
+        });
+        let sank = top.iter().map(|&v| placed[v as usize].z - positions[v as usize].z).sum::<f64>();
+        1e3 * sank / top.len().max(1) as f64
+    };
+    scene.tops().into_iter().zip(of_part).map(sank).collect()
+}
+
+/// The largest descent of a connected part's top edge, mm, and the parts that slid, by falling descent. Parts that fell off the
+/// body are omitted.
+pub(super) fn sinking(scene: &Scene, positions: &[DVec3]) -> (f64, Vec<SlidPart>) {
+    let tops = tops_sank_mm(scene, positions);
+    let fallen = scene.fallen_parts(positions);
+    let loose = scene.loose_parts().into_iter().filter(|part| !fallen.contains(part));
+    let slid = loose.map(|part| SlidPart { part, sank_mm: tops[part - 1] });
+    let mut slid: Vec<SlidPart> = slid.filter(|slid| slid.sank_mm > SANK_MM).collect();
+    slid.sort_by(|a, b| b.sank_mm.total_cmp(&a.sank_mm));
+    (tops.into_iter().fold(f64::NEG_INFINITY, f64::max), slid)
+}
