@@ -1,17 +1,17 @@
-//! Whether a drape is a minimum of its energy, how soft the softest way out is, and how far rest would be.
+//! Curvature of the energy about a drape: stability, softest mode, and the next Newton step.
 //!
-//! H is what `mechanics::curvature` has, with what holds the touching vertices: κ A n nᵀ along the normal and, where friction has
-//! something left, μ_f N/ε across it. B is the same with every triangle's negative part taken away (as Newton's steps have it) and a
-//! damping ε M, so it can be factorised.
+//! H is the Hessian of `mechanics::curvature` plus the stiffness of the touching vertices: κ A n nᵀ along the normal and, where
+//! friction sticks, μ_f N/ε across it. B is the projected Hessian (without the negative part of each triangle, as in Newton's steps)
+//! plus a damping ε M, so it can be factorised.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | ω² | zᵀHz / zᵀMz of the lowest: negative where the cloth would leave | 1/s² |
-//! | r | force that nothing balances ([`reactions`](crate::mechanics::reactions)) | N |
+//! | ω² | zᵀHz / zᵀMz of the lowest mode: negative at an unstable equilibrium | 1/s² |
+//! | r | unbalanced force ([`reactions`](crate::mechanics::reactions)) | N |
 //! | d | −B⁻¹ r: the next Newton step | m |
 //!
-//! Limits: contacts are kept as they are, so a way out that lifts cloth off the body is not seen; ω² is that of [`STEPS`] steps of
-//! Lanczos' method, an upper bound.
+//! Limits: contacts are fixed, so an instability that lifts cloth off the body is not detected; ω² comes from [`STEPS`] steps of
+//! Lanczos' method and is an upper bound.
 
 use glam::{DMat3, DVec3};
 
@@ -26,21 +26,21 @@ use crate::mechanics::refine::{SolveError, Solver};
 /// The curvature about a drape.
 #[derive(Debug, Clone)]
 pub struct Curvature {
-    /// ω² of the softest way, 1/s².
+    /// ω² of the softest mode, 1/s².
     pub lowest: f64,
-    /// Ways on which the energy falls.
-    pub ways_out: usize,
-    /// The vertex that goes farthest on the softest.
+    /// Number of modes of negative curvature.
+    pub unstable_modes: usize,
+    /// The vertex with the largest displacement in the softest mode.
     pub at: usize,
     /// The next Newton step of every vertex, m; zero where held.
     pub step: Vec<DVec3>,
 }
 
 impl Curvature {
-    /// Of `cloth` about `x` (m), held up by `forces`.
+    /// The curvature of `cloth` about `x` (m), with the reactions of `forces`.
     ///
     /// # Errors
-    /// [`SolveError`] where B cannot be factorised.
+    /// [`SolveError`] if B cannot be factorised.
     pub(crate) fn new(cloth: &Cloth, forces: &Forces, x: &[DVec3]) -> Result<Self, SolveError> {
         let pushing = || forces.touching.iter().filter(|t| t.normal_n > 0.0);
         let pairs = pushing().flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])));
@@ -71,7 +71,7 @@ impl Curvature {
             (0..softest.len()).fold(0, |most, i| if softest[i].length() > softest[most].length() { i } else { most });
         Ok(Self {
             lowest: dot(softest, &turned) / mass,
-            ways_out: ritz.values.iter().filter(|&&l| l < NEGATIVE).count(),
+            unstable_modes: ritz.values.iter().filter(|&&l| l < NEGATIVE).count(),
             at: layout.order.get(farthest).map_or(0, |&v| v as usize),
             step: curved.scatter(&step),
         })

@@ -1,24 +1,24 @@
-//! A certificate of rest: whether a garment, given by where its vertices are and nothing else, is a drape one can rely on.
+//! A certificate of rest: checks, from the positions of its vertices alone, that a garment is at a stable equilibrium.
 //!
-//! Nothing that the solver remembers is used, neither its contact forces nor its friction anchors, so a drape can be certified from its
-//! files by whoever doubts it. Forces are taken anew from the positions, and the body is granted whatever reaction it could give
-//! ([`Forces`]: Coulomb's cone at every vertex that touches); what no reaction balances is the residual. Whether the rest is one that
-//! would last is asked of the energy's curvature ([`Curvature`]).
+//! The certificate uses neither contact forces nor friction anchors of the solver, so a drape can be certified from its exported
+//! files. Forces are computed from the positions. The body may exert any reaction inside Coulomb's cone at each touching vertex
+//! ([`Forces`]); the residual is the force that no such reaction balances. The curvature of the energy decides whether the
+//! equilibrium is stable ([`Curvature`]).
 //!
-//! | line | what is asked | limit from |
+//! | line | quantity | source of the limit |
 //! |---|---|---|
-//! | residual | ‖r‖₂ over the weight, r what nothing balances | the solver's own tolerance |
+//! | residual | ‖r‖₂ over the weight, r the unbalanced force | the solver's own tolerance |
 //! | forces add up | \|Σ reactions − weight\| over the weight | one percent |
 //! | friction | tangential force beyond μN, and pull towards the body, over the weight | the same |
 //! | still moving | share of vertices that the next Newton step moves by over a millimetre | GarmentCode's simulator calls 1.5 % static |
 //! | distance to rest | RMS of that step, mm | thickness of a garment's cloth |
-//! | lowest curvature | ω² of the softest way out, 1/s²: negative where the rest is none that lasts | rounding |
+//! | lowest curvature | ω² of the softest mode, 1/s²: negative at an unstable equilibrium | rounding |
 //! | inside the body | vertices, by the exact distance | none |
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
 //! | largest strain | principal strain of a triangle, % | [`TORN_PERCENT`]: more than fabrics bear |
 //!
-//! Limits: a reaction that could be given need not be the one that history left; of the curvature, contacts are taken as they are.
+//! Limits: an admissible reaction need not be the one that the history left; the curvature keeps the contacts fixed.
 
 mod curvature;
 
@@ -35,38 +35,41 @@ use crate::mechanics::refine::SolveError;
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::{Placement, Scene};
 
-/// Residual over weight that counts as rest: [`RefineOptions::default`](crate::mechanics::refine::RefineOptions)'s tolerance.
+/// Largest residual over weight at rest: [`RefineOptions::default`](crate::mechanics::refine::RefineOptions)'s tolerance.
 const REST: f64 = 1e-3;
 
-/// Share of the weight that reactions may miss or exceed: residual forces of a thousandth each, leaning to one side, add up to more.
+/// Largest difference of reactions and weight, over the weight. It exceeds [`REST`], because residual forces in one direction add up.
 const BALANCE: f64 = 1e-2;
 
-/// Move of a vertex that counts as moving, m.
+/// A vertex counts as moving if the next Newton step would displace it by more than this, m.
 const MOVES: f64 = 1e-3;
 
-/// Share of the vertices that may still move: what the field's simulator calls static (GarmentCode, 2024).
+/// Largest share of moving vertices: the limit of GarmentCode's simulator (2024) for a static garment.
 const STILL_MOVING: f64 = 0.015;
 
-/// RMS of the next step that may be left, mm: a thick cloth's thickness.
+/// Largest RMS of the next Newton step, mm: the thickness of a thick cloth.
 const NEAR_REST_MM: f64 = 1.0;
 
-/// ω² below which a rest does not last, 1/s²: what is softer takes over ten seconds to leave, and is not told from rounding.
+/// Least ω² of a stable equilibrium, 1/s². Modes between this value and zero need more than ten seconds to grow by a factor e and are
+/// not distinguishable from rounding.
 const LASTS: f64 = -1e-2;
 
-/// Why nothing could be certified.
+/// Why a drape cannot be certified.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum CertifyError {
-    /// Positions for another mesh.
-    #[error("{found} positions for a garment of {expected} vertices: give those of this very garment")]
+    /// The positions belong to another mesh.
+    #[error(
+        "found {found} positions, expected {expected}, one per vertex of the garment; give the positions of this garment"
+    )]
     Count { found: usize, expected: usize },
-    /// A position that is not a number.
+    /// A position is not finite.
     #[error("the position of vertex number {} is not finite", .vertex + 1)]
     NotFinite { vertex: usize },
     /// The cloth cannot be set up.
     #[error(transparent)]
     Energy(#[from] EnergyError),
-    /// The curvature cannot be found.
+    /// The curvature cannot be computed.
     #[error("the curvature of the energy: {0}")]
     Solve(#[from] SolveError),
 }
@@ -74,34 +77,30 @@ pub enum CertifyError {
 /// One line of a certificate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was asked.
+    /// Name of the line.
     pub name: &'static str,
-    /// What was found.
+    /// Measured value.
     pub value: f64,
-    /// Its unit; empty for counts and shares.
+    /// Unit of the value; empty for counts.
     pub unit: &'static str,
-    /// The most it may be; of the curvature the least.
+    /// Largest value that passes; of the curvature the least.
     pub limit: f64,
-    /// Whether it is within the limit.
+    /// Whether the value is within the limit.
     pub passes: bool,
-    /// Where, or how it comes about.
+    /// Location or composition of the value.
     pub remark: String,
 }
 
-/// What was found of a drape.
+/// The lines of a certificate and their verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Certificate {
     /// Whether every line passes.
     pub passes: bool,
-    /// Line by line.
+    /// The lines.
     pub findings: Vec<Finding>,
 }
 
 impl Certificate {
-    fn new(findings: Vec<Finding>) -> Self {
-        Self { passes: findings.iter().all(|f| f.passes), findings }
-    }
-
     /// The line of this name.
     #[must_use]
     pub fn finding(&self, name: &str) -> Option<&Finding> {
@@ -109,10 +108,10 @@ impl Certificate {
     }
 }
 
-/// Certifies the garment of `scene` with its vertices at `x` (m): its rest shape and held vertices are the scene's.
+/// Certifies the garment of `scene` with its vertices at `x` (m). Rest shape and held vertices are those of the scene.
 ///
 /// # Errors
-/// [`CertifyError`] where positions and scene do not belong together, or are none.
+/// [`CertifyError`] if the positions do not fit the scene or are not finite.
 pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificate, CertifyError> {
     let expected = scene.garment.vertex_count();
     if x.len() != expected {
@@ -128,10 +127,10 @@ pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificat
     findings.extend(of_motion(&curvature));
     findings.extend(of_surfaces(scene, x));
     findings.push(of_strain(&cloth, x));
-    Ok(Certificate::new(findings))
+    Ok(Certificate { passes: findings.iter().all(|f| f.passes), findings })
 }
 
-/// A line that passes up to a limit.
+/// A line that passes if `value` is at most `limit`.
 fn at_most(name: &'static str, value: f64, unit: &'static str, limit: f64, remark: String) -> Finding {
     Finding { name, value, unit, limit, passes: value <= limit, remark }
 }
@@ -152,7 +151,7 @@ fn of_forces(forces: &Forces, cloth: &Cloth) -> [Finding; 3] {
     ]
 }
 
-/// Where the largest unbalanced force is.
+/// Location of the largest unbalanced force.
 fn worst(forces: &Forces) -> String {
     let (vertex, force) = forces
         .rest
@@ -168,9 +167,9 @@ fn of_motion(curvature: &Curvature) -> [Finding; 3] {
     let n = curvature.step.len().max(1) as f64;
     let longest = curvature.step.iter().map(|d| d.length()).fold(0.0, f64::max);
     let rms = (curvature.step.iter().map(|d| d.length_squared()).sum::<f64>() / n).sqrt();
-    let ways = match curvature.ways_out {
+    let modes = match curvature.unstable_modes {
         0 => "a minimum".to_owned(),
-        n => format!("{n} ways out, the softest about vertex {}", curvature.at + 1),
+        n => format!("{n} unstable modes, the softest about vertex {}", curvature.at + 1),
     };
     [
         at_most(
@@ -187,7 +186,7 @@ fn of_motion(curvature: &Curvature) -> [Finding; 3] {
             unit: "1/s²",
             limit: LASTS,
             passes: curvature.lowest >= LASTS,
-            remark: ways,
+            remark: modes,
         },
     ]
 }

@@ -1,6 +1,6 @@
-//! The Cusick drape test, simulated: how far a fabric's folds let it fall.
+//! Simulation of the Cusick drape test, which measures the drape coefficient of a fabric.
 //!
-//! A disc of cloth 30 cm across lies between two plates of 18 cm; its rim hangs free and folds. The drape coefficient is
+//! A disc of cloth 30 cm across is clamped between two plates 18 cm across; its rim hangs free and folds. The drape coefficient is
 //!
 //! DC = (A_p − A_d)/(A_s − A_d), the areas of the drape's shadow, of the plates and of the flat specimen
 //!
@@ -12,8 +12,8 @@
 //! | A_p, A_d, A_s | shadow, disc, specimen | m² |
 //! | DC | drape coefficient | – |
 //!
-//! Limits: no contact between folds, nor with the plates' edge from below; a fabric of several equilibria gives the one nearest a flat
-//! start with millimetre waves of two to nine folds, where a laboratory takes the mean of six drapes.
+//! Limits: no contact between folds, nor with the edge of the lower plate. A fabric with several equilibria gives the one reached from a
+//! flat start with millimetre waves of two to nine folds; a laboratory takes the mean of six drapes.
 
 mod shadow;
 mod specimen;
@@ -24,9 +24,9 @@ use serde::Deserialize;
 
 use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::energy::{Cloth, Contacts, EnergyError};
-use crate::mechanics::refine::{RefineOptions, SolveError, Stop, refine_with};
+use crate::mechanics::refine::{RefineOptions, SolveError, refine_with};
 use crate::mesh::rest::RestError;
-use crate::mesh::{RestShape, Topology, TriMesh};
+use crate::mesh::{RestShape, Topology};
 
 pub(crate) use shadow::shadow_area;
 pub(crate) use specimen::specimen;
@@ -43,7 +43,7 @@ const TARGETS: &str = include_str!("../../../assets/cusick/targets.csv");
 /// Why a drape test failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CusickError {
-    /// Too coarse to fold.
+    /// The specimen is too coarse to fold.
     #[error("{rows} rows of cells across the rim cannot fold; expected at least 4")]
     TooCoarse {
         /// Rows asked for.
@@ -69,8 +69,6 @@ pub(crate) enum CusickError {
 /// One simulated drape test.
 #[derive(Debug, Clone)]
 pub(crate) struct CusickResult {
-    /// Name of the fabric.
-    pub fabric: String,
     /// Drape coefficient DC, 0 to 1.
     pub coefficient: f64,
     /// Folds: maxima of the rim's distance from the axis.
@@ -79,10 +77,6 @@ pub(crate) struct CusickResult {
     pub residual_over_weight: f64,
     /// Newton steps.
     pub steps: usize,
-    /// Whether the residual got under the tolerance.
-    pub converged: bool,
-    /// The drape; the part between the plates is left out but for its outermost rows.
-    pub drape: TriMesh,
 }
 
 /// Drapes `fabric` with `rows` rows of cells from the plates' edge to the rim.
@@ -96,7 +90,7 @@ pub(crate) fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickEr
     let flat = specimen(rows);
     let cloth =
         Cloth::new(&flat.mesh, &Topology::new(&flat.mesh), &RestShape::from_edges(&flat.mesh)?, fabric, &flat.held)?;
-    // The folds of a specimen hang apart.
+    // The folds of a specimen do not touch.
     let options = RefineOptions { self_contact: false, ..RefineOptions::default() };
     let end =
         refine_with(&cloth, Contacts::none(), specimen::waved(&flat), &options, &mut |_| ControlFlow::Continue(()))?;
@@ -105,13 +99,10 @@ pub(crate) fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickEr
     let (plate, whole) = (circle(PLATE_RADIUS), circle(SPECIMEN_RADIUS));
     let rim: Vec<f64> = drape.positions[flat.rim].iter().map(|p| p.truncate().length()).collect();
     Ok(CusickResult {
-        fabric: fabric.name.clone(),
         coefficient: (shadow_area(&drape, PLATE_RADIUS) - plate) / (whole - plate),
         folds: maxima(&rim),
         residual_over_weight: end.residual_over_weight,
         steps: end.steps,
-        converged: end.stop == Stop::Converged,
-        drape,
     })
 }
 
@@ -124,10 +115,8 @@ pub(crate) struct Target {
     pub low_percent: f64,
     /// Greatest published coefficient, percent.
     pub high_percent: f64,
-    /// Whether a constant of the fabric was set so that it falls inside: no check of the model then.
+    /// Whether a constant of the fabric was calibrated to this band; the band does not validate the model then.
     pub calibrated_to: bool,
-    /// Where it was published.
-    pub source: String,
 }
 
 /// The published bands.
@@ -138,10 +127,10 @@ pub(crate) fn targets() -> Result<Vec<Target>, CusickError> {
     Ok(csv::Reader::from_reader(TARGETS.as_bytes()).deserialize().collect::<Result<_, _>>()?)
 }
 
-/// Drapes fabrics, built in by name or from files, and sets the results beside the published bands, as CSV.
+/// Drapes fabrics, by built-in name or file, and writes the results beside the published bands as CSV.
 ///
 /// # Errors
-/// As [`run`], and [`FabricError`] for an unknown name or a file that is none of a fabric.
+/// Errors of [`run`], and [`FabricError`] for an unknown name or an invalid file.
 pub(crate) fn results_csv(fabrics: &[&str], rows: usize) -> Result<String, CusickError> {
     let targets = targets()?;
     let mut csv = String::from(
@@ -174,18 +163,18 @@ fn verdict(percent: f64, target: &Target) -> String {
     }
 }
 
-/// Maxima of a closed sequence that stand out by more than a millimetre from the minima beside them.
+/// Number of maxima of a closed sequence that exceed the neighbouring minima by more than a millimetre.
 fn maxima(radii: &[f64]) -> usize {
-    const STANDS_OUT: f64 = 1e-3;
+    const PROMINENCE_M: f64 = 1e-3;
     let (mut count, mut rising) = (0, false);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    // Twice around: the first round finds a place to start counting from.
+    // Two rounds: the first finds a start, the second counts.
     for (i, &r) in radii.iter().chain(radii).enumerate() {
         (low, high) = (low.min(r), high.max(r));
-        if rising && r < high - STANDS_OUT {
+        if rising && r < high - PROMINENCE_M {
             (rising, low) = (false, r);
             count += usize::from(i >= radii.len());
-        } else if !rising && r > low + STANDS_OUT {
+        } else if !rising && r > low + PROMINENCE_M {
             (rising, high) = (true, r);
         }
     }

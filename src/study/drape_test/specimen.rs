@@ -19,10 +19,10 @@ pub(crate) struct Specimen {
     pub rim: Range<usize>,
 }
 
-/// With `rows` rows of cells from the plates' edge to the rim.
+/// A specimen with `rows` rows of cells from the plates' edge to the rim.
 ///
-/// The last held ring lies half a cell outside the plates' edge: a ring of vertices bends for half a cell to either
-/// side, so the clamp of the discrete cloth is where that of the test is.
+/// The last held ring lies half a cell outside the plates' edge. A ring of vertices bends over half a cell to either side, so the
+/// discrete cloth is clamped at the plates' edge.
 #[must_use]
 pub(crate) fn specimen(rows: usize) -> Specimen {
     let cell = (SPECIMEN_RADIUS - PLATE_RADIUS) / (rows as f64 + 0.5);
@@ -39,15 +39,15 @@ pub(crate) fn specimen(rows: usize) -> Specimen {
             DVec3::new(radius * cos, radius * sin, 0.0)
         }));
         if let Some(inner) = rings.last() {
-            zip(inner.clone(), start..start + count, [0.5 * ((k + 1) % 2) as f64, offset], &mut mesh.triangles);
+            triangulate(inner.clone(), start..start + count, [0.5 * ((k + 1) % 2) as f64, offset], &mut mesh.triangles);
         }
         rings.push(start..start + count);
     }
     Specimen { mesh, held: (0..rings[1].end as u32).collect(), rim: rings[rows + 1].clone() }
 }
 
-/// Triangles between two rings: always the shorter way around, seen from above counter-clockwise.
-fn zip(inner: Range<usize>, outer: Range<usize>, offsets: [f64; 2], triangles: &mut Vec<[u32; 3]>) {
+/// Triangles between two rings, counter-clockwise from above; each step advances the ring that lags behind.
+fn triangulate(inner: Range<usize>, outer: Range<usize>, offsets: [f64; 2], triangles: &mut Vec<[u32; 3]>) {
     let (n, m) = (inner.len(), outer.len());
     let (mut i, mut j) = (0, 0);
     while i < n || j < m {
@@ -64,8 +64,8 @@ fn zip(inner: Range<usize>, outer: Range<usize>, offsets: [f64; 2], triangles: &
     }
 }
 
-/// The start: waves of two to nine folds, half a millimetre each at the rim, since a perfectly flat cloth need not
-/// choose how to fold. Phases are a golden angle apart, so that none is favoured.
+/// Start positions: waves of two to nine folds with an amplitude of half a millimetre each at the rim, because a flat cloth is an unstable
+/// equilibrium. Phases differ by golden angles, so that no number of folds is favoured.
 pub(super) fn waved(flat: &Specimen) -> Vec<DVec3> {
     let golden = TAU * (1.0 - 1.0 / 1.618_033_988_749_895);
     let wave = |p: &DVec3| {

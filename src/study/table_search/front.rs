@@ -52,20 +52,7 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// The least error with at most so many PARTs.
-    #[must_use]
-    pub(crate) fn best_within(&self, max_parts: usize) -> Option<&FrontPoint> {
-        self.points[..self.points.partition_point(|p| p.parts <= max_parts)].last()
-    }
-
-    /// The fewest PARTs with at most this error, m.
-    #[must_use]
-    pub(crate) fn coarsest_within(&self, rms_m: f64) -> Option<&FrontPoint> {
-        self.points.iter().find(|p| p.rms_m <= rms_m)
-    }
-
-    /// What neither front beats.
-    #[must_use]
+    /// The points of both fronts that no other point dominates.
     pub(crate) fn union(&self, other: &Self) -> Self {
         let mut all: Vec<&FrontPoint> = self.points.iter().chain(&other.points).collect();
         all.sort_by(|a, b| a.parts.cmp(&b.parts).then(a.rms_m.total_cmp(&b.rms_m)));

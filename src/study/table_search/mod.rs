@@ -93,15 +93,6 @@ pub(crate) struct Search {
     pub exact: bool,
 }
 
-impl Search {
-    /// The final front.
-    #[must_use]
-    pub(crate) fn front(&self) -> &Front {
-        const NONE: &Front = &Front { points: Vec::new(), best: None };
-        self.rounds.last().unwrap_or(NONE)
-    }
-}
-
 /// Finds the tables on the Pareto front of PARTs and representable error. The result has the same bits on any number of threads;
 /// `progress` is called from any of them, and where it breaks off, what the rounds before found is what there is.
 ///

@@ -7,8 +7,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use crate::study::sweep::disk::Append;
 use crate::study::sweep::{
-    Append, Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, SweepProgress, store, sweep,
+    Existing, Manifest, Plan, Point, PointError, Run, Status, Store, StoreError, SweepProgress, store, sweep,
 };
 use proptest::prelude::*;
 

@@ -5,7 +5,8 @@ use std::fs;
 
 use crate::drape::StageTimes;
 use crate::study::metrics::Metrics;
-use crate::study::sweep::{Row, Status, Timing, columns};
+use crate::study::sweep::row::columns;
+use crate::study::sweep::{Row, Status, Timing};
 use proptest::prelude::*;
 
 use super::{plan, uninterrupted};

@@ -15,9 +15,12 @@ use std::time::Duration;
 use crate::Job;
 use crate::drape::StageTimes;
 use crate::study::metrics::Metrics;
+use crate::study::sweep::bench::{Pass, row_of};
+use crate::study::sweep::disk::Append;
+use crate::study::sweep::run::run_missing;
 use crate::study::sweep::{
-    Append, Existing, Manifest, Medium, Outcome, Pass, Plan, Point, PointError, Row, Run, Store, StoreError,
-    SweepProgress, result_hash, row_of, run_missing, sweep,
+    Existing, Manifest, Medium, Outcome, Plan, Point, PointError, Row, Run, Store, StoreError, SweepProgress,
+    result_hash, sweep,
 };
 use glam::DVec3;
 

@@ -10,8 +10,23 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 use crate::parts::range_table::RangeTable;
 use crate::parts::{Grain, Parts, segment};
 use crate::study::accuracy::representable::unblended_rms_m;
-use crate::study::table_search::{Front, FrontPoint, Progress, Sample, SearchError, SearchOptions, search};
+use crate::study::table_search::{Front, FrontPoint, Progress, Sample, Search, SearchError, SearchOptions, search};
 use glam::DVec3;
+
+impl Search {
+    /// The final front.
+    fn front(&self) -> &Front {
+        const NONE: &Front = &Front { points: Vec::new(), best: None };
+        self.rounds.last().unwrap_or(NONE)
+    }
+}
+
+impl Front {
+    /// The least error with at most this many PARTs.
+    fn best_within(&self, max_parts: usize) -> Option<&FrontPoint> {
+        self.points[..self.points.partition_point(|p| p.parts <= max_parts)].last()
+    }
+}
 
 /// A sheet of `w` by `h` vertices, 2 cm apart.
 fn sheet(w: usize, h: usize) -> TriMesh {
@@ -122,7 +137,7 @@ fn no_included_table_is_better_and_no_round_is_worse() {
     }
     let front = found.front();
     let last = front.points.last().unwrap();
-    assert_eq!(front.coarsest_within(last.rms_m), Some(last));
+    assert_eq!(front.points.iter().find(|p| p.rms_m <= last.rms_m), Some(last));
     assert_eq!(front.best_within(0), None);
 }
 
