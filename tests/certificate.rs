@@ -136,7 +136,7 @@ fn hanging(holds: impl Fn(DVec3) -> bool) -> (Scene, Vec<DVec3>) {
     (scene, x)
 }
 
-/// Where it comes to rest, whether that must last or not.
+/// The equilibrium reached from `start`; `lasting` requires a stable one.
 fn rests(scene: &Scene, start: &[DVec3], lasting: bool) -> Refined {
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &jersey(), &scene.held).unwrap();
     let options = RefineOptions { lasting, ..RefineOptions::default() };
@@ -157,7 +157,7 @@ fn a_strip_pressed_along_its_plane_stands_straight_until_it_is_looked_at() {
     assert!(deepest(&straight.positions) < 1e-9, "{}", deepest(&straight.positions));
     fails(&certified(&scene, &straight.positions), "lowest curvature");
     assert!(buckled.energy < straight.energy);
-    // As deep as a sine shorter by that much, its span less whatever the cloth takes up in its plane.
+    // The depth of a sine of the same arc length, less in-plane compression.
     let sine = 2.0 / std::f64::consts::PI * by.sqrt() * 2.0 * half;
     let deep = deepest(&buckled.positions);
     assert!(deep > 0.5 * sine && deep < 1.3 * sine, "{deep} m, a sine {sine} m");

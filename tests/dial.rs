@@ -228,14 +228,14 @@ fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
     for word in ["partwise tune", "flared-skirt@400", "Table 3"] {
         assert!(table.source.contains(word), "{}", table.source);
     }
-    // What compare counts is what tune promised.
+    // `compare` counts the PARTs that `tune` reported.
     let path = path.display().to_string();
     let common = ["compare", "table-3", &path, "--garment", "flared-skirt@400", "--accuracy", "none", "--no-save"];
     let compared = json(&bench.does(&[&common[..], &["--format", "json"]].concat()));
     let promised = verdicts.iter().find(|v| v["held_out"] == false && v["kind"] == "levels").unwrap();
     assert_eq!(compared[0]["level_part_count"], promised["table_3_parts"]);
     assert_eq!(compared[1]["level_part_count"], promised["parts"]);
-    // What run cuts without a further flag is what tune promised, extents and all.
+    // `run` without further flags makes the PARTs and extents that `tune` reported.
     let both = bench.path("t/flared-skirt@400-levels-and-extents.toml").display().to_string();
     assert!(RangeTable::parse(&fs::read_to_string(&both).unwrap(), "tuned").unwrap().has_extents());
     let run =

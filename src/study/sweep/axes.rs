@@ -21,7 +21,7 @@ use crate::study::job::Job;
 /// its points take 200 MB of memory).
 const LIMIT: usize = 100_000;
 
-/// What a value of an axis does to a point.
+/// The change of a point by a value of an axis.
 pub(super) type Edit = Box<dyn Fn(&mut Point)>;
 
 /// The values of every axis, in the order in which a grid is nested.
@@ -174,7 +174,7 @@ fn extents(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
     }
 }
 
-/// What a point is measured against, and further keys of its scene that name no file.
+/// The reference of a point, and further keys of its scene that do not name files.
 fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
     let expected = "{ name = value, ... } with accuracy = \"none\", \"canonical\" or \"own\", or a key of the scene such as \
                     rest = \"texture\", hold, unit, up, weld";

@@ -1,4 +1,4 @@
-//! Runs points: the scene of each made once for all that share it, passes timed, figures taken, whatever goes wrong a row.
+//! Runs the points of a sweep: loads each scene once, times the passes, measures the result. Failures become rows.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -50,7 +50,7 @@ impl PointError {
 /// The outcome of one pass over a point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pass<T> {
-    /// What is measured afterwards, untimed.
+    /// Data for the measurement, which is not timed.
     pub value: T,
     /// How long the stages took.
     pub times: StageTimes,
@@ -70,7 +70,7 @@ pub fn result_hash(positions: &[DVec3]) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// The row of a point: so many passes before, so many timed, the figures of the last; `None` if it was interrupted.
+/// The row of a point after warm-up and timed passes, with the metrics of the last pass; `None` if it was interrupted.
 pub(crate) fn row_of<T>(
     point: &Point,
     (warm_up, repeats): (usize, usize),
@@ -96,7 +96,7 @@ pub(crate) fn row_of<T>(
         let Pass { value, result_hash, .. } = last;
         Ok(Row::solved(point, &measure(value)?, &result_hash, &Timing::of(&times)))
     };
-    // What the threads share may be left odd by a panic; the next point says so again, as a row.
+    // A panic may leave shared data inconsistent; a failure of the next point would be a row, too.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(row)) => Some(row),
         Ok(Err(PointError::Failed(text))) => Some(Row::failed(point, text)),
@@ -146,14 +146,14 @@ impl<'a> Bench<'a> {
         Ok(loaded)
     }
 
-    /// What the scenes' makers warned of, garment by garment.
+    /// Warnings of the loaded scenes, by garment.
     #[must_use]
     pub(crate) fn warnings(&self) -> Vec<String> {
         let made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         made.values().flat_map(|loaded| loaded.warnings()).collect()
     }
 
-    /// The row of a point, after so many passes before and so many timed; `keep` sees what it was made from, untimed.
+    /// The row of a point after warm-up and timed passes; `keep` receives the last drape, untimed.
     pub fn row(
         &self,
         point: &Point,

@@ -14,7 +14,7 @@ pub(crate) trait Append: Send {
     /// Appends and returns once the bytes are on the disk, not before.
     ///
     /// # Errors
-    /// What the system says; part of the bytes may have been written.
+    /// Errors of the system; a part of the bytes may have been written.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     /// Cuts back to this length, bytes.
@@ -53,7 +53,7 @@ pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> 
     }
 }
 
-/// Replaces a file: whoever looks, and whatever breaks, sees the old or the new one.
+/// Replaces a file atomically.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     WholeFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
 }

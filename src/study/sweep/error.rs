@@ -1,4 +1,4 @@
-//! What can go wrong with a sweep: its file, its rows on disk, the joining of shards. A point that fails is none of
+//! Errors of a sweep: its file, its rows on disk, the merge of shards. A point that fails is none of
 //! these: it is a row.
 
 use std::error::Error;
@@ -40,7 +40,7 @@ pub enum PlanError {
     /// A job that a sweep file has no keys for.
     #[error("{label}: a sweep file cannot say it: {why}")]
     Unsayable { label: String, why: String },
-    /// A shard that is none.
+    /// An invalid shard.
     #[error("shard: found \"{found}\", expected i/n with 1 <= i <= n, for example 2/3")]
     Shard { found: String },
 }

@@ -69,7 +69,7 @@ const KEYS: [[&str; 2]; 12] = [
 #[serde(deny_unknown_fields)]
 pub(super) struct SweepFile {
     pub(super) name: String,
-    /// What it is for; part of the file, not of any result.
+    /// Description; it does not affect results.
     #[serde(default)]
     pub(super) about: String,
     pub(super) repeats: Option<At>,

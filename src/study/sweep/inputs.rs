@@ -14,7 +14,7 @@ pub(super) struct Input {
     pub(super) label: String,
     /// The name, or the file's path from where the program runs.
     pub(super) name: String,
-    /// What determines a result: the name, or the hash of the file's contents.
+    /// Identity of an input: its name, or the hash of the file's contents.
     pub(super) key: String,
 }
 

@@ -1,4 +1,4 @@
-//! What a folder of rows belongs to: the sweep's identity, its points, and the shard.
+//! The manifest of a folder of rows: the sweep's identity, its points, and the shard.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,7 +14,7 @@ use super::{Plan, PlanError, StoreError, disk};
 /// Name of the manifest in a sweep's folder.
 pub(super) const MANIFEST: &str = "plan.json";
 
-/// A share of a sweep: every n-th point, so that the shares cost about the same whatever axis is slow.
+/// A share of a sweep: every n-th point, so that shares have similar costs independent of the slow axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Shard {
@@ -78,11 +78,11 @@ impl TryFrom<String> for Shard {
 pub struct Listed {
     /// Content hash.
     pub id: String,
-    /// What it is, for people.
+    /// Label of the point in messages.
     pub label: String,
 }
 
-/// The identity of a sweep and all its points, whatever the shard.
+/// The identity of a sweep and all its points, independent of the shard.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {

@@ -1,12 +1,12 @@
 //! Sweeps: a file of range tables and other parameters run point by point, a row on disk after each.
 //!
 //! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row
-//! yet, with whatever makes rows of points (a [`Bench`], as a rule), and keeps the rows in a [`Store`]; [`merge`] joins
-//! the stores of shards. Equal plans give equal rows, whatever was interrupted, however many jobs and shards there
-//! were, timings aside.
+//! yet by a function from point to row (usually a [`Bench`]), and writes the rows to a [`Store`]; [`merge`] joins
+//! the stores of shards. Equal plans give equal rows, timings excepted, independent of interruptions, jobs and
+//! shards.
 //!
 //! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points,
-//! [`point`] what their ids are made of, [`store`] the files; [`sweep_file`] writes one of jobs.
+//! [`point`] their ids, [`store`] the files; [`sweep_file`] writes one of jobs.
 
 mod axes;
 mod bench;

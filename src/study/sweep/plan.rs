@@ -16,7 +16,7 @@ use super::{PlanError, Point};
 use crate::base::files::read_text;
 use crate::study::job::Job;
 
-/// Timed passes, and passes before them, that a point can be asked for: a median of more says nothing more, and takes for ever.
+/// Largest number of timed passes, and of warm-up passes. Heuristic: more passes do not improve the median.
 pub(crate) const MOST_PASSES: usize = 100;
 
 /// All points of a sweep, in order.
@@ -24,7 +24,7 @@ pub(crate) const MOST_PASSES: usize = 100;
 pub struct Plan {
     /// The sweep's name.
     pub name: String,
-    /// What it is for; can be empty.
+    /// Description; may be empty.
     pub about: String,
     /// Timed passes of each point, at least 1.
     pub repeats: usize,
@@ -32,7 +32,7 @@ pub struct Plan {
     pub warm_up: usize,
     /// The points.
     pub points: Vec<Point>,
-    /// What the user should know: points left out.
+    /// Warnings for the user: omitted points.
     pub notes: Vec<String>,
 }
 

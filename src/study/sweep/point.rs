@@ -24,13 +24,13 @@ pub struct Point {
     pub id: String,
     /// Place in the plan, from 0; the same in every shard.
     pub index: usize,
-    /// What the reports call the body.
+    /// Name of the body in reports.
     pub body: String,
-    /// What they call the garment: as written, `name@vertices` or a path.
+    /// Name of the garment in reports: `name@vertices` or a path, as written.
     pub garment: String,
-    /// What the job was given beyond the columns of its own, by name.
+    /// Options of the job without a column of their own, by name.
     pub options: BTreeMap<String, String>,
-    /// What is computed.
+    /// The job of the point.
     pub job: Job,
     /// Body and garment by content.
     keys: [String; 2],
@@ -102,7 +102,7 @@ impl Point {
     pub(super) fn named(mut self) -> Self {
         self.options.insert("accuracy".to_owned(), self.job.accuracy.to_string());
         let mut key = Job { scene: self.scene_key(), ..self.job.clone() };
-        // What table and fabric are called and where they come from changes nothing.
+        // Names and sources of table and fabric do not affect the result.
         key.settings.table = key.settings.table.anonymous();
         (key.settings.fabric.name, key.settings.fabric.source) = Default::default();
         self.id = content_id(&(VERSION, key));

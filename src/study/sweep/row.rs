@@ -28,12 +28,12 @@ pub enum Status {
 
 /// One point and what came of it. The fields, in order, are the columns.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
+#[allow(missing_docs, reason = "the names are descriptive")]
 pub struct Row {
     pub point: String,
     pub index: usize,
     pub body: String,
-    /// What the garment is called, with its size.
+    /// Name of the garment with its size.
     pub garment: String,
     pub fabric: String,
     /// `paper` or `coupled`.

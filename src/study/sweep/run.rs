@@ -35,7 +35,7 @@ pub struct Run<'a> {
 /// jobs; not from rayon's, so that it may hold a lock around work that rayon spreads.
 pub(crate) type Maker<'a> = dyn Fn(&Point) -> Option<Row> + Sync + 'a;
 
-/// What became of a sweep.
+/// Result of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Points of this sweep or shard.

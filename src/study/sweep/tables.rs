@@ -5,10 +5,10 @@
 //! | `"table-3"` | the paper's |
 //! | `"folder/file.toml"` | a range table file, from the folder of the sweep file |
 //! | `{ scale = [0.5, 2] }` | Table 3 with all bounds multiplied, one table a factor |
-//! | `{ levels = [8, 38] }` | Table 3 with so many levels, neighbours joined or the widest halved |
+//! | `{ levels = [8, 38] }` | Table 3 with this number of levels: neighbours joined, or the widest halved |
 //! | `{ of = "file.toml", scale = 0.5, levels = 8 }` | another table; first its levels, then its scale |
 //! | `{ name = "mine", rows = [[0, 0.5], [0.5, inf]], gap = "extend-lower" }` | these rows, cm, as in a range table file |
-//! | `{ quantile = [10, 20] }` | so many levels of equally many vertices, garment by garment |
+//! | `{ quantile = [10, 20] }` | this number of levels, each with equally many vertices of the garment |
 //! | `{ geometric = [10, 20], first_cm = 0.1, last_cm = 11 }` | bounds in geometric progression between the two |
 //!
 //! A single number may stand for a list of one; `name` names a single table.

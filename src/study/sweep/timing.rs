@@ -26,7 +26,7 @@ pub struct Timing {
     pub time_mechanics_spread_ms: Option<f64>,
     pub time_refine_ms: f64,
     pub time_refine_spread_ms: Option<f64>,
-    /// What no stage counts: tables by rule, penetration and crossings told at the end.
+    /// Time outside the stages: tables by rule, final penetration and intersections.
     #[serde(default)]
     pub time_other_ms: f64,
     #[serde(default)]

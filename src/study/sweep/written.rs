@@ -146,12 +146,12 @@ fn rows(rule: &TableRule, name: &str) -> Result<Value, String> {
     Ok(Value::Table(table))
 }
 
-/// What of the scene has no key of its own and is not as it comes.
+/// Fields of the scene without a key of their own that differ from their defaults.
 fn options(scene: &SceneSpec) -> Result<Table, String> {
     Ok(unusual(scene)?.filter(|(key, _)| !matches!(key.as_str(), "body" | "garment" | "measurements")).collect())
 }
 
-/// The fields that are not as they come.
+/// Fields that differ from their defaults.
 fn unusual<T: Serialize + Default>(given: &T) -> Result<impl Iterator<Item = (String, Value)>, String> {
     let given = Table::try_from(given).map_err(|e| e.to_string())?;
     let usual = Table::try_from(T::default()).map_err(|e| e.to_string())?;

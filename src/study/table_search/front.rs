@@ -4,7 +4,7 @@ use super::extent_grid::Ladder;
 use super::program::Path;
 use crate::parts::range_table::{Extent, RangeTable, TableError};
 
-/// A table that no other found beats in both PARTs and error.
+/// A Pareto-optimal table: no other table has both fewer PARTs and a smaller error.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrontPoint {
     /// PARTs over all garments.
@@ -18,7 +18,7 @@ pub(crate) struct FrontPoint {
 }
 
 impl FrontPoint {
-    /// The table of a path with so many PARTs.
+    /// The table of a path with the given number of PARTs.
     pub(super) fn on(path: &Path, parts: usize, inner_cm: &[f64], ladder: &Ladder) -> Self {
         // The first level starts at 0.
         let bounds = path.levels.iter().filter_map(|level| inner_cm.get(level.lower.checked_sub(1)?).copied());
@@ -31,10 +31,10 @@ impl FrontPoint {
         }
     }
 
-    /// As a table with a name, extents and all.
+    /// Converts the point to a named range table with its extents.
     ///
     /// # Errors
-    /// [`TableError`] where the bounds were changed so that they no longer ascend.
+    /// [`TableError`] if the bounds do not ascend.
     pub(crate) fn table(&self, name: &str, source: &str) -> Result<RangeTable, TableError> {
         let table = RangeTable::from_inner_bounds(name, &self.inner_bounds_cm)?.with_source(source);
         table.with_extents(&self.extents.iter().copied().map(Some).collect::<Vec<_>>())

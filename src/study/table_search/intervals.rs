@@ -1,8 +1,8 @@
 //! PARTs and squared error of every level [a, b) between candidate bounds, uncut and cut to each extent.
 //!
 //! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces and the sums
-//! their errors follow from ([`Moments`]). A piece that changed is cut as stage one would cut it: its seeds lie where they lie for
-//! every extent, so one run of them gives all, and from seed to seed only the vertices that change hands are counted anew.
+//! of their errors ([`Moments`]). A changed piece is cut as in stage one. The seeds do not depend on the extent, so one sequence of
+//! seeds serves all extents, and a new seed updates the sums of the reassigned vertices only.
 
 use super::Sample;
 use super::extent_grid::Ladder;
@@ -10,11 +10,11 @@ use crate::mechanics::coupled::Motion;
 use crate::parts::{Ruler, spread_seeds};
 use crate::study::accuracy::moments::Moments;
 
-/// What a level costs.
+/// PARTs and error of a level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Cost {
     pub(super) parts: u32,
-    /// What the PARTs' motions leave, squared, over its vertices, m².
+    /// Squared error that remains after the PARTs' best motions, summed over the vertices, m².
     pub(super) error: f64,
 }
 
@@ -27,7 +27,7 @@ impl Cost {
     }
 }
 
-/// What all rows of a garment share.
+/// Data of a garment for all rows.
 pub(super) struct Intervals<'a> {
     sample: &'a Sample<'a>,
     /// Sums of each vertex by itself.

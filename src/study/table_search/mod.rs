@@ -2,16 +2,16 @@
 //! open (section 3.3: "the proposed scheme cannot provide an optimal solution for the determination of the number of the
 //! levels and range values of each level").
 //!
-//! Both quantities add up over levels: the PARTs of level [a, b) are the connected pieces of the vertices with a ≤ d < b, whatever
-//! the other levels are, and so are their errors, cut to an extent e of the level's own or not. So a table is a path through the
+//! Both quantities add up over levels: the PARTs of level [a, b) are the connected pieces of the vertices with a ≤ d < b,
+//! independent of the other levels, with or without an extent e to which the level is cut. So a table is a path through the
 //! candidate bounds, and the best tables for every number of PARTs come out of one dynamic program,
 //!
 //! ```text
 //! E(b, p) = min over a < b and e of E(a, p − c(a, b, e)) + v(a, b, e)
 //! ```
 //!
-//! exact over all tables whose bounds are candidates. Several garments, each with a limit of PARTs, share one program in which PARTs
-//! are charged (see `charges`). For levels alone on one garment of ordinary size every bound that makes a
+//! exact over all tables whose bounds are candidates. Several garments, each with a limit of PARTs, share one program in which each PART
+//! has a cost (see `multipliers`). For levels alone on one garment of ordinary size every bound that makes a
 //! difference is one, so that no table at all is better. With extents candidates are quantiles of the distances plus the bounds
 //! of given tables (so the front is never worse than those); later rounds put them close around the best table found.
 //!
@@ -67,11 +67,11 @@ pub(crate) struct Sample<'a> {
     pub displacement: &'a [DVec3],
     /// How much its squared error counts beside the other garments'; only the ratios matter.
     pub weight: f64,
-    /// Most PARTs a table may make of it; as many as it has vertices where more are asked for.
+    /// Largest number of PARTs of the garment; clamped to its number of vertices.
     pub max_parts: usize,
 }
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Progress {
     /// Round, from 1.
@@ -84,20 +84,20 @@ pub(crate) struct Progress {
     pub total: usize,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Search {
     /// The best tables after each round, never worse than the round before.
     pub rounds: Vec<Front>,
-    /// Whether every bound was tried: no table with these extents is better then.
+    /// Whether all bounds were candidates; no table with these extents is better then.
     pub exact: bool,
 }
 
 /// Finds the tables on the Pareto front of PARTs and representable error. The result has the same bits on any number of threads;
-/// `progress` is called from any of them, and where it breaks off, what the rounds before found is what there is.
+/// `progress` is called from any thread; when it breaks, the result holds the rounds finished before.
 ///
 /// # Errors
-/// [`SearchError`] where the samples do not fit together or no table is coarse enough.
+/// [`SearchError`] if a sample is invalid or no table is coarse enough.
 pub(crate) fn search(
     samples: &[Sample<'_>],
     options: &SearchOptions,
@@ -142,16 +142,16 @@ pub(crate) fn search(
     Ok(Search { rounds, exact })
 }
 
-/// Lower bounds whose levels are evaluated at once: enough for any machine, few enough to hold.
+/// Lower bounds evaluated in parallel. Larger batches need more memory; 64 keep all threads of usual machines busy. Heuristic.
 const BATCH: usize = 64;
 
-/// What a vertex of each garment adds to the squared error.
+/// Weight of a vertex of each garment in the squared error.
 fn shares(samples: &[Sample<'_>]) -> Vec<f64> {
     let total_weight: f64 = samples.iter().map(|s| s.weight).sum();
     samples.iter().map(|s| s.weight / (total_weight * s.distances_m.len() as f64)).collect()
 }
 
-/// Makes the levels no table may have cost more than any has: the first so many as too thin, and whole ones where none may be.
+/// Excludes levels from all tables: the first `too_thin` levels, and uncut levels if the options require a cut.
 fn forbid(row: &mut [intervals::Cost], too_thin: usize, ladder: &Ladder, options: &SearchOptions) {
     for (i, steps) in row.chunks_mut(ladder.len()).enumerate() {
         if i < too_thin {
@@ -162,7 +162,7 @@ fn forbid(row: &mut [intervals::Cost], too_thin: usize, ladder: &Ladder, options
     }
 }
 
-/// The front of one garment over one set of candidates; none where `step` breaks off.
+/// The front of one garment over one set of candidates; `None` if `step` breaks.
 fn one_garment(
     sample: &Sample<'_>,
     candidates: &Candidates,

@@ -1,7 +1,7 @@
-//! Several garments at once, each with a limit of its own: PARTs are charged so that no garment uses up what is meant for all.
+//! Search over several garments, each with its own limit of PARTs, by Lagrange multipliers.
 //!
-//! A limit a garment makes a program of as many counts as garments, which is too much to solve exactly. Its Lagrangian
-//! relaxation has one: a PART of garment g costs c_g, and all together may cost what all limits together do,
+//! One limit per garment makes a dynamic program with one count per garment, which is too large to solve exactly. The Lagrangian
+//! relaxation has a single count: a PART of garment g costs c_g, and the total cost is limited,
 //!
 //! ```text
 //! minimise E  subject to  Σ_g c_g n_g ≤ Σ_g c_g N_g,    c_g ∝ λ_g / N_g
@@ -31,10 +31,11 @@ use super::intervals::{Cost, Intervals};
 use super::program::{Path, Program};
 use super::{Sample, SearchOptions, forbid, shares};
 
-/// What all limits together cost, about: charges of PARTs come out between 1 and some tens for Table 3's counts.
+/// Approximate total cost of all limits. With Table 3's counts the costs of PARTs lie between 1 and some tens; a larger budget resolves
+/// the multipliers more finely and makes the program larger.
 const BUDGET: f64 = 2000.0;
 
-/// Programs a round. Multipliers carry over from round to round and settle within the first two or three.
+/// Largest number of programs a round. Multipliers carry over between rounds and usually converge within two or three programs.
 const PROGRAMS: usize = 6;
 
 /// The multipliers, one a garment.
@@ -49,7 +50,7 @@ impl Charges {
         Self { multipliers: vec![1.0 / garments as f64; garments] }
     }
 
-    /// What a PART of each garment costs.
+    /// Cost of a PART of each garment.
     fn of(&self, samples: &[Sample<'_>]) -> Vec<u32> {
         let charge = |(m, s): (&f64, &Sample<'_>)| (m * BUDGET / s.max_parts.max(1) as f64).round().max(1.0) as u32;
         self.multipliers.iter().zip(samples).map(charge).collect()

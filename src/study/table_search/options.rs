@@ -1,9 +1,9 @@
-//! What a search tries: bounds, extents, rounds.
+//! Options of a search: bounds, extents, rounds.
 
 use crate::mechanics::coupled::Motion;
 use crate::parts::range_table::RangeTable;
 
-/// What to search.
+/// Options of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SearchOptions {
     /// How a PART moves: by an affine map, as the coupled model moves it, or as in the paper by a translation.
@@ -11,7 +11,7 @@ pub(crate) struct SearchOptions {
     /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
     /// extents means cut.
     pub candidates: usize,
-    /// With at most so many distinct distances of one garment every bound is a candidate, and one round is exact. Default 12,000
+    /// Up to this number of distinct distances of one garment every bound is a candidate, and one round is exact. Default 12,000
     /// for levels alone, 0 with extents.
     pub exact_up_to: usize,
     /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.

@@ -65,7 +65,7 @@ fn worthwhile(steps: &[Cost], max_parts: usize) -> Vec<(u32, Cost)> {
 const GRAIN: usize = 64;
 
 impl Program {
-    /// For so many smallest levels, with so many steps of extents each.
+    /// An empty program over `bins` smallest levels with `steps` extents each.
     pub(super) fn new(bins: usize, max_parts: usize, steps: usize) -> Self {
         let width = max_parts + 1;
         let mut error = vec![f64::INFINITY; (bins + 1) * width];
@@ -113,7 +113,7 @@ impl Program {
         paths
     }
 
-    /// The levels of the best table with so many PARTs, read back from the end.
+    /// The levels of the best table with `parts` PARTs, traced back from the last level.
     fn levels(&self, mut parts: usize) -> Vec<Span> {
         let mut levels = Vec::new();
         let mut upper = self.bins;

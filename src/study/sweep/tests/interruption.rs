@@ -1,4 +1,4 @@
-//! Whatever interrupts a sweep, resumed it equals one that was not.
+//! A resumed sweep equals an uninterrupted one.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};

@@ -1,4 +1,4 @@
-//! Sweep files: points, their order and ids, and what bad ones are told.
+//! Sweep files: points, their order and ids, and error messages.
 
 use std::collections::BTreeSet;
 use std::fs;
