@@ -1,4 +1,4 @@
-//! The dress form: girths as asked, measured by slicing; closed, smooth enough to drape on, the same on every run.
+//! The dress form: requested girths, measured by slicing; closed; smooth; the same bits on every run.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use partwise::DVec3;
@@ -11,11 +11,11 @@ fn assert_girths(form: &DressForm, mesh: &TriMesh, what: &str) {
     for mark in form.girths() {
         let found = loop_around(mesh, mark.plane).unwrap().tape_length();
         assert!(
-            (found / mark.asked - 1.0).abs() < 0.01,
-            "{what}: {} is {:.2} cm, asked {:.2}",
+            (found / mark.requested - 1.0).abs() < 0.01,
+            "{what}: {} is {:.2} cm, requested {:.2}",
             mark.name,
             100.0 * found,
-            100.0 * mark.asked
+            100.0 * mark.requested
         );
     }
 }
@@ -53,7 +53,7 @@ fn the_default_form_has_the_girths_of_size_38() {
 }
 
 #[test]
-fn it_stands_on_the_floor_as_tall_as_asked_and_looks_along_minus_y() {
+fn the_form_stands_on_the_floor_has_its_stature_and_faces_minus_y() {
     let mesh = dress_form(&BodySpec::default()).unwrap();
     let (low, high) = mesh.bounds().unwrap();
     assert!(low.z.abs() < 0.003 && (high.z - 1.68).abs() < 0.005, "{low} {high}");
@@ -89,7 +89,7 @@ fn smallest_angle(c: [DVec3; 3]) -> f64 {
 }
 
 #[test]
-fn girths_hold_at_other_resolutions() {
+fn girths_agree_at_other_resolutions() {
     let form = DressForm::new(&BodySpec::default()).unwrap();
     for triangles in [5_000, 24_000] {
         let mesh = form.mesh(triangles).unwrap();
@@ -141,7 +141,7 @@ fn every_body_within_two_deviations_is_closed_true_to_size_and_free_of_self_inte
 }
 
 #[test]
-fn one_measurement_can_be_set_by_name_and_the_stored_bodies_are_read() {
+fn a_measurement_is_set_by_name_and_the_stored_bodies_parse() {
     let spec = BodySpec::default().with("bust", 92.0).unwrap();
     assert_eq!(spec, BodySpec { bust_cm: 92.0, ..BodySpec::default() });
     let spec = spec.with("waist-height", 101.0).unwrap();
@@ -157,7 +157,7 @@ fn one_measurement_can_be_set_by_name_and_the_stored_bodies_are_read() {
 }
 
 #[test]
-fn what_is_no_body_is_refused_with_what_was_found() {
+fn errors_of_measurements_name_the_value_and_the_range() {
     let error = |spec: &BodySpec| DressForm::new(spec).unwrap_err().to_string();
     let thin = BodySpec { waist_cm: 20.0, ..BodySpec::default() };
     assert_eq!(error(&thin), "waist is 20 cm; a body's is from 45 to 150 cm");

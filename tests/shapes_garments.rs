@@ -1,4 +1,4 @@
-//! The wardrobe: the paper's sizes, well-shaped triangles, openings where a garment has them, nothing inside the body.
+//! The built-in garments: the paper's sizes, well-shaped triangles, their openings, nothing inside the body.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ fn vertex_counts_are_those_of_table_4() {
 }
 
 #[test]
-fn each_is_one_manifold_piece_with_openings_exactly_where_it_has_them() {
+fn each_garment_is_one_manifold_with_its_openings() {
     for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter() {
         let topology = Topology::new(mesh);
         assert!(topology.edge_valence.iter().all(|&v| v <= 2), "{name}");
@@ -79,7 +79,7 @@ fn each_is_one_manifold_piece_with_openings_exactly_where_it_has_them() {
 }
 
 #[test]
-fn openings_are_where_they_are_worn() {
+fn openings_are_at_their_heights() {
     let centre = |mesh: &TriMesh, group: &str| {
         let g = mesh.groups.iter().position(|n| n == group).unwrap() as u32;
         let points: Vec<DVec3> =
@@ -99,7 +99,7 @@ fn openings_are_where_they_are_worn() {
             assert!(held.iter().all(|&v| (mesh.positions[v as usize].z - FORM.measures.waist_height).abs() < 1e-5));
         } else {
             let z = centre(mesh, "neckline").z;
-            assert!((FORM.measures.bust_height..FORM.measures.cervicale).contains(&z), "{name}: {z}");
+            assert!((FORM.measures.bust_height..FORM.measures.cervicale_height).contains(&z), "{name}: {z}");
             assert!(held.is_empty());
         }
     }
@@ -147,7 +147,7 @@ fn no_direction_of_edges_is_preferred() {
 }
 
 #[test]
-fn nothing_is_inside_the_body_and_nothing_crosses() {
+fn garments_are_outside_the_body_and_do_not_intersect() {
     let body = Body::new(&BODY).unwrap();
     for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter() {
         let least = body.nearest_all(&mesh.positions).iter().map(|p| p.signed_distance).fold(f64::INFINITY, f64::min);
@@ -158,7 +158,7 @@ fn nothing_is_inside_the_body_and_nothing_crosses() {
 }
 
 #[test]
-fn outward_is_away_from_the_body() {
+fn normals_point_away_from_the_body() {
     let body = Body::new(&BODY).unwrap();
     for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter().take(9).step_by(2) {
         let normals = mesh.vertex_normals();
@@ -173,7 +173,7 @@ fn outward_is_away_from_the_body() {
 }
 
 #[test]
-fn the_rest_shape_is_the_placed_one_but_where_there_is_fullness() {
+fn the_rest_shape_is_the_placed_one_except_for_fullness() {
     for (_, PlacedGarment { name, mesh, rest, .. }) in WARDROBE.iter().step_by(2) {
         assert_eq!(rest.corners.len(), mesh.triangles.len());
         let mut lengths: BTreeMap<(u32, u32), f64> = BTreeMap::new();
@@ -224,7 +224,7 @@ fn the_skirt_s_hem_holds_its_fullness_and_its_waist_none() {
 }
 
 #[test]
-fn lengths_and_eases_are_those_of_the_spec() {
+fn lengths_and_eases_agree_with_the_spec() {
     for (_, PlacedGarment { name, mesh, .. }) in WARDROBE.iter().step_by(2) {
         let spec = GarmentSpec::by_name(name).unwrap();
         let (low, high) = mesh.bounds().unwrap();
@@ -239,7 +239,7 @@ fn lengths_and_eases_are_those_of_the_spec() {
         };
         let m = &FORM.measures;
         let waist = girth(m.waist_height - 0.002) - 100.0 * m.waist;
-        // Where the body pushes out, the cloth goes around it: more ease than asked, never less than a centimetre under.
+        // Where the body is wider than the tube, the cloth follows it: more ease than requested, and at most a centimetre less.
         assert!((spec.ease.waist_cm - 1.0..spec.ease.waist_cm + 4.0).contains(&waist), "{name}: {waist}");
         // Under a sleeve the bust's plane cuts the sleeve as well.
         if name == "low-cut-dress" {
@@ -250,7 +250,7 @@ fn lengths_and_eases_are_those_of_the_spec() {
 }
 
 #[test]
-fn a_spec_can_be_changed_and_another_density_asked() {
+fn length_edge_length_and_vertex_count_can_be_changed() {
     let text = include_str!("../assets/garments/flared-skirt.toml");
     let mut spec = GarmentSpec::from_toml(&text.replace("length_cm = 60.0", "length_cm = 75.0")).unwrap();
     let longer = garment_on(&spec, &FORM, Some(900)).unwrap();
@@ -284,7 +284,7 @@ fn requests_name_a_garment_and_a_count() {
 }
 
 #[test]
-fn what_makes_no_garment_is_refused_with_what_was_found() {
+fn errors_of_garments_name_the_value() {
     let unknown = GarmentSpec::by_name("cape").unwrap_err().to_string();
     assert!(unknown.contains("cape") && unknown.contains("low-cut-dress"), "{unknown}");
     let text = include_str!("../assets/garments/pullover-1.toml");
@@ -303,7 +303,7 @@ fn what_makes_no_garment_is_refused_with_what_was_found() {
 }
 
 #[test]
-fn garments_fit_other_bodies_too() {
+fn garments_fit_other_bodies() {
     let body = |stature_cm, bust_cm, waist_cm: f64, hip_cm: f64| BodySpec {
         stature_cm,
         bust_cm,

@@ -80,7 +80,7 @@ impl Anatomy {
         let buttock = Ellipsoid {
             centre: DVec3::new(0.076 * seat, 0.036 * seat, m.hip_height + 0.040 * k),
             // Its lower end is a little above the crotch, so that the seat does not close the gap between the legs.
-            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch + 0.055 * k),
+            radii: DVec3::new(0.076 * seat, 0.079 * seat, m.hip_height - m.crotch_height + 0.055 * k),
             lean: -0.3,
         };
         let (arm, wrist_at, biceps_at) = arm(m, f);
@@ -173,11 +173,11 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let shoulder = shoulder_half(m);
     let neck = radius(m.neck, of_neck);
     let under_z = underbust_height(m);
-    let rise = m.acromion - m.axilla;
-    let top = m.cervicale - 0.018 * k;
+    let rise = m.acromion_height - m.axilla_height;
+    let top = m.cervicale_height - 0.018 * k;
     let front = 0.70 * mix(under, bust, 0.35);
     let stations: [(f64, Section); 11] = [
-        (m.crotch + 0.036 * k, [0.0, 0.005, 0.84 * hip, 0.50 * hip, 0.54 * hip]),
+        (m.crotch_height + 0.036 * k, [0.0, 0.005, 0.84 * hip, 0.50 * hip, 0.54 * hip]),
         (m.hip_height + 0.02 * k, [0.0, 0.005, 1.00 * hip, 0.59 * hip, 0.62 * hip]),
         (mix(m.hip_height, m.waist_height, 0.5), {
             let r = mix(hip, waist, 0.45);
@@ -186,10 +186,10 @@ fn trunk(m: &Measures, f: &Factors) -> (Sweep, f64) {
         (m.waist_height, [0.0, -0.002, 1.12 * waist, 0.74 * waist, 0.73 * waist]),
         (under_z, [0.0, 0.004, 1.09 * under, 0.78 * under, 0.82 * under]),
         (m.bust_height, [0.0, 0.008, 1.03 * mix(under, bust, 0.4), front, 0.86 * mix(under, bust, 0.4)]),
-        (m.axilla, [0.0, 0.013, 1.10 * chest, 0.66 * chest, 0.80 * chest]),
-        (m.axilla + 0.45 * rise, [0.0, 0.018, 0.91 * shoulder, 0.56 * chest, 0.68 * chest]),
-        (m.acromion - 0.022 * k, [0.0, 0.022, 0.90 * shoulder, 0.44 * chest, 0.54 * chest]),
-        (m.acromion + 0.012 * k, [0.0, 0.025, 0.66 * shoulder, 0.36 * chest, 0.44 * chest]),
+        (m.axilla_height, [0.0, 0.013, 1.10 * chest, 0.66 * chest, 0.80 * chest]),
+        (m.axilla_height + 0.45 * rise, [0.0, 0.018, 0.91 * shoulder, 0.56 * chest, 0.68 * chest]),
+        (m.acromion_height - 0.022 * k, [0.0, 0.022, 0.90 * shoulder, 0.44 * chest, 0.54 * chest]),
+        (m.acromion_height + 0.012 * k, [0.0, 0.025, 0.66 * shoulder, 0.36 * chest, 0.44 * chest]),
         (top, [0.0, 0.027, 0.95 * neck, 0.30 * chest, 0.34 * chest]),
     ];
     (Sweep::upright(2.3, &stations, [0.025, 0.01]), front - 0.008)
@@ -223,12 +223,12 @@ fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
         (0.12 * k, ring(1.0)),
         (0.18 * k, ring(0.9)),
     ];
-    (Sweep::new(DVec3::new(0.0, 0.027, m.cervicale - 0.072 * k), axes, 2.0, &stations, [0.01, 0.02]), at)
+    (Sweep::new(DVec3::new(0.0, 0.027, m.cervicale_height - 0.072 * k), axes, 2.0, &stations, [0.01, 0.02]), at)
 }
 
 /// Height of the thigh girth, m: the first at which the legs are apart.
 pub(crate) fn thigh_height(m: &Measures) -> f64 {
-    m.crotch - 0.035 * m.scale()
+    m.crotch_height - 0.035 * m.scale()
 }
 
 /// Height of the calf girth, m: the EU 38 column has none; 0.72 of the knee's is usual.
@@ -249,7 +249,7 @@ fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
     let t = DVec3::new(ARM_ANGLE.sin(), -0.07, -ARM_ANGLE.cos()).normalize();
     let u = t.cross(DVec3::Y).normalize();
     let v = u.cross(t);
-    let origin = DVec3::new(shoulder_half(m) - 0.012 * k, 0.022, m.acromion - 0.038 * k);
+    let origin = DVec3::new(shoulder_half(m) - 0.012 * k, 0.022, m.acromion_height - 0.038 * k);
     let wrist = m.arm_length - 0.02 * k;
     let biceps = 0.37 * wrist;
     let oval = |s: f64, thick: f64, wide: f64| (s, [0.0, 0.0, thick, wide, wide]);
@@ -300,13 +300,13 @@ fn leg(m: &Measures, f: &Factors) -> (Sweep, Sweep) {
             let r = mix(knee, thigh, 0.33);
             [mix(knee_x, inner, 0.25), 0.005 * k, 0.96 * r, 1.04 * r, 1.03 * r]
         }),
-        (mix(m.knee_height, m.crotch, 0.6), {
+        (mix(m.knee_height, m.crotch_height, 0.6), {
             let r = mix(knee, thigh, 0.72);
             [mix(knee_x, inner, 0.65), 0.003 * k, 0.92 * r, 1.06 * r, 1.08 * r]
         }),
         (thigh_height(m), [inner, 0.004 * k, 0.88 * thigh, 1.06 * thigh, 1.14 * thigh]),
-        (m.crotch + 0.03 * k, [0.93 * inner, 0.004 * k, 0.89 * thigh, 1.00 * thigh, 1.06 * thigh]),
-        (m.crotch + 0.13 * k, [0.88 * inner, 0.002 * k, 0.68 * thigh, 0.76 * thigh, 0.74 * thigh]),
+        (m.crotch_height + 0.03 * k, [0.93 * inner, 0.004 * k, 0.89 * thigh, 1.00 * thigh, 1.06 * thigh]),
+        (m.crotch_height + 0.13 * k, [0.88 * inner, 0.002 * k, 0.68 * thigh, 0.76 * thigh, 0.74 * thigh]),
     ];
     let leg = Sweep::upright(2.0, &stations, [0.005, 0.03]);
     // The foot points forward and 7 degrees outward.

@@ -89,7 +89,7 @@ impl DressForm {
         for _ in 0..MESH_ROUNDS {
             for (bias, mark) in bias.iter_mut().zip(self.girths()) {
                 if let Some(found) = loop_around(mesh, mark.plane) {
-                    *bias *= (mark.asked / found.tape_length()).clamp(0.95, 1.05);
+                    *bias *= (mark.requested / found.tape_length()).clamp(0.95, 1.05);
                 }
             }
             let corrected = Anatomy::new(&self.measures, &fit(&self.measures, &bias));
@@ -118,8 +118,8 @@ impl Surface for DressForm {
         let ankle = 1.0 - 0.35 * (1.0 - smooth_step(0.15, 0.6, p.z / scale));
         let head = 1.0 - 0.15 * smooth_step(-0.05, 0.0, p.z - (m.stature - 0.2 * scale));
         // Crotch and armpits are saddles narrower than an edge of the trunk.
-        let crotch = DVec3::new(0.0, leg.centre(m.crotch).y, m.crotch);
-        let pit = trunk.centre(m.axilla) + trunk.section(m.axilla)[2] * DVec3::X;
+        let crotch = DVec3::new(0.0, leg.centre(m.crotch_height).y, m.crotch_height);
+        let pit = trunk.centre(m.axilla_height) + trunk.section(m.axilla_height)[2] * DVec3::X;
         let saddle =
             |at: DVec3, finer: f64| 1.0 - finer * (1.0 - smooth_step(0.03, 0.12, mirrored.distance(at) / scale));
         let saddle = saddle(crotch, 0.55).min(saddle(pit, 0.4));
@@ -145,18 +145,18 @@ pub struct GirthMark {
     /// Its plane; the origin is the section's centre.
     pub plane: Plane,
     /// Requested length, m.
-    pub asked: f64,
+    pub requested: f64,
 }
 
 /// Every girth of the form, trunk first, then limbs downward; limbs are the left ones.
 pub(super) fn girth_marks(m: &Measures, form: &Anatomy) -> [GirthMark; 11] {
-    let across = |name, sweep: &Sweep, at: f64, normal, asked| {
+    let across = |name, sweep: &Sweep, at: f64, normal, requested| {
         let plane = Plane { origin: sweep.centre(at), normal };
-        GirthMark { name, plane, asked }
+        GirthMark { name, plane, requested }
     };
-    let trunk = |name, z, asked| across(name, &form.trunk, z, DVec3::Z, asked);
-    let leg = |name, z, asked| across(name, &form.leg, z, DVec3::Z, asked);
-    let arm = |name, t, asked| across(name, &form.arm, t, form.arm.direction(), asked);
+    let trunk = |name, z, requested| across(name, &form.trunk, z, DVec3::Z, requested);
+    let leg = |name, z, requested| across(name, &form.leg, z, DVec3::Z, requested);
+    let arm = |name, t, requested| across(name, &form.arm, t, form.arm.direction(), requested);
     [
         trunk("bust", m.bust_height, m.bust),
         trunk("underbust", underbust_height(m), m.underbust),
@@ -207,8 +207,8 @@ fn fit(m: &Measures, bias: &Factors) -> Factors {
         let form = Anatomy::new(m, &factors);
         let marks = girth_marks(m, &form);
         for ((factor, mark), bias) in factors.iter_mut().zip(&marks).zip(bias) {
-            let found = solid_girth(&form, mark.plane, 0.8 * mark.asked / std::f64::consts::TAU);
-            *factor *= (bias * mark.asked / found).clamp(0.7, 1.4);
+            let found = solid_girth(&form, mark.plane, 0.8 * mark.requested / std::f64::consts::TAU);
+            *factor *= (bias * mark.requested / found).clamp(0.7, 1.4);
         }
     }
     factors

@@ -1,4 +1,4 @@
-//! Girths: a mesh cut by a plane, and the length of what comes out.
+//! Girths: sections of a mesh by a plane, and their lengths.
 //!
 //! Every triangle whose corners lie on both sides of the plane gives one segment between two crossed edges; segments
 //! that share an edge are joined to loops (or chains, where the mesh is open). The girth along the surface is the loop's
@@ -38,7 +38,7 @@ impl Plane {
 /// One curve in which a plane cuts a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionLoop {
-    /// Where it crosses the mesh's edges, in order, m.
+    /// Its crossings with the mesh's edges, in order, m.
     pub points: Vec<DVec3>,
     /// Whether the last point joins the first.
     pub closed: bool,
@@ -110,10 +110,11 @@ fn chains(mut points: Vec<DVec2>) -> [Vec<DVec2>; 2] {
     [half(false), half(true)]
 }
 
-/// One curve in which a plane cuts a mesh, by what it crosses.
+/// One curve in which a plane cuts a mesh, by the edges it crosses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
-    /// The crossed edges in order, each with its end above the plane first, and how far from there the crossing is, as a share of the edge.
+    /// The crossed edges in order, each with its end above the plane first, and the position of the crossing from there as a share
+    /// of the edge.
     pub(crate) crossings: Vec<([u32; 2], f64)>,
     /// The triangle between each crossing and the next; of a closed curve also that from the last to the first.
     pub(crate) triangles: Vec<u32>,
@@ -129,7 +130,7 @@ pub fn section(mesh: &TriMesh, plane: Plane) -> Vec<SectionLoop> {
     cuts(mesh, plane).into_iter().map(of).collect()
 }
 
-/// The curves of a [`section`].
+/// The curves of a [`section`] by crossed edges.
 pub(crate) fn cuts(mesh: &TriMesh, plane: Plane) -> Vec<Cut> {
     let height: Vec<f64> = mesh.positions.iter().map(|&p| (p - plane.origin).dot(plane.normal)).collect();
     let above = |v: u32| height[v as usize] >= 0.0;
@@ -175,7 +176,7 @@ pub(crate) fn cuts(mesh: &TriMesh, plane: Plane) -> Vec<Cut> {
     found
 }
 
-/// The closed curve of a section whose centre is nearest to the plane's origin.
+/// The closed curve of a section with its centre nearest to the plane's origin.
 #[must_use]
 pub fn loop_around(mesh: &TriMesh, plane: Plane) -> Option<SectionLoop> {
     section(mesh, plane)
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_prism_s_girth_is_that_of_its_polygon() {
+    fn the_girth_of_a_prism_is_that_of_its_polygon() {
         let loops = section(&prism(12, 0.5, 0.0), Plane::horizontal(0.3));
         assert_eq!(loops.len(), 1);
         let exact = 12.0 * 2.0 * 0.5 * (std::f64::consts::PI / 12.0).sin();
@@ -205,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn two_prisms_give_two_loops_and_an_upright_plane_two_chains() {
+    fn two_prisms_give_two_loops_and_a_vertical_plane_two_chains() {
         let mut mesh = prism(8, 0.2, 0.0);
         let other = prism(8, 0.2, 1.0);
         let shift = mesh.positions.len() as u32;
@@ -220,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tape_spans_hollows() {
+    fn the_tape_length_spans_hollows() {
         let star = [(0.0, 0.0), (2.0, 0.0), (1.0, 0.5), (2.0, 1.0), (0.0, 1.0)];
         assert!((hull_length(star.iter().map(|&(x, y)| DVec2::new(x, y)).collect()) - 6.0).abs() < 1e-12);
     }

@@ -5,6 +5,8 @@
 //! the calf. Heights and lengths that are not given are proportional to stature. [`BodySpec`] is in centimetres, [`Measures`] in
 //! metres.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 
 /// Measurements and descriptions that no mesh can be made of.
@@ -39,93 +41,105 @@ pub enum ShapeError {
     NotManifold { what: &'static str },
 }
 
-/// The measurements of a body, in centimetres. Defaults are European size 38; heights and lengths that are not given are
-/// proportional to stature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BodySpec {
-    /// Height of the crown above the floor.
-    pub stature_cm: f64,
-    /// Girth over the fullest part of the bust, by tape.
-    pub bust_cm: f64,
-    /// Girth right below the bust.
-    pub underbust_cm: f64,
-    /// Girth of the waist.
-    pub waist_cm: f64,
-    /// Girth over the fullest part of the hip, by tape.
-    pub hip_cm: f64,
-    /// Girth of the middle of the neck, across its axis.
-    pub neck_cm: f64,
-    /// Girth of the thigh right below the crotch.
-    pub thigh_cm: f64,
-    /// Girth of the knee.
-    pub knee_cm: f64,
-    /// Largest girth of the calf.
-    pub calf_cm: f64,
-    /// Smallest girth of the ankle.
-    pub ankle_cm: f64,
-    /// Girth of the upper arm, across it.
-    pub biceps_cm: f64,
-    /// Girth of the wrist, across the arm.
-    pub wrist_cm: f64,
-    /// Distance from the side of the neck to the end of the shoulder.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shoulder_length_cm: Option<f64>,
-    /// Distance from the end of the shoulder to the wrist.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub arm_length_cm: Option<f64>,
-    /// Height of the vertebra at the nape.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cervicale_height_cm: Option<f64>,
-    /// Height of the end of the shoulder.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acromion_height_cm: Option<f64>,
-    /// Height of the armpit.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub axilla_height_cm: Option<f64>,
-    /// Height of the bust girth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bust_height_cm: Option<f64>,
-    /// Height of the waist girth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub waist_height_cm: Option<f64>,
-    /// Height of the hip girth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hip_height_cm: Option<f64>,
-    /// Height of the crotch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub crotch_height_cm: Option<f64>,
-    /// Height of the knee girth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub knee_height_cm: Option<f64>,
+/// Declares [`BodySpec`] and [`Measures`] from one row per measurement: the name in metres, the name in centimetres, the value at
+/// European size 38, and the accepted range. A proportional measurement is optional; its default is in proportion to stature, and
+/// its range is 0.5 to 1.6 times the value at size 38.
+macro_rules! measurements {
+    (
+        required { $($(#[$doc:meta])* $name:ident, $cm:ident = $default:literal in $range:expr;)* }
+        proportional { $($(#[$proportional_doc:meta])* $proportional:ident, $proportional_cm:ident = $eu38:literal;)* }
+    ) => {
+        /// The measurements of a body, in centimetres. Defaults are European size 38; heights and lengths that are not given are
+        /// proportional to stature.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct BodySpec {
+            $($(#[$doc])* pub $cm: f64,)*
+            $($(#[$proportional_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $proportional_cm: Option<f64>,)*
+        }
+
+        impl Default for BodySpec {
+            fn default() -> Self {
+                Self { $($cm: $default,)* $($proportional_cm: None,)* }
+            }
+        }
+
+        /// A body's measurements in metres, complete.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Measures {
+            $($(#[$doc])* pub $name: f64,)*
+            $($(#[$proportional_doc])* pub $proportional: f64,)*
+        }
+
+        impl Measures {
+            /// Converts and checks each measurement.
+            fn in_range(spec: &BodySpec) -> Result<Self, ShapeError> {
+                let metres = |name, found_cm: f64, range: RangeInclusive<f64>| {
+                    let (low_cm, high_cm) = (*range.start(), *range.end());
+                    let error = ShapeError::Measurement { name, found_cm, low_cm, high_cm };
+                    if range.contains(&found_cm) { Ok(found_cm / 100.0) } else { Err(error) }
+                };
+                let proportional = |name, given: Option<f64>, eu38: f64| {
+                    let cm = given.unwrap_or(eu38 * spec.stature_cm / BodySpec::default().stature_cm);
+                    metres(name, cm, 0.5 * eu38..=1.6 * eu38)
+                };
+                Ok(Self {
+                    $($name: metres(stringify!($name), spec.$cm, $range)?,)*
+                    $($proportional: proportional(stringify!($proportional), spec.$proportional_cm, $eu38)?,)*
+                })
+            }
+        }
+    };
 }
 
-impl Default for BodySpec {
-    fn default() -> Self {
-        Self {
-            stature_cm: 168.0,
-            bust_cm: 88.0,
-            underbust_cm: 75.0,
-            waist_cm: 72.0,
-            hip_cm: 96.0,
-            neck_cm: 31.7,
-            thigh_cm: 57.0,
-            knee_cm: 36.1,
-            calf_cm: 36.1,
-            ankle_cm: 21.3,
-            biceps_cm: 27.9,
-            wrist_cm: 15.4,
-            shoulder_length_cm: None,
-            arm_length_cm: None,
-            cervicale_height_cm: None,
-            acromion_height_cm: None,
-            axilla_height_cm: None,
-            bust_height_cm: None,
-            waist_height_cm: None,
-            hip_height_cm: None,
-            crotch_height_cm: None,
-            knee_height_cm: None,
-        }
+measurements! {
+    required {
+        /// Height of the crown above the floor.
+        stature, stature_cm = 168.0 in 120.0..=220.0;
+        /// Girth over the fullest part of the bust, by tape.
+        bust, bust_cm = 88.0 in 60.0..=150.0;
+        /// Girth right below the bust.
+        underbust, underbust_cm = 75.0 in 55.0..=140.0;
+        /// Girth of the waist.
+        waist, waist_cm = 72.0 in 45.0..=150.0;
+        /// Girth over the fullest part of the hip, by tape.
+        hip, hip_cm = 96.0 in 65.0..=160.0;
+        /// Girth of the middle of the neck, across its axis.
+        neck, neck_cm = 31.7 in 24.0..=50.0;
+        /// Girth of the thigh right below the crotch.
+        thigh, thigh_cm = 57.0 in 35.0..=90.0;
+        /// Girth of the knee.
+        knee, knee_cm = 36.1 in 24.0..=60.0;
+        /// Largest girth of the calf.
+        calf, calf_cm = 36.1 in 24.0..=60.0;
+        /// Smallest girth of the ankle.
+        ankle, ankle_cm = 21.3 in 15.0..=35.0;
+        /// Girth of the upper arm, across it.
+        biceps, biceps_cm = 27.9 in 18.0..=50.0;
+        /// Girth of the wrist, across the arm.
+        wrist, wrist_cm = 15.4 in 11.0..=25.0;
+    }
+    proportional {
+        /// Distance from the side of the neck to the end of the shoulder.
+        shoulder_length, shoulder_length_cm = 13.9;
+        /// Distance from the end of the shoulder to the wrist.
+        arm_length, arm_length_cm = 56.1;
+        /// Height of the vertebra at the nape.
+        cervicale_height, cervicale_height_cm = 144.1;
+        /// Height of the end of the shoulder.
+        acromion_height, acromion_height_cm = 137.7;
+        /// Height of the armpit.
+        axilla_height, axilla_height_cm = 128.5;
+        /// Height of the bust girth.
+        bust_height, bust_height_cm = 122.0;
+        /// Height of the waist girth.
+        waist_height, waist_height_cm = 103.2;
+        /// Height of the hip girth.
+        hip_height, hip_height_cm = 85.8;
+        /// Height of the crotch.
+        crotch_height, crotch_height_cm = 81.6;
+        /// Height of the knee girth.
+        knee_height, knee_height_cm = 46.5;
     }
 }
 
@@ -148,73 +162,10 @@ impl BodySpec {
     /// # Errors
     /// [`ShapeError::Measurement`] for one out of range, [`ShapeError::Order`] for heights out of order.
     pub fn measures(&self) -> Result<Measures, ShapeError> {
-        let in_range = |name: &'static str, cm: f64, low: f64, high: f64| {
-            if (low..=high).contains(&cm) {
-                Ok(cm / 100.0)
-            } else {
-                Err(ShapeError::Measurement { name, found_cm: cm, low_cm: low, high_cm: high })
-            }
-        };
-        let stature = in_range("stature", self.stature_cm, 120.0, 220.0)?;
-        // The EU 38 column has a stature of 168 cm.
-        let part = |name, given: Option<f64>, eu38: f64| {
-            in_range(name, given.unwrap_or(eu38 * self.stature_cm / 168.0), 0.5 * eu38, 1.6 * eu38)
-        };
-        let m = Measures {
-            stature,
-            bust: in_range("bust", self.bust_cm, 60.0, 150.0)?,
-            underbust: in_range("underbust", self.underbust_cm, 55.0, 140.0)?,
-            waist: in_range("waist", self.waist_cm, 45.0, 150.0)?,
-            hip: in_range("hip", self.hip_cm, 65.0, 160.0)?,
-            neck: in_range("neck", self.neck_cm, 24.0, 50.0)?,
-            thigh: in_range("thigh", self.thigh_cm, 35.0, 90.0)?,
-            knee: in_range("knee", self.knee_cm, 24.0, 60.0)?,
-            calf: in_range("calf", self.calf_cm, 24.0, 60.0)?,
-            ankle: in_range("ankle", self.ankle_cm, 15.0, 35.0)?,
-            biceps: in_range("biceps", self.biceps_cm, 18.0, 50.0)?,
-            wrist: in_range("wrist", self.wrist_cm, 11.0, 25.0)?,
-            shoulder_length: part("shoulder_length", self.shoulder_length_cm, 13.9)?,
-            arm_length: part("arm_length", self.arm_length_cm, 56.1)?,
-            cervicale: part("cervicale_height", self.cervicale_height_cm, 144.1)?,
-            acromion: part("acromion_height", self.acromion_height_cm, 137.7)?,
-            axilla: part("axilla_height", self.axilla_height_cm, 128.5)?,
-            bust_height: part("bust_height", self.bust_height_cm, 122.0)?,
-            waist_height: part("waist_height", self.waist_height_cm, 103.2)?,
-            hip_height: part("hip_height", self.hip_height_cm, 85.8)?,
-            crotch: part("crotch_height", self.crotch_height_cm, 81.6)?,
-            knee_height: part("knee_height", self.knee_height_cm, 46.5)?,
-        };
-        m.check_order()?;
-        Ok(m)
+        let measures = Measures::in_range(self)?;
+        measures.check_order()?;
+        Ok(measures)
     }
-}
-
-/// A body's measurements in metres, complete.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "the same names as in BodySpec, which documents them")]
-pub struct Measures {
-    pub stature: f64,
-    pub bust: f64,
-    pub underbust: f64,
-    pub waist: f64,
-    pub hip: f64,
-    pub neck: f64,
-    pub thigh: f64,
-    pub knee: f64,
-    pub calf: f64,
-    pub ankle: f64,
-    pub biceps: f64,
-    pub wrist: f64,
-    pub shoulder_length: f64,
-    pub arm_length: f64,
-    pub cervicale: f64,
-    pub acromion: f64,
-    pub axilla: f64,
-    pub bust_height: f64,
-    pub waist_height: f64,
-    pub hip_height: f64,
-    pub crotch: f64,
-    pub knee_height: f64,
 }
 
 impl Measures {
@@ -230,13 +181,13 @@ impl Measures {
         let k = self.scale();
         let ladder = [
             ("knee_height", self.knee_height, 0.0),
-            ("crotch_height", self.crotch, 0.12 * k),
+            ("crotch_height", self.crotch_height, 0.12 * k),
             ("hip_height", self.hip_height, 0.017 * k),
             ("waist_height", self.waist_height, 0.041 * k),
             ("bust_height", self.bust_height, 0.0),
-            ("axilla_height", self.axilla, 0.0),
-            ("acromion_height", self.acromion, 0.041 * k),
-            ("cervicale_height", self.cervicale, 0.031 * k),
+            ("axilla_height", self.axilla_height, 0.0),
+            ("acromion_height", self.acromion_height, 0.041 * k),
+            ("cervicale_height", self.cervicale_height, 0.031 * k),
             ("stature", self.stature, 0.0),
         ];
         for pair in ladder.windows(2) {

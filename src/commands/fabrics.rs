@@ -48,6 +48,10 @@ impl FabricArgs {
         }
         let mut by: Vec<&str> = loaded.swatches.iter().filter_map(|swatch| swatch.by.as_deref()).collect();
         by.dedup();
-        Err(SceneError::from(CutError::Unused { fabric: fabric.clone(), by: by.join(", ") }).into())
+        Err(SceneError::from(CutError::Unfit(format!(
+            "--fabric {fabric}: found nothing to cut from it, every panel has its own ({}); take --fabric away, or `default` there",
+            by.join(", ")
+        )))
+        .into())
     }
 }

@@ -121,7 +121,7 @@ impl Made {
         if let Some(slides @ LetGo::Slides { .. }) = &let_go {
             warnings.push(format!("the garment {slides}"));
         }
-        warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)).map(|fallen| fallen.to_string()));
+        warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));
         let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();

@@ -38,33 +38,9 @@ pub enum CutError {
     /// The same on the command line.
     #[error(transparent)]
     Given(#[from] FabricError),
-    /// A line whose panel does not exist.
-    #[error(
-        "{file}, line {line}: found no panel `{found}` in {garment}, expected {}",
-        if known.is_empty() { "none: it has neither panels nor groups".to_owned() } else { format!("one of {}", listed(known)) }
-    )]
-    Panel { file: String, line: usize, garment: String, found: String, known: Vec<String> },
-    /// A panel that matches two lines.
-    #[error("{file}: panel `{panel}` fits both {first} and {second}, of different fabrics; give it a line of its own")]
-    Both { file: String, panel: String, first: String, second: String },
-    /// Two fabrics for the panels that are not named.
-    #[error(
-        "{garment}: {file} says default = \"{default}\", and --fabric says {fabric} for the same; take one of them away"
-    )]
-    Twice { garment: String, file: String, default: String, fabric: String },
-    /// Neither one fabric nor one for each garment.
-    #[error("found {fabrics} fabrics for {garments} garments, expected one for all, or one for each in the same order")]
-    Count { fabrics: usize, garments: usize },
-    /// One file for several garments.
-    #[error(
-        "--fabrics {file}: found {garments} garments, expected one; put a file beside each garment's own, GARMENT.{BESIDE}"
-    )]
-    Whose { file: String, garments: usize },
-    /// A fabric that no panel takes.
-    #[error(
-        "--fabric {fabric}: found nothing to cut from it, every panel has its own ({by}); take --fabric away, or `default` there"
-    )]
-    Unused { fabric: String, by: String },
+    /// Lines that do not fit the garment, or fabrics that do not fit each other: place, found, expected and remedy.
+    #[error("{0}")]
+    Unfit(String),
 }
 
 /// The panels of a garment that are cut from one fabric.
@@ -126,15 +102,22 @@ impl Cut {
             return Ok(Self { fabrics: vec![given], swatches });
         };
         let names = PanelFabrics::read(&path)?;
-        let garment_name = || garment.to_owned();
         if let (Some(default), Some(given)) = (&names.default, &given) {
-            let (default, fabric) = (default.name.clone(), given.name.clone());
-            return Err(CutError::Twice { garment: garment_name(), file: names.file, default, fabric });
+            return Err(CutError::Unfit(format!(
+                "{garment}: {} says default = \"{}\", and --fabric says {} for the same; take one of them away",
+                names.file, default.name, given.name
+            )));
         }
         let unknown = |(name, ..): &&(String, usize, Fabric)| !mesh.groups.iter().any(|group| matches(name, group));
         if let Some((found, line, _)) = names.panels.iter().find(unknown) {
-            let (file, found, known) = (names.file.clone(), found.clone(), mesh.groups.clone());
-            return Err(CutError::Panel { file, line: *line, garment: garment_name(), found, known });
+            let expected = match &mesh.groups[..] {
+                [] => "none: it has neither panels nor groups".to_owned(),
+                known => format!("one of {}", listed(known)),
+            };
+            let file = &names.file;
+            return Err(CutError::Unfit(format!(
+                "{file}, line {line}: found no panel `{found}` in {garment}, expected {expected}"
+            )));
         }
         let own = |panel: &String| Ok(names.of(panel)?.or(given.as_ref()).cloned());
         let of_group = mesh.groups.iter().map(own).collect::<Result<Vec<_>, CutError>>()?;
@@ -229,7 +212,7 @@ impl PanelFabrics {
     /// The fabric of a panel; `None` where neither a line nor a default assigns one.
     ///
     /// # Errors
-    /// [`CutError::Both`] where it matches two lines of different fabrics.
+    /// [`CutError::Unfit`] where it matches two lines of different fabrics.
     pub fn of(&self, panel: &str) -> Result<Option<&Fabric>, CutError> {
         if let Some((.., fabric)) = self.panels.iter().find(|(name, ..)| name == panel) {
             return Ok(Some(fabric));
@@ -237,8 +220,10 @@ impl PanelFabrics {
         let mut matching = self.panels.iter().filter(|(name, ..)| matches(name, panel));
         let Some((first, _, fabric)) = matching.next() else { return Ok(self.default.as_ref()) };
         let Some((second, ..)) = matching.find(|(.., other)| other != fabric) else { return Ok(Some(fabric)) };
-        let (file, panel, first, second) = (self.file.clone(), panel.to_owned(), first.clone(), second.clone());
-        Err(CutError::Both { file, panel, first, second })
+        Err(CutError::Unfit(format!(
+            "{}: panel `{panel}` fits both {first} and {second}, of different fabrics; give it a line of its own",
+            self.file
+        )))
     }
 }
 

@@ -16,6 +16,6 @@ pub use crate::body::distance::push_out::{PushOutReport, push_out};
 pub use error::SceneError;
 pub use loaded::{Loaded, Tailored};
 pub use materials::{CutError, PanelFabrics, Swatch};
-pub use outfit::{DistanceTo, Fallen, Layer, Scene};
+pub use outfit::{DistanceTo, Layer, Scene};
 pub use placement::{FARTHEST, Placement, facing_body};
 pub use spec::{DRESS_FORM, FileRole, SceneSpec};

@@ -5,7 +5,7 @@
 //! those below it (`drape/layers.rs`), which are then a surface like the body.
 //!
 //! Edges to hold are named by the user: the highest edge of the garment or of one of its connected parts, or the edges of a
-//! group. Connected parts of which nothing is held may fall off the body, which [`Fallen`] reports.
+//! group. Connected parts of which nothing is held may fall off the body, which [`Scene::fallen`] reports.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -99,19 +99,6 @@ impl FromStr for DistanceTo {
 
     fn from_str(text: &str) -> Result<Self, String> {
         word(text).ok_or_else(|| format!("found `{text}`, expected body or below"))
-    }
-}
-
-/// Connected parts that have fallen off the body, and the remedy.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fallen {
-    parts: String,
-    remedy: String,
-}
-
-impl fmt::Display for Fallen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} fallen off the body; {}, or place it better", self.parts, self.remedy)
     }
 }
 
@@ -365,13 +352,16 @@ impl Scene {
         (0..parts as u32).filter(|part| !held.contains(part)).map(|part| part as usize + 1).collect()
     }
 
-    /// Connected parts that have fallen off the body at `positions` (m): nothing of them is held, and every vertex is below
-    /// the body. They touch nothing any more and would fall for ever.
+    /// A warning about connected parts that have fallen off the body at `positions` (m): nothing of them is held, and every
+    /// vertex is below the body. They touch nothing any more and would fall for ever.
     #[must_use]
-    pub(crate) fn fallen(&self, positions: &[DVec3]) -> Option<Fallen> {
+    pub(crate) fn fallen(&self, positions: &[DVec3]) -> Option<String> {
         let fallen = self.fallen_parts(positions);
-        let parts = format!("{} {}", self.named(&fallen), if fallen.len() > 1 { "have" } else { "has" });
-        (!fallen.is_empty()).then(|| Fallen { parts, remedy: self.how_to_hold(&fallen) })
+        (!fallen.is_empty()).then(|| {
+            let have = if fallen.len() > 1 { "have" } else { "has" };
+            let (parts, remedy) = (self.named(&fallen), self.how_to_hold(&fallen));
+            format!("{parts} {have} fallen off the body; {remedy}, or place it better")
+        })
     }
 
     /// Numbers, from 1, of the connected parts that have [`fallen`](Self::fallen).

@@ -217,11 +217,15 @@ impl SceneSpec {
             return Err(SceneError::UnknownBody { found: self.body.clone() });
         }
         let (fabrics, garments) = (self.fabrics.len(), 1 + self.over.len());
-        if let Some(file) = self.fabrics_file.clone().filter(|_| garments > 1) {
-            return Err(CutError::Whose { file, garments }.into());
+        if let Some(file) = self.fabrics_file.as_ref().filter(|_| garments > 1) {
+            return Err(SceneError::from(CutError::Unfit(format!(
+                "--fabrics {file}: found {garments} garments, expected one; put a file beside each garment's own, GARMENT.{BESIDE}"
+            ))));
         }
         if fabrics != 0 && fabrics != garments {
-            return Err(CutError::Count { fabrics, garments }.into());
+            return Err(SceneError::from(CutError::Unfit(format!(
+                "found {fabrics} fabrics for {garments} garments, expected one for all, or one for each in the same order"
+            ))));
         }
         for layer in self.layers().filter(|layer| !names_a_file(&layer.garment)) {
             layer.described()?;

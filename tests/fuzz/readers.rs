@@ -162,7 +162,7 @@ fn bodies() {
             Err(e) => refused(&e),
             Ok(m) => {
                 check(
-                    [m.stature, m.bust, m.waist, m.hip, m.crotch].iter().all(|x| x.is_finite() && *x > 0.0),
+                    [m.stature, m.bust, m.waist, m.hip, m.crotch_height].iter().all(|x| x.is_finite() && *x > 0.0),
                     "no length",
                 )?;
                 Ok(Said::Taken)

@@ -1,4 +1,4 @@
-//! Every kind of edge, as meshed, against the formula of the format.
+//! Meshed edges of every kind lie on the curves of the format.
 
 use glam::DVec2;
 use partwise::garment::pattern::sew;
@@ -31,8 +31,8 @@ fn meshed_edges_lie_on_their_curves_at_equal_lengths() {
     let sewn = sew(&parse(&pattern(&json!({ "one": panel }), &json!([]))), 0.01).unwrap();
     let panel = &sewn.panels[0];
     let flat = |edge: usize| -> Vec<DVec2> {
-        let places = panel.along(edge);
-        places.iter().map(|v| panel.flat[panel.vertices.iter().position(|w| w == v).unwrap()]).collect()
+        let vertices = panel.along(edge);
+        vertices.iter().map(|v| panel.flat[panel.vertices.iter().position(|w| w == v).unwrap()]).collect()
     };
     let v = vertices.map(|v| DVec2::from_array(v) * 0.01);
     let control = |a: DVec2, b: DVec2, u: f64, w: f64| a + (b - a) * u + (b - a).perp() * w;
@@ -61,7 +61,7 @@ fn meshed_edges_lie_on_their_curves_at_equal_lengths() {
 }
 
 #[test]
-fn panels_are_placed_as_the_format_says() {
+fn panels_are_placed_by_the_format_s_rotation_and_translation() {
     let panel = json!({ "translation": [10.0, 100.0, 20.0], "rotation": [0.0, 90.0, 30.0],
         "vertices": [[0.0, 0.0], [10.0, 0.0], [0.0, 20.0]],
         "edges": [{ "endpoints": [0, 1] }, { "endpoints": [1, 2] }, { "endpoints": [2, 0] }] });

@@ -1,4 +1,4 @@
-//! Sewing patterns: edges against their curves, seams that meet, bad files, and shapes that are known.
+//! Sewing patterns: edges on their curves, seams that meet, invalid files, and shapes in closed form.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

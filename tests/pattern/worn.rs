@@ -1,4 +1,4 @@
-//! Patterns on the dress form.
+//! Patterns put on the dress form, and meshes with open seams.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn tshirt() -> SewingPattern {
 }
 
 #[test]
-fn the_forms_marks_are_found() {
+fn landmarks_of_the_dress_form_are_found() {
     let form = dress_form(&BodySpec::default()).unwrap();
     let found = Landmarks::of(&form);
     let near = |found: Option<f64>, expected: f64, by: f64| {
@@ -31,18 +31,18 @@ fn the_forms_marks_are_found() {
     near(found.armpit_z, 1.68 * 0.75, 0.035);
     near(found.arm_fall, f64::to_radians(50.0), 0.05);
     assert!(found.middle.length() < 0.02 && found.facing == 0.0, "{found:?}");
-    // Turned about, it is found turned.
+    // A turned body has a turned front.
     let turn = glam::DMat3::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let turned = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| turn * p).collect()));
     assert!((turned.facing - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{turned:?}");
     near(turned.arm_fall, f64::to_radians(50.0), 0.05);
-    // A mountain is no body, and not cut into a thousand million slices.
+    // A body as large as a mountain is not cut into a thousand million slices.
     let mountain = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| 1e7 * p).collect()));
     assert_eq!((mountain.waist_z, mountain.hip_z, mountain.bust_z, mountain.shoulder_z), (None, None, None, None));
 }
 
 #[test]
-fn patterns_are_drawn_shut_about_the_body() {
+fn seams_of_patterns_are_closed_outside_the_body() {
     for (name, held) in [("tshirt", false), ("skirt", true)] {
         let loaded = SceneSpec { edge_cm: 2.5, ..SceneSpec::new("form", asset(name)) }.load().unwrap();
         let scene = &loaded.scene;
@@ -87,8 +87,8 @@ fn an_exported_garment_keeps_its_panels_and_its_flat_pattern() {
 }
 
 #[test]
-fn a_pattern_in_texture_coordinates_is_known_as_such() {
-    // As GarmentCode's own meshes come: panels held about the body, seams bridged by long triangles, coordinates in cm.
+fn a_flat_pattern_in_texture_coordinates_is_detected() {
+    // As in GarmentCode's own meshes: panels placed around the body, seams bridged by long triangles, coordinates in cm.
     let pattern = tshirt();
     let sewn = sew(&pattern, 0.02).unwrap();
     let texture: Vec<_> = sewn.laid_out(&pattern).iter().map(|c| c.map(|p| 100.0 * p)).collect();
@@ -101,7 +101,7 @@ fn a_pattern_in_texture_coordinates_is_known_as_such() {
     let area = |rest: &partwise::mesh::RestShape| rest.areas().iter().sum::<f64>();
     assert!((area(&found.scene.rest) / area(&sewn.rest) - 1.0).abs() < 1e-9);
     assert!(found.notes().iter().any(|note| note.contains("flat pattern") && note.contains("--rest own")));
-    seams_are_shut(&found);
+    assert_seams_closed(&found);
     let own = SceneSpec { rest: "own".into(), ..spec }.load().unwrap();
     assert!(!own.notes().iter().any(|note| note.contains("drew open seams")), "{:?}", own.notes());
     assert_eq!(own.flat_pattern, None);
@@ -109,7 +109,7 @@ fn a_pattern_in_texture_coordinates_is_known_as_such() {
 }
 
 #[test]
-fn without_its_pattern_a_mesh_with_open_seams_is_as_large_at_rest_as_what_it_was_cut_from() {
+fn a_mesh_with_open_seams_has_the_rest_area_of_its_pattern() {
     let sewn = sew(&tshirt(), 0.02).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("box.obj").display().to_string();
@@ -119,11 +119,11 @@ fn without_its_pattern_a_mesh_with_open_seams_is_as_large_at_rest_as_what_it_was
     let ratio = area(&found.scene.rest) / area(&sewn.rest);
     assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
     assert!(found.notes().iter().any(|note| note.contains("open seams") && note.contains("--rest own")));
-    seams_are_shut(&found);
+    assert_seams_closed(&found);
 }
 
-/// On the body without a seam open, cloth through cloth or a vertex inside, in edges of 2 cm.
-fn seams_are_shut(found: &Loaded) {
+/// The garment, in edges of 2 cm, has no open seam, no self-intersection and no vertex inside the body.
+fn assert_seams_closed(found: &Loaded) {
     assert!(found.notes().iter().any(|note| note.contains("drew open seams")), "{:?}", found.notes());
     let (garment, body) = (&found.scene.garment, &found.scene.body);
     let sides = garment.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);

@@ -25,10 +25,9 @@ const OVERLAP: f64 = 0.08;
 /// The uncut surface of a garment.
 #[derive(Debug, Clone)]
 pub(super) struct Cloth<'a> {
-    form: &'a Anatomy,
+    under: Under<'a>,
     tube: Sweep,
     sleeve: Option<Sweep>,
-    arms: bool,
     /// Height of the hem, m.
     pub(super) hem: f64,
     /// Height of the upper edge or of the shoulder at the neckline, m.
@@ -36,6 +35,7 @@ pub(super) struct Cloth<'a> {
 }
 
 /// The part of the form under a garment, without the head.
+#[derive(Debug, Clone)]
 struct Under<'a> {
     form: &'a Anatomy,
     arms: bool,
@@ -53,7 +53,7 @@ impl Solid for Cloth<'_> {
         if let Some(sleeve) = &self.sleeve {
             cloth = Sided::new(sleeve, p.x).join(cloth, p, 0.05);
         }
-        cloth.smooth_min(Under { form: self.form, arms: self.arms }.at(p) - CLEARANCE, BLEND)
+        cloth.smooth_min(self.under.at(p) - CLEARANCE, BLEND)
     }
 }
 
@@ -62,13 +62,13 @@ impl<'a> Cloth<'a> {
         let (m, anatomy) = (&form.measures, &form.anatomy);
         let arms = spec.carried_by == Support::Shoulders;
         let top = match (spec.carried_by, &spec.neckline) {
-            (Support::Shoulders, Some(neckline)) => shoulder_top(anatomy, neckline.width_cm / 200.0, m.acromion),
+            (Support::Shoulders, Some(neckline)) => shoulder_top(anatomy, neckline.width_cm / 200.0, m.acromion_height),
             _ => m.waist_height,
         };
         let hem = top - spec.length_cm / 100.0;
         let tube = tube(spec, form, hem);
         let sleeve = spec.sleeves.as_ref().map(|s| sleeve(s, anatomy, m.arm_length));
-        Self { form: anatomy, tube, sleeve, arms, hem, top }
+        Self { under: Under { form: anatomy, arms }, tube, sleeve, hem, top }
     }
 
     /// Centre of the tube at height `z`.
@@ -165,7 +165,7 @@ fn skirt(from: Section, z0: f64, hem: f64, flare: f64) -> Vec<(f64, Section)> {
 fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let (m, anatomy) = (&form.measures, &form.anatomy);
     let ease = &spec.ease;
-    let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch + 0.03), girth);
+    let section = |z: f64, girth: f64| with_girth(extents(anatomy, z, m.crotch_height + 0.03), girth);
     let flare = spec.flare_cm / 100.0;
     let waist = section(m.waist_height, m.waist + ease.waist_cm / 100.0);
     // Hip and seat stay inside, so that the cloth falls over them.
@@ -182,7 +182,8 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
         let (_, seat) = widest(seat_z, around(hip, anatomy, seat_z));
         let grown = perimeter(seat) - perimeter(waist);
         let mut stations = skirt(seat, seat_z, hem, (flare - grown).max(0.0));
-        let high = high_hip(m.hip_height, m.waist_height);
+        // The high hip is a little over half the way from the hip up to the waist.
+        let high = m.hip_height + (m.waist_height - m.hip_height) * 0.6;
         stations.extend([(seat_z, seat), widest(high, around(straight.values(high), anatomy, high))]);
         stations.extend([(m.waist_height, waist), (m.waist_height + 0.04, waist)]);
         return Sweep::upright(EXPONENT, &stations, [0.005, 0.005]);
@@ -197,7 +198,7 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
     let mut underbust = section(under_z, m.underbust + 0.5 * (ease.bust_cm + ease.waist_cm) / 100.0);
     // Cloth hangs from the bust: below it the tube narrows only part of the way.
     underbust[3] = underbust[3].max(0.5 * (underbust[3] + bust[3]));
-    let axilla_z = m.axilla - 0.01;
+    let axilla_z = m.axilla_height - 0.01;
     let axilla = section(
         axilla_z,
         0.5 * (m.bust + m.underbust) + (ease.bust_cm + if spec.sleeves.is_some() { 4.0 } else { 0.0 }) / 100.0,
@@ -211,11 +212,6 @@ fn tube(spec: &GarmentSpec, form: &DressForm, hem: f64) -> Sweep {
         (axilla_z + 0.035, widened(axilla, -0.006)),
     ]);
     Sweep::upright(EXPONENT, &stations, [0.005, 0.02])
-}
-
-/// Height of the high hip, m: a little over half the way from the hip up to the waist.
-fn high_hip(hip: f64, waist: f64) -> f64 {
-    hip + (waist - hip) * 0.6
 }
 
 /// The left sleeve.

@@ -41,7 +41,7 @@ impl<'a> Opening<'a> {
             return openings;
         }
         if let Some(Neckline { width_cm, front_depth_cm, back_depth_cm }) = spec.neckline {
-            let y = anatomy.trunk.centre(m.acromion).y;
+            let y = anatomy.trunk.centre(m.acromion_height).y;
             openings.push(Self::Neckline {
                 half_width: width_cm / 200.0,
                 front: front_depth_cm / 100.0,
@@ -60,8 +60,8 @@ impl<'a> Opening<'a> {
             let strap = spec.strap_cm.unwrap_or(4.0) / 100.0;
             let upper = DVec3::new(0.5 * width + strap, 0.0, cloth.top);
             // Under the arm the opening starts a little below the armpit, outside the chest.
-            let chest = anatomy.trunk.section(m.axilla)[2];
-            let along = DVec3::new(chest + 0.016, 0.0, m.axilla - 0.035) - upper;
+            let chest = anatomy.trunk.section(m.axilla_height)[2];
+            let along = DVec3::new(chest + 0.016, 0.0, m.axilla_height - 0.035) - upper;
             let normal = DVec3::new(-along.z, 0.0, along.x).normalize();
             let root = anatomy.arm.section(0.06 * m.scale());
             let radius = root[2].max(root[3]) + ARMHOLE_ROOM;

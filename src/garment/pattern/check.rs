@@ -26,7 +26,11 @@ pub(super) fn check(pattern: &mut SewingPattern) -> Result<(), PatternError> {
             let length = e.curve.length();
             // The negation also rejects NaN.
             if !(length >= MIN_LENGTH && length.is_finite()) {
-                return Err(PatternError::Short { panel: panel.name.clone(), edge, length_cm: 100.0 * length });
+                return Err(PatternError::Invalid(format!(
+                    "panel {}, edge {edge}: its length is {:.4} cm, expected 0.01 cm or more; join its vertices, or leave it out",
+                    panel.name,
+                    100.0 * length
+                )));
             }
         }
         let chords: Vec<Chord> = (panel.edges.iter().enumerate())
@@ -37,8 +41,11 @@ pub(super) fn check(pattern: &mut SewingPattern) -> Result<(), PatternError> {
             })
             .collect();
         if let Some((first, second, at)) = crossing(&chords) {
-            let (panel, x_cm, y_cm) = (panel.name.clone(), 100.0 * at.x, 100.0 * at.y);
-            return Err(PatternError::Crossing { panel, first, second, x_cm, y_cm });
+            let (panel, at_cm) = (&panel.name, 100.0 * at);
+            return Err(PatternError::Invalid(format!(
+                "panel {panel}: edges {first} and {second} cross near ({:.2}, {:.2}) cm, expected a loop that does not cross itself",
+                at_cm.x, at_cm.y
+            )));
         }
     }
     stitches(pattern)
@@ -97,15 +104,21 @@ fn stitches(pattern: &mut SewingPattern) -> Result<(), PatternError> {
     for (number, stitch) in pattern.stitches.iter().enumerate() {
         for side in stitch.sides {
             if let Some(first) = sewn.insert(side, number) {
-                let panel = pattern.panels[side.panel].name.clone();
-                return Err(PatternError::Twice { panel, edge: side.edge, first, second: number });
+                let (panel, edge) = (&pattern.panels[side.panel].name, side.edge);
+                return Err(PatternError::Invalid(format!(
+                    "stitches {first} and {number} both sew edge {edge} of panel {panel}, \
+                     expected each edge in one stitch at most; split the edge"
+                )));
             }
         }
         let ([a_m, b_m], ratio) = (pattern.lengths(stitch), pattern.gathering(stitch));
         let [a, b] = stitch.sides.map(|side| pattern.edge_name(side));
         let (a_cm, b_cm) = (100.0 * a_m, 100.0 * b_m);
         if ratio > MAX_RATIO {
-            return Err(PatternError::Lengths { stitch: number, a, a_cm, b, b_cm, most: MAX_RATIO });
+            return Err(PatternError::Invalid(format!(
+                "stitch {number}: {a} is {a_cm:.1} cm long and {b} {b_cm:.1} cm, expected lengths within a factor of {MAX_RATIO}: \
+                 gathering explains no more; are these the edges that were meant?"
+            )));
         }
         if ratio > NOTED_RATIO {
             notes.push(format!(

@@ -16,7 +16,7 @@ use super::check;
 use super::curve::Curve;
 use super::error::PatternError;
 use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
-use crate::base::files::{read_text, stem};
+use crate::base::files::{listed, read_text, stem};
 
 /// Longest accepted file, MB. The 115,000 patterns of the public data set have at most 60 kB.
 const MAX_MB: usize = 4;
@@ -59,11 +59,16 @@ pub fn parse(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
 
 fn unchecked(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
     if text.len() > MAX_MB << 20 {
-        return Err(PatternError::TooLong { megabytes: text.len() as f64 / f64::from(1 << 20), most_mb: MAX_MB });
+        let megabytes = text.len() as f64 / f64::from(1 << 20);
+        return Err(PatternError::Invalid(format!(
+            "found {megabytes:.1} MB of JSON, expected a sewing pattern of {MAX_MB} MB at most; is this another file?"
+        )));
     }
     let Unique(value) = serde_json::from_str(text).map_err(|e| match e.classify() {
-        Category::Data => PatternError::Repeated { reason: e.to_string() },
-        _ => PatternError::NotJson { reason: e.to_string() },
+        Category::Data => PatternError::Invalid(e.to_string()),
+        _ => PatternError::Invalid(format!(
+            "this is no JSON: {e}; expected a sewing pattern as GarmentCode writes it (*_specification.json)"
+        )),
     })?;
     let root = At::new(&value, "the file");
     let mut notes = Vec::new();
@@ -83,7 +88,7 @@ fn unchecked(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
     let by_name = panels.object("the panels by name")?;
     if by_name.is_empty() || by_name.len() > MAX_PANELS {
         let found = format!("{} panels", by_name.len());
-        return Err(PatternError::Wrong { place: panels.place, found, expected: format!("1 to {MAX_PANELS}") });
+        return Err(PatternError::unexpected(&panels.place, &found, &format!("1 to {MAX_PANELS}")));
     }
     let mut read = Vec::new();
     for name in ordered(inner.get("panel_order"), by_name) {
@@ -96,13 +101,8 @@ fn unchecked(text: &str, name: &str) -> Result<SewingPattern, PatternError> {
     Ok(SewingPattern { name: name.to_owned(), panels: read, stitches, notes })
 }
 
-fn key<'a>(
-    object: &'a Map<String, Value>,
-    key: &'static str,
-    place: &str,
-    expected: &'static str,
-) -> Result<&'a Value, PatternError> {
-    object.get(key).ok_or_else(|| PatternError::Missing { place: place.to_owned(), key, expected })
+fn key<'a>(object: &'a Map<String, Value>, key: &str, place: &str, expected: &str) -> Result<&'a Value, PatternError> {
+    object.get(key).ok_or_else(|| PatternError::Invalid(format!("{place}: found no \"{key}\", expected {expected}")))
 }
 
 fn unknown(object: &Map<String, Value>, known: &[&str], place: &str, notes: &mut Vec<String>) {
@@ -173,7 +173,7 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
     let values = list.list("a list of edges")?;
     if !(2..=MAX_EDGES).contains(&values.len()) {
         let found = format!("{} edges", values.len());
-        return Err(PatternError::Wrong { place: list.place, found, expected: format!("2 to {MAX_EDGES}") });
+        return Err(PatternError::unexpected(&list.place, &found, &format!("2 to {MAX_EDGES}")));
     }
     let mut edges = Vec::new();
     let mut ends: Vec<[usize; 2]> = Vec::new();
@@ -197,8 +197,10 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
     for (i, [from, _]) in ends.iter().enumerate() {
         let before = (i + ends.len() - 1) % ends.len();
         if *from != ends[before][1] {
-            let (panel, expected) = (name.to_owned(), ends[before][1]);
-            return Err(PatternError::Open { panel, edge: i, before, found: *from, expected });
+            let expected = ends[before][1];
+            return Err(PatternError::Invalid(format!(
+                "panel {name}: edge {i} begins at vertex {from}, expected {expected}, where edge {before} ends: the loop is open"
+            )));
         }
     }
     let label = label(object, &place)?;
@@ -245,17 +247,16 @@ fn curve(place: &str, value: &Value, a: DVec2, b: DVec2, of: &Properties) -> Res
             };
             let radius = number(radius, "radius")?;
             let arc = Curve::arc(a, b, radius * of.metres_per_unit, flag(large, "large")?, flag(right, "right")?);
-            arc.ok_or_else(|| PatternError::Wrong {
-                place: at.place.clone(),
-                found: format!("a circle of radius {radius}"),
-                expected: format!("one that reaches both ends, {:.4} or more", 0.5 * d.length() / of.metres_per_unit),
+            arc.ok_or_else(|| {
+                let least = 0.5 * d.length() / of.metres_per_unit;
+                let expected = format!("one that reaches both ends, {least:.4} or more");
+                PatternError::unexpected(&at.place, &format!("a circle of radius {radius}"), &expected)
             })
         }
-        (kind, params) => Err(PatternError::Wrong {
-            place: at.place.clone(),
-            found: format!("type {} with {} params", kind.unwrap_or("(none)"), params.len()),
-            expected: "quadratic with 1, cubic with 2 or circle with 3".to_owned(),
-        }),
+        (kind, params) => {
+            let found = format!("type {} with {} params", kind.unwrap_or("(none)"), params.len());
+            Err(PatternError::unexpected(&at.place, &found, "quadratic with 1, cubic with 2 or circle with 3"))
+        }
     }
 }
 
@@ -275,14 +276,18 @@ fn stitch(number: usize, value: &Value, panels: &[PatternPanel]) -> Result<Stitc
         else {
             return Err(at.wrong(expected));
         };
-        let known = || panels.iter().map(|p| p.name.clone()).collect();
-        let panel = panels.iter().position(|p| p.name == *name);
-        let panel =
-            panel.ok_or_else(|| PatternError::NoPanel { stitch: number, found: name.clone(), known: known() })?;
+        let Some(panel) = panels.iter().position(|p| p.name == *name) else {
+            let known = listed(&panels.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
+            let message = format!("stitch {number}: found no panel \"{name}\", expected one of {known}");
+            return Err(PatternError::Invalid(message));
+        };
         let last = panels[panel].edges.len() - 1;
-        let place = usize::try_from(edge).ok().filter(|&e| e <= last);
-        let missing = || PatternError::NoEdge { stitch: number, panel: name.clone(), found: edge, last };
-        Ok(EdgeAt { panel, edge: place.ok_or_else(missing)? })
+        if edge > last as u64 {
+            let message =
+                format!("stitch {number}: found edge {edge} of panel {name}, expected one of its edges 0 to {last}");
+            return Err(PatternError::Invalid(message));
+        }
+        Ok(EdgeAt { panel, edge: edge as usize })
     };
     Ok(Stitch { sides: [side(pair[0])?, side(pair[1])?], right_wrong })
 }
@@ -362,8 +367,8 @@ impl<'a> At<'a> {
         Self { value, place: place.into() }
     }
 
-    fn wrong(&self, expected: impl Into<String>) -> PatternError {
-        PatternError::Wrong { place: self.place.clone(), found: shown(self.value), expected: expected.into() }
+    fn wrong(&self, expected: impl AsRef<str>) -> PatternError {
+        PatternError::unexpected(&self.place, &shown(self.value), expected.as_ref())
     }
 
     fn object(&self, expected: &str) -> Result<&'a Map<String, Value>, PatternError> {

@@ -63,18 +63,27 @@ pub struct SewnGarment {
 pub fn sew(pattern: &SewingPattern, edge_m: f64) -> Result<SewnGarment, PatternError> {
     if !(EDGES[0]..=EDGES[1]).contains(&edge_m) {
         let [low_cm, high_cm] = EDGES.map(|m| 100.0 * m);
-        return Err(PatternError::EdgeLength { found_cm: 100.0 * edge_m, low_cm, high_cm });
+        let found_cm = 100.0 * edge_m;
+        let found = format!("found an edge length of {found_cm} cm, expected {low_cm} to {high_cm} cm");
+        return Err(PatternError::Invalid(found));
     }
     let counts = divisions(pattern, edge_m);
     let area: f64 = pattern.panels.iter().map(|p| p.signed_area().abs()).sum();
     let found = (area / (0.75_f64.sqrt() * edge_m * edge_m)) as usize + counts.iter().flatten().sum::<usize>();
     if found > MAX_VERTICES {
-        return Err(PatternError::TooFine { edge_cm: 100.0 * edge_m, found, most: MAX_VERTICES });
+        let edge_cm = 100.0 * edge_m;
+        return Err(PatternError::Invalid(format!(
+            "an edge length of {edge_cm} cm makes about {found} vertices of this pattern, expected {MAX_VERTICES} at most; \
+             ask for longer edges"
+        )));
     }
     let outlines = outlines(pattern, &counts);
     let meshed: Vec<Meshed> = (pattern.panels.par_iter().zip(&outlines))
         .map(|(panel, outline)| {
-            let failed = |reason| PatternError::NoMesh { panel: panel.name.clone(), reason };
+            let failed = |reason: String| {
+                let panel = &panel.name;
+                PatternError::Invalid(format!("panel {panel}: it cannot be meshed: {reason}"))
+            };
             if panel.signed_area() > 0.0 {
                 return panel_mesh::mesh(&outline.points, &outline.class, edge_m).map_err(failed);
             }

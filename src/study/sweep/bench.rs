@@ -16,7 +16,7 @@ use crate::base::error_text::said;
 use crate::drape::{Drape, StageTimes};
 use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
-use crate::scene::{Fallen, Loaded};
+use crate::scene::Loaded;
 use crate::study::accuracy::ReferenceCache;
 use crate::study::evaluate::EvaluateError;
 use crate::study::job::Measured;
@@ -41,8 +41,8 @@ impl PointError {
     }
 
     /// A garment of which nothing keeps some or all on the body.
-    fn fallen(what: Option<Fallen>) -> Self {
-        let what = what.map_or_else(|| "the garment has fallen off the body".to_owned(), |fallen| fallen.to_string());
+    fn fallen(what: Option<String>) -> Self {
+        let what = what.unwrap_or_else(|| "the garment has fallen off the body".to_owned());
         Self::Failed(format!("{what}; in a sweep file it is `hold` that holds an edge"))
     }
 }
