@@ -154,7 +154,7 @@ pub(crate) fn cuts(mesh: &TriMesh, plane: Plane) -> Vec<Cut> {
         let [above, below] = edge.map(|v| height[v as usize]);
         (edge, above / (above - below))
     };
-    // Open chains first, from the edges nothing leads to; what is left are loops.
+    // Open chains first, from edges that end no segment; the rest are loops.
     let ends: std::collections::BTreeSet<[u32; 2]> = links.values().map(|(next, _)| *next).collect();
     let starts: Vec<[u32; 2]> = links.keys().filter(|k| !ends.contains(*k)).copied().collect();
     let mut found = Vec::new();

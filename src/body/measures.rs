@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-/// Measurements and descriptions that no mesh can be made of.
+/// Invalid measurements of a body or lengths of a garment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum ShapeError {
@@ -169,7 +169,7 @@ impl BodySpec {
 }
 
 impl Measures {
-    /// Stature relative to the default body's 1.68 m; scales what is not measured (head, hands, feet).
+    /// Stature relative to the default body's 1.68 m; scales head, hands and feet.
     #[must_use]
     pub(crate) fn scale(&self) -> f64 {
         self.stature / 1.68

@@ -1,4 +1,4 @@
-//! A scene with its origin: what was read, guessed, repaired and made on the way to it, and how it is written back.
+//! A scene with its origin: guesses, findings and repairs of its files, and writing the result back.
 
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 //!
 //! [`SceneSpec`] names body and garments, as files or built in. [`SceneSpec::load`] reads them in this order: the garment is
 //! oriented to face away from the body, its rest shape is taken before anything moves, the garment must be near the body,
-//! and what starts inside the body is pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
+//! and vertices that start inside the body are pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
 mod error;
 mod layering;

@@ -1,6 +1,6 @@
-//! What a recording holds, read back.
+//! The contents of a recording, read back.
 
-#![allow(dead_code, reason = "each test reads what it needs")]
+#![allow(dead_code, reason = "each test reads some of the fields")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -8,23 +8,23 @@ use std::path::Path;
 
 use rerun::{ChunkStore, ChunkStoreConfig};
 
-/// What lies at one entity path.
+/// The data at one entity path.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Entity {
     /// Names of its components (`Mesh3D:vertex_positions`).
     pub(crate) components: BTreeSet<String>,
-    /// Timelines it has rows on; none where all is static.
+    /// Timelines of its rows; none where all data are static.
     pub(crate) timelines: BTreeSet<String>,
     /// Rows with a time.
     pub(crate) rows: usize,
-    /// Rows without: logged once for all.
+    /// Static rows.
     pub(crate) fixed_rows: usize,
 }
 
 /// The contents of an `.rrd` file.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Contents {
-    /// What lies at each path of the recording.
+    /// The data at each path of the recording.
     pub(crate) entities: BTreeMap<String, Entity>,
     /// Paths of the blueprint.
     pub(crate) blueprint: BTreeSet<String>,

@@ -54,7 +54,7 @@ const FLOOR_TOLERANCE: f64 = 1e-6;
 
 /// Least cosine between the way out of the body and the cloth's outer normal at which that way counts as leading outward.
 pub(crate) const OUTWARD: f64 = 0.3;
-/// Least depth of a protrusion, m; contact pushes out what is less deep.
+/// Least depth of a protrusion, m; contact pushes out shallower triangles.
 const MIN_PROTRUSION_DEPTH: f64 = 2e-3;
 /// Longest protrusion beyond the cloth, m: a foot less its heel.
 const MAX_PROTRUSION: f64 = 0.12;

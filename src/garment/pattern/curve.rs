@@ -7,23 +7,14 @@
 //! | cubic | (1−t)³ a + 3 t (1−t)² c + 3 t² (1−t) d + t³ b |
 //! | arc | m + r (cos φ, sin φ), φ = φ₀ + t Δφ |
 //!
-//! Lengths of Béziers are Gauss sums (five points) over [`PIECES`] pieces each, with a relative error of 1e-12 where a curve
-//! has no cusp. The point at a given length is found in its piece by bisection of the parameter, so it lies on the curve to
-//! rounding. All in metres.
+//! Béziers are kurbo's: their lengths, the points at given lengths, and their areas. kurbo approximates arcs by Béziers, so arcs
+//! are exact here. All in metres.
 
 use glam::DVec2;
+use kurbo::{CubicBez, Line, ParamCurve, ParamCurveArclen, ParamCurveArea, PathSeg, Point, QuadBez};
 
-/// Pieces of a Bézier, of five Gauss points each; more are more accurate near cusps.
-const PIECES: usize = 32;
-
-/// Abscissae and weights of the five-point Gauss-Legendre rule on [−1, 1].
-const GAUSS: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
+/// Absolute error of lengths and of points at a length, m: a millionth of a micrometre.
+const ACCURACY: f64 = 1e-12;
 
 /// A curve in the plane of its panel, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,38 +74,21 @@ impl Curve {
     /// p(t); the ends are exact.
     #[must_use]
     pub(crate) fn at(&self, t: f64) -> DVec2 {
-        if t <= 0.0 {
-            return self.start();
-        }
-        if t >= 1.0 {
-            return self.end();
-        }
-        let s = 1.0 - t;
         match *self {
-            Self::Line { a, b } => a * s + b * t,
-            Self::Quadratic { a, c, b } => a * (s * s) + c * (2.0 * s * t) + b * (t * t),
-            Self::Cubic { a, c, d, b } => {
-                a * (s * s * s) + c * (3.0 * s * s * t) + d * (3.0 * s * t * t) + b * (t * t * t)
-            }
+            _ if t <= 0.0 => self.start(),
+            _ if t >= 1.0 => self.end(),
             Self::Arc { centre, radius, from, turn, .. } => centre + radius * DVec2::from_angle(from + t * turn),
+            _ => vector(self.segment().eval(t)),
         }
     }
 
-    /// dp/dt.
-    fn velocity(&self, t: f64) -> DVec2 {
-        let s = 1.0 - t;
+    /// The curve as kurbo's; an arc, which kurbo only approximates, as its chord.
+    fn segment(&self) -> PathSeg {
         match *self {
-            Self::Line { a, b } => b - a,
-            Self::Quadratic { a, c, b } => 2.0 * (s * (c - a) + t * (b - c)),
-            Self::Cubic { a, c, d, b } => 3.0 * (s * s * (c - a) + 2.0 * s * t * (d - c) + t * t * (b - d)),
-            Self::Arc { radius, from, turn, .. } => turn * radius * DVec2::from_angle(from + t * turn).perp(),
+            Self::Line { a, b } | Self::Arc { a, b, .. } => Line::new(point(a), point(b)).into(),
+            Self::Quadratic { a, c, b } => QuadBez::new(point(a), point(c), point(b)).into(),
+            Self::Cubic { a, c, d, b } => CubicBez::new(point(a), point(c), point(d), point(b)).into(),
         }
-    }
-
-    /// Length between two parameters in one piece.
-    fn piece_length(&self, from: f64, to: f64) -> f64 {
-        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-        half * GAUSS.iter().map(|(x, w)| w * self.velocity(middle + half * x).length()).sum::<f64>()
     }
 
     /// Length, m.
@@ -123,66 +97,38 @@ impl Curve {
         match *self {
             Self::Line { a, b } => a.distance(b),
             Self::Arc { radius, turn, .. } => radius * turn.abs(),
-            _ => (0..PIECES).map(|i| self.piece_length(parameter(i), parameter(i + 1))).sum(),
+            _ => self.segment().arclen(ACCURACY),
         }
     }
 
     /// `count` + 1 points at equal arc lengths, both ends included.
     #[must_use]
     pub(crate) fn divided(&self, count: usize) -> Vec<DVec2> {
-        let share = |i: usize| i as f64 / count as f64;
-        if let Self::Line { .. } | Self::Arc { .. } = self {
-            return (0..=count).map(|i| self.at(share(i))).collect();
-        }
-        let mut before = vec![0.0];
-        for i in 0..PIECES {
-            before.push(before[i] + self.piece_length(parameter(i), parameter(i + 1)));
-        }
-        let whole = before[PIECES];
-        (0..=count)
-            .map(|i| {
-                if i == count {
-                    return self.end();
-                }
-                let wanted = whole * share(i);
-                let piece = before.partition_point(|&l| l <= wanted).clamp(1, PIECES) - 1;
-                let (mut low, mut high) = (parameter(piece), parameter(piece + 1));
-                let origin = low;
-                for _ in 0..60 {
-                    let middle = 0.5 * (low + high);
-                    if before[piece] + self.piece_length(origin, middle) < wanted {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                    if high - low < 1e-15 {
-                        break;
-                    }
-                }
-                self.at(0.5 * (low + high))
-            })
-            .collect()
+        let length = self.length();
+        let parameter = |share: f64| match self {
+            Self::Line { .. } | Self::Arc { .. } => share,
+            _ if share == 1.0 => 1.0,
+            _ => self.segment().inv_arclen(share * length, ACCURACY),
+        };
+        (0..=count).map(|i| self.at(parameter(i as f64 / count as f64))).collect()
     }
 
     /// ½ ∫ p × dp along it. The edges of a loop add up to its area, m², positive counter-clockwise.
     #[must_use]
     pub(crate) fn area(&self) -> f64 {
-        if let Self::Arc { centre, radius, turn, a, b, .. } = *self {
-            return 0.5 * (centre.perp_dot(b - a) + radius * radius * turn);
+        match *self {
+            Self::Arc { centre, radius, turn, a, b, .. } => 0.5 * (centre.perp_dot(b - a) + radius * radius * turn),
+            _ => self.segment().signed_area(),
         }
-        // The integrand is a polynomial of degree five at most, for which the rule is exact.
-        0.5 * GAUSS
-            .iter()
-            .map(|(x, w)| {
-                let t = 0.5 * (1.0 + x);
-                0.5 * w * self.at(t).perp_dot(self.velocity(t))
-            })
-            .sum::<f64>()
     }
 }
 
-fn parameter(i: usize) -> f64 {
-    i as f64 / PIECES as f64
+fn point(p: DVec2) -> Point {
+    Point::new(p.x, p.y)
+}
+
+fn vector(p: Point) -> DVec2 {
+    DVec2::new(p.x, p.y)
 }
 
 #[cfg(test)]

@@ -127,7 +127,7 @@ fn ordered(order: Option<&Value>, panels: &Map<String, Value>) -> Vec<String> {
 fn properties(value: Option<&Value>, notes: &mut Vec<String>) -> Result<Properties, PatternError> {
     let mut found = Properties { metres_per_unit: 0.01, relative: true };
     let Some(value) = value else {
-        notes.push("the file has no properties: lengths are taken for centimetres, curvatures for relative".to_owned());
+        notes.push("the file has no properties: assumed centimetres and relative curvatures".to_owned());
         return Ok(found);
     };
     let place = "properties";

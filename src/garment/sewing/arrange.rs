@@ -8,9 +8,6 @@ use glam::{DMat3, DVec2, DVec3};
 use super::landmarks::Landmarks;
 use crate::garment::pattern::{EdgeAt, PatternPanel, SewingPattern};
 
-/// Height of the shoulder seams above the shoulder's neck end, m. From above, the garment comes down on its shoulders.
-/// GarmentCode's placement on its own body is 3.8 cm lower, and six patterns closed from there are stretched half as much again.
-const ABOVE_SHOULDER: f64 = 0.0;
 /// Height of a waist above the body's smallest girth, m, as GarmentCode has it on its own body.
 const ABOVE_WAIST: f64 = -0.022;
 
@@ -36,17 +33,6 @@ pub struct Arranged {
     pub turned: f64,
 }
 
-/// The body landmarks that a pattern was placed for.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Expected {
-    /// Height of the neck end of the shoulder seams, m.
-    shoulder_z: Option<f64>,
-    /// Height of the waist, m: edges labelled `lower_interface`, or the top of a garment without shoulders.
-    waist_z: f64,
-    /// Angle of the sleeves below the horizontal, radians.
-    arm_fall: Option<f64>,
-}
-
 /// For each panel that is a sleeve, its angle below the horizontal, radians.
 fn sleeves(pattern: &SewingPattern) -> Vec<Option<f64>> {
     let of = |panel: &PatternPanel| {
@@ -66,10 +52,8 @@ fn placed(pattern: &SewingPattern, at: EdgeAt) -> (DVec3, f64) {
     (placed.iter().sum::<DVec3>() / placed.len() as f64, top)
 }
 
-fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
-    let sleeves = sleeves(pattern);
-    let falls: Vec<f64> = sleeves.iter().flatten().copied().collect();
-    let arm_fall = (!falls.is_empty()).then(|| falls.iter().sum::<f64>() / falls.len() as f64);
+/// Height of the neck end of the pattern's shoulder seams, m. They are at most [`MAX_BELOW_ARMPITS`] below the armpits.
+fn shoulder_height(pattern: &SewingPattern, sleeves: &[Option<f64>], armpit_z: f64) -> Option<f64> {
     // Shoulder seams join front and back, neither of them a sleeve, and run across the body more than down it.
     let mut shoulder_z: Option<f64> = None;
     for stitch in &pattern.stitches {
@@ -82,7 +66,11 @@ fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
             shoulder_z = Some(shoulder_z.map_or(top, |z| z.max(top)));
         }
     }
-    shoulder_z = shoulder_z.filter(|z| *z > armpit_z - MAX_BELOW_ARMPITS);
+    shoulder_z.filter(|z| *z > armpit_z - MAX_BELOW_ARMPITS)
+}
+
+/// Height of the pattern's waist, m: edges labelled `lower_interface`, or the top of a garment without shoulders.
+fn waist_height(pattern: &SewingPattern) -> f64 {
     let mut waist = Vec::new();
     let mut top = f64::NEG_INFINITY;
     for (panel, of) in pattern.panels.iter().enumerate() {
@@ -94,28 +82,32 @@ fn expected(pattern: &SewingPattern, armpit_z: f64) -> Expected {
             }
         }
     }
-    let waist_z = if waist.is_empty() { top } else { waist.iter().sum::<f64>() / waist.len() as f64 };
-    Expected { shoulder_z, waist_z, arm_fall }
+    if waist.is_empty() { top } else { waist.iter().sum::<f64>() / waist.len() as f64 }
 }
 
 /// Moves the panels to a body; returns the moves and whether the garment has shoulder seams.
+///
+/// Shoulder seams are placed at the shoulder's neck end, so that the garment comes down on its shoulders. GarmentCode's placement
+/// on its own body is 3.8 cm lower, and six patterns closed from there are stretched half as much again.
 pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arranged, bool) {
     let armpit_z = body.armpit_z.or(body.shoulder_z).unwrap_or(f64::INFINITY);
-    let expected = expected(pattern, armpit_z);
+    let sleeves = sleeves(pattern);
+    let shoulder_z = shoulder_height(pattern, &sleeves, armpit_z);
+    let falls: Vec<f64> = sleeves.into_iter().flatten().collect();
     let mut done = Arranged::default();
-    let raised = match (expected.shoulder_z, body.shoulder_z, body.waist_z) {
-        (Some(own), Some(shoulder), _) => shoulder + ABOVE_SHOULDER - own,
-        (None, _, Some(waist)) => waist + ABOVE_WAIST - expected.waist_z,
+    let raised = match (shoulder_z, body.shoulder_z, body.waist_z) {
+        (Some(own), Some(shoulder), _) => shoulder - own,
+        (None, _, Some(waist)) => waist + ABOVE_WAIST - waist_height(pattern),
         _ => 0.0,
     };
     if raised.abs() > MIN_SHIFT {
         done.raised = raised;
     }
-    if let (Some(own), Some(arms)) = (expected.arm_fall, body.arm_fall)
-        && (arms - own).abs() > MIN_TURN
-    {
-        done.sleeves = arms - own;
-        turn_sleeves(pattern, done.sleeves);
+    // Without sleeves the mean is not a number, and nothing turns.
+    let turn = body.arm_fall.map_or(0.0, |arms| arms - falls.iter().sum::<f64>() / falls.len() as f64);
+    if turn.abs() > MIN_TURN {
+        done.sleeves = turn;
+        turn_sleeves(pattern, turn);
     }
     done.turned = body.facing;
     let turn = DMat3::from_rotation_z(body.facing);
@@ -123,7 +115,7 @@ pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arrange
         panel.rotation = turn * panel.rotation;
         panel.translation = turn * panel.translation + body.middle.extend(done.raised);
     }
-    (done, expected.shoulder_z.is_some())
+    (done, shoulder_z.is_some())
 }
 
 /// Turns each side's sleeves downwards about the middle of the edges that join them to the bodice.
