@@ -1,4 +1,4 @@
-//! What happens where a recording cannot go.
+//! Errors of a recording's sinks.
 #![cfg(feature = "viewer")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -7,24 +7,24 @@ use std::path::PathBuf;
 
 use partwise::record::{RecordError, RecordOptions, Recorder, Sink};
 
-/// A port somebody else listens on, for as long as the listener lives.
+/// A port in use, until the listener is dropped.
 fn taken_port() -> (TcpListener, u16) {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     (listener, port)
 }
 
-fn refused(sinks: Vec<Sink>) -> RecordError {
+fn open_error(sinks: Vec<Sink>) -> RecordError {
     Recorder::open(RecordOptions { sinks, ..RecordOptions::default() }).err().expect("it must not open")
 }
 
 #[test]
-fn an_unwritable_path_is_the_users_mistake_and_names_the_file() {
+fn an_unwritable_path_is_a_user_error_that_names_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("a-file");
     std::fs::write(&file, "no folder").unwrap();
     for path in [file.join("x.rrd"), folder.path().to_owned(), PathBuf::from("/proc/none/x.rrd")] {
-        let error = refused(vec![Sink::File(path.clone())]);
+        let error = open_error(vec![Sink::File(path.clone())]);
         assert!(matches!(error, RecordError::Unwritable { .. }), "{error}");
         assert!(error.is_users());
         assert!(error.to_string().contains(&path.display().to_string()), "{error}");
@@ -37,7 +37,7 @@ fn a_port_in_use_is_named_and_no_file_is_begun() {
     let (_listener, port) = taken_port();
     let serve = |web_port, grpc_port| Sink::Serve { web_port, grpc_port, history_bytes: 1 << 28 };
     for (sink, option) in [(serve(Some(port), None), "--web-port"), (serve(None, Some(port)), "--grpc-port")] {
-        let error = refused(vec![Sink::File(folder.path().join("x.rrd")), sink]);
+        let error = open_error(vec![Sink::File(folder.path().join("x.rrd")), sink]);
         assert!(matches!(error, RecordError::PortInUse { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(&port.to_string()) && text.contains(option), "{text}");
@@ -46,13 +46,13 @@ fn a_port_in_use_is_named_and_no_file_is_begun() {
 }
 
 #[test]
-fn a_viewer_that_is_not_there_is_said_before_anything_is_computed() {
+fn a_missing_viewer_is_reported_when_the_recording_opens() {
     let (listener, port) = taken_port();
     drop(listener);
     let url = format!("rerun+http://127.0.0.1:{port}/proxy");
-    let error = refused(vec![Sink::Connect(url.clone())]);
+    let error = open_error(vec![Sink::Connect(url.clone())]);
     assert!(matches!(error, RecordError::Unreachable { .. }), "{error}");
     assert!(error.to_string().contains(&url), "{error}");
-    let error = refused(vec![Sink::Connect("127.0.0.1".into())]);
+    let error = open_error(vec![Sink::Connect("127.0.0.1".into())]);
     assert!(matches!(error, RecordError::BadUrl { .. }), "{error}");
 }

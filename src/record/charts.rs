@@ -146,7 +146,7 @@ mod tests {
             LevelCount { level: 1, lower_cm, upper_cm, ..LevelCount::default() }
         };
         let distances = [0.0, 0.001, 0.0099, 0.01, 0.02, 0.049, 0.3];
-        // A narrow level has one bar of its own width.
+        // A narrow level has one bar, as wide as the level.
         let narrow = bars(&level(0.0, 0.01), &distances, 0.02, 0.1);
         assert_eq!(narrow, [Bar { height: 3.0, left: 0.0, width: 0.01 }]);
         // A wide level is divided evenly, without empty bars.

@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn neighbours_in_one_level_differ_while_there_are_enough_shades() {
-        // A fan: vertex 0 in the middle of 30 others, each a PART of its own, all in one level.
+        // A fan: vertex 0 in the middle of 30 others, 31 PARTs of one level.
         let triangles: Vec<[u32; 3]> = (1..30).map(|i| [0, i, i + 1]).collect();
         let parts: Vec<u32> = (0..31).collect();
         let colours = colour_parts(&parts, 31, &levels(&[31]), &triangles, &[]).of_vertices;

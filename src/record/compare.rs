@@ -13,7 +13,7 @@ use super::paths;
 use crate::parts::UNASSIGNED;
 use crate::study::metrics::LevelCount;
 
-/// One of two to six results side by side, each in a view of its own with the same eye.
+/// One of two to six results side by side. All views have the same eye.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Compared<'a> {
     /// Step of the timeline `table`.

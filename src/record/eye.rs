@@ -51,10 +51,7 @@ impl Eye {
         let up = toward.cross(right);
         let extent = |axis: DVec3| {
             let along = garment.positions.iter().map(|p| p.dot(axis));
-            along.fold(None, |range: Option<(f64, f64)>, v| {
-                let (low, high) = range.unwrap_or((v, v));
-                Some((low.min(v), high.max(v)))
-            })
+            along.map(|v| (v, v)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
         };
         let (left_end, right_end) = extent(right)?;
         let (low, high) = extent(up)?;
@@ -62,10 +59,8 @@ impl Eye {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
         let centre = right * middle((left_end, right_end)) + up * middle((low, high)) + toward * middle((back, near));
         let (half_width, half_height) = (0.5 * (right_end - left_end), 0.5 * (high - low));
-        let half_depth = 0.5 * (near - back);
-        let (target, position) = (centre, centre);
-        let eye = Self { position, target, half_width, half_height, toward, half_depth };
-        Some(eye.through(aspect))
+        let (position, target, half_depth) = (centre, centre, 0.5 * (near - back));
+        Some(Self { position, target, half_width, half_height, toward, half_depth }.through(aspect))
     }
 
     /// Half the height that is visible at the target, m.

@@ -47,7 +47,12 @@ pub(super) struct Legend<'a> {
     pub(super) open_end: bool,
 }
 
-impl Legend<'_> {
+impl<'a> Legend<'a> {
+    /// The colour bar of values over `range`.
+    pub(super) fn new(title: &'a str, unit: &'a str, map: ColourMap, range: Range, values: &[f64]) -> Self {
+        Self { title, unit, map, range, open_end: values.iter().any(|&v| v > range.high) }
+    }
+
     /// Logs `{path}/bar` and `{path}/ticks` in a cell of the drawing.
     pub(super) fn log(&self, recording: &OpenRecording, path: &str, [column, row]: Cell) -> Result<(), RecordError> {
         let [x, y] = [column as f64 * CELL[0], row as f64 * CELL[1]];

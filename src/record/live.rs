@@ -114,7 +114,7 @@ impl LiveEncoder {
             let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
             row.push((1.0, View::spatial(format!("Pin: {}", pin.label), &[&body, &garment], &self.eye).into()));
         }
-        // The layout first: a slow viewer takes seconds to read the triangles, and would meanwhile use a layout of its own.
+        // The layout first: a slow viewer takes seconds to read the triangles, and would meanwhile lay out the views itself.
         blueprint::send(&stream, &Node::Row("Live", row), TimePanel { timeline: paths::TABLE, follow: false })?;
         stream.log_static(paths::BODY, &meshes::plain(body, colours::BODY))?;
         stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;

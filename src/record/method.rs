@@ -1,4 +1,4 @@
-//! A reference method: its intermediate results, each in a view of its own, and the garment as it moves.
+//! A reference method: a view for each intermediate result, and the garment as it moves.
 
 use glam::DVec3;
 use rerun::{LineStrips3D, Radius};
@@ -7,7 +7,7 @@ use super::charts::log_scalar;
 use super::error::RecordError;
 use super::meshes::{self, rerun_colours, singles};
 use super::open_recording::OpenRecording;
-use super::overlay::{Overlay, log_overlay};
+use super::overlay::{Overlay, log_fit};
 use super::panel::Panel;
 use super::{colours, paths};
 use crate::methods::Exhibit;
@@ -77,8 +77,7 @@ pub(super) fn log(recording: &mut OpenRecording, view: &MethodView<'_>) -> Resul
     recording.at(0, 6);
     let draped = recording.garment.with_positions(view.draped.to_vec());
     for (column, overlay) in view.overlays.iter().enumerate() {
-        let [branch, legend] = [paths::FIT, paths::FIT_LEGEND].map(|of| format!("{of}/{}", overlay.name));
-        log_overlay(recording, &branch, &draped, overlay, &legend, [column, 0])?;
+        log_fit(recording, &draped, overlay, column)?;
     }
     recording.log_report(view.panel.markdown())?;
     recording.last_iteration = Some(i64::try_from(view.steps).unwrap_or(i64::MAX));

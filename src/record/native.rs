@@ -9,23 +9,17 @@ use std::time::{Duration, Instant};
 
 use super::error::{RERUN_VERSION, RecordError};
 
-/// Name of the viewer's program.
-const PROGRAM: &str = "rerun";
 /// Longest wait for the viewer's port: a cold start from a slow disk takes seconds.
 const START_TIMEOUT: Duration = Duration::from_secs(15);
 /// Interval of the attempts to connect.
 const POLL: Duration = Duration::from_millis(100);
 
-/// Starts the native viewer on `port` of 127.0.0.1 and waits until it listens. A listener that is there already is assumed to be a
+/// Starts the native viewer, `program`, on `port` of 127.0.0.1 and waits until it listens. A listener that is there already is assumed to be a
 /// viewer.
 ///
 /// # Errors
-/// No `rerun` in PATH, one of another version, one that ends or does not listen in time.
-pub(super) fn start(port: u16) -> Result<(), RecordError> {
-    start_program(PROGRAM, port)
-}
-
-fn start_program(program: &str, port: u16) -> Result<(), RecordError> {
+/// No such program in PATH, one of another version, one that ends or does not listen in time.
+pub(super) fn start(program: &str, port: u16) -> Result<(), RecordError> {
     if listens(port) {
         return Ok(());
     }
@@ -109,17 +103,17 @@ mod tests {
     fn a_viewer_that_does_not_start_is_reported_with_its_cause() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("none").to_str().unwrap().to_owned();
-        assert!(start_program(&missing, free_port()).unwrap_err().to_string().contains("in PATH"));
+        assert!(start(&missing, free_port()).unwrap_err().to_string().contains("in PATH"));
         let old = program(&folder, "echo rerun-cli 0.21.0");
-        assert!(start_program(&old, free_port()).unwrap_err().to_string().contains("is rerun-cli 0.21.0"));
+        assert!(start(&old, free_port()).unwrap_err().to_string().contains("is rerun-cli 0.21.0"));
         let broken = program(&folder, "case $1 in --version) echo rerun-cli 0.36.1;; *) exit 3;; esac");
-        assert!(start_program(&broken, free_port()).unwrap_err().to_string().contains("exit status: 3"));
+        assert!(start(&broken, free_port()).unwrap_err().to_string().contains("exit status: 3"));
     }
 
     #[test]
     fn a_viewer_that_listens_already_is_used() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        start_program("no such program", listener.local_addr().unwrap().port()).unwrap();
+        start("no such program", listener.local_addr().unwrap().port()).unwrap();
     }
 
     #[test]

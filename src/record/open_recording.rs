@@ -24,7 +24,7 @@ const MAX_ID: usize = 100;
 const LAST_FLUSH: Duration = Duration::from_secs(10);
 
 /// The sinks, name and layout of a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RecordOptions {
     /// Where the recording goes. Without sinks nothing is recorded.
     pub sinks: Vec<Sink>,
@@ -32,22 +32,10 @@ pub struct RecordOptions {
     pub name: String,
     /// The contents that will be logged, which determine the views.
     pub layout: Layout,
-    /// Direction in which the wearer looks (horizontal).
+    /// Direction in which the wearer looks (horizontal); zero stands for −y.
     pub front: DVec3,
     /// Whether meshes may be replaced later (`--watch`): they are then logged at a step instead of statically.
     pub replaceable: bool,
-}
-
-impl Default for RecordOptions {
-    fn default() -> Self {
-        Self {
-            sinks: Vec::new(),
-            name: String::new(),
-            layout: Layout::default(),
-            front: DVec3::NEG_Y,
-            replaceable: false,
-        }
-    }
 }
 
 /// Size and cost of a finished recording.

@@ -67,8 +67,18 @@ pub(super) fn log_overlay(
     let map = ColourMap::ALARM;
     let colours = rerun_colours(map.colours(overlay.values, range));
     recording.log(&path, &meshes::shape(draped).with_vertex_colors(colours))?;
-    let open_end = overlay.values.iter().any(|&v| v > range.high);
-    Legend { title: overlay.name, unit: overlay.unit, map, range, open_end }.log(recording, legend, cell)
+    Legend::new(overlay.name, overlay.unit, map, range, overlay.values).log(recording, legend, cell)
+}
+
+/// Logs an overlay of the fit, whose colour bar is in a column of its tab.
+pub(super) fn log_fit(
+    recording: &OpenRecording,
+    draped: &TriMesh,
+    overlay: &Overlay<'_>,
+    column: usize,
+) -> Result<(), RecordError> {
+    let [branch, legend] = [paths::FIT, paths::FIT_LEGEND].map(|of| format!("{of}/{}", overlay.name));
+    log_overlay(recording, &branch, draped, overlay, &legend, [column, 0])
 }
 
 /// The flat panels of a sewing pattern.

@@ -1,7 +1,7 @@
 //! The sink of a remote viewer, with time limits.
 //!
 //! Rerun's client waits for ever, also when it is dropped, for a server that accepts a connection and does not answer. Here it
-//! runs in a thread of its own, and every wait for that thread has a time limit.
+//! runs in a separate thread, and every wait for that thread has a time limit.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};

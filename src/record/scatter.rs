@@ -73,7 +73,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// The axis that contains all values with a margin; a decade if there are none.
+    /// The axis that contains all values with a margin; a decade without values.
     fn around(values: impl Iterator<Item = f64>, length: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if low > high {

@@ -124,7 +124,7 @@ fn file(path: &Path) -> Result<Target, RecordError> {
 }
 
 fn spawn() -> Result<Remote, RecordError> {
-    native::start(VIEWER_PORT)?;
+    native::start("rerun", VIEWER_PORT)?;
     connect(&format!("rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"))
         .map_err(|error| RecordError::NoViewer { reason: error.to_string() })
 }

@@ -1,5 +1,5 @@
 //! One step of the timeline `table`: the PARTs of a range table, their forces, the drape, and its metrics. The layers of an outfit
-//! show the same, each in a branch of its own.
+//! show the same, each under its own entity path.
 
 use glam::DVec3;
 use rerun::Mesh3D;
@@ -11,7 +11,7 @@ use super::error::RecordError;
 use super::legend::{Legend, caption, table_title};
 use super::meshes::{self, CellMesh, rerun_colours};
 use super::open_recording::OpenRecording;
-use super::overlay::{Overlay, QUANTILE, log_overlay};
+use super::overlay::{Overlay, QUANTILE, log_fit, log_overlay};
 use super::panel::Panel;
 use super::{part_marks, paths};
 use crate::parts::UNASSIGNED;
@@ -89,9 +89,7 @@ fn log_distance(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<()
     let range = recording.range("distance", || Range::to_quantile(cm.iter().copied(), QUANTILE));
     let map = ColourMap::DISTANCE;
     recording.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
-    let open_end = cm.iter().any(|&d| d > range.high);
-    let legend = Legend { title: "distance", unit: "cm", map, range, open_end };
-    legend.log(recording, &format!("{}/distance", paths::STAGES_LEGEND), [0, 1])
+    Legend::new("distance", "cm", map, range, &cm).log(recording, &format!("{}/distance", paths::STAGES_LEGEND), [0, 1])
 }
 
 fn log_parts(recording: &mut OpenRecording, step: &StepView<'_>, tooltips: &[String]) -> Result<(), RecordError> {
@@ -139,8 +137,7 @@ fn log_drape(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<(), R
             let legend = format!("{}/error", paths::STAGES_LEGEND);
             log_overlay(recording, paths::ERROR, &draped, overlay, &legend, [0, error_row])?;
         } else {
-            let [branch, legend] = [paths::FIT, paths::FIT_LEGEND].map(|of| format!("{of}/{}", overlay.name));
-            log_overlay(recording, &branch, &draped, overlay, &legend, [fit, 0])?;
+            log_fit(recording, &draped, overlay, fit)?;
             fit += 1;
         }
     }

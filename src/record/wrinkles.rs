@@ -63,8 +63,7 @@ pub(super) fn log(recording: &OpenRecording, view: &WrinkleView<'_>) -> Result<(
         .with_colors(meshes::rerun_colours(map.colours(&values, range)))
         .with_radii([Radius::new_ui_points(SEAM_THICKNESS)]);
     recording.log(&format!("{}/lines", paths::SEAMS), &lines)?;
-    let open_end = values.iter().any(|&v| v > range.high);
-    Legend { title: "PART jump", unit: "mm", map, range, open_end }.log(recording, &legend("seams"), [0, 0])
+    Legend::new("PART jump", "mm", map, range, &values).log(recording, &legend("seams"), [0, 0])
 }
 
 /// For each joining edge the section of the seam that crosses it: from one adjacent triangle's centroid through the edge's

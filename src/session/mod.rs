@@ -1,7 +1,7 @@
 //! A session: one owner of a scene that several clients edit.
 //!
 //! Every accepted edit makes a **state** with a number. Its PARTs and forces are known when [`Session::submit`] returns. A
-//! [`Worker`], on a thread of its own, then computes the newest state alone, in tasks short enough that the next edit does
+//! [`Worker`], on a separate thread, then computes the newest state alone, in tasks short enough that the next edit does
 //! not wait. Each result names the state that it belongs to:
 //!
 //! | an edit of | recomputes | keeps |

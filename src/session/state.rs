@@ -38,7 +38,7 @@ pub(super) struct SessionState {
     /// Body and garment while their files are read again.
     before_reload: Option<Arc<LoadedScene>>,
     last_pin_id: u64,
-    /// Drapes of the current body and garment that came to rest, the newest last.
+    /// Converged drapes of the current body and garment, the newest last.
     rests: Vec<Arc<AtRest>>,
 }
 
@@ -199,7 +199,7 @@ impl SessionState {
         })
     }
 
-    /// Refuses an edit of the fabric where every panel has a fabric of its own.
+    /// Refuses an edit of the fabric where every panel already has one.
     pub(super) fn check_fabric(&self, edit: &Edit, job: &Job) -> Result<(), EditError> {
         let loaded_scene = self.snapshot.loaded_scene.as_ref().filter(|scene| scene.spec == job.scene);
         if edit.fabric.is_none() || loaded_scene.is_none_or(|scene| scene.input.scene.takes_the_settings_fabric()) {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::handle::Session;
-use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented};
+use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented, Snapshot};
 use super::state::{SessionState, ms_since};
 use crate::drape::{Drape, ENOUGH, Levels, Settings};
 use crate::mechanics::coupled::{self, CoupledOptions, Hints, Motion};
@@ -15,19 +15,15 @@ use crate::mechanics::energy::{Cloth, Contacts};
 use crate::parts::Parts;
 use crate::scene::Scene;
 use crate::study::accuracy::representable::representable;
-use crate::study::job::Job;
 
 /// Steps of a warm preview on the coarser cloth.
 pub(super) const COARSE_STEPS: usize = 2;
 
-/// The newest state, and the results that already belong to it.
+/// The newest state. Its snapshot has stage one and the drape at rest of this state only.
 pub(super) struct Target {
-    pub(super) state: u64,
-    pub(super) job: Arc<Job>,
+    pub(super) snapshot: Snapshot,
     pub(super) warm: bool,
     pub(super) accepted: Instant,
-    pub(super) segmented: Option<Arc<Segmented>>,
-    pub(super) rest: Option<Arc<AtRest>>,
 }
 
 /// A part of the computation of a state whose PARTs are known.
@@ -40,7 +36,7 @@ pub(super) struct Task<'a> {
 
 impl<'a> Task<'a> {
     pub(super) fn settings(self) -> &'a Settings {
-        &self.target.job.settings
+        &self.target.snapshot.job.settings
     }
 
     pub(super) fn loaded_scene(self) -> &'a Arc<LoadedScene> {
@@ -53,18 +49,22 @@ impl<'a> Task<'a> {
 
     /// Breaks once the state is no longer the newest.
     pub(super) fn check(self) -> ControlFlow<()> {
-        if self.session.is_superseded(self.target.state) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if self.session.is_superseded(self.target.snapshot.state) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 
     /// Publishes a result of the state, if it is still the newest.
     pub(super) fn publish(self, add: impl FnOnce(&mut SessionState)) {
-        self.session.publish(self.target.state, add);
+        self.session.publish(self.target.snapshot.state, add);
     }
 
     /// A cold preview that is not done, of `parts` at `positions` (m) after `ms` milliseconds.
     pub(super) fn preview(self, parts: Arc<Parts>, positions: Vec<DVec3>, ms: f64) -> Preview {
         Preview {
-            state: self.target.state,
+            state: self.target.snapshot.state,
             loaded_scene: Arc::clone(self.loaded_scene()),
             warm: false,
             done: false,
@@ -119,7 +119,7 @@ impl Refinement<'_> {
     pub(super) fn at(&self, positions: &[DVec3], residual_over_weight: f64, steps: usize) -> AtRest {
         let Self { task, warm, began } = *self;
         AtRest {
-            state: task.target.state,
+            state: task.target.snapshot.state,
             loaded_scene: Arc::clone(task.loaded_scene()),
             done: false,
             balanced: false,

@@ -84,25 +84,21 @@ impl Worker {
         }
     }
 
-    /// Runs the next task of the newest state and publishes its results; returns `false` if there is none.
+    /// Runs the next task of the newest state and publishes its results; returns `false` without one.
     pub fn advance(&mut self, session: &Session) -> bool {
         let target = {
             let state = session.lock();
             if !self.is_due(&state) {
                 return false;
             }
-            let snapshot = &state.snapshot;
-            Target {
-                state: snapshot.state,
-                job: Arc::clone(&snapshot.job),
-                warm: state.warm,
-                accepted: state.accepted,
-                segmented: snapshot.segmented.clone().filter(|s| s.state == snapshot.state),
-                rest: snapshot.rest.clone().filter(|r| r.state == snapshot.state && r.done),
-            }
+            let mut snapshot = state.snapshot.clone();
+            snapshot.segmented.take_if(|segmented| segmented.state != snapshot.state);
+            snapshot.rest.take_if(|rest| rest.state != snapshot.state || !rest.done);
+            Target { snapshot, warm: state.warm, accepted: state.accepted }
         };
-        if self.progress.state != target.state {
-            self.progress = Progress { state: target.state, ..Progress::default() };
+        let newest = target.snapshot.state;
+        if self.progress.state != newest {
+            self.progress = Progress { state: newest, ..Progress::default() };
         }
         // Inside rayon's pool, because hundreds of short joins follow.
         let outcome = catch_unwind(AssertUnwindSafe(|| rayon::scope(|_| self.next_task(session, &target))));
@@ -116,9 +112,9 @@ impl Worker {
             }
         };
         if let Some((sentence, scene)) = refused
-            && !session.is_superseded(target.state)
+            && !session.is_superseded(newest)
         {
-            session.publish(target.state, |state| state.refuse(target.state, sentence, scene));
+            session.publish(newest, |state| state.refuse(newest, sentence, scene));
         }
         true
     }
@@ -130,7 +126,7 @@ impl Worker {
     }
 
     fn next_task(&mut self, session: &Session, target: &Target) -> Result<(), EditError> {
-        let Some(segmented) = &target.segmented else { return self.load(session, target) };
+        let Some(segmented) = &target.snapshot.segmented else { return self.load(session, target) };
         let task = Task { session, target, segmented };
         let settings = task.settings();
         if task.scene().layers.len() > 1 {
@@ -143,7 +139,7 @@ impl Worker {
         if needs_cloth && levels.is_none() {
             return self.build_cloth(segmented, &settings.fabric);
         }
-        if let Some(rest) = target.rest.as_ref().filter(|rest| rest.reused) {
+        if let Some(rest) = target.snapshot.rest.as_ref().filter(|rest| rest.reused) {
             self.rest = Some(WarmStart { generation, positions: Arc::clone(&rest.held_positions) });
         }
         let usable = |start: &Option<WarmStart>| {
@@ -157,10 +153,10 @@ impl Worker {
         {
             self.progress.warm_preview_done = true;
             let Some(start) = preview else { return Ok(()) };
-            let rest_follows = rest.is_some() && target.rest.is_none();
+            let rest_follows = rest.is_some() && target.snapshot.rest.is_none();
             return self.warm_preview(task, levels, options, &start, rest_follows);
         }
-        let to_refine = levels.as_ref().filter(|_| target.rest.is_none() && self.progress.refined.is_none());
+        let to_refine = levels.as_ref().filter(|_| target.snapshot.rest.is_none() && self.progress.refined.is_none());
         if let (Some(levels), Some(start)) = (to_refine, rest) {
             return self.refine(task, levels, start.to_vec(), true);
         }
@@ -180,20 +176,20 @@ impl Worker {
     /// Loads body and garment, and computes their distances and stage one.
     fn load(&mut self, session: &Session, target: &Target) -> Result<(), EditError> {
         let began = Instant::now();
-        let input = target.job.scene.load_with(&self.meshes)?;
+        let input = target.snapshot.job.scene.load_with(&self.meshes)?;
         let (load_ms, began) = (ms_since(began), Instant::now());
         let distances = Distances::of(&input.scene)?;
         self.generations += 1;
         let loaded_scene = Arc::new(LoadedScene {
             generation: self.generations,
-            spec: target.job.scene.clone(),
+            spec: target.snapshot.job.scene.clone(),
             input,
             load_ms,
             distance_ms: ms_since(began),
             distances,
         });
         let mut outcome = Ok(());
-        session.publish(target.state, |state| outcome = state.set_loaded_scene(loaded_scene));
+        session.publish(target.snapshot.state, |state| outcome = state.set_loaded_scene(loaded_scene));
         outcome
     }
 
@@ -376,7 +372,7 @@ impl Worker {
     /// Assembles the whole drape of the state from the results of its tasks.
     fn finish(&mut self, task: Task<'_>, levels: Option<&Levels>) {
         let Some((stage, took)) = self.progress.both_stages.take() else { return };
-        let (loaded_scene, segmented, rest) = (task.loaded_scene(), task.segmented, task.target.rest.as_ref());
+        let (loaded_scene, segmented, rest) = (task.loaded_scene(), task.segmented, task.target.snapshot.rest.as_ref());
         let ms = |ms: f64| Duration::from_secs_f64(1e-3 * ms);
         let cloth_time = self.cloth.as_ref().map_or(Duration::ZERO, |cached| cached.took);
         let mut times = StageTimes {
@@ -409,7 +405,7 @@ impl Worker {
         let refined = drape.state.is_some() && task.settings().refine != Refine::Steps(0);
         let preview_error_mm = refined.then(|| accuracy::rms_mm(&drape.preview, &drape.positions));
         let bound_mm = refined.then(|| task.bound_mm(&drape)).filter(|mm| mm.is_finite());
-        let (state, loaded_scene) = (task.target.state, Arc::clone(task.loaded_scene()));
+        let (state, loaded_scene) = (task.target.snapshot.state, Arc::clone(task.loaded_scene()));
         let finished = Finished { state, loaded_scene, drape, metrics, preview_error_mm, bound_mm };
         self.progress.finished = true;
         task.publish(|state| {

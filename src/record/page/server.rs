@@ -1,4 +1,4 @@
-//! HTTP/1.1 and HTTP/2 on a thread of its own, until the [`Server`] is dropped.
+//! HTTP/1.1 and HTTP/2 on a separate thread, until the [`Server`] is dropped.
 //!
 //! No client keeps others out. A response that makes no progress for [`Limits::stall`] closes its connection, and so does a client
 //! that sends nothing in that time. When all places are taken, overall or those of one peer address, the connection that wrote

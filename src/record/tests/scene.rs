@@ -1,5 +1,5 @@
-//! A dress form and a flared dress in closed form, with PARTs, forces and a drape that look like the real ones: enough to
-//! see a recording, independent of the solver.
+//! A dress form and a flared dress in closed form, with plausible PARTs, forces and drape, so that recordings are tested without the
+//! solver.
 
 use crate::body::distance::Body;
 use crate::mesh::{Topology, TriMesh};
