@@ -9,17 +9,17 @@ use super::{Bench, json, sheet};
 fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     let bench = Bench::new();
     let rows = bench.path("rows.json");
-    let contest = |rounds: &str| {
+    let run = |rounds: &str| {
         let of = ["--rows", "pullover-1@600", "--rounds", rounds, "--starts", "0", "--rows-file", &rows];
         bench.run(&[&["bench", "table-4", "--format", "json"], &of[..]].concat())
     };
-    let first = json(&contest("1"));
+    let first = json(&run("1"));
     let entries = first["rows"][0]["entries"].as_array().unwrap();
     let names: Vec<&str> = entries.iter().map(|e| e["entrant"].as_str().unwrap()).collect();
     assert_eq!(names, ["zhu2016", "gross2003", "thomaszewski2006", "paper", "preview", "converged"]);
     assert!(entries.iter().all(|e| e["error"].is_null() && e["median_ms"].as_f64().unwrap() > 0.0));
     // The very times of the first run: nothing was draped again.
-    assert_eq!(json(&contest("1")), first);
+    assert_eq!(json(&run("1")), first);
     // A recording of a row that is draped, and none of one that is found.
     let recorded = |rows_file: &str| {
         let of = ["bench", "table-4", "--rows", "pullover-1@600", "--rounds", "1", "--starts", "0", "--rows-file"];
@@ -30,7 +30,7 @@ fn the_papers_table_is_run_again_and_goes_on_from_its_rows() {
     let made = recorded("others.json");
     assert!(String::from_utf8_lossy(&made.stderr).contains("recording: "));
     assert!(fs::metadata(bench.path("seen/pullover-1-600.rrd")).unwrap().len() > 50_000);
-    let other = contest("2");
+    let other = run("2");
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("1 counted rounds"));
     // Where nothing is recorded yet: a refusal leaves nothing.

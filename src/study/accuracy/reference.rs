@@ -47,7 +47,6 @@ pub(crate) struct ReferenceKey(blake3::Hash);
 
 impl ReferenceKey {
     /// Hashes all inputs of a reference.
-    #[must_use]
     pub(crate) fn new(input: &ReferenceInput<'_>) -> Self {
         fn mesh(mesh: &TriMesh) -> (&[DVec3], &[[u32; 3]]) {
             (&mesh.positions, &mesh.triangles)
@@ -66,7 +65,6 @@ impl ReferenceKey {
     }
 
     /// File name in the cache.
-    #[must_use]
     pub(crate) fn file_name(&self) -> String {
         format!("{}.drape", self.0.to_hex())
     }

@@ -39,7 +39,6 @@ pub(crate) struct State {
 
 impl State {
     /// Metrics of `cloth` on `body` at the positions `x` (m).
-    #[must_use]
     pub(crate) fn of(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
         let contacts = cloth.contacts(body, x);
         let mut gradient = Vec::new();

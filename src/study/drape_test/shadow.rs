@@ -9,7 +9,6 @@ use crate::mesh::TriMesh;
 const CELL: f64 = 2.5e-4;
 
 /// Area of the shadow of `drape` along z together with a full disc of radius `plate` (m) about the origin, m².
-#[must_use]
 pub(crate) fn shadow_area(drape: &TriMesh, plate: f64) -> f64 {
     let reach = drape.positions.iter().map(|p| p.x.abs().max(p.y.abs())).fold(plate, f64::max);
     let half = (reach / CELL).ceil() as i64 + 1;

@@ -23,7 +23,6 @@ pub(crate) struct Specimen {
 ///
 /// The last held ring lies half a cell outside the plates' edge. A ring of vertices bends over half a cell to either side, so the
 /// discrete cloth is clamped at the plates' edge.
-#[must_use]
 pub(crate) fn specimen(rows: usize) -> Specimen {
     let cell = (SPECIMEN_RADIUS - PLATE_RADIUS) / (rows as f64 + 0.5);
     let mut mesh = TriMesh::default();

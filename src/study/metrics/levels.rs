@@ -44,13 +44,11 @@ impl LevelCount {
     }
 
     /// Lower value, m.
-    #[must_use]
     pub(crate) fn lower_m(&self) -> f64 {
         self.lower_cm * METRES_PER_CM
     }
 
     /// Upper value, m.
-    #[must_use]
     pub(crate) fn upper_m(&self) -> f64 {
         self.upper_cm * METRES_PER_CM
     }

@@ -35,7 +35,6 @@ pub enum PointError {
 
 impl PointError {
     /// A failure in the words of an error and of all that caused it.
-    #[must_use]
     pub(crate) fn failed(error: &(dyn Error + 'static)) -> Self {
         Self::Failed(said(error, ": "))
     }
@@ -129,7 +128,6 @@ impl<'a> Bench<'a> {
     }
 
     /// The same, with made meshes in `meshes`.
-    #[must_use]
     pub(crate) fn with_meshes(self, meshes: MeshCache) -> Self {
         Self { meshes, ..self }
     }
@@ -147,7 +145,6 @@ impl<'a> Bench<'a> {
     }
 
     /// Warnings of the loaded scenes, by garment.
-    #[must_use]
     pub(crate) fn warnings(&self) -> Vec<String> {
         let made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         made.values().flat_map(|loaded| loaded.warnings()).collect()

@@ -35,7 +35,6 @@ impl Shard {
     }
 
     /// Whether the point of this number is in the share.
-    #[must_use]
     pub(crate) fn holds(self, point: usize) -> bool {
         point % self.count == self.index - 1
     }
@@ -99,7 +98,6 @@ pub struct Manifest {
 }
 
 /// Whether a text is a content hash as points and scenes have them: hexadecimal, hence good for a file name.
-#[must_use]
 pub(crate) fn is_id(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
@@ -113,13 +111,11 @@ impl Manifest {
     }
 
     /// How many points belong here.
-    #[must_use]
     pub(crate) fn share(&self) -> usize {
         (0..self.points.len()).filter(|&i| self.holds(i)).count()
     }
 
     /// Whether the point of this number belongs here.
-    #[must_use]
     pub(crate) fn holds(&self, point: usize) -> bool {
         self.shard.is_none_or(|s| s.holds(point))
     }
@@ -130,7 +126,6 @@ impl Manifest {
     }
 
     /// The sweep in a few words: what two that differ are told apart by.
-    #[must_use]
     pub(crate) fn identity(&self) -> String {
         let Self { name, partwise, plan, points, .. } = self;
         let shard = self.shard.map_or(String::new(), |s| format!(", shard {s}"));

@@ -57,7 +57,6 @@ impl Point {
     }
 
     /// The extents as the rows have them: `none`, `5`, or `12>6>3` for a cascade.
-    #[must_use]
     pub(crate) fn extent_text(&self) -> String {
         let extents = self.job.settings.model.extents_cm();
         if extents.is_empty() {
@@ -67,13 +66,11 @@ impl Point {
     }
 
     /// The options as the rows have them: `a=1 b=2`, what it is measured against always among them.
-    #[must_use]
     pub(crate) fn options_text(&self) -> String {
         self.options.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
     }
 
     /// All that tells this point from others, in one line.
-    #[must_use]
     pub(crate) fn label(&self) -> String {
         let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
         let Settings { model, table, min_part, refine, fabric, .. } = settings;
@@ -88,7 +85,6 @@ impl Point {
 
     /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one
     /// fabric their references.
-    #[must_use]
     pub(crate) fn scene_id(&self) -> String {
         content_id(&self.scene_key())
     }

@@ -103,13 +103,11 @@ impl Row {
     }
 
     /// The row without what differs from run to run.
-    #[must_use]
     pub(crate) fn without_times(&self) -> Self {
         Self { timing: None, ..self.clone() }
     }
 
     /// Names of the columns, timings aside, in which two rows differ.
-    #[must_use]
     pub(crate) fn differences(&self, other: &Self) -> Vec<String> {
         let (mine, theirs) = (cells(&self.without_times()), cells(&other.without_times()));
         columns().into_iter().filter(|name| mine.get(name) != theirs.get(name)).collect()
@@ -117,7 +115,6 @@ impl Row {
 }
 
 /// The columns, in order.
-#[must_use]
 pub(crate) fn columns() -> Vec<String> {
     let full = Row { metrics: Some(Metrics::default()), timing: Some(Timing::default()), ..Row::default() };
     cells(&full).into_keys().collect()
@@ -138,7 +135,6 @@ pub fn csv_text(rows: &[Row]) -> Vec<u8> {
 }
 
 /// A value of JSON as a cell of a CSV; nothing for null.
-#[must_use]
 pub(crate) fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),

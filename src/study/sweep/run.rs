@@ -52,7 +52,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// Of a sweep all of whose rows were there.
-    #[must_use]
     pub(crate) fn found(rows: Vec<Row>) -> Self {
         let total = rows.len();
         Self { total, skipped: total, failed: count_failed(&rows), stopped: false, rows }

@@ -98,19 +98,16 @@ impl Store {
     }
 
     /// Whose rows these are.
-    #[must_use]
     pub(crate) fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
     /// The rows so far, in the order in which they were written.
-    #[must_use]
     pub(crate) fn rows(&self) -> &[Row] {
         &self.rows
     }
 
     /// Whether the point of this number belongs here and has no row yet.
-    #[must_use]
     pub(crate) fn lacks(&self, point: usize) -> bool {
         self.manifest.holds(point) && self.done.get(point) == Some(&false)
     }

@@ -62,7 +62,6 @@ impl Timing {
     }
 
     /// The stages, what is beside them and the whole: medians, ms.
-    #[must_use]
     pub(crate) fn stages(&self) -> [(&'static str, f64); 6] {
         [
             ("distance", self.time_distance_ms),

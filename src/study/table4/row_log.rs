@@ -74,7 +74,6 @@ pub(crate) struct RowLog {
 
 /// Why a log cannot be resumed.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the message says what each field is")]
 pub(crate) enum RowLogError {
     /// The file cannot be read.
     #[error(transparent)]

@@ -6,7 +6,6 @@ use super::Sample;
 
 /// A search that cannot be run. Garments are numbered from 1, vertices from 0; limits are garment by garment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the message says what each field is")]
 pub(crate) enum SearchError {
     /// Nothing to search on.
     #[error("no garment to tune on, expected at least one")]

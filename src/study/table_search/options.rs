@@ -54,7 +54,6 @@ impl Default for SearchOptions {
 
 impl SearchOptions {
     /// Defaults for levels that may each be cut to one of these widths (cm).
-    #[must_use]
     pub(crate) fn with_extents(widths_cm: &[f64]) -> Self {
         Self {
             candidates: 120,
