@@ -2,8 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod fixtures;
+
 use std::ops::ControlFlow;
 
+use fixtures::{Diagonals, cuboid, grid, scene};
 use glam::{DMat3, DVec3};
 use partwise::Scene;
 use partwise::body::distance::Body;
@@ -17,35 +20,22 @@ use partwise::study::certificate::{Certificate, CertifyError, Forces, certify};
 const SQUARES: u32 = 8;
 const SIDE: f64 = 0.02;
 
-/// A box of these half sizes with its top at z = 0, turned by `turn` about the origin.
+/// A table 2 `half` wide with its top at z = 0, turned by `turn` about the origin.
 fn table(half: f64, turn: DMat3) -> TriMesh {
-    let corner = |i: usize| DVec3::new(half * sign(i), half * sign(i >> 1), if i >> 2 & 1 == 1 { 0.0 } else { -1.0 });
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    TriMesh::new((0..8).map(|i| turn * corner(i)).collect(), triangles)
-}
-
-fn sign(bit: usize) -> f64 {
-    if bit & 1 == 1 { 1.0 } else { -1.0 }
+    let mut table = cuboid(DVec3::new(-half, -half, -1.0), DVec3::new(half, half, 0.0));
+    table.positions.iter_mut().for_each(|x| *x = turn * *x);
+    table
 }
 
 /// A square cloth in the plane z = 0 about the origin.
 fn sheet() -> TriMesh {
-    let n = SQUARES + 1;
     let middle = 0.5 * f64::from(SQUARES);
-    let at = |i: u32| DVec3::new(f64::from(i % n) - middle, f64::from(i / n) - middle, 0.0) * SIDE;
-    let squares = (0..n * n).filter(|i| i % n < SQUARES && i / n < SQUARES);
-    let triangles = squares.flat_map(|i| [[i, i + 1, i + n + 1], [i, i + n + 1, i + n]]).collect();
-    TriMesh::new((0..n * n).map(at).collect(), triangles)
+    let at = |i, j| DVec3::new(f64::from(i) - middle, f64::from(j) - middle, 0.0) * SIDE;
+    grid(SQUARES, SQUARES, Diagonals::Parallel, at)
 }
 
 fn jersey() -> Fabric {
     Fabric::by_name("jersey").unwrap()
-}
-
-fn scene(body: &TriMesh, garment: TriMesh) -> Scene {
-    let rest = RestShape::from_edges(&garment).unwrap();
-    Scene::new(Body::new(body).unwrap(), garment, rest)
 }
 
 /// The distance that the cloth keeps from what it lies on, m.

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod fixtures;
+
+use fixtures::{Diagonals, cube, far_away, flipped, grid, isotropic, tube};
 use glam::DVec3;
 use partwise::GRAVITY;
 use partwise::body::distance::Body;
@@ -16,47 +19,11 @@ use partwise::parts::{Parts, segment};
 
 /// An upright sheet of `columns` × `rows` squares of `h` metres in the plane y = 0, its top edge at z = 0.
 fn sheet(columns: u32, rows: u32, h: f64) -> TriMesh {
-    let at = |i: u32, j: u32| DVec3::new(f64::from(i) * h, 0.0, -f64::from(j) * h);
-    let positions = (0..=rows).flat_map(|j| (0..=columns).map(move |i| at(i, j))).collect();
-    let v = |i: u32, j: u32| j * (columns + 1) + i;
-    let squares = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j)));
-    let triangles = squares
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [v(i, j), v(i + 1, j), v(i, j + 1), v(i + 1, j + 1)];
-            if (i + j) % 2 == 0 { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] }
-        })
-        .collect();
-    TriMesh::new(positions, triangles)
-}
-
-/// A cube of half edge `r` about `centre`.
-fn cube(centre: DVec3, r: f64) -> Body {
-    let corner = |i: u32| {
-        let side = |bit: u32| if i >> bit & 1 == 1 { r } else { -r };
-        centre + DVec3::new(side(0), side(1), side(2))
-    };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    Body::new(&TriMesh::new((0..8).map(corner).collect(), triangles)).unwrap()
-}
-
-fn far_away() -> Body {
-    cube(DVec3::splat(50.0), 1.0)
+    flipped(grid(columns, rows, Diagonals::Alternating, |i, j| DVec3::new(f64::from(i) * h, 0.0, -f64::from(j) * h)))
 }
 
 fn fabric(stiffness: f64) -> Fabric {
-    Fabric {
-        name: "test".into(),
-        source: "round figures".into(),
-        density_kg_per_m2: 0.2,
-        thickness_m: 0.001,
-        stretch_weft_n_per_m: stiffness,
-        stretch_warp_n_per_m: stiffness,
-        shear_n_per_m: 0.4 * stiffness,
-        poisson: 0.0,
-        bending_nm: [2e-5; 3],
-        friction: 0.3,
-    }
+    Fabric { shear_n_per_m: 0.4 * stiffness, ..isotropic(0.2, stiffness, 0.0, 2e-5) }
 }
 
 /// PARTs by bounds of some distance (m), as stage one makes them.
@@ -116,21 +83,11 @@ fn rings_shrink_to_the_radius_that_hangs_straight_down() {
     // A cone from 20 to 32 cm, 36 cm along its side, its top held: it hangs as a cylinder of 20 cm, folds and all.
     let (around, rows, top, hem, side) = (96, 36, 0.20, 0.32, 0.36);
     let slope = f64::sqrt(side * side - (hem - top) * (hem - top)) / side;
-    let at = |row: u32, i: u32| {
-        let (s, angle) =
-            (side * f64::from(row) / f64::from(rows), std::f64::consts::TAU * f64::from(i) / f64::from(around));
-        let radius = top + (hem - top) * s / side;
-        DVec3::new(radius * angle.cos(), radius * angle.sin(), -slope * s)
+    let at = |share: f64, angle: f64| {
+        let radius = top + (hem - top) * share;
+        DVec3::new(radius * angle.cos(), radius * angle.sin(), -slope * side * share)
     };
-    let positions: Vec<DVec3> = (0..=rows).flat_map(|row| (0..around).map(move |i| at(row, i))).collect();
-    let vertex = |row: u32, i: u32| row * around + i % around;
-    let triangles = (0..rows).flat_map(|row| {
-        (0..around).flat_map(move |i| {
-            let [a, b, c, d] = [vertex(row, i), vertex(row, i + 1), vertex(row + 1, i), vertex(row + 1, i + 1)];
-            if (row + i) % 2 == 0 { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] }
-        })
-    });
-    let mesh = TriMesh::new(positions, triangles.collect());
+    let mesh = flipped(tube(around, rows + 1, Diagonals::Alternating, at));
     let radius = |x: &DVec3| x.x.hypot(x.y);
     let out: Vec<f64> = mesh.positions.iter().map(|x| radius(x) - top).collect();
     let held: Vec<u32> = (0..around).collect();
@@ -225,7 +182,7 @@ fn a_sheet_that_falls_on_a_block_rests_on_it() {
     let upright = sheet(24, 24, 0.01);
     let flat = upright.positions.iter().map(|p| DVec3::new(p.x - 0.12, -p.z - 0.12, 0.03)).collect();
     let mesh = upright.with_positions(flat);
-    let body = cube(DVec3::new(0.0, 0.0, -0.1), 0.1);
+    let body = Body::new(&cube(DVec3::new(0.0, 0.0, -0.1), 0.1)).unwrap();
     let options = CoupledOptions { least_move_m: 3e-4, ..Default::default() };
     let result = settle(&mesh, &body, &fabric(60.0), &[], |t: &Topology| pieces(&mesh, t, 0.06), &options).unwrap();
     assert!(body.nearest_all(&result.positions).iter().all(|p| p.signed_distance > 0.0));
@@ -254,7 +211,7 @@ fn vertices_in_no_level_go_with_the_nearest_part() {
 #[test]
 fn the_same_bits_twice_and_on_one_thread() {
     let mesh = sheet(20, 20, 0.01);
-    let body = cube(DVec3::new(0.1, 0.12, -0.1), 0.1);
+    let body = Body::new(&cube(DVec3::new(0.1, 0.12, -0.1), 0.1)).unwrap();
     let parts = |topology: &Topology| pieces(&mesh, topology, 0.05);
     let run = || settle(&mesh, &body, &fabric(60.0), &[0, 20], parts, &CoupledOptions::default()).unwrap().positions;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run);
@@ -264,7 +221,7 @@ fn the_same_bits_twice_and_on_one_thread() {
 
 #[test]
 fn the_push_out_leaves_held_vertices_and_nothing_inside() {
-    let body = cube(DVec3::ZERO, 0.1);
+    let body = Body::new(&cube(DVec3::ZERO, 0.1)).unwrap();
     let inside = vec![DVec3::new(0.09, 0.01, 0.0), DVec3::new(0.02, -0.08, 0.01), DVec3::new(0.2, 0.0, 0.0)];
     let mut x = inside.clone();
     assert_eq!(push_out(&body, &[false, true, false], &[0.001; 3], &mut x), 1);

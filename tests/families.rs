@@ -3,11 +3,14 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stderr, reason = "a test fails by panicking, and tells counts")]
 
+mod fixtures;
+
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use fixtures::joined;
 use glam::DVec3;
 use partwise::body::{BodySpec, dress_form};
 use partwise::drape::drape;
@@ -73,12 +76,6 @@ fn capsule(at: DVec3, radius: f64, half: f64, n: u32) -> TriMesh {
         mesh.triangles.push([last - n + i, last - n + next, last]);
     }
     mesh
-}
-
-fn joined(a: TriMesh, b: &TriMesh) -> TriMesh {
-    let first = a.positions.len() as u32;
-    let triangles = b.triangles.iter().map(|t| t.map(|v| v + first));
-    TriMesh::new([a.positions, b.positions.clone()].concat(), a.triangles.into_iter().chain(triangles).collect())
 }
 
 fn body(kind: &str) -> TriMesh {

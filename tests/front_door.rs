@@ -1,10 +1,13 @@
-//! The front door: scenes by name, from files and from memory, and the jobs that run on them.
+//! The public entry points: scenes by name, from files and from memory, and the jobs that run on them.
 
 #![allow(clippy::unwrap_used)]
+
+mod fixtures;
 
 use std::fs;
 use std::path::Path;
 
+use fixtures::{Diagonals, cuboid, flipped, grid};
 use partwise::drape::{Refine, unobserved};
 use partwise::mesh::TriMesh;
 use partwise::parts::range_table::TableRule;
@@ -13,28 +16,17 @@ use partwise::study::job::{Against, Job};
 use partwise::study::sweep::result_hash;
 use partwise::{DVec3, Scene, SceneSpec, Settings, drape};
 
-/// A cube of half a metre around (0, 0, 1).
-fn cube() -> TriMesh {
-    let at = |i: usize, bit: usize| if i >> bit & 1 == 1 { 0.25 } else { -0.25 };
-    let positions = (0..8).map(|i| DVec3::new(at(i, 0), at(i, 1), 1.0 + 2.0 * at(i, 2))).collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriMesh::new(positions, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+/// A block 0.5 m wide whose top is at z = 1.5 m.
+fn block() -> TriMesh {
+    cuboid(DVec3::new(-0.25, -0.25, 0.5), DVec3::new(0.25, 0.25, 1.5))
 }
 
-/// A square sheet a centimetre above it, 0.6 m wide, one vertex a centimetre inside.
+/// A square sheet a centimetre above the block, 0.6 m wide, one vertex a centimetre inside.
 fn sheet() -> TriMesh {
-    let n = 12_u32;
-    let at = |k: u32| 0.6 * (f64::from(k) / f64::from(n) - 0.5);
-    let mut positions: Vec<DVec3> =
-        (0..=n).flat_map(|j| (0..=n).map(move |i| DVec3::new(at(i), at(j), 1.51))).collect();
-    positions[84].z = 1.49;
-    let corner = |i, j| j * (n + 1) + i;
-    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let triangles = cells.flat_map(|(i, j)| {
-        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    });
-    TriMesh::new(positions, triangles.collect())
+    let at = |k: u32| 0.6 * (f64::from(k) / 12.0 - 0.5);
+    let mut mesh = grid(12, 12, Diagonals::Parallel, |i, j| DVec3::new(at(i), at(j), 1.51));
+    mesh.positions[84].z = 1.49;
+    mesh
 }
 
 fn write(path: &Path, mesh: &TriMesh) {
@@ -49,7 +41,7 @@ fn preview() -> Settings {
 fn meshes_in_memory_and_in_files_are_one_scene_whichever_way_they_face() {
     let folder = tempfile::tempdir().unwrap();
     let (body, garment) = (folder.path().join("body.obj"), folder.path().join("sheet.obj"));
-    write(&body, &cube());
+    write(&body, &block());
     write(&garment, &sheet());
     let spec = SceneSpec::new(body.display().to_string(), garment.display().to_string());
     let spec = SceneSpec { unit: Some(partwise::mesh::Unit::M), up: Some(partwise::mesh::Axis::Z), ..spec };
@@ -57,12 +49,10 @@ fn meshes_in_memory_and_in_files_are_one_scene_whichever_way_they_face() {
     assert_eq!((loaded.body_name.as_str(), loaded.garment_name.as_str()), ("body", "sheet"));
     assert_eq!(loaded.pushed_out.found_inside, 1);
     assert!(loaded.reports.len() == 2 && loaded.notes().len() == 3 && loaded.warnings().is_empty());
-    let mut turned = sheet();
-    turned.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-    let drapes = [loaded.scene.clone(), Scene::of_meshes(&cube(), sheet()).unwrap()]
+    let drapes = [loaded.scene.clone(), Scene::of_meshes(&block(), sheet()).unwrap()]
         .map(|scene| result_hash(&drape::drape(&scene, &preview(), &mut unobserved).unwrap().positions));
     assert_eq!(drapes[0], drapes[1]);
-    assert_eq!(Scene::of_meshes(&cube(), turned).unwrap().garment.triangles[0], sheet().triangles[0]);
+    assert_eq!(Scene::of_meshes(&block(), flipped(sheet())).unwrap().garment.triangles[0], sheet().triangles[0]);
     let out = folder.path().join("out.obj");
     let draped = drape::drape(&loaded.scene, &preview(), &mut unobserved).unwrap();
     loaded.write(&out, &draped.positions).unwrap();
@@ -77,19 +67,19 @@ fn meshes_in_memory_and_in_files_are_one_scene_whichever_way_they_face() {
 }
 
 #[test]
-fn names_that_mean_nothing_are_told_before_any_time_is_spent() {
+fn unknown_names_are_errors_before_anything_is_loaded() {
     for (body, garment, word) in
         [("mannequin", "pullover-1", "form"), ("form", "toga", "flared-skirt"), ("form", "pullover-1@many", "@5000")]
     {
-        let said = SceneSpec::new(body, garment).check_names().unwrap_err().to_string();
-        assert!(said.contains(word), "{said}");
+        let message = SceneSpec::new(body, garment).check_names().unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
     }
-    let said = SceneSpec::new("nowhere.obj", "shirt.obj").load().unwrap_err().to_string();
-    assert!(said.contains("nowhere.obj"), "{said}");
+    let message = SceneSpec::new("nowhere.obj", "shirt.obj").load().unwrap_err().to_string();
+    assert!(message.contains("nowhere.obj"), "{message}");
 }
 
 #[test]
-fn a_file_of_measurements_is_a_body_as_the_measurements_are() {
+fn a_file_of_measurements_makes_the_same_body_as_the_measurements() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("me.toml");
     fs::write(&file, "bust_cm = 95.0\n").unwrap();
@@ -98,13 +88,13 @@ fn a_file_of_measurements_is_a_body_as_the_measurements_are() {
     spec.measurements.bust_cm = 95.0;
     assert_eq!(by_file.scene.body.mesh(), spec.load().unwrap().scene.body.mesh());
     fs::write(&file, "bosom_cm = 95.0\n").unwrap();
-    let said = SceneSpec::new(file.display().to_string(), "flared-skirt@400").load().unwrap_err().to_string();
-    assert!(said.contains("me.toml") && said.contains("bosom_cm"), "{said}");
+    let message = SceneSpec::new(file.display().to_string(), "flared-skirt@400").load().unwrap_err().to_string();
+    assert!(message.contains("me.toml") && message.contains("bosom_cm"), "{message}");
 }
 
 #[test]
-fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
-    let scene = Scene::of_meshes(&cube(), sheet()).unwrap();
+fn a_job_measures_against_its_reference_and_a_seed_perturbs_the_start_alone() {
+    let scene = Scene::of_meshes(&block(), sheet()).unwrap();
     let mut job = Job { accuracy: Against::Canonical, ..Job::preview() };
     job.settings.table = TableRule::Quantile { name: "thirds".into(), levels: 3 };
     let draped = job.drape(&scene, &mut unobserved).unwrap();
@@ -113,18 +103,18 @@ fn a_job_measures_what_it_is_asked_and_a_seed_moves_the_start_alone() {
     let measured = job.measure(&scene, &draped, None, &mut unobserved).unwrap();
     let metrics = &measured.metrics;
     assert!(metrics.canonical_rms_mm.unwrap() > 0.0, "{metrics:?}");
-    // What translates can turn and stretch as well.
+    // Affine maps include translations.
     assert!(metrics.representable_affine_rms_mm.unwrap() < metrics.representable_rms_mm.unwrap(), "{metrics:?}");
     assert!(metrics.rms_mm.is_none() && measured.error_mm.len() == metrics.vertices);
     job.seed = 7;
     let moved = job.drape(&scene, &mut unobserved).unwrap();
     assert_ne!(moved.positions, draped.positions);
-    // The table is the undisturbed garment's, or starts would differ by it too.
+    // The table is that of the unperturbed garment; otherwise the starts would differ by the table, too.
     assert_eq!(moved.table, draped.table);
     (job.seed, job.accuracy, job.settings.refine) = (0, Against::Own, Refine::Converged);
     let settled = job.drape(&scene, &mut unobserved).unwrap();
     let own = job.measure(&scene, &settled, None, &mut unobserved).unwrap().metrics;
-    // The solver's residual is under its tolerance; what friction can hold is another figure.
+    // The solver's residual is the reported one; the residual at rest excludes forces that friction can hold.
     assert!(own.rms_mm.is_some() && own.residual_at_rest_over_weight.is_some());
     assert_eq!(own.residual_over_weight, settled.state.map(|s| s.residual_over_weight));
 }

@@ -2,48 +2,29 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
+mod fixtures;
+
 use std::f64::consts::PI;
 
+use fixtures::Diagonals;
 use glam::DVec3;
 use partwise::body::distance::Body;
 use partwise::mesh::TriMesh;
 use partwise::mesh::health::health;
 use partwise::scene::{Placement, Scene, SceneError, facing_body, push_out};
 
-/// A sphere about the origin: `n` parallels, 2n meridians, closed with two poles.
+/// A sphere about the origin with `n` parallels and 2n meridians.
 fn sphere(radius: f64, n: u32) -> TriMesh {
-    let around = 2 * n;
-    let at = |i: u32, j: u32| {
-        let (polar, turn) = (PI * f64::from(i) / f64::from(n + 1), PI * f64::from(j) / f64::from(n));
-        radius * DVec3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos())
-    };
-    let mut positions = vec![DVec3::Z * radius, DVec3::NEG_Z * radius];
-    positions.extend((1..=n).flat_map(|i| (0..around).map(move |j| at(i, j))));
-    let v = |i: u32, j: u32| 2 + (i - 1) * around + j % around;
-    let mut triangles = Vec::new();
-    for j in 0..around {
-        triangles.push([0, v(1, j), v(1, j + 1)]);
-        triangles.push([1, v(n, j + 1), v(n, j)]);
-        for i in 1..n {
-            triangles.push([v(i, j), v(i + 1, j), v(i + 1, j + 1)]);
-            triangles.push([v(i, j), v(i + 1, j + 1), v(i, j + 1)]);
-        }
-    }
-    TriMesh::new(positions, triangles)
+    fixtures::sphere(DVec3::ZERO, radius, n, 2 * n)
 }
 
-/// A tube about the z axis, open at both ends: `rows` rings of `around` vertices, radius by turn and height.
+/// An open tube about the z axis: `rows` rings of `around` vertices, radius by angle and height.
 fn tube(rows: u32, around: u32, height: f64, radius: impl Fn(f64, f64) -> f64) -> TriMesh {
-    let at = |i: u32, j: u32| {
-        let (z, turn) =
-            (height * (f64::from(i) / f64::from(rows - 1) - 0.5), 2.0 * PI * f64::from(j) / f64::from(around));
-        let r = radius(turn, z);
-        DVec3::new(r * turn.cos(), r * turn.sin(), z)
-    };
-    let positions = (0..rows).flat_map(|i| (0..around).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect();
-    let v = |i: u32, j: u32| i * around + j % around;
-    let square = |i: u32, j: u32| [[v(i, j), v(i, j + 1), v(i + 1, j + 1)], [v(i, j), v(i + 1, j + 1), v(i + 1, j)]];
-    TriMesh::new(positions, (0..rows - 1).flat_map(|i| (0..around).flat_map(move |j| square(i, j))).collect())
+    fixtures::tube(around, rows, Diagonals::Parallel, |share, angle| {
+        let z = height * (share - 0.5);
+        let r = radius(angle, z);
+        DVec3::new(r * angle.cos(), r * angle.sin(), z)
+    })
 }
 
 #[test]

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod fixtures;
+
+use fixtures::{Diagonals, flipped, grid, table};
 use glam::DVec3;
 use partwise::body::distance::Body;
 use partwise::mesh::{RestShape, Topology, TriMesh};
@@ -49,20 +52,15 @@ fn body_mesh(jitter: &[f64]) -> TriMesh {
     TriMesh::new((0..4).map(corner).collect(), vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 }
 
-/// A height field of `w` by `h` vertices, some triangles left out so that it falls to pieces here and there.
-fn sheet(w: usize, h: usize, heights: &[f64], missing: &[bool]) -> TriMesh {
-    let at = |i: usize, j: usize| (j * w + i) as u32;
-    let position = |v: usize| DVec3::new(0.05 * (v % w) as f64 - 0.15, 0.05 * (v / w) as f64 - 0.15, heights[v]);
-    let mut triangles = Vec::new();
-    for j in 0..h - 1 {
-        for i in 0..w - 1 {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
-    }
+/// A height field of `w` by `h` vertices without some of its triangles, so that it has several components.
+fn sheet(w: u32, h: u32, heights: &[f64], missing: &[bool]) -> TriMesh {
+    let position = |i: u32, j: u32| {
+        DVec3::new(0.05 * f64::from(i) - 0.15, 0.05 * f64::from(j) - 0.15, heights[(j * w + i) as usize])
+    };
+    let mut mesh = grid(w - 1, h - 1, Diagonals::Parallel, position);
     let mut keep = missing.iter().cycle();
-    triangles.retain(|_| !keep.next().copied().unwrap_or(false));
-    TriMesh::new((0..w * h).map(position).collect(), triangles)
+    mesh.triangles.retain(|_| !keep.next().copied().unwrap_or(false));
+    mesh
 }
 
 /// Levels by reading the table from top to bottom, PARTs by union-find over triangle sides.
@@ -112,7 +110,7 @@ proptest! {
         let topology = Topology::new(&garment);
         let searched = Body::new(&body).unwrap();
         let distances: Vec<f64> = searched.nearest_all(&garment.positions).iter().map(|s| s.signed_distance).collect();
-        let table = RangeTable::from_bounds("random", &bounds_cm).unwrap();
+        let table = table(&bounds_cm);
         let parts = segment(&topology, &distances, &table);
 
         let expected = brute_force(&garment, &body, &bounds_cm);
@@ -128,7 +126,7 @@ proptest! {
     }
 }
 
-/// What must hold for any PARTs: vertices partitioned, connected, numbered in order; seams are the edges between.
+/// The invariants of PARTs: they partition the vertices, are connected and numbered in order; seams are the edges between them.
 fn consistent(parts: &Parts, topology: &Topology) {
     let mut seen = vec![0; parts.part_of_vertex.len()];
     for (number, part) in parts.parts.iter().enumerate() {
@@ -169,11 +167,10 @@ fn consistent(parts: &Parts, topology: &Topology) {
     }
 }
 
-/// A strip of `n + 1` rows of two vertices, rungs 1 cm apart and 1 cm wide, along x.
-fn strip(n: usize) -> (TriMesh, Topology) {
-    let position = |v: usize| DVec3::new(0.01 * (v / 2) as f64, 0.01 * (v % 2) as f64, 0.0);
-    let quad = |i: u32| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]];
-    let mesh = TriMesh::new((0..2 * n + 2).map(position).collect(), (0..n as u32).flat_map(quad).collect());
+/// A strip of `n + 1` rows of two vertices along x, rows 1 cm apart and 1 cm wide.
+fn strip(n: u32) -> (TriMesh, Topology) {
+    let mesh =
+        flipped(grid(1, n, Diagonals::Parallel, |i, j| DVec3::new(0.01 * f64::from(j), 0.01 * f64::from(i), 0.0)));
     let topology = Topology::new(&mesh);
     (mesh, topology)
 }
@@ -181,7 +178,7 @@ fn strip(n: usize) -> (TriMesh, Topology) {
 #[test]
 fn two_equal_levels_apart_are_two_parts() {
     let (_, topology) = strip(4);
-    let table = RangeTable::from_bounds("near and far", &[0.0, 1.0, f64::INFINITY]).unwrap();
+    let table = table(&[0.0, 1.0, f64::INFINITY]);
     let d = [0.0, 0.0, 0.0, -0.002, 0.05, 0.05, 0.0, 0.0, 0.0, 0.009];
     let parts = segment(&topology, &d, &table);
     assert_eq!(parts.part_of_vertex, [0, 0, 0, 0, 2, 2, 1, 1, 1, 1]);
@@ -211,7 +208,7 @@ fn a_hole_is_given_away_and_counted() {
 fn a_seam_across_a_strip_is_as_long_as_the_strip_is_wide() {
     let (mesh, topology) = strip(6);
     let d: Vec<f64> = (0..14).map(|v| if v < 6 { 0.001 } else { 0.05 }).collect();
-    let table = RangeTable::from_bounds("two", &[0.0, 1.0, f64::INFINITY]).unwrap();
+    let table = table(&[0.0, 1.0, f64::INFINITY]);
     let parts = segment(&topology, &d, &table);
     assert_eq!(parts.seams.len(), 1);
     assert_eq!(parts.seams[0].edges.len(), 3);
@@ -221,7 +218,7 @@ fn a_seam_across_a_strip_is_as_long_as_the_strip_is_wide() {
 #[test]
 fn no_piece_is_wider_than_the_extent() {
     let (mesh, topology) = strip(100);
-    let table = RangeTable::from_bounds("one", &[0.0, f64::INFINITY]).unwrap();
+    let table = table(&[0.0, f64::INFINITY]);
     let whole = segment(&topology, &vec![0.0; mesh.vertex_count()], &table);
     assert_eq!(whole.len(), 1);
     for extent in [0.5, 0.1, 0.03] {
@@ -248,7 +245,7 @@ fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
     let rest = RestShape::from_edges(&mesh).unwrap();
     let (first, all) = (mesh.positions[0], mesh.vertex_count());
     let d: Vec<f64> = (0..all).map(|v| [0.005, 0.015, 0.025, 0.035][4 * v / all]).collect();
-    let table = RangeTable::from_bounds("four", &[0.0, 1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
+    let table = table(&[0.0, 1.0, 2.0, 3.0, f64::INFINITY]);
     let whole = segment(&topology, &d, &table);
     assert_eq!(whole.cut_to_table(&mesh, &topology, &rest, &table), whole);
     let length = mesh.positions[all - 1].distance(first);
@@ -282,7 +279,7 @@ fn a_level_is_cut_to_its_own_extent_and_the_others_to_the_runs() {
 #[test]
 fn small_parts_join_along_the_longest_seam() {
     let (mesh, topology) = strip(6);
-    let table = RangeTable::from_bounds("three", &[0.0, 1.0, 2.0, f64::INFINITY]).unwrap();
+    let table = table(&[0.0, 1.0, 2.0, f64::INFINITY]);
     // Rows 0–2 level 0, rows 3–6 level 2; vertex 6 alone at level 1 touches both.
     let mut d: Vec<f64> = (0..14).map(|v| if v < 6 { 0.001 } else { 0.05 }).collect();
     d[6] = 0.015;

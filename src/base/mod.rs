@@ -1,4 +1,4 @@
-//! Infrastructure without a domain: error text, serde names, checksums, atomic files, quantiles, SIMD lanes.
+//! Utilities that know no domain: error text, names of enum variants, checksums, files, quantiles, SIMD.
 
 pub mod atomic_file;
 pub mod checksum;

@@ -1,17 +1,17 @@
-//! Quantiles of a list of numbers: the one place that sorts for them.
+//! Quantiles of a list of numbers.
 //!
-//! Nearest rank takes a value of the list, interpolation (type 7 of Hyndman and Fan 1996) what lies between two of them.
+//! Nearest rank returns a value of the list; interpolation (type 7 of Hyndman and Fan 1996) is linear between two of them.
 
 use serde::Serialize;
 
-/// The smallest value that a `share` of all values do not exceed (nearest rank); zero for an empty list.
+/// The smallest value such that at least `share` of all values do not exceed it (nearest rank); 0 for an empty list.
 #[must_use]
 pub(crate) fn nearest_rank(values: &[f64], share: f64) -> f64 {
     let rank = (share * values.len() as f64).ceil() as usize;
     sorted(values).get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
-/// The quantile at `share` by linear interpolation; zero for an empty list.
+/// The quantile at `share` by linear interpolation; 0 for an empty list.
 #[must_use]
 pub(crate) fn interpolated(values: &[f64], share: f64) -> f64 {
     let sorted = sorted(values);
@@ -22,7 +22,7 @@ pub(crate) fn interpolated(values: &[f64], share: f64) -> f64 {
     sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
-/// The least and the greatest of some values; infinite and the wrong way round for none.
+/// Minimum and maximum; (∞, −∞) for no values.
 pub(crate) fn extremes(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let none = (f64::INFINITY, f64::NEG_INFINITY);
     values.into_iter().fold(none, |(low, high), value| (low.min(value), high.max(value)))
@@ -34,9 +34,9 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// Six figures that stand for many, `p01` the first percentile: each the value at the nearest place of the sorted list.
+/// Minimum, percentiles and maximum of a list; `p01` is the first percentile. Each is a value of the list, at the rounded rank.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
+#[allow(missing_docs, reason = "the fields are percentiles, named by their number")]
 pub struct Percentiles {
     pub min: f64,
     pub p01: f64,
@@ -47,7 +47,7 @@ pub struct Percentiles {
 }
 
 impl Percentiles {
-    /// Of these values; zeros for none.
+    /// The percentiles of `values`; zeros for an empty list.
     #[must_use]
     pub(crate) fn of(values: &[f64]) -> Self {
         let sorted = sorted(values);
@@ -56,7 +56,7 @@ impl Percentiles {
         Self { min: at(0.0), p01: at(0.01), p05: at(0.05), p50: at(0.5), p95: at(0.95), max: at(1.0) }
     }
 
-    /// As words, each value times `scale`, with `digits` behind the point.
+    /// A phrase for a report, each value times `scale` with `digits` decimals.
     #[must_use]
     pub(crate) fn text(&self, scale: f64, digits: usize) -> String {
         let [min, p01, p05, p50, p95, max] =

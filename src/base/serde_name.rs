@@ -1,10 +1,10 @@
-//! Values of one word, by the names that serde has for them.
+//! Parses an enum variant from the name that serde gives it.
 
 use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 
-/// The value that a word stands for, if any.
+/// The variant of this name.
 #[must_use]
-pub(crate) fn word<'a, T: Deserialize<'a>>(text: &'a str) -> Option<T> {
-    T::deserialize(StrDeserializer::<Error>::new(text)).ok()
+pub(crate) fn parse<'a, T: Deserialize<'a>>(name: &'a str) -> Option<T> {
+    T::deserialize(StrDeserializer::<Error>::new(name)).ok()
 }

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::base::error_text::{plain, said};
+use crate::base::error_text::{with_causes, without_control};
 use comfy_table::{CellAlignment, ContentArrangement, Row, Table};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -17,7 +17,7 @@ static UNPRINTED: AtomicBool = AtomicBool::new(false);
 pub(crate) fn result(text: &str) {
     let mut stdout = std::io::stdout().lock();
     // Flushed here, as nobody hears of what fails when the program ends.
-    let printed = writeln!(stdout, "{}", plain(text.trim_end_matches('\n'))).and_then(|()| stdout.flush());
+    let printed = writeln!(stdout, "{}", without_control(text.trim_end_matches('\n'))).and_then(|()| stdout.flush());
     if let Err(error) = printed.or_else(|e| if e.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(e) }) {
         UNPRINTED.store(true, Ordering::SeqCst);
         say(&paint("error: ", "31;1"), &format!("standard output: the result cannot be printed: {error}"));
@@ -57,7 +57,7 @@ pub(crate) fn notes(texts: &[String]) {
 /// Writes to stderr; `mark` may hold colours, `text` may come from a file and may not.
 fn say(mark: &str, text: &str) {
     // Where stderr is closed there is nobody left to tell.
-    let _ = writeln!(std::io::stderr().lock(), "{mark}{}", plain(text));
+    let _ = writeln!(std::io::stderr().lock(), "{mark}{}", without_control(text));
 }
 
 /// Something to act upon, on stderr.
@@ -72,7 +72,7 @@ pub(crate) fn warnings(texts: &[String]) {
 
 /// An error with its causes, on stderr.
 pub(crate) fn error(error: &anyhow::Error) {
-    say(&paint("error: ", "31;1"), &said(error.as_ref(), "\n  because: "));
+    say(&paint("error: ", "31;1"), &with_causes(error.as_ref(), "\n  because: "));
 }
 
 fn paint(text: &str, code: &str) -> String {
@@ -90,7 +90,7 @@ pub(crate) fn progress(length: Option<u64>, what: &str) -> ProgressBar {
         None => ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}")),
     };
     bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
-    bar.set_message(plain(what).into_owned());
+    bar.set_message(without_control(what).into_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::base::files::names_a_file;
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 use crate::drape::{Model, Refine, Settings};
 use crate::mechanics::coupled::Motion;
 use crate::parts::range_table::{GapRule, RangeTable, TABLE_3};
@@ -125,5 +125,6 @@ fn extent(text: &str) -> Result<f64, String> {
 }
 
 fn gap_rule(text: &str) -> Result<GapRule, String> {
-    word(text).ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
+    serde_name::parse(text)
+        .ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
 }

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use serde::Serialize;
 
 use super::builtin::{GarmentSpec, PlacedGarment, garment};
-use crate::base::checksum::{self, Kind};
+use crate::base::checksum::{self, Tag};
 use crate::base::files::{read_own, user_cache};
 use crate::body::ShapeError;
 use crate::body::dress_form::{BodySpec, DEFAULT_TRIANGLES, dress_form};
@@ -20,7 +20,7 @@ use crate::mesh::{RestShape, TriMesh};
 
 /// First bytes of an entry, and part of every name. The number rises with the format and with every change of the mesher's
 /// results, so that an older mesh is never used for a newer one.
-const KIND: &Kind = b"PWMESH01";
+const TAG: &Tag = b"PWMESH01";
 /// Most entries, the newest: a sweep over measurements makes a form for each.
 const MAX_ENTRIES: usize = 64;
 
@@ -71,8 +71,8 @@ impl MeshCache {
     ) -> Result<PlacedGarment, ShapeError> {
         let (Some(folder), Ok(of)) = (&self.0, serde_json::to_string(of)) else { return make() };
         let of = format!("{} {} {of}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH);
-        let path = folder.join(format!("{}.mesh", checksum::hash(KIND, &of).to_hex()));
-        let found = read_own(&path).ok().and_then(|bytes| checksum::open::<(String, Stored)>(KIND, &bytes));
+        let path = folder.join(format!("{}.mesh", checksum::hash(TAG, &of).to_hex()));
+        let found = read_own(&path).ok().and_then(|bytes| checksum::decode::<(String, Stored)>(TAG, &bytes));
         if let Some((found_of, stored)) = found
             && found_of == of
         {
@@ -88,7 +88,7 @@ impl MeshCache {
 fn store(folder: &Path, path: &Path, of: &str, made: &PlacedGarment) -> std::io::Result<()> {
     let PlacedGarment { mesh, rest, held, .. } = made;
     let stored = (&mesh.positions, &mesh.triangles, &mesh.groups, &mesh.triangle_group, &rest.corners, held);
-    checksum::write(path, KIND, &(of, stored))?;
+    checksum::write(path, TAG, &(of, stored))?;
     let mut kept: Vec<(SystemTime, PathBuf)> = std::fs::read_dir(folder)?
         .filter_map(|entry| entry.ok().filter(|e| e.path().extension().is_some_and(|ending| ending == "mesh")))
         .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
@@ -125,14 +125,14 @@ mod tests {
         let [entry] = entries(&folder.path().join("meshes")).try_into().unwrap();
         // Whether an entry is read at all shows by one that holds another mesh under the right text.
         let whole = std::fs::read(&entry).unwrap();
-        let (of, mut stored) = checksum::open::<(String, Stored)>(KIND, &whole).unwrap();
+        let (of, mut stored) = checksum::decode::<(String, Stored)>(TAG, &whole).unwrap();
         stored.0[0].x = 9.0;
-        let other = checksum::seal(KIND, &(&of, &stored)).unwrap();
+        let other = checksum::encode(TAG, &(&of, &stored)).unwrap();
         std::fs::write(&entry, &other).unwrap();
         assert_eq!(skirt(&cache).mesh.positions[0].x, 9.0);
         let mut flipped = other.clone();
         flipped[200] ^= 1;
-        let foreign = checksum::seal(KIND, &(format!("{of} "), &stored)).unwrap();
+        let foreign = checksum::encode(TAG, &(format!("{of} "), &stored)).unwrap();
         for damaged in [&flipped[..], &other[..300], b"", b"PWMESH01 and more", &foreign[..]] {
             std::fs::write(&entry, damaged).unwrap();
             assert_eq!(skirt(&cache), made);

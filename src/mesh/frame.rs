@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::error::MeshError;
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 
 /// Length of one unit in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +53,7 @@ impl FromStr for Unit {
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
         let unknown = || MeshError::UnknownUnit { found: text.to_owned() };
-        word(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
+        serde_name::parse(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
     }
 }
 
@@ -86,7 +86,7 @@ impl FromStr for Axis {
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
         let unknown = || MeshError::UnknownAxis { found: text.to_owned() };
-        word(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
+        serde_name::parse(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
     }
 }
 

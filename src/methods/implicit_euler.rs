@@ -21,7 +21,7 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use super::friction::Grip;
 use super::linear::{ConjugateGradients, Operator, System};
 use super::rest::{Ended, Rest, RestRule, find_velocities, rms_speed};
-use super::{Dressing, MethodDrape, MethodError, MethodOutcome, Moment, Spectator, Stopwatch};
+use super::{MethodInput, MethodDrape, MethodError, MethodOutcome, Moment, Spectator, Stopwatch};
 use crate::GRAVITY;
 use crate::mechanics::energy::Contacts;
 use crate::mechanics::energy::contact::Touch;
@@ -99,7 +99,7 @@ struct State {
 /// Moves the cloth from where it is placed until it rests; tells the work of the linear solver, and the corrections of
 /// [`Elastic::limit`] where there are any.
 pub(super) fn march(
-    dressing: &Dressing<'_>,
+    dressing: &MethodInput<'_>,
     course: Course<'_>,
     (elastic, obstacle): (&mut dyn Elastic, &mut dyn Obstacle),
     mut watch: Stopwatch,
@@ -170,7 +170,7 @@ impl State {
     /// The linear system of a step.
     fn assemble(
         &mut self,
-        dressing: &Dressing<'_>,
+        dressing: &MethodInput<'_>,
         elastic: &mut dyn Elastic,
         touches: &[Touch],
         friction: &Grip,

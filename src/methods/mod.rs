@@ -37,7 +37,7 @@ pub use rest::{Ended, RestRule};
 
 /// What a method drapes.
 #[derive(Debug, Clone, Copy)]
-pub struct Dressing<'a> {
+pub struct MethodInput<'a> {
     /// Body and garment.
     pub scene: &'a Scene,
     /// The cloth's constants.
@@ -46,7 +46,7 @@ pub struct Dressing<'a> {
     pub cloth: &'a Cloth,
 }
 
-impl Dressing<'_> {
+impl MethodInput<'_> {
     /// The methods have one stiffness, density and friction for all of a garment.
     fn of_one_fabric(&self, method: &'static str) -> Result<(), MethodError> {
         match self.cloth.fabrics.len() {
@@ -160,13 +160,13 @@ pub trait ReferenceMethod: Sync {
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome;
+    fn run(&self, dressing: &MethodInput<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome;
 
     /// Drapes until the garment rests by `rule`; `onlooker` is told of every step and may end it.
     ///
     /// # Errors
     /// [`MethodError`] says in one line why there is no drape.
-    fn drape(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
+    fn drape(&self, dressing: &MethodInput<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         dressing.of_one_fabric(self.name())?;
         // In the pool: hundreds of short parallel loops follow.
         rayon::scope(|_| self.run(dressing, rule, onlooker))

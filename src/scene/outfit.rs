@@ -19,7 +19,7 @@ use super::SceneError;
 use super::layering::{lift_off, put_over};
 use super::placement::{check_near, facing_body};
 use crate::base::files::first_of;
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 use crate::body::distance::push_out::{PushOutReport, push_out};
 use crate::body::distance::{Body, SurfacePoint, pull_off_protrusions};
 use crate::garment::fabric::Fabric;
@@ -98,7 +98,7 @@ impl FromStr for DistanceTo {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        word(text).ok_or_else(|| format!("found `{text}`, expected body or below"))
+        serde_name::parse(text).ok_or_else(|| format!("found `{text}`, expected body or below"))
     }
 }
 

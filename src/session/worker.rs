@@ -12,7 +12,7 @@ use super::handle::Session;
 use super::results::{AtRest, Finished, LoadedScene, Preview, Segmented};
 use super::state::{SessionState, ms_since, sum_by_part};
 use super::task::{COARSE_STEPS, Refinement, Target, Task, reactions};
-use crate::base::error_text::said;
+use crate::base::error_text::with_causes;
 use crate::drape::{
     ClothState, Distances, Drape, DrapeError, Levels, Made, Model, Refine, Released, StageTimes, StageTwo, StartsFrom,
     approach, drape, folds_of, let_go, refine_from, settled, stage_two, told,
@@ -104,7 +104,7 @@ impl Worker {
         let outcome = catch_unwind(AssertUnwindSafe(|| rayon::scope(|_| self.next_task(session, &target))));
         let refused = match outcome {
             Ok(Ok(())) => None,
-            Ok(Err(error)) => Some((said(&error, "; because "), matches!(error, EditError::Scene(_)))),
+            Ok(Err(error)) => Some((with_causes(&error, "; because "), matches!(error, EditError::Scene(_)))),
             Err(_) => {
                 // A panic may leave any of these half done.
                 (self.cloth, self.preview, self.rest, self.progress) = (None, None, None, Progress::default());

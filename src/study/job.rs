@@ -10,7 +10,7 @@ use std::str::FromStr;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 use crate::drape::{Drape, DrapeError, Model, Refine, Settings, drape};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::CoupledOptions;
@@ -45,7 +45,7 @@ impl FromStr for Against {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        word(text).ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
+        serde_name::parse(text).ok_or_else(|| format!("found accuracy = {text}, expected none, canonical or own"))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use partwise::base::error_text::said;
+use partwise::base::error_text::with_causes;
 use partwise::body::BodySpec;
 use partwise::drape::Refine;
 use partwise::garment::fabric::{self, Fabric};
@@ -61,7 +61,7 @@ pub(crate) const TELLING: &[&str] = &[
 ];
 
 pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Said, String> {
-    Ok(Said::Refused(said(error, ": ")))
+    Ok(Said::Refused(with_causes(error, ": ")))
 }
 
 pub(crate) fn check(holds: bool, what: &str) -> Result<(), String> {
@@ -91,7 +91,7 @@ fn range_tables() {
         };
         check(table.levels.iter().all(|l| l.lower_cm.is_finite() && !l.upper_cm.is_nan()), "a bound is no number")?;
         let distances: Vec<f64> = (0..200).map(|i| 1e-3 * f64::from(i)).collect();
-        let levels = table.assign(&distances).level_of_vertex;
+        let levels = table.assign(&distances).0;
         check(levels.len() == distances.len(), "levels do not match distances")?;
         let again = RangeTable::parse(&table.to_toml(), "again").map_err(|e| format!("written and refused: {e}"))?;
         check(again == table, "it reads back as another")?;

@@ -8,7 +8,7 @@ use partwise::methods::gross2003::cut::cut;
 use partwise::methods::gross2003::developable::Developable;
 use partwise::methods::gross2003::pieces::{BodyPart, Piece, distortion, of_pattern, parts};
 use partwise::methods::gross2003::{Gross2003, lay};
-use partwise::methods::{Dressing, Ended, Exhibit, MethodError, RestRule};
+use partwise::methods::{MethodInput, Ended, Exhibit, MethodError, RestRule};
 use partwise::{DVec3, Scene, SceneSpec};
 
 use super::scenes::{drape, hanging, rectangle};
@@ -23,7 +23,7 @@ fn dressed(garment: &str) -> Scene {
 fn prepared(scene: &Scene, pieces: Option<Vec<Piece>>) -> (Vec<Piece>, Vec<BodyPart>, Vec<Developable>) {
     let fabric = Fabric::default();
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
-    let dressing = Dressing { scene, fabric: &fabric, cloth: &cloth };
+    let dressing = MethodInput { scene, fabric: &fabric, cloth: &cloth };
     let pieces = pieces.unwrap_or_else(|| cut(&dressing).unwrap());
     let parts = parts(&dressing, &pieces).unwrap();
     let around = |part: &BodyPart| {

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+#[path = "../fixtures/mod.rs"]
+mod fixtures;
+
 mod gross2003;
 mod scenes;
 mod thomaszewski2006;

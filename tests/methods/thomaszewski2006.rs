@@ -6,10 +6,11 @@ use partwise::mesh::TriMesh;
 use partwise::methods::implicit_euler::Elastic;
 use partwise::methods::linear::Operator;
 use partwise::methods::thomaszewski2006::{Thomaszewski2006, elements_of_garment};
-use partwise::methods::{Dressing, Ended, MethodError};
+use partwise::methods::{MethodInput, Ended, MethodError};
 use partwise::{DVec3, GRAVITY};
 
-use crate::scenes::{STILL, drape, fabric, hanging, rectangle};
+use crate::fixtures::{Diagonals, grid, isotropic};
+use crate::scenes::{STILL, drape, hanging, rectangle};
 
 /// A sheet in the xz plane whose inner vertices are shifted, with diagonals both ways: valences of four and eight.
 fn uneven() -> TriMesh {
@@ -25,9 +26,9 @@ fn uneven() -> TriMesh {
 #[test]
 fn a_stretched_and_turned_sheet_has_the_same_strain_everywhere() {
     let scene = hanging(uneven(), vec![0]);
-    let fabric = fabric(0.2, 60.0, 0.3, 1e-5);
+    let fabric = isotropic(0.2, 60.0, 0.3, 1e-5);
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
-    let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+    let mut elements = elements_of_garment(&MethodInput { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
     // Seen from −y: x along the weft, z along the warp.
     let stretch = DMat3::from_diagonal(DVec3::new(1.1, 1.0, 0.95));
     let turn = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-1.1);
@@ -52,24 +53,19 @@ fn a_stretched_and_turned_sheet_has_the_same_strain_everywhere() {
 #[test]
 fn in_a_regular_sheet_under_even_strain_nothing_pulls_inside() {
     // All diagonals one way: inner valences of six.
-    let (n, side) = (8usize, 0.2);
-    let at = |i: usize, j: usize| DVec3::new(side * i as f64, 0.0, side * j as f64) / n as f64;
-    let id = |i: usize, j: usize| (j * (n + 1) + i) as u32;
-    let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
-    let cells = (0..n).flat_map(|j| {
-        (0..n)
-            .flat_map(move |i| [[id(i, j), id(i + 1, j), id(i + 1, j + 1)], [id(i, j), id(i + 1, j + 1), id(i, j + 1)]])
-    });
-    let scene = hanging(TriMesh::new(positions, cells.collect()), vec![0]);
-    let fabric = fabric(0.2, 60.0, 0.3, 1e-5);
+    let n = 8;
+    let sheet =
+        grid(n, n, Diagonals::Parallel, |i, j| DVec3::new(f64::from(i), 0.0, f64::from(j)) * 0.2 / f64::from(n));
+    let scene = hanging(sheet, vec![0]);
+    let fabric = isotropic(0.2, 60.0, 0.3, 1e-5);
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
-    let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+    let mut elements = elements_of_garment(&MethodInput { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
     let x: Vec<DVec3> = scene.garment.positions.iter().map(|p| DVec3::new(1.1 * p.x, 0.0, 0.95 * p.z)).collect();
     let mut force = vec![DVec3::ZERO; x.len()];
     elements.linearise(&x, &mut force);
     for j in 2..=n - 2 {
         for i in 2..=n - 2 {
-            let f = force[id(i, j) as usize].length();
+            let f = force[(j * (n + 1) + i) as usize].length();
             // A side pulls with 6 N/m on 25 mm a vertex: 0.15 N.
             assert!(f < 1e-4, "{i} {j}: {f}");
         }
@@ -79,9 +75,9 @@ fn in_a_regular_sheet_under_even_strain_nothing_pulls_inside() {
 #[test]
 fn stiffness_is_the_derivative_of_the_force_in_the_plane() {
     let scene = hanging(uneven(), vec![0]);
-    let fabric = fabric(0.2, 60.0, 0.3, 1e-3);
+    let fabric = isotropic(0.2, 60.0, 0.3, 1e-3);
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
-    let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+    let mut elements = elements_of_garment(&MethodInput { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
     // At rest, where turning costs nothing yet: a smooth move in the plane and across it.
     let x = &scene.garment.positions;
     let move_by: Vec<DVec3> =
@@ -118,7 +114,8 @@ fn a_hanging_strip_stretches_as_its_closed_form() {
     let (length, density) = (0.6, 0.2);
     let scene = hanging(rectangle(DVec3::X * 0.1, DVec3::NEG_Z * length, 6, 36), (0..7).collect());
     for stretch in [60.0, 1000.0] {
-        let made = drape(&Thomaszewski2006::default(), &scene, &fabric(density, stretch, 0.0, 1e-5), &STILL).unwrap();
+        let made =
+            drape(&Thomaszewski2006::default(), &scene, &isotropic(density, stretch, 0.0, 1e-5), &STILL).unwrap();
         assert_eq!(made.ended, Ended::AtRest);
         let hem = &made.positions[made.positions.len() - 7..];
         let lowest = hem.iter().map(|p| p.z).sum::<f64>() / 7.0;
@@ -130,13 +127,13 @@ fn a_hanging_strip_stretches_as_its_closed_form() {
 #[test]
 fn a_cantilever_bends_as_its_closed_form() {
     // Two columns of vertices are held, so the strip is clamped where the cloth's slope is theirs: at the second.
-    let (length, density, cells) = (0.1, 0.2, 20);
-    let cell = length / cells as f64;
+    let (length, density, cells) = (0.1, 0.2, 20_u32);
+    let cell = length / f64::from(cells);
     let strip = rectangle(DVec3::X * (length + cell), DVec3::Y * 0.04, cells + 1, 8);
     let held = (0..9u32).flat_map(|j| [j * 22, j * 22 + 1]).collect();
     let scene = hanging(strip, held);
     let bending = 5e-4;
-    let made = drape(&Thomaszewski2006::default(), &scene, &fabric(density, 2000.0, 0.0, bending), &STILL).unwrap();
+    let made = drape(&Thomaszewski2006::default(), &scene, &isotropic(density, 2000.0, 0.0, bending), &STILL).unwrap();
     let tip = made.positions[4 * 22 + 21].z;
     let exact = -density * GRAVITY * length.powi(4) / (8.0 * bending);
     assert!((tip / exact - 1.0).abs() < 0.1, "{tip} expected {exact}");
@@ -151,7 +148,7 @@ fn a_mesh_without_a_limit_surface_is_refused_in_one_line() {
     sheet.positions.extend(away.positions.iter().map(|p| *p + DVec3::new(0.1, 0.0, 0.1)));
     sheet.triangles.extend(away.triangles.iter().map(|t| t.map(|v| if v == 0 { base - 1 } else { base + v })));
     let scene = hanging(sheet, vec![0]);
-    let error = drape(&Thomaszewski2006::default(), &scene, &fabric(0.2, 60.0, 0.3, 1e-5), &STILL).unwrap_err();
+    let error = drape(&Thomaszewski2006::default(), &scene, &isotropic(0.2, 60.0, 0.3, 1e-5), &STILL).unwrap_err();
     assert!(matches!(error, MethodError::Unfit { .. }));
     assert!(error.to_string().contains("vertex 16") && !error.to_string().contains('\n'), "{error}");
 }
@@ -161,7 +158,7 @@ fn however_strained_nothing_pulls_or_turns_by_itself() {
     let scene = hanging(uneven(), vec![0]);
     let fabric = partwise::garment::fabric::Fabric::default();
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &scene.held).unwrap();
-    let mut elements = elements_of_garment(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+    let mut elements = elements_of_garment(&MethodInput { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
     // Sheared, stretched unevenly and bent sharply, in a fabric of three stiffnesses.
     let bend = |p: DVec3| {
         let (angle, r) = (20.0 * p.x, 0.05 + 0.3 * p.z);

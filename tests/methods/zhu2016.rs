@@ -1,19 +1,21 @@
 //! Springs, units, quadrics and the hierarchy.
 
+use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::methods::implicit_euler::Obstacle;
 use partwise::methods::zhu2016::Zhu2016;
 use partwise::methods::zhu2016::hierarchy::Hierarchy;
-use partwise::methods::{Dressing, Ended, MethodError};
+use partwise::methods::{MethodInput, Ended, Exhibit, MethodError, RestRule};
 use partwise::{DVec3, GRAVITY, Scene, SceneSpec};
 
-use crate::scenes::{STILL, drape, fabric, hanging, rectangle};
+use crate::fixtures::isotropic;
+use crate::scenes::{STILL, drape, hanging, rectangle};
 
 #[test]
 fn a_hanging_strip_stretches_as_its_closed_form() {
     let (length, density, stretch) = (0.6, 0.2, 60.0);
     let scene = hanging(rectangle(DVec3::X * 0.1, DVec3::NEG_Z * length, 6, 36), (0..7).collect());
-    let made = drape(&Zhu2016::default(), &scene, &fabric(density, stretch, 0.3, 1e-6), &STILL).unwrap();
+    let made = drape(&Zhu2016::default(), &scene, &isotropic(density, stretch, 0.3, 1e-6), &STILL).unwrap();
     assert_eq!(made.ended, Ended::AtRest);
     let hem = &made.positions[made.positions.len() - 7..];
     let lowest = hem.iter().map(|p| p.z).sum::<f64>() / 7.0;
@@ -26,7 +28,7 @@ fn a_hanging_strip_stretches_as_its_closed_form() {
 fn no_spring_stays_longer_than_its_limit() {
     let scene = hanging(rectangle(DVec3::X * 0.1, DVec3::NEG_Z * 0.2, 2, 4), (0..3).collect());
     // By its own stiffness its upper edge would be strained by a half.
-    let soft = fabric(0.2, 0.8, 0.3, 1e-7);
+    let soft = isotropic(0.2, 0.8, 0.3, 1e-7);
     let made = drape(&Zhu2016 { strain_limit: 0.05, ..Zhu2016::default() }, &scene, &soft, &STILL).unwrap();
     let longest = |made: &[DVec3]| {
         let ends = scene.topology.edges.iter().map(|edge| edge.map(|v| v as usize));
@@ -49,14 +51,14 @@ fn dressed() -> Scene {
 #[test]
 fn the_hierarchy_finds_what_an_exact_search_finds() {
     let scene = dressed();
-    let fabric = fabric(0.2, 60.0, 0.3, 1e-5);
+    let fabric = isotropic(0.2, 60.0, 0.3, 1e-5);
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &[]).unwrap();
     let body = scene.body.mesh();
     let normals = body.vertex_normals();
     // Points about the skin from 15 mm inside to 15 mm outside, as many at a time as the cloth has vertices.
     for (round, depth) in [-0.015, -0.004, 0.0, 0.5 * cloth.offset, 0.99 * cloth.offset, 0.015].into_iter().enumerate()
     {
-        let mut hierarchy = Hierarchy::new(&Dressing { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
+        let mut hierarchy = Hierarchy::new(&MethodInput { scene: &scene, fabric: &fabric, cloth: &cloth }).unwrap();
         let pick = |i: usize| (i * 7919 + round * 131) % body.vertex_count();
         let points: Vec<DVec3> = (0..cloth.vertex_count())
             .map(|i| {
@@ -100,8 +102,8 @@ fn the_hierarchy_finds_what_an_exact_search_finds() {
 #[test]
 fn a_skirt_comes_to_rest_outside_the_body_with_the_same_bits_every_time() {
     let scene = dressed();
-    let fabric = partwise::garment::fabric::Fabric::default();
-    let rule = partwise::methods::RestRule::default();
+    let fabric = Fabric::default();
+    let rule = RestRule::default();
     let made = drape(&Zhu2016::default(), &scene, &fabric, &rule).unwrap();
     assert_eq!(made.ended, Ended::AtRest);
     assert!(made.rms_speed_m_per_s < 0.01);
@@ -118,7 +120,7 @@ fn an_open_body_is_refused_in_one_line() {
     let mut open = scene.body.mesh().clone();
     open.triangles.pop();
     scene.body = partwise::body::distance::Body::new_open(&open).unwrap();
-    let error = drape(&Zhu2016::default(), &scene, &partwise::garment::fabric::Fabric::default(), &STILL).unwrap_err();
+    let error = drape(&Zhu2016::default(), &scene, &Fabric::default(), &STILL).unwrap_err();
     assert!(matches!(error, MethodError::Unfit { .. }));
     assert!(error.to_string().contains("3 boundary edges") && !error.to_string().contains('\n'), "{error}");
 }
@@ -126,11 +128,11 @@ fn an_open_body_is_refused_in_one_line() {
 #[test]
 fn the_quadrics_can_be_shown() {
     let scene = dressed();
-    let rule = partwise::methods::RestRule { limit_s: 0.1, ..partwise::methods::RestRule::default() };
+    let rule = RestRule { limit_s: 0.1, ..RestRule::default() };
     let method = Zhu2016 { exhibit: true, ..Zhu2016::default() };
-    let made = drape(&method, &scene, &partwise::garment::fabric::Fabric::default(), &rule).unwrap();
+    let made = drape(&method, &scene, &Fabric::default(), &rule).unwrap();
     assert_eq!(made.ended, Ended::TimeOver);
-    let [("units and quadrics", partwise::methods::Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
+    let [("units and quadrics", Exhibit::Lines(lines))] = made.exhibits.as_slice() else { panic!() };
     let quadrics = made.counts.iter().find(|c| c.0 == "quadrics").unwrap().1;
     assert_eq!(lines.len() as u64, 2 * quadrics);
     // Each slice's lines, at 1 + ε, go around the body: none of its vertices is outside all of them by height and breadth.

@@ -1,4 +1,4 @@
-//! The lanes of a processor that has none that are known here: arrays of four.
+//! [`Lanes`] as plain arrays, for processors without AVX2.
 
 use super::{Four, Lanes};
 
@@ -9,7 +9,7 @@ macro_rules! lanewise {
     ($($function:ident $operator:tt)*) => {
         $(#[inline(always)]
         fn $function(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-            [a[0] $operator b[0], a[1] $operator b[1], a[2] $operator b[2], a[3] $operator b[3]]
+            std::array::from_fn(|i| a[i] $operator b[i])
         })*
     };
 }
@@ -18,7 +18,7 @@ macro_rules! shuffles {
     ($($function:ident $i:literal $j:literal $k:literal $l:literal)*) => {
         $(#[inline(always)]
         fn $function(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-            // Numbers from four on are places in b.
+            // Indices from 4 on are lanes of b.
             let both = [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]];
             [both[$i], both[$j], both[$k], both[$l]]
         })*
@@ -54,7 +54,7 @@ impl Lanes for Arrays {
 
     #[inline(always)]
     fn max(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-        // As the processor's own: b where either is not a number.
+        // As the instruction does: b where either is NaN.
         std::array::from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
     }
 

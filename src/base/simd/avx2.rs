@@ -1,4 +1,4 @@
-//! The lanes of AVX2.
+//! [`Lanes`] as AVX2 registers.
 
 use std::arch::x86_64::__m256d;
 

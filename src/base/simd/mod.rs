@@ -1,20 +1,20 @@
-//! Four doubles at a time: the same sums and products on every machine, in AVX2's registers where there are such.
+//! Four doubles at a time, in AVX2 registers where the processor has them, with the same bits on every machine.
 //!
-//! A plain x86-64 build may use two lanes only, so what is hot is written once over [`Lanes`] and [`run`] picks its
-//! implementation by the processor: [`V3`](pulp::x86::V3) or arrays. Both do the same operations in the same order, each
-//! rounded by IEEE 754 and never fused, hence the same bits.
+//! A plain x86-64 build may assume SSE2 only, which has two lanes. Hot loops are therefore written once over [`Lanes`], and [`run`]
+//! selects the implementation at run time: AVX2 ([`V3`](pulp::x86::V3)) or arrays. Both do the same operations in the same order,
+//! each rounded by IEEE 754 and never fused, hence the same bits.
 //!
-//! Everything that is to run in AVX2 must be inlined into [`run`], so it is `#[inline(always)]` and without closures.
+//! A function runs in AVX2 only if it is inlined into [`run`]: it must be `#[inline(always)]` and free of closures.
 
 mod arrays;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use arrays::Arrays;
 
-/// Four doubles that one register holds: four of a kind, or a vector of space and a zero.
+/// Four doubles as one register holds them: four scalars, or a vector and a zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C, align(32))]
 pub(crate) struct Four(pub(crate) [f64; 4]);
@@ -23,9 +23,9 @@ impl Four {
     pub(crate) const ZERO: Self = Self([0.0; 4]);
 }
 
-/// What a processor does with four doubles.
+/// The operations of a processor on four doubles.
 pub(crate) trait Lanes: Copy {
-    /// Its register.
+    /// Its register type.
     type Register: Copy;
 
     fn load(self, four: &Four) -> Self::Register;
@@ -58,15 +58,15 @@ pub(crate) trait Lanes: Copy {
     fn high_low(self, a: Self::Register, b: Self::Register) -> Self::Register;
 }
 
-/// Something to do in lanes.
+/// A computation over [`Lanes`].
 pub(crate) trait Work {
     type Output;
 
-    /// To be `#[inline(always)]`.
+    /// Must be `#[inline(always)]`.
     fn with<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
-/// Does it in the widest lanes there are.
+/// Runs `work` in the widest lanes of this processor.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if let Some(v3) = pulp::x86::V3::try_new() {
@@ -91,7 +91,7 @@ impl<W: Work> pulp::NullaryFnOnce for Avx2<W> {
     }
 }
 
-/// A register with the lanes it belongs to, so that formulas read as such.
+/// A register together with its lanes, so that formulas can use operators.
 #[derive(Clone, Copy)]
 pub(crate) struct Pack<L: Lanes> {
     pub(crate) lanes: L,
@@ -120,22 +120,17 @@ impl<L: Lanes> Pack<L> {
     }
 
     #[inline(always)]
-    pub(crate) fn over(self, b: Self) -> Self {
-        Self::new(self.lanes, self.lanes.div(self.register, b.register))
-    }
-
-    #[inline(always)]
     pub(crate) fn sqrt(self) -> Self {
         Self::new(self.lanes, self.lanes.sqrt(self.register))
     }
 
-    /// Itself where greater than b, else b.
+    /// `self` where it is greater than b, else b.
     #[inline(always)]
     pub(crate) fn max(self, b: Self) -> Self {
         Self::new(self.lanes, self.lanes.max(self.register, b.register))
     }
 
-    /// a where it is negative, else b.
+    /// a where `self` is negative, else b.
     #[inline(always)]
     pub(crate) fn if_negative(self, a: Self, b: Self) -> Self {
         Self::new(self.lanes, self.lanes.where_negative(self.register, a.register, b.register))
@@ -164,6 +159,7 @@ macro_rules! operator {
 operator!(Add, add);
 operator!(Sub, sub);
 operator!(Mul, mul);
+operator!(Div, div);
 
 impl<L: Lanes> Mul<f64> for Pack<L> {
     type Output = Self;
@@ -174,7 +170,7 @@ impl<L: Lanes> Mul<f64> for Pack<L> {
     }
 }
 
-/// Four vectors of space, by coordinate.
+/// Four vectors, by coordinate.
 #[derive(Clone, Copy)]
 pub(crate) struct Vectors<L: Lanes> {
     pub(crate) x: Pack<L>,
@@ -188,7 +184,7 @@ impl<L: Lanes> Vectors<L> {
         Self { x: Pack::load(l, x), y: Pack::load(l, y), z: Pack::load(l, z) }
     }
 
-    /// From one vector and a fourth number in each register.
+    /// From registers that hold one vector each; their fourth lane is ignored.
     #[inline(always)]
     pub(crate) fn from_rows(l: L, [a, b, c, d]: [L::Register; 4]) -> Self {
         let (ab, cd) = (l.even(a, b), l.even(c, d));
@@ -197,7 +193,7 @@ impl<L: Lanes> Vectors<L> {
         Self { x: Pack::new(l, x), y: Pack::new(l, y), z: Pack::new(l, z) }
     }
 
-    /// One vector and a zero in each register.
+    /// Registers that hold one vector and a zero each.
     #[inline(always)]
     pub(crate) fn rows(self, l: L) -> [L::Register; 4] {
         let (x, y, z) = (self.x.register, self.y.register, self.z.register);
@@ -207,7 +203,7 @@ impl<L: Lanes> Vectors<L> {
         [l.low(xy, z), l.low(xy_odd, z_odd), l.high(xy, z), l.high(xy_odd, z_odd)]
     }
 
-    /// From coordinates one after the other: x y z x | y z x y | z x y z.
+    /// From interleaved coordinates: x y z x | y z x y | z x y z.
     #[inline(always)]
     pub(crate) fn from_flat(l: L, [a, b, c]: &[Four; 3]) -> Self {
         let (a, b, c) = (l.load(a), l.load(b), l.load(c));
@@ -216,7 +212,7 @@ impl<L: Lanes> Vectors<L> {
         Self { x: Pack::new(l, x), y: Pack::new(l, y), z: Pack::new(l, z) }
     }
 
-    /// Coordinates one after the other.
+    /// Interleaved coordinates, as [`from_flat`](Self::from_flat) reads them.
     #[inline(always)]
     pub(crate) fn flat(self, l: L) -> [Four; 3] {
         let (x, y, z) = (self.x.register, self.y.register, self.z.register);

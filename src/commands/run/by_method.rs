@@ -8,7 +8,7 @@ use crate::DVec3;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
-use crate::methods::{self, Dressing, METHODS, MethodDrape, RestRule};
+use crate::methods::{self, MethodInput, METHODS, MethodDrape, RestRule};
 use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
 use crate::scene::Loaded;
 use crate::study::certificate::{Certificate, certify};
@@ -104,7 +104,7 @@ impl RunArgs {
         let scene = loaded.scene.clone();
         let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&fabric), &scene.held)?;
         let fabric = &cloth.fabrics[0];
-        let dressing = Dressing { scene: &scene, fabric, cloth: &cloth };
+        let dressing = MethodInput { scene: &scene, fabric, cloth: &cloth };
         let bar = console::progress(None, self.method);
         let (mut kept, mut meshes): (Vec<Kept>, f64) = (Vec::new(), 0.0);
         interrupt::keep();

@@ -13,7 +13,7 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::base::checksum::{self, Kind, write};
+use crate::base::checksum::{self, Tag, write};
 use crate::base::files::{self, read_own};
 use crate::drape::Drape;
 use crate::mesh::TriMesh;
@@ -26,8 +26,8 @@ use serde::{Deserialize, Serialize};
 
 use super::single;
 
-const POINT: &Kind = b"PWPOINT5";
-const SCENE: &Kind = b"PWSCENE3";
+const POINT: &Tag = b"PWPOINT5";
+const SCENE: &Tag = b"PWSCENE3";
 
 /// Body and garment as a recording shows them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -172,7 +172,7 @@ impl PointStore {
     pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::open(POINT, &read_own(&point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+                checksum::decode(POINT, &read_own(&point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
             }
             Self::Memory(kept) => open(kept).1.get(id).cloned(),
         }
@@ -184,7 +184,7 @@ impl PointStore {
             Self::Folder(folder, _) => {
                 let mut head = Vec::new();
                 files::open(&point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
-                checksum::peek(POINT, &head).filter(|scene: &String| is_id(scene))
+                checksum::first_field(POINT, &head).filter(|scene: &String| is_id(scene))
             }
             Self::Memory(kept) => Some(open(kept).1.get(id)?.scene.clone()),
         }
@@ -194,7 +194,7 @@ impl PointStore {
     pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::open(SCENE, &read_own(&scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+                checksum::decode(SCENE, &read_own(&scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
             }
             Self::Memory(kept) => open(kept).0.get(id).cloned(),
         }

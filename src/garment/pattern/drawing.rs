@@ -224,6 +224,6 @@ fn middle(outline: &[DVec2]) -> DVec2 {
 }
 
 fn escaped(text: &str) -> String {
-    let plain = crate::base::error_text::plain(text);
+    let plain = crate::base::error_text::without_control(text);
     plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 use crate::mechanics::energy::EnergyError;
 use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::Record;
@@ -63,7 +63,7 @@ impl std::str::FromStr for Motion {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        word(text).ok_or_else(|| format!("found `{text}`, expected affine or translation"))
+        serde_name::parse(text).ok_or_else(|| format!("found `{text}`, expected affine or translation"))
     }
 }
 

@@ -124,7 +124,7 @@ fn of_one_fabric<L: Lanes>(
         let (tu, tv) = (field_u + r * (sigma_u - field_u), field_v + r * (sigma_v - field_v));
         let (tu, tv, tau) = (area * tu, area * tv, area * (shear * gamma));
         energy = energy + (tu * su + tv * sv + tau * gamma);
-        let (tu, tv) = (tu.over(shortest.max(lu)), tv.over(shortest.max(lv)));
+        let (tu, tv) = (tu / shortest.max(lu), tv / shortest.max(lv));
         let (gu, gv) = (fu * tu + fv * tau, fv * tv + fu * tau);
         let second = (gu * pu + gv * pv).rows(l);
         let third = (gu * qu + gv * qv).rows(l);

@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 use super::pieces::{Piece, unfit};
 use crate::garment::sewing::laid_flat;
 use crate::mesh::{Lists, RestShape, Topology, TriMesh, each_once, pieces};
-use crate::methods::{Dressing, MethodError};
+use crate::methods::{MethodInput, MethodError};
 
 /// A piece of fewer triangles than this share of the garment's is joined to its neighbour.
 const LEAST_SHARE: f64 = 0.02;
@@ -24,7 +24,7 @@ const LEAST_SHARE: f64 = 0.02;
 ///
 /// # Errors
 /// [`MethodError::Unfit`] where nothing tells sleeve from bodice, or a piece does not open out.
-pub fn cut(dressing: &Dressing<'_>) -> Result<Vec<Piece>, MethodError> {
+pub fn cut(dressing: &MethodInput<'_>) -> Result<Vec<Piece>, MethodError> {
     let (garment, topology) = (&dressing.scene.garment, &dressing.scene.topology);
     let known = |group: &&String| ["body", "sleeve", "hem"].contains(&group.as_str());
     if garment.groups.iter().filter(known).count() < 2 {
@@ -145,7 +145,7 @@ fn joined(mut label: Vec<usize>, topology: &Topology) -> Vec<usize> {
 }
 
 /// A set of triangles as a piece, laid flat.
-fn opened(dressing: &Dressing<'_>, name: String, of_garment: &[u32]) -> Result<Piece, MethodError> {
+fn opened(dressing: &MethodInput<'_>, name: String, of_garment: &[u32]) -> Result<Piece, MethodError> {
     let scene = dressing.scene;
     let vertices = each_once(of_garment.iter().flat_map(|&t| scene.garment.triangles[t as usize]));
     let local = |v: u32| vertices.binary_search(&v).unwrap_or_default() as u32;

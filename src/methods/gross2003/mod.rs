@@ -29,7 +29,7 @@ use glam::DVec3;
 use super::rest::{Ended, Rest};
 use super::spring_list::springs;
 use super::{
-    Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, Moment, ReferenceMethod, RestRule, Spectator, Stopwatch,
+    MethodInput, Exhibit, MethodDrape, MethodError, MethodOutcome, Moment, ReferenceMethod, RestRule, Spectator, Stopwatch,
 };
 use crate::garment::pattern::SewnGarment;
 use crate::mechanics::energy::Cloth;
@@ -84,8 +84,8 @@ impl ReferenceMethod for Gross2003 {
         NAME
     }
 
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
-        let Dressing { scene, fabric, cloth } = dressing;
+    fn run(&self, dressing: &MethodInput<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
+        let MethodInput { scene, fabric, cloth } = dressing;
         let cutting = Instant::now();
         let pieces = match &self.sewn {
             Some(sewn) => pieces::of_pattern(sewn, &scene.garment)?,

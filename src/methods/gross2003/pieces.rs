@@ -12,7 +12,7 @@ use crate::base::quantiles::{extremes, nearest_rank};
 use crate::garment::pattern::SewnGarment;
 use crate::mesh::{RestShape, TriMesh};
 use crate::methods::segment::{Segments, longest};
-use crate::methods::{Dressing, MethodError};
+use crate::methods::{MethodInput, MethodError};
 
 /// A piece is a limb's if that is nearest to so many of its vertices.
 const OF_LIMB: f64 = 0.5;
@@ -123,7 +123,7 @@ fn spread(points: &[DVec3]) -> DVec3 {
 ///
 /// # Errors
 /// [`MethodError::Unfit`] for a body that is not closed.
-pub fn parts(dressing: &Dressing<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>, MethodError> {
+pub fn parts(dressing: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>, MethodError> {
     let (scene, body) = (dressing.scene, dressing.scene.body.mesh());
     let segments = Segments::of_closed(body, "part").map_err(unfit)?;
     let count = segments.is_limb.len();

@@ -31,7 +31,7 @@ use rayon::prelude::*;
 
 use super::implicit_euler::{Course, Pacing, march};
 use super::{
-    Dressing, Exhibit, MethodDrape, MethodError, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
+    MethodInput, Exhibit, MethodDrape, MethodError, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch,
 };
 use elements::{Elements, Made};
 use patch::{Around, Irregular, around_all, derivatives, limit_stencil};
@@ -54,9 +54,9 @@ impl ReferenceMethod for Thomaszewski2006 {
         NAME
     }
 
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
+    fn run(&self, dressing: &MethodInput<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         let mut watch = Stopwatch::begin();
-        let Dressing { scene, fabric, cloth } = dressing;
+        let MethodInput { scene, fabric, cloth } = dressing;
         let around = watch.time("patches", || fans(dressing))?;
         let mut elements = watch.time("patches", || elements_of(dressing, &around))?;
         let mut body = watch.time("contact", || cloth.contacts_by_planes(&scene.body, &scene.garment.positions));
@@ -76,7 +76,7 @@ impl ReferenceMethod for Thomaszewski2006 {
 }
 
 /// The fans of a garment's vertices.
-fn fans(dressing: &Dressing<'_>) -> Result<Vec<Around>, MethodError> {
+fn fans(dressing: &MethodInput<'_>) -> Result<Vec<Around>, MethodError> {
     let scene = dressing.scene;
     around_all(&scene.garment, &scene.topology).map_err(|irregular| {
         let reason = match irregular {
@@ -94,12 +94,12 @@ fn fans(dressing: &Dressing<'_>) -> Result<Vec<Around>, MethodError> {
 /// # Errors
 /// [`MethodError::Unfit`] where the mesh has no limit surface, or the patch of a triangle folds over itself where it is
 /// laid flat.
-pub fn elements_of_garment(dressing: &Dressing<'_>) -> Result<Elements, MethodError> {
+pub fn elements_of_garment(dressing: &MethodInput<'_>) -> Result<Elements, MethodError> {
     elements_of(dressing, &fans(dressing)?)
 }
 
-fn elements_of(dressing: &Dressing<'_>, around: &[Around]) -> Result<Elements, MethodError> {
-    let Dressing { scene, fabric, cloth } = dressing;
+fn elements_of(dressing: &MethodInput<'_>, around: &[Around]) -> Result<Elements, MethodError> {
+    let MethodInput { scene, fabric, cloth } = dressing;
     let made: Result<Vec<Made>, MethodError> = (0..scene.garment.triangles.len())
         .into_par_iter()
         .with_min_len(64)

@@ -20,7 +20,7 @@ use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::contact::Touch;
 use crate::methods::implicit_euler::Obstacle;
 use crate::methods::segment::Segments;
-use crate::methods::{Dressing, MethodError};
+use crate::methods::{MethodInput, MethodError};
 
 /// Vertices of one task.
 const CHUNK: usize = 256;
@@ -80,8 +80,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// [`MethodError::Unfit`] for a body that is not closed, which has no inside.
-    pub fn new(dressing: &Dressing<'_>) -> Result<Self, MethodError> {
-        let Dressing { scene, cloth, .. } = dressing;
+    pub fn new(dressing: &MethodInput<'_>) -> Result<Self, MethodError> {
+        let MethodInput { scene, cloth, .. } = dressing;
         let mesh = scene.body.mesh();
         let segments = Segments::of_closed(mesh, "unit").map_err(|reason| MethodError::unfit(super::NAME, reason))?;
         let mut of_unit = vec![Vec::new(); segments.is_limb.len()];

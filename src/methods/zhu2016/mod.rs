@@ -22,7 +22,7 @@ pub mod springs;
 pub mod units;
 
 use super::implicit_euler::{Course, Pacing, march};
-use super::{Dressing, Exhibit, MethodDrape, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
+use super::{MethodInput, Exhibit, MethodDrape, MethodOutcome, ReferenceMethod, RestRule, Spectator, Stopwatch};
 use hierarchy::Hierarchy;
 use springs::Springs;
 
@@ -51,7 +51,7 @@ impl ReferenceMethod for Zhu2016 {
         NAME
     }
 
-    fn run(&self, dressing: &Dressing<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
+    fn run(&self, dressing: &MethodInput<'_>, rule: &RestRule, onlooker: Spectator<'_>) -> MethodOutcome {
         let mut watch = Stopwatch::begin();
         let mut springs = watch.time("springs", || Springs::new(dressing, self.strain_limit));
         let mut hierarchy = watch.time("hierarchy", || Hierarchy::new(dressing))?;

@@ -16,7 +16,7 @@ use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::mesh::Lists;
-use crate::methods::Dressing;
+use crate::methods::MethodInput;
 use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::{BlockRows, Operator};
 use crate::methods::spring_list::{Spring, springs};
@@ -56,8 +56,8 @@ pub(crate) struct Springs {
 impl Springs {
     /// Springs of the garment by its rest shape.
     #[must_use]
-    pub(crate) fn new(dressing: &Dressing<'_>, strain_limit: f64) -> Self {
-        let Dressing { scene, fabric, cloth } = dressing;
+    pub(crate) fn new(dressing: &MethodInput<'_>, strain_limit: f64) -> Self {
+        let MethodInput { scene, fabric, cloth } = dressing;
         let [structural, bending] = springs(&scene.garment.triangles, &scene.topology, &scene.rest, fabric);
         let edges = structural.len();
         let springs = [structural, bending].concat();

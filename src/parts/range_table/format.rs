@@ -1,15 +1,16 @@
-//! Range tables as TOML: reading with file, line and row in every message, and writing so that it reads back equal.
+//! Range tables as text: TOML files, with file, line and row in every message, and the plain form inside jobs and recordings.
 
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toml::Spanned;
 
-use super::error::{EXPECTED_ROWS, first_problem};
-use super::{Extent, GapRule, Level, RangeTable, TableError};
+use super::level::{EXPECTED_ROWS, GapRule, Level, TableError, first_problem};
+use super::table::{RangeTable, TABLE_3};
 use crate::base::files::{line_of, names_a_file, read_text};
-use crate::base::serde_name::word;
+use crate::base::serde_name;
 
-/// Table 3 as printed, inside the binary.
-const TABLE_3: &str = include_str!("../../../assets/tables/table-3.toml");
+/// Table 3 as printed, compiled in.
+const TABLE_3_TOML: &str = include_str!("../../../assets/tables/table-3.toml");
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,23 +24,23 @@ struct File {
 }
 
 impl RangeTable {
-    /// The paper's Table 3, verbatim, hole and all.
+    /// The paper's Table 3, verbatim, including its hole.
     #[must_use]
     pub fn table_3() -> Self {
-        // The text is part of the program and a test reads it, so it always parses.
-        Self::parse(TABLE_3, "table-3.toml").unwrap_or_default()
+        // A test parses the text, so the default never applies.
+        Self::parse(TABLE_3_TOML, "table-3.toml").unwrap_or_default()
     }
 
-    /// The table of this name: `table-3`, or a file.
+    /// The table of this name: `table-3` or a file.
     pub(crate) fn by_name(name: &str) -> Result<Self, TableError> {
         match name {
-            super::TABLE_3 => Ok(Self::table_3()),
+            TABLE_3 => Ok(Self::table_3()),
             file if names_a_file(file) => Self::parse(&read_text(file.as_ref())?, file),
             other => Err(TableError::Unknown { found: other.to_owned() }),
         }
     }
 
-    /// Reads a table; `source_name` (a path) only serves the messages.
+    /// Parses a table; `source_name` (a path) appears in messages only.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, TableError> {
         let at = |offset: usize| format!("{source_name}:{}", line_of(text, offset));
         let file: File = toml::from_str(text).map_err(|e| TableError::Syntax {
@@ -53,9 +54,9 @@ impl RangeTable {
         }
         let gap = match &file.gap {
             None => GapRule::default(),
-            Some(rule) => word(rule.get_ref()).ok_or_else(|| {
-                let expected = "\"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose who takes the \
-                                distances between two rows that do not meet";
+            Some(rule) => serde_name::parse(rule.get_ref()).ok_or_else(|| {
+                let expected = "\"extend-lower\", \"extend-upper\", \"own-level\" or \"error\"; choose the level \
+                                of the distances between two rows that do not meet";
                 TableError::value(at(rule.span().start), format!("gap = \"{}\"", rule.get_ref()), expected)
             })?,
         };
@@ -63,18 +64,18 @@ impl RangeTable {
         if rows.is_empty() {
             return Err(TableError::value(at(file.levels.span().start), "no levels", EXPECTED_ROWS));
         }
-        let mut levels = Vec::with_capacity(rows.len());
-        for (i, row) in rows.iter().enumerate() {
-            let wrong = |problem| TableError::Row { place: at(row.span().start), row: i + 1, problem };
-            levels.push(Level::from_numbers(row.get_ref()).map_err(wrong)?);
-        }
+        let wrong = |row: usize, problem| TableError::Row { place: at(rows[row - 1].span().start), row, problem };
+        let level = |(i, row): (usize, &Spanned<Vec<f64>>)| {
+            Level::from_numbers(row.get_ref()).map_err(|problem| wrong(i + 1, problem))
+        };
+        let levels = rows.iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
         if let Some((row, problem)) = first_problem(&levels, gap) {
-            return Err(TableError::Row { place: at(rows[row - 1].span().start), row, problem });
+            return Err(wrong(row, problem));
         }
         Ok(Self { name: file.name, source: file.source, gap, levels })
     }
 
-    /// The table as a file that [`parse`](Self::parse) reads back to an equal one.
+    /// The table as TOML that [`parse`](Self::parse) reads back to an equal one.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let quoted = |s: &str| toml::Value::String(s.to_owned()).to_string();
@@ -84,20 +85,80 @@ impl RangeTable {
         }
         text.push_str(&format!("unit = \"cm\"\ngap = \"{}\"\nlevels = [\n", self.gap));
         for level in &self.levels {
-            // `{:?}` is the shortest text that reads back to the same bits; TOML spells infinity the same way.
-            let numbers =
-                [level.lower_cm, level.upper_cm].into_iter().chain(level.extent.iter().flat_map(Extent::numbers_cm));
-            text.push_str(&format!("    [{}],\n", numbers.map(|cm| format!("{cm:?}")).collect::<Vec<_>>().join(", ")));
+            // `{:?}` is the shortest text that parses to the same bits, and writes infinity as TOML does.
+            let numbers: Vec<String> = level.numbers_cm().map(|cm| format!("{cm:?}")).collect();
+            text.push_str(&format!("    [{}],\n", numbers.join(", ")));
         }
         text.push_str("]\n");
         text
     }
 }
 
+/// A bound or an extent, cm. JSON has no infinity, so it is written as the string `inf`, TOML's word.
+struct Cm(f64);
+
+impl Serialize for Cm {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        if self.0.is_infinite() { out.serialize_str("inf") } else { out.serialize_f64(self.0) }
+    }
+}
+
+impl<'de> Deserialize<'de> for Cm {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged, expecting = "expected centimetres or \"inf\"")]
+        enum Either {
+            Number(f64),
+            Word(String),
+        }
+        match Either::deserialize(from)? {
+            Either::Number(cm) => Ok(Self(cm)),
+            Either::Word(word) if word == "inf" => Ok(Self(f64::INFINITY)),
+            Either::Word(word) => Err(D::Error::custom(format!("found \"{word}\", expected centimetres or \"inf\""))),
+        }
+    }
+}
+
+/// A table as jobs and recordings serialise it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Plain {
+    name: String,
+    #[serde(default)]
+    source: String,
+    #[serde(default)]
+    gap: GapRule,
+    levels: Vec<Vec<Cm>>,
+}
+
+impl Serialize for RangeTable {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        let levels = self.levels.iter().map(|level| level.numbers_cm().map(Cm).collect()).collect();
+        Plain { name: self.name.clone(), source: self.source.clone(), gap: self.gap, levels }.serialize(out)
+    }
+}
+
+impl<'de> Deserialize<'de> for RangeTable {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let plain = Plain::deserialize(from)?;
+        let place = || format!("table \"{}\"", plain.name);
+        let rows = plain.levels.iter().enumerate().map(|(i, row)| {
+            let cm: Vec<f64> = row.iter().map(|cm| cm.0).collect();
+            Level::from_numbers(&cm).map_err(|problem| TableError::Row { place: place(), row: i + 1, problem })
+        });
+        let levels = rows.collect::<Result<Vec<_>, _>>().map_err(D::Error::custom)?;
+        if levels.is_empty() {
+            return Err(D::Error::custom(TableError::value(place(), "no levels", EXPECTED_ROWS)));
+        }
+        let table = Self::new(plain.name, plain.gap, levels).map_err(D::Error::custom)?;
+        Ok(table.with_source(plain.source))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parts::range_table::BoundProblem;
+    use crate::parts::range_table::{BoundProblem, Extent, TableRule};
 
     fn file(levels: &str) -> String {
         format!("name = \"t\"\nunit = \"cm\"\nlevels = [\n{levels}\n]\n")
@@ -134,9 +195,9 @@ mod tests {
             ("[0, 1, 5],\n[1, inf, 4, nan],", 5, 2, "the extent [4.0, NaN]"),
         ] {
             let text = file(rows);
-            let said = message(&text);
-            assert!(said.starts_with(&format!("t.toml:{line}: row {row} ")), "{said}");
-            assert!(said.contains(word), "{said}");
+            let found = message(&text);
+            assert!(found.starts_with(&format!("t.toml:{line}: row {row} ")), "{found}");
+            assert!(found.contains(word), "{found}");
         }
         assert!(message(&file("[0, 1],\n[2],")).starts_with("t.toml:5: row 2 has 1 numbers"));
         assert!(message(&file("[0, 1, 2, 3, 4],")).contains("or [lower, upper, width, height]"));
@@ -159,5 +220,21 @@ mod tests {
         let error = RangeTable::parse(&text, "t.toml").unwrap_err();
         let problem = BoundProblem::Hole { lower: 3.5, before: 3.0 };
         assert_eq!(error, TableError::Row { place: "t.toml:6".into(), row: 2, problem });
+    }
+
+    #[test]
+    fn a_table_survives_json_with_its_open_end_and_bad_rows_are_refused() {
+        let table = RangeTable::table_3().with_extents(&[Some(Extent { width_cm: 6.0, height_cm: f64::INFINITY })]);
+        let rule = TableRule::from(table.unwrap());
+        let text = serde_json::to_string(&rule).unwrap();
+        assert!(text.contains("\"inf\""), "{text}");
+        assert_eq!(serde_json::from_str::<TableRule>(&text).unwrap(), rule);
+        for (levels, word) in
+            [("[]", "no levels"), ("[[1]]", "row 1"), ("[[0, 2], [1, 3]]", "row 2"), ("[[0, \"far\"]]", "far")]
+        {
+            let text = format!("{{\"rows\": {{\"name\": \"t\", \"levels\": {levels}}}}}");
+            let message = serde_json::from_str::<TableRule>(&text).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
     }
 }

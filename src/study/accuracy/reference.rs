@@ -13,14 +13,14 @@ use std::path::PathBuf;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::base::checksum::{self, Kind};
+use crate::base::checksum::{self, Tag};
 use crate::base::files::{read_own, user_cache};
 use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, TriMesh};
 
 /// First bytes of a file, and part of every key. Increment the digit with each change of the format or of the mechanics, so
 /// that a drape of an older solver does not serve as reference of a newer one.
-const KIND: &Kind = b"PWREF\x004\n";
+const KIND: &Tag = b"PWREF\x004\n";
 
 /// All inputs of a reference.
 #[derive(Debug, Clone, Copy)]
@@ -127,7 +127,7 @@ impl ReferenceCache {
         let path = self.directory.join(key.file_name());
         let mut warnings = Vec::new();
         match read_own(&path) {
-            Ok(bytes) => match checksum::open::<([u8; blake3::OUT_LEN], Reference)>(KIND, &bytes) {
+            Ok(bytes) => match checksum::decode::<([u8; blake3::OUT_LEN], Reference)>(KIND, &bytes) {
                 Some((of, reference)) if of == *key.0.as_bytes() && reference.positions.len() == vertices => {
                     return Ok(Found { reference, cached: true, warnings });
                 }

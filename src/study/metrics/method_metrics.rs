@@ -6,7 +6,7 @@ use super::drape_metrics::Metrics;
 use super::faults::{SlidPart, sinking};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
-use crate::methods::{Dressing, Ended, MethodDrape};
+use crate::methods::{MethodInput, Ended, MethodDrape};
 use crate::study::accuracy::{State, rms_mm};
 
 /// Metrics of one drape by a reference method. Names shared with [`Metrics`] have the same meaning; energy and pressure are those of
@@ -41,8 +41,8 @@ pub(crate) struct MethodMetrics {
 
 impl MethodMetrics {
     /// Metrics of a drape, and strain and pressure at its vertices.
-    pub(crate) fn of(dressing: &Dressing<'_>, drape: &MethodDrape) -> (Self, Fit) {
-        let Dressing { scene, cloth, .. } = dressing;
+    pub(crate) fn of(dressing: &MethodInput<'_>, drape: &MethodDrape) -> (Self, Fit) {
+        let MethodInput { scene, cloth, .. } = dressing;
         let x = &drape.positions;
         let garment = scene.garment.with_positions(x.clone());
         let state = State::of(cloth, &scene.body, x);
@@ -89,7 +89,7 @@ impl MethodMetrics {
     }
 
     /// Warnings for the user.
-    pub(crate) fn warnings(&self, dressing: &Dressing<'_>) -> Vec<String> {
+    pub(crate) fn warnings(&self, dressing: &MethodInput<'_>) -> Vec<String> {
         let mut found = self.shared().warnings(dressing.scene);
         if self.ended == Ended::TimeOver {
             found.push(format!(

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 
 use super::{Point, Row, Timing};
-use crate::base::error_text::said;
+use crate::base::error_text::with_causes;
 use crate::drape::{Drape, StageTimes};
 use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
@@ -36,7 +36,7 @@ pub enum PointError {
 impl PointError {
     /// A failure in the words of an error and of all that caused it.
     pub(crate) fn failed(error: &(dyn Error + 'static)) -> Self {
-        Self::Failed(said(error, ": "))
+        Self::Failed(with_causes(error, ": "))
     }
 
     /// A garment of which nothing keeps some or all on the body.

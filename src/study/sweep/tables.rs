@@ -21,7 +21,7 @@ use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
 use crate::base::files::names_a_file;
-use crate::parts::range_table::{MOST_LEVELS, RangeTable, TABLE_3, TableError, TableRule};
+use crate::parts::range_table::{MAX_LEVELS, RangeTable, TABLE_3, TableError, TableRule};
 
 /// Default ends of a geometric table, cm: the smallest bounds of Table 3 are about 0.1, its largest is 11.
 const GEOMETRIC_CM: (f64, f64) = (0.1, 11.0);
@@ -146,7 +146,7 @@ fn list(value: &Value) -> &[Value] {
 
 fn counts(source: Source<'_>, entry: &At, value: &Value) -> Result<Vec<usize>, PlanError> {
     let count =
-        |v: &Value| v.as_integer().and_then(|n| usize::try_from(n).ok()).filter(|n| (1..=MOST_LEVELS).contains(n));
+        |v: &Value| v.as_integer().and_then(|n| usize::try_from(n).ok()).filter(|n| (1..=MAX_LEVELS).contains(n));
     let counts: Option<Vec<usize>> = list(value).iter().map(count).collect();
     counts
         .filter(|c| !c.is_empty())

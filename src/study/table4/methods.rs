@@ -10,7 +10,7 @@ use crate::garment::builtin::{BUILT_IN, TABLE_4_SIZES};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::Stop;
-use crate::methods::{self, Dressing, Ended, RestRule, gross2003, thomaszewski2006, zhu2016};
+use crate::methods::{self, MethodInput, Ended, RestRule, gross2003, thomaszewski2006, zhu2016};
 use crate::scene::Scene;
 
 /// A compared method.
@@ -84,7 +84,7 @@ impl ComparedMethod {
     ) -> Result<Outcome, String> {
         let (model, refine) = match self {
             Self::Reference(name) => {
-                return run_reference(name, &Dressing { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
+                return run_reference(name, &MethodInput { scene, fabric: &cloth.fabrics[0], cloth }, rule, go_on);
             }
             Self::Paper => ("paper", Refine::Steps(0)),
             Self::Preview => ("coupled", Refine::Steps(0)),
@@ -114,7 +114,7 @@ impl ComparedMethod {
 
 fn run_reference(
     name: &str,
-    dressing: &Dressing<'_>,
+    dressing: &MethodInput<'_>,
     rule: &RestRule,
     go_on: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<Outcome, String> {
