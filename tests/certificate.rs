@@ -9,11 +9,10 @@ use std::ops::ControlFlow;
 use fixtures::{Diagonals, cuboid, grid, scene};
 use glam::{DMat3, DVec3};
 use partwise::Scene;
-use partwise::body::distance::Body;
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::{Cloth, Contacts};
 use partwise::mechanics::refine::{RefineOptions, Refined, Stop, refine_with};
-use partwise::mesh::{RestShape, TriMesh};
+use partwise::mesh::TriMesh;
 use partwise::study::certificate::{Certificate, CertifyError, Forces, certify};
 
 /// Squares along each side of the cloth, and the length of one, m.

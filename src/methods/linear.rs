@@ -4,19 +4,19 @@
 //! Iterates until ‖b − A d‖ ≤ τ ‖b‖ in the norm of the preconditioner. Source: Hestenes, Stiefel 1952; for cloth
 //! Baraff, Witkin: "Large steps in cloth simulation", SIGGRAPH 1998.
 //!
-//! Blocks and vectors are single precision in SIMD registers, sums are double: a step of a simulation in time wants
-//! three or four digits of its solution, and the matrix is what memory waits for. Rows are shared among the threads,
-//! and sums are taken in the order of the rows, so the bits do not depend on how many there are.
+//! Blocks and vectors are single precision in SIMD registers, sums are double: a step of a simulation in time needs
+//! three or four digits of its solution, and reading the matrix from memory takes most of the time. Rows are shared among the
+//! threads, and sums are taken in the order of the rows, so the bits do not depend on the number of threads.
 
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::mesh::Lists;
 
-/// Rows of one task.
+/// Rows of one parallel task. A heuristic.
 const CHUNK: usize = 512;
 
-/// A symmetric matrix of 3×3 blocks, all of them, by rows with columns ascending.
+/// A symmetric matrix of 3×3 blocks, both triangles stored, by rows with ascending columns.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BlockRows {
     /// Columns of the blocks of each row.
@@ -28,7 +28,7 @@ pub(crate) struct BlockRows {
 }
 
 impl BlockRows {
-    /// All zero, with blocks at `pairs` (each once or oftener, in any order), their transposes and the diagonal.
+    /// A zero matrix with blocks at `pairs` (in any order, repetitions allowed), their transposes and the diagonal.
     #[must_use]
     pub(crate) fn new(rows: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let mut all: Vec<u64> = (0..rows as u64).map(|i| i << 32 | i).collect();
@@ -39,12 +39,6 @@ impl BlockRows {
         let mut matrix = Self { columns, diagonal: Vec::new(), blocks: vec![Mat3A::ZERO; all.len()] };
         matrix.diagonal = (0..rows as u32).filter_map(|i| matrix.at(i, i)).collect();
         matrix
-    }
-
-    /// Number of rows.
-    #[must_use]
-    pub(crate) fn rows(&self) -> usize {
-        self.columns.len()
     }
 
     /// Index of the block in row `i`, column `j`.
@@ -65,9 +59,9 @@ impl BlockRows {
     }
 }
 
-/// A symmetric positive matrix that can be multiplied with; its own blocks are kept apart.
+/// A symmetric positive definite matrix as a product with a vector.
 pub trait Operator: Sync {
-    /// out = A d without what is added to A in the right side's own blocks.
+    /// out = A d.
     fn times(&mut self, d: &[Vec3A], out: &mut [Vec3A]);
 }
 
@@ -88,10 +82,10 @@ pub(crate) struct System<'a> {
     /// B.
     pub added: &'a [Mat3A],
     /// The diagonal blocks of A + B.
-    pub own: &'a [Mat3A],
+    pub diagonal: &'a [Mat3A],
     /// b.
-    pub side: &'a [Vec3A],
-    /// Rows that keep their d.
+    pub right_side: &'a [Vec3A],
+    /// Rows whose d is fixed.
     pub fixed: &'a [bool],
 }
 
@@ -107,39 +101,45 @@ impl System<'_> {
     }
 }
 
-/// Conjugate gradients with their memory, which is made once.
+/// Conjugate gradients with their buffers, which are allocated once.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ConjugateGradients {
     inverse: Vec<Mat3A>,
-    rest: Vec<Vec3A>,
+    residual: Vec<Vec3A>,
     direction: Vec<Vec3A>,
     image: Vec<Vec3A>,
 }
 
 impl ConjugateGradients {
-    /// Improves `d` until the residual is under `tolerance` of the right side's, both in the preconditioner's norm, or for
-    /// `most` iterations. Returns the number of iterations.
-    pub(crate) fn solve(&mut self, mut system: System<'_>, (tolerance, most): (f64, usize), d: &mut [Vec3A]) -> usize {
+    /// Improves `d` until the residual is below `tolerance` times the right side, both in the preconditioner's norm, or for
+    /// `max_iterations`. Returns the number of iterations.
+    pub(crate) fn solve(
+        &mut self,
+        mut system: System<'_>,
+        tolerance: f64,
+        max_iterations: usize,
+        d: &mut [Vec3A],
+    ) -> usize {
         let n = d.len();
-        let Self { inverse, rest, direction, image } = self;
-        for list in [&mut *rest, &mut *direction, &mut *image] {
+        let Self { inverse, residual, direction, image } = self;
+        for list in [&mut *residual, &mut *direction, &mut *image] {
             list.resize(n, Vec3A::ZERO);
         }
-        // A fixed row has no inverse: its residual is never seen and its direction stays zero.
+        // The inverse of a fixed row is zero: its residual is ignored and its direction stays zero.
         inverse.clear();
-        let inverse_of = |(own, fixed): (&Mat3A, &bool)| if *fixed { Mat3A::ZERO } else { own.inverse() };
-        inverse.extend(system.own.iter().zip(system.fixed).map(inverse_of));
+        let inverse_of = |(block, fixed): (&Mat3A, &bool)| if *fixed { Mat3A::ZERO } else { block.inverse() };
+        inverse.extend(system.diagonal.iter().zip(system.fixed).map(inverse_of));
         system.times(d, image);
-        let (mut gamma, mut whole) = (0.0, 0.0);
+        let (mut gamma, mut norm_of_right_side) = (0.0, 0.0);
         for i in 0..n {
-            rest[i] = system.side[i] - image[i];
-            direction[i] = inverse[i] * rest[i];
-            gamma += f64::from(rest[i].dot(direction[i]));
-            whole += f64::from(system.side[i].dot(inverse[i] * system.side[i]));
+            residual[i] = system.right_side[i] - image[i];
+            direction[i] = inverse[i] * residual[i];
+            gamma += f64::from(residual[i].dot(direction[i]));
+            norm_of_right_side += f64::from(system.right_side[i].dot(inverse[i] * system.right_side[i]));
         }
-        let goal = tolerance * tolerance * whole;
+        let target = tolerance * tolerance * norm_of_right_side;
         let mut iterations = 0;
-        while iterations < most && gamma > goal {
+        while iterations < max_iterations && gamma > target {
             let curvature = system.times(direction, image);
             if curvature.is_nan() || curvature <= 0.0 {
                 break;
@@ -148,13 +148,13 @@ impl ConjugateGradients {
             let mut next = 0.0;
             for i in 0..n {
                 d[i] += step * direction[i];
-                rest[i] -= step * image[i];
-                image[i] = inverse[i] * rest[i];
-                next += f64::from(rest[i].dot(image[i]));
+                residual[i] -= step * image[i];
+                image[i] = inverse[i] * residual[i];
+                next += f64::from(residual[i].dot(image[i]));
             }
-            let turn = (next / gamma) as f32;
+            let beta = (next / gamma) as f32;
             for i in 0..n {
-                direction[i] = image[i] + turn * direction[i];
+                direction[i] = image[i] + beta * direction[i];
             }
             gamma = next;
             iterations += 1;
@@ -192,11 +192,11 @@ mod tests {
         let mut d = vec![Vec3A::ZERO; n as usize];
         let own: Vec<Mat3A> = a.diagonal.iter().map(|&k| a.blocks[k as usize]).collect();
         let added = vec![Mat3A::ZERO; n as usize];
-        let system = System { matrix: &mut a, added: &added, own: &own, side: &side, fixed: &fixed };
-        let iterations = ConjugateGradients::default().solve(system, (1e-6, 200), &mut d);
+        let system = System { matrix: &mut a, added: &added, diagonal: &own, right_side: &side, fixed: &fixed };
+        let iterations = ConjugateGradients::default().solve(system, 1e-6, 200, &mut d);
         assert!(iterations < 60, "{iterations}");
         for i in 0..n {
-            // Each spring bears the weight of what hangs below it: d_i = Σ_{k ≤ i} (n − k).
+            // Each spring carries the weight below it: d_i = Σ_{k ≤ i} (n − k).
             let exact: u32 = (1..=i).map(|k| n - k).sum();
             let off = (d[i as usize] - Vec3A::new(0.0, 1.0, -1.0) * exact as f32).length();
             assert!(off <= 2e-4 * 800.0, "{i}: {} expected {exact}", d[i as usize]);
@@ -204,9 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn blocks_are_found_where_they_are() {
+    fn blocks_are_found_at_their_row_and_column() {
         let a = chain(5);
-        assert_eq!(a.rows(), 5);
+        assert_eq!(a.columns.len(), 5);
         assert_eq!(a.blocks.len(), 5 + 2 * 4);
         assert!(a.at(2, 3).is_some() && a.at(0, 2).is_none());
         assert_eq!(a.columns.entries()[a.diagonal[3] as usize], 3);

@@ -1,10 +1,10 @@
-//! The body cut into its units: trunk, limbs, head, wherever they branch.
+//! Segmentation of the body into trunk, hip, head and limbs.
 //!
 //! The geodesic distance from the body's highest vertex is cut into bands; the connected pieces of a band are its
-//! rings, and rings of neighbouring bands that touch make a graph (a Reeb graph; Reeb 1946, for bodies Hilaga and
-//! others: "Topology matching", SIGGRAPH 2001). Where it branches, at armpits and crotch, a unit ends. What is too
-//! short to be a limb goes to its parent. A unit between two branchings, the torso, is cut once more at its narrowest
-//! ring between its ends, the waist: trunk and hip.
+//! rings, and rings of neighbouring bands that touch form a graph (a Reeb graph; Reeb 1946, for bodies Hilaga and
+//! others: "Topology matching", SIGGRAPH 2001). A unit ends where the graph branches, at armpits and crotch. A unit too
+//! short to be a limb joins its parent. A unit between two branchings, the torso, is cut once more at the waist, its narrowest
+//! ring: trunk and hip.
 //!
 //! Our reading: the source says that arms, legs, trunk and hip are segmented, not how.
 
@@ -16,19 +16,19 @@ use ordered_float::OrderedFloat;
 
 use crate::mesh::{Flow, Lists, NONE, Topology, TriMesh, outer, pieces};
 
-/// Bands from the highest vertex to the farthest.
+/// Bands from the highest vertex to the farthest. More bands resolve shorter limbs, and leave fewer triangles a ring. A heuristic.
 const BANDS: f64 = 56.0;
-/// A unit has at least this many bands.
-const LEAST_BANDS: usize = 5;
-/// A ring of less than this share of its band's area is noise.
-const LEAST_SHARE: f64 = 0.02;
+/// Fewest bands of a unit; shorter ones join a neighbour. A heuristic.
+const MIN_BANDS: usize = 5;
+/// Smallest share of its band's area that a ring has; smaller ones are noise. A heuristic.
+const MIN_SHARE: f64 = 0.02;
 
-/// Which unit each triangle is in, and whether each unit is a limb: one that ends.
+/// The units of a body.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     /// Unit of each triangle.
     pub of_triangle: Vec<u32>,
-    /// Whether each unit ends.
+    /// Whether each unit is a limb or the head: one with a free end.
     pub is_limb: Vec<bool>,
 }
 
@@ -42,16 +42,16 @@ struct Ring {
 }
 
 impl Segments {
-    /// Those of a body that must be closed; else why not, `what` of it having no inside.
-    pub(super) fn of_closed(mesh: &TriMesh, what: &str) -> Result<Self, String> {
+    /// The units of a closed body. For an open one the error says that no `part` of it has an inside.
+    pub(super) fn of_closed(mesh: &TriMesh, part: &str) -> Result<Self, String> {
         let topology = Topology::new(mesh);
         match topology.boundary_edges().count() {
             0 => Ok(Self::new(mesh, &topology)),
-            open => Err(format!("the body is not closed ({open} boundary edges), so no {what} of it has an inside")),
+            open => Err(format!("the body is not closed ({open} boundary edges), so no {part} of it has an inside")),
         }
     }
 
-    /// Cuts a connected body; further components are units of their own.
+    /// The units of any body; each component has its own.
     #[must_use]
     pub(crate) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let distance = geodesics(mesh, topology);
@@ -67,13 +67,13 @@ impl Segments {
         let (ring_of, rings) = rings(mesh, topology, &band);
         let unit_of_ring = units(&rings);
         let count = unit_of_ring.iter().max().map_or(0, |m| m + 1);
-        // What has other units before it and after it lies between two branchings.
-        let (mut goes_on, mut came_from) = (vec![false; count], vec![false; count]);
+        // A unit with other units before and after it lies between two branchings.
+        let (mut has_children, mut has_parents) = (vec![false; count], vec![false; count]);
         for (ring, &unit) in rings.iter().zip(&unit_of_ring) {
-            goes_on[unit] |= ring.children.iter().any(|&c| unit_of_ring[c] != unit);
-            came_from[unit] |= ring.parents.iter().any(|&p| unit_of_ring[p] != unit);
+            has_children[unit] |= ring.children.iter().any(|&c| unit_of_ring[c] != unit);
+            has_parents[unit] |= ring.parents.iter().any(|&p| unit_of_ring[p] != unit);
         }
-        let is_limb = goes_on.iter().zip(came_from).map(|(on, from)| !(*on && from)).collect();
+        let is_limb = has_children.iter().zip(has_parents).map(|(on, from)| !(*on && from)).collect();
         let of_triangle = ring_of.iter().map(|&r| unit_of_ring[r] as u32).collect();
         Self { of_triangle, is_limb }
     }
@@ -99,7 +99,7 @@ fn geodesics(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     distance
 }
 
-/// The ring of each triangle, and the rings with their neighbours; noise is joined to the ring it borders on most.
+/// The ring of each triangle, and the rings with their neighbours; noise joins the ring with the longest common border.
 fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Vec<Ring>) {
     let n = mesh.triangles.len();
     let joined = || {
@@ -109,7 +109,7 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
     let beside = Lists::gathered(n, || joined().flat_map(|[s, t]| [(s, t), (t, s)]));
     let areas = mesh.triangle_areas();
     let mut band = band.to_vec();
-    // Two rounds: what is joined to its neighbour's band in the first is a ring with it in the second.
+    // Noise takes the band of its neighbour; the next round makes it part of that ring.
     for round in 0.. {
         let (ring_of, mut rings) = flood(&beside, &band, &areas);
         let mut of_band = std::collections::BTreeMap::<usize, f64>::new();
@@ -120,12 +120,12 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
                 *border[ring_of[t]].entry(band[s]).or_default() += 1;
             }
         }
-        let noise = |r: usize| rings[r].area < LEAST_SHARE * of_band[&rings[r].band] && !border[r].is_empty();
+        let noise = |r: usize| rings[r].area < MIN_SHARE * of_band[&rings[r].band] && !border[r].is_empty();
         if round < 3 && (0..rings.len()).any(noise) {
             for t in 0..n {
                 if noise(ring_of[t]) {
-                    let most = border[ring_of[t]].iter().max_by_key(|(band, count)| (**count, Reverse(**band)));
-                    band[t] = most.map_or(band[t], |(band, _)| *band);
+                    let longest = border[ring_of[t]].iter().max_by_key(|(band, count)| (**count, Reverse(**band)));
+                    band[t] = longest.map_or(band[t], |(band, _)| *band);
                 }
             }
             continue;
@@ -181,7 +181,7 @@ fn units(rings: &[Ring]) -> Vec<usize> {
     }
     join_short(rings, &mut chain, &mut chains);
     cut_waists(rings, &mut chain, &mut chains);
-    // Numbered anew, without the empty ones.
+    // Renumbered without the empty ones.
     let mut number = vec![usize::MAX; chains.len()];
     let mut next = 0;
     order.iter().for_each(|&r| {
@@ -193,8 +193,8 @@ fn units(rings: &[Ring]) -> Vec<usize> {
     chain.iter().map(|&c| number[c]).collect()
 }
 
-/// The direction in which weighted points about the origin spread most, by power iteration on their covariance.
-pub(crate) fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
+/// The principal axis of weighted points about the origin, by power iteration on their covariance.
+pub(super) fn principal_axis(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
     let mut covariance = DMat3::ZERO;
     for (p, w) in points {
         covariance += outer(p, p) * w;
@@ -206,10 +206,10 @@ pub(crate) fn longest(points: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
     axis
 }
 
-/// Chains of few bands go to a neighbour: the one before them, else one after.
+/// Joins short chains to a neighbour: the one before them, else one after.
 fn join_short(rings: &[Ring], chain: &mut [usize], chains: &mut [Vec<usize>]) {
     for c in 0..chains.len() {
-        if chains[c].is_empty() || chains[c].len() >= LEAST_BANDS {
+        if chains[c].is_empty() || chains[c].len() >= MIN_BANDS {
             continue;
         }
         let neighbours = |pick: fn(&Ring) -> &BTreeSet<usize>| {
@@ -226,13 +226,13 @@ fn join_short(rings: &[Ring], chain: &mut [usize], chains: &mut [Vec<usize>]) {
     }
 }
 
-/// Cuts what lies between two branchings where it is narrowest, in its middle half.
+/// Cuts chains between two branchings at the narrowest band of their middle half.
 fn cut_waists(rings: &[Ring], chain: &mut [usize], chains: &mut Vec<Vec<usize>>) {
     for c in 0..chains.len() {
-        let goes_on = |r: &usize| rings[*r].children.iter().any(|&k| chain[k] != c);
-        let came_from = |r: &usize| rings[*r].parents.iter().any(|&k| chain[k] != c);
-        let (true, true) = (chains[c].iter().any(goes_on), chains[c].iter().any(came_from)) else { continue };
-        if chains[c].len() < 2 * LEAST_BANDS {
+        let has_children = |r: &usize| rings[*r].children.iter().any(|&k| chain[k] != c);
+        let has_parents = |r: &usize| rings[*r].parents.iter().any(|&k| chain[k] != c);
+        let (true, true) = (chains[c].iter().any(has_children), chains[c].iter().any(has_parents)) else { continue };
+        if chains[c].len() < 2 * MIN_BANDS {
             continue;
         }
         let bands: BTreeSet<usize> = chains[c].iter().map(|&r| rings[r].band).collect();

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
+use partwise::methods::gross2003::Gross2003;
 use partwise::methods::gross2003::cut::cut;
 use partwise::methods::gross2003::developable::Developable;
-use partwise::methods::gross2003::pieces::{BodyPart, Piece, distortion, of_pattern, parts};
-use partwise::methods::gross2003::{Gross2003, lay};
-use partwise::methods::{MethodInput, Ended, Exhibit, MethodError, RestRule};
+use partwise::methods::gross2003::pieces::{BodyPart, Piece, distortion, lay_all, of_pattern, parts};
+use partwise::methods::{Ended, Exhibit, MethodError, MethodInput, RestRule};
 use partwise::{DVec3, Scene, SceneSpec};
 
 use super::scenes::{drape, hanging, rectangle};
@@ -69,7 +69,7 @@ fn bounding_surfaces_bound_the_body_and_pieces_lie_on_them_at_their_own_lengths(
             let nearest = part.points.iter().map(|p| surface.outside(*p)).fold(f64::NEG_INFINITY, f64::max);
             assert!(nearest <= -CLEARANCE * 0.999, "{garment}: {nearest}");
         }
-        let laid = lay::all_laid(&pieces, &parts, &surfaces, &scene.garment.positions);
+        let laid = lay_all(&pieces, &parts, &surfaces, &scene.garment.positions);
         for (number, (piece, x)) in pieces.iter().zip(&laid).enumerate() {
             let of = parts.iter().position(|p| p.pieces.contains(&number)).unwrap();
             assert!(x.iter().all(|x| surfaces[of].outside(*x).abs() < 1e-9));

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
 use partwise::mesh::{RestShape, TriMesh};
-use partwise::methods::{MethodInput, MethodDrape, MethodError, ReferenceMethod, RestRule};
+use partwise::methods::{MethodDrape, MethodError, MethodInput, ReferenceMethod, RestRule};
 use partwise::{DVec3, Scene};
 
 use crate::fixtures::{far_away, flipped};

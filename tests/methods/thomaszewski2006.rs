@@ -6,7 +6,7 @@ use partwise::mesh::TriMesh;
 use partwise::methods::implicit_euler::Elastic;
 use partwise::methods::linear::Operator;
 use partwise::methods::thomaszewski2006::{Thomaszewski2006, elements_of_garment};
-use partwise::methods::{MethodInput, Ended, MethodError};
+use partwise::methods::{Ended, MethodError, MethodInput};
 use partwise::{DVec3, GRAVITY};
 
 use crate::fixtures::{Diagonals, grid, isotropic};
@@ -100,7 +100,7 @@ fn stiffness_is_the_derivative_of_the_force_in_the_plane() {
     }
     // Each vertex's own block is what the operator does to it alone.
     let mut own = vec![glam::Mat3A::ZERO; d.len()];
-    elements.add_own(&mut own);
+    elements.add_diagonal(&mut own);
     for v in [0, 13, 40, 77] {
         let mut one = vec![Vec3A::ZERO; d.len()];
         one[v] = Vec3A::new(0.3, -0.5, 0.8);

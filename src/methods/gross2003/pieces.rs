@@ -1,47 +1,56 @@
-//! The pieces a garment is sewn of, flat, and which part of the body each is for.
+//! The flat pieces of a garment, the part of the body that each covers, and their place on its bounding surface.
 //!
-//! A sewing pattern brings its panels; a garment without seams is [`cut`](super::cut).
+//! A sewing pattern has its panels; a garment without seams is [`cut`](super::cut). A piece belongs to the limb that most of its
+//! vertices are nearest to, else to the trunk together with the parts of limbs below it.
 //!
-//! A piece belongs to the limb of the body that most of its vertices are nearest to, or else to the trunk with what of the limbs lies
-//! under it. Source: Groß, Fuhrmann, Luckas 2003 are told the part of the body; the rule is ours.
+//! All pieces are laid at once and without stretch. In the plane of the unrolled surface a piece is moved rigidly to the least squares
+//! fit to the placed garment: min Σ |R p + t − q|² over its vertices, p flat, q the unrolled projection of the placed vertex
+//! (Procrustes in the plane, in closed form). Then it is rolled back, and no length on the cloth changes.
+//!
+//! Source: Groß, Fuhrmann, Luckas 2003, as far as described: pieces are laid isometrically and simultaneously, on a part of the body
+//! and by feature points of body and piece that the user gives. Both rules here are ours.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
-use super::NAME;
+use super::developable::Developable;
 use crate::base::quantiles::{extremes, nearest_rank};
 use crate::garment::pattern::SewnGarment;
 use crate::mesh::{RestShape, TriMesh};
-use crate::methods::segment::{Segments, longest};
-use crate::methods::{MethodInput, MethodError};
+use crate::methods::method::{MethodError, MethodInput};
+use crate::methods::segment::{Segments, principal_axis};
 
-/// A piece is a limb's if that is nearest to so many of its vertices.
-const OF_LIMB: f64 = 0.5;
-/// A part is bounded with the units that are nearest to at least so many of its vertices.
-const UNDER: f64 = 0.1;
+/// The method's name.
+pub(crate) const NAME: &str = "gross2003";
+
+/// Share of a piece's vertices nearest to a limb above which it belongs to the limb. A heuristic.
+const LIMB_SHARE: f64 = 0.5;
+/// Share of a part's vertices nearest to a unit above which the part's surface bounds the unit. A heuristic.
+const BOUNDED_SHARE: f64 = 0.1;
 
 /// One piece of cloth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
     /// Its name.
     pub name: String,
-    /// The garment's vertex that each of its own is.
+    /// The garment's vertex of each of its own vertices.
     pub vertices: Vec<u32>,
-    /// Where they lie flat, m.
+    /// Their flat positions, m.
     pub flat: Vec<DVec2>,
-    /// Its triangles by its own vertices, and which of the garment's each is.
+    /// Its triangles, by its own vertices.
     pub triangles: Vec<[u32; 3]>,
-    /// The same triangles as the garment numbers them.
+    /// The garment's number of each triangle.
     pub of_garment: Vec<u32>,
 }
 
-/// A part of the body, what is worn on it, and the body's vertices to be bounded.
+/// A part of the body with the pieces that cover it.
 #[derive(Debug, Clone)]
 pub struct BodyPart {
-    /// Its pieces.
+    /// The pieces, by number.
     pub pieces: Vec<usize>,
-    /// Direction of its axis, upwards.
+    /// Direction of the part's axis, upwards.
     pub axis: DVec3,
-    /// What is to be bounded, m.
+    /// The vertices of the body that its surface must bound, m.
     pub points: Vec<DVec3>,
 }
 
@@ -52,10 +61,10 @@ pub(super) fn unfit(reason: impl Into<String>) -> MethodError {
 /// The panels of a pattern.
 ///
 /// # Errors
-/// [`MethodError::Unfit`] where the garment is not the one sewn of them.
+/// [`MethodError::Unfit`] for a garment made from another pattern.
 pub fn of_pattern(sewn: &SewnGarment, garment: &TriMesh) -> Result<Vec<Piece>, MethodError> {
     if sewn.mesh.triangles.len() != garment.triangles.len() {
-        return Err(unfit("the garment is not the one that its pattern is sewn to"));
+        return Err(unfit("the garment was not made from this pattern"));
     }
     let mut pieces = Vec::new();
     for (number, panel) in sewn.panels.iter().enumerate() {
@@ -64,7 +73,7 @@ pub fn of_pattern(sewn: &SewnGarment, garment: &TriMesh) -> Result<Vec<Piece>, M
         (0u32..).zip(&panel.vertices).for_each(|(i, &v)| local[v as usize] = i);
         let own = (0u32..).zip(&sewn.mesh.triangle_group).filter(|(_, group)| **group as usize == number);
         let of_garment: Vec<u32> = own.map(|(t, _)| t).collect();
-        // A dart sews a panel to itself: its corners are found by where they lie flat.
+        // A dart sews a panel to itself, so a vertex may occur twice; the flat position selects the corner.
         let corner = |v: u32, at: DVec2| {
             let same = |i: &usize| panel.vertices[*i] == v && panel.flat[*i].distance_squared(at) < 1e-18;
             if panel.flat[local[v as usize] as usize] == at {
@@ -84,7 +93,7 @@ pub fn of_pattern(sewn: &SewnGarment, garment: &TriMesh) -> Result<Vec<Piece>, M
     Ok(pieces)
 }
 
-/// How far the flat pieces are off the rest shape: 95th percentile and largest relative difference of an edge's length.
+/// 95th percentile and maximum of the relative difference between the edge lengths of flat pieces and rest shape.
 #[must_use]
 pub fn distortion(pieces: &[Piece], rest: &RestShape) -> [f64; 2] {
     let mut off: Vec<f64> = Vec::new();
@@ -100,12 +109,12 @@ pub fn distortion(pieces: &[Piece], rest: &RestShape) -> [f64; 2] {
     [nearest_rank(&off, 0.95), off.iter().copied().fold(0.0, f64::max)]
 }
 
-/// The direction in which the points of a limb spread most about their mean, upwards; without the upper third, where it joins the
-/// trunk, and what counts as its own differs from left to right.
-fn spread(points: &[DVec3]) -> DVec3 {
+/// The principal axis of a limb, upwards. The upper third is left out: it joins the trunk, and its segmentation differs between left
+/// and right.
+fn limb_axis(points: &[DVec3]) -> DVec3 {
     let along = |points: &[DVec3]| {
         let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-        let axis = longest(points.iter().map(|p| (*p - mean, 1.0)));
+        let axis = principal_axis(points.iter().map(|p| (*p - mean, 1.0)));
         if axis.z < 0.0 { -axis } else { axis }
     };
     let first = along(points);
@@ -119,12 +128,12 @@ fn spread(points: &[DVec3]) -> DVec3 {
     along(&sorted)
 }
 
-/// The parts of the body that the pieces are for.
+/// The parts of the body that the pieces cover.
 ///
 /// # Errors
 /// [`MethodError::Unfit`] for a body that is not closed.
-pub fn parts(dressing: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>, MethodError> {
-    let (scene, body) = (dressing.scene, dressing.scene.body.mesh());
+pub fn parts(input: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>, MethodError> {
+    let (scene, body) = (input.scene, input.scene.body.mesh());
     let segments = Segments::of_closed(body, "part").map_err(unfit)?;
     let count = segments.is_limb.len();
     let unit = |t: u32| segments.of_triangle[t as usize] as usize;
@@ -136,19 +145,19 @@ pub fn parts(dressing: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPar
         let all = found.iter().sum::<usize>().max(1) as f64;
         found.into_iter().map(|n| n as f64 / all).collect::<Vec<f64>>()
     };
-    // By limb, and the trunk after them.
+    // Indexed by limb; the trunk comes last.
     let mut of_part = vec![Vec::new(); count + 1];
     for (number, piece) in pieces.iter().enumerate() {
         let own = shares(&mut piece.vertices.iter().copied());
-        let limb = (0..count).find(|&u| segments.is_limb[u] && own[u] > OF_LIMB);
+        let limb = (0..count).find(|&u| segments.is_limb[u] && own[u] > LIMB_SHARE);
         of_part[limb.unwrap_or(count)].push(number);
     }
     let taken: Vec<bool> = of_part.iter().map(|pieces| !pieces.is_empty()).collect();
     let mut all = Vec::new();
     for (limb, of) in of_part.into_iter().enumerate().filter(|(_, of)| !of.is_empty()) {
         let own = shares(&mut of.iter().flat_map(|&p| pieces[p].vertices.iter().copied()));
-        // A limb with pieces of its own is not the trunk's to bound.
-        let bounded = |u: usize| u == limb || (own[u] > UNDER && !(segments.is_limb[u] && taken[u]));
+        // The trunk's surface does not bound a limb with pieces of its own.
+        let bounded = |u: usize| u == limb || (own[u] > BOUNDED_SHARE && !(segments.is_limb[u] && taken[u]));
         let mut inside = vec![false; body.vertex_count()];
         for (triangle, &u) in body.triangles.iter().zip(&segments.of_triangle) {
             if bounded(u as usize) {
@@ -156,11 +165,79 @@ pub fn parts(dressing: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPar
             }
         }
         let points: Vec<DVec3> = body.positions.iter().zip(inside).filter(|(_, i)| *i).map(|(p, _)| *p).collect();
-        let axis = if limb < count { spread(&points) } else { DVec3::Z };
+        let axis = if limb < count { limb_axis(&points) } else { DVec3::Z };
         let vertices = of.iter().flat_map(|&p| &pieces[p].vertices);
         let (low, high) = extremes(vertices.map(|&v| scene.garment.positions[v as usize].dot(axis)));
         let under = points.into_iter().filter(|p| (low..=high).contains(&p.dot(axis))).collect();
         all.push(BodyPart { pieces: of, axis, points: under });
     }
     Ok(all)
+}
+
+/// Positions of a piece's vertices on the surface, m.
+fn lay(piece: &Piece, surface: &Developable, placed: &[DVec3]) -> Vec<DVec3> {
+    let at = |v: &u32| placed[*v as usize];
+    let mean = piece.vertices.iter().map(at).sum::<DVec3>() / piece.vertices.len().max(1) as f64;
+    let origin = surface.arc_at(mean);
+    let to: Vec<DVec2> = piece.vertices.iter().map(|v| surface.unrolled(at(v), origin)).collect();
+    // A panel that the file draws from its wrong side must be mirrored.
+    let mirrored: Vec<DVec2> = piece.flat.iter().map(|p| DVec2::new(-p.x, p.y)).collect();
+    let (own, over) = (rigid_fit(&piece.flat, &to), rigid_fit(&mirrored, &to));
+    let off = |x: &[DVec2]| x.iter().zip(&to).map(|(x, to)| x.distance_squared(*to)).sum::<f64>();
+    let best = if off(&own) <= off(&over) { own } else { over };
+    best.into_iter().map(|p| surface.rolled(p, origin)).collect()
+}
+
+/// Points moved rigidly to the least squares fit to others.
+fn rigid_fit(from: &[DVec2], to: &[DVec2]) -> Vec<DVec2> {
+    let n = from.len().max(1) as f64;
+    let mean = |points: &[DVec2]| points.iter().sum::<DVec2>() / n;
+    let (a, b) = (mean(from), mean(to));
+    let pairs = || from.iter().zip(to).map(|(p, q)| (*p - a, *q - b));
+    let (cos, sin) = pairs().fold((0.0, 0.0), |(c, s), (p, q)| (c + p.dot(q), s + p.perp_dot(q)));
+    let turn = DVec2::new(cos, sin).normalize_or(DVec2::X);
+    from.iter().map(|p| b + turn.rotate(*p - a)).collect()
+}
+
+/// All pieces, each on the surface of its body part, m.
+#[must_use]
+pub fn lay_all(pieces: &[Piece], parts: &[BodyPart], surfaces: &[Developable], placed: &[DVec3]) -> Vec<Vec<DVec3>> {
+    let surface = |number: usize| parts.iter().position(|part| part.pieces.contains(&number)).map(|i| &surfaces[i]);
+    let own = |piece: &Piece| piece.vertices.iter().map(|&v| placed[v as usize]).collect();
+    pieces
+        .par_iter()
+        .enumerate()
+        .map(|(number, piece)| surface(number).map_or_else(|| own(piece), |s| lay(piece, s, placed)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_piece_cut_from_a_cylinder_returns_to_its_place() {
+        let ring = |z: f64| {
+            (0..360).map(move |k| DVec2::from_angle(f64::from(k).to_radians()).extend(0.0) * 0.15 + DVec3::Z * z)
+        };
+        let points: Vec<DVec3> = [0.0, 0.2, 0.4].into_iter().flat_map(ring).collect();
+        let surface = Developable::around(&points, DVec3::Z, &points, 0.0).unwrap();
+        let origin = surface.arc_at(DVec3::new(0.0, -1.0, 0.2));
+        let flat: Vec<DVec2> = (0..40).map(|k| DVec2::new(0.01 * f64::from(k % 8), 0.05 * f64::from(k / 8))).collect();
+        let placed: Vec<DVec3> = flat.iter().map(|p| surface.rolled(*p, origin)).collect();
+        for mirrored in [false, true] {
+            // Drawn rotated, shifted, and once from the wrong side.
+            let drawn = flat.iter().map(|p| DVec2::from_angle(0.7).rotate(*p) + DVec2::new(3.0, -1.0));
+            let drawn: Vec<DVec2> = drawn.map(|p| if mirrored { DVec2::new(-p.x, p.y) } else { p }).collect();
+            let piece = Piece {
+                name: String::new(),
+                vertices: (0..40).collect(),
+                flat: drawn,
+                triangles: Vec::new(),
+                of_garment: Vec::new(),
+            };
+            let found = lay(&piece, &surface, &placed);
+            assert!(found.iter().zip(&placed).all(|(a, b)| a.distance(*b) < 1e-9));
+        }
+    }
 }

@@ -1,26 +1,26 @@
-//! The rest shape of a patch: a triangle and all that touches it, laid flat about it.
+//! The rest shape of a patch: a triangle and its neighbours, flattened around it.
 //!
-//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are laid
-//! next to one another from the middle triangle on, from both sides; where they meet again the two places of a vertex,
-//! the same on cloth that lies flat, are blended by how many triangles each took.
+//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are flattened
+//! next to one another in both directions, starting from the middle triangle. Where the two directions meet, the two positions of a
+//! vertex (equal on developable cloth) are blended by the number of triangles on each side.
 //!
-//! With the patch's flat places P_I and the derivatives N of its functions: J = [Σ N_s P, Σ N_t P], A = ½ |det J|;
+//! With the patch's flat positions P_I and the derivatives N of its functions: J = [Σ N_s P, Σ N_t P], A = ½ |det J|;
 //! weights by the cloth's coordinates are b = N J⁻¹; and w = J⁻ᵀ (N'' − Γ·N') J⁻¹ with Γ the derivatives Σ N'' P in
 //! terms of J's columns.
 
 use glam::{DMat2, DVec2};
 
-use super::elements::Made;
-use super::patch::{Around, Derivatives, beyond};
+use super::elements::Element;
+use super::patch::{Derivatives, VertexFan, beyond};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
-/// The flat places of the vertices around triangle `t`, its own first, in the frame of its rest shape, m.
-pub(super) fn laid_flat(
+/// The flat positions of the vertices around triangle `t`, its own first, in the frame of its rest shape, m.
+pub(super) fn flattened(
     t: usize,
     mesh: &TriMesh,
     rest: &RestShape,
     topology: &Topology,
-    around: &[Around],
+    fans: &[VertexFan],
 ) -> Vec<(u32, DVec2)> {
     let triangle = mesh.triangles[t];
     let own = rest.corners[t];
@@ -28,16 +28,16 @@ pub(super) fn laid_flat(
     for k in 0..3 {
         let [v, next, last] = [0, 1, 2].map(|i| triangle[(k + i) % 3]);
         let [at, at_next, at_last] = [0, 1, 2].map(|i| own[(k + i) % 3]);
-        let left = laid_around(t as u32, (v, at), (last, at_last), mesh, rest, topology);
-        let right = laid_around(t as u32, (v, at), (next, at_next), mesh, rest, topology);
-        let n = around[v as usize].ring.len();
+        let left = flattened_around(t as u32, (v, at), (last, at_last), mesh, rest, topology);
+        let right = flattened_around(t as u32, (v, at), (next, at_next), mesh, rest, topology);
+        let n = fans[v as usize].ring.len();
         for (i, &(w, place)) in left.iter().enumerate() {
             if w == next {
                 break;
             }
-            // Met from the other side after as many triangles as are left.
-            let met = right.iter().position(|(other, _)| *other == w).filter(|_| around[v as usize].closed && n > 3);
-            let place = met.map_or(place, |j| place.lerp(right[j].1, i as f64 / (i + j).max(1) as f64));
+            // The same vertex in the other direction, after the remaining triangles.
+            let other = right.iter().position(|(u, _)| *u == w).filter(|_| fans[v as usize].closed && n > 3);
+            let place = other.map_or(place, |j| place.lerp(right[j].1, i as f64 / (i + j).max(1) as f64));
             keep(&mut places, w, place);
         }
         for &(w, place) in right.iter().take_while(|(w, _)| *w != last) {
@@ -47,15 +47,15 @@ pub(super) fn laid_flat(
     places
 }
 
-/// Keeps the first place of each vertex.
+/// Stores the first position of each vertex.
 fn keep(places: &mut Vec<(u32, DVec2)>, v: u32, place: DVec2) {
     if !places.iter().any(|(known, _)| *known == v) {
         places.push((v, place));
     }
 }
 
-/// Vertices met in going around `v` from triangle `t` over its edge to `w`, with their places, until back or at an edge.
-fn laid_around(
+/// The vertices around `v` with their flat positions, starting from triangle `t` across its edge to `w`, until `t` or a boundary.
+fn flattened_around(
     t: u32,
     (v, at): (u32, DVec2),
     (w, at_w): (u32, DVec2),
@@ -63,7 +63,7 @@ fn laid_around(
     rest: &RestShape,
     topology: &Topology,
 ) -> Vec<(u32, DVec2)> {
-    let mut met = Vec::new();
+    let mut found = Vec::new();
     let (mut s, mut w, mut at_w) = (t, w, at_w);
     while let Some(next) = beyond(topology, s, v, w) {
         if next == t {
@@ -74,19 +74,19 @@ fn laid_around(
         let (Some(i), Some(j)) = (of(v), of(w)) else { break };
         let k = 3 - i - j;
         let flat = rest.corners[next as usize];
-        // The turn that takes its edge onto the one laid already.
+        // The rotation that takes its edge onto the flattened one.
         let (from, to) = (flat[j] - flat[i], at_w - at);
         let turn = DVec2::new(from.dot(to), from.perp_dot(to)).normalize_or(DVec2::X);
         at_w = at + turn.rotate(flat[k] - flat[i]);
         w = corners[k];
         s = next;
-        met.push((w, at_w));
+        found.push((w, at_w));
     }
-    met
+    found
 }
 
-/// The element of a patch: its area and its weights by the cloth's coordinates; `None` where it has no area.
-pub(super) fn element(found: &[(u32, Derivatives)], flat: &[(u32, DVec2)]) -> Option<Made> {
+/// The element of a patch: its area and its weights by the cloth's coordinates; `None` without a positive area.
+pub(super) fn element(found: &[(u32, Derivatives)], flat: &[(u32, DVec2)]) -> Option<Element> {
     let mut sums = [DVec2::ZERO; 5];
     for (v, d) in found {
         let place = flat.iter().find(|(w, _)| w == v)?.1;
@@ -107,8 +107,8 @@ pub(super) fn element(found: &[(u32, Derivatives)], flat: &[(u32, DVec2)]) -> Op
         let second = [ss, st, tt];
         let [ss, st, tt] = std::array::from_fn(|k| second[k] - curving[k].dot(DVec2::new(*s, *t)));
         let w = inverse.transpose() * DMat2::from_cols(DVec2::new(ss, st), DVec2::new(st, tt)) * inverse;
-        // κ_uv is counted once: H x_uv².
+        // κ_uv occurs once in the energy: H x_uv².
         (*v, [b.x, b.y, w.x_axis.x, w.x_axis.y, w.y_axis.y].map(|w| w as f32))
     });
-    Some(Made { area: 0.5 * det, vertices: weighted.collect() })
+    Some(Element { area: 0.5 * det, vertices: weighted.collect() })
 }

@@ -5,19 +5,19 @@
 //! - circle: min Σ w (x² + y² + c x + d y + e)² (Kåsa: "A circle fitting procedure and its error analysis", IEEE Trans. Instrum. Meas. 25, 1976);
 //! - ellipse along the principal axes of the points: min Σ w (A x² + B y² + C x + D y − 1)².
 //!
-//! Where the fit is no ellipse, or one twice as large or half as large as the points spread, the slice is open or
-//! lopsided (a shoulder, a crotch), and its moments stand in: half axes √2 σ about the mean, which are right for a full
+//! Where the fit is no ellipse, or its half axes differ from the spread of the points by more than a factor of 2, the slice is open
+//! or lopsided (a shoulder, a crotch), and its moments replace the fit: half axes √2 σ about the mean, which are exact for a full
 //! ring.
 //!
-//! ε is what makes the quadric bound its slice: with ρ(p) = |((x/a), (y/b))|, 1 + ε = max ρ over the corners of the
-//! slice's triangles + o/min(a, b), o the cloth's offset. ρ is convex, so no point of a triangle has more than its
-//! corners; it grows by at most 1/min(a, b) a metre, so what touches is within.
+//! ε is such that the quadric bounds its slice: with ρ(p) = |((x/a), (y/b))|, 1 + ε = max ρ over the corners of the
+//! slice's triangles + o/min(a, b), o the cloth's offset. ρ is convex, so its maximum over a triangle is at a
+//! corner; it grows by at most 1/min(a, b) a metre, so every contact is within the quadric.
 
 use faer::linalg::solvers::Solve;
 use faer::{Col, Mat};
 use glam::DVec2;
 
-/// An ellipse in a slice's plane, and how far the slice reaches beyond it.
+/// An ellipse in the plane of a slice, and the factor by which it must grow to bound the slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Quadric {
     /// Centre, m.
@@ -28,7 +28,7 @@ pub(crate) struct Quadric {
     pub half: DVec2,
     /// (1 + ε)².
     pub bound: f64,
-    /// Whether the least squares made no ellipse and the moments stand in.
+    /// Whether least squares gave no ellipse and the moments replace it.
     pub by_moments: bool,
 }
 
@@ -42,7 +42,7 @@ impl Quadric {
         x * x + y * y
     }
 
-    /// Fits points with weights; `round` for a cylinder. `None` for fewer than three.
+    /// Fits points with weights; `round` for a cylinder. `None` for fewer than three points.
     #[must_use]
     pub(crate) fn fit(points: &[(DVec2, f64)], round: bool) -> Option<Self> {
         let weight: f64 = points.iter().map(|p| p.1).sum();
@@ -63,7 +63,7 @@ impl Quadric {
             return None;
         }
         half = half.max(DVec2::splat(1e-3 * size));
-        // Scaled to about one, so that the normal equations are well posed.
+        // Scaled to about 1, so that the normal equations are well conditioned.
         let scaled: Vec<(DVec2, f64)> = points
             .iter()
             .map(|&(p, w)| (DVec2::new((p - mean).dot(axis), axis.perp_dot(p - mean)) / size, w / weight))
@@ -82,7 +82,7 @@ impl Quadric {
         })
     }
 
-    /// Sets ε so that `corners` and what is within `offset` (m) of them lie inside.
+    /// Sets ε so that `corners` and all points within `offset` (m) of them lie inside.
     pub(crate) fn enclose(&mut self, corners: impl Iterator<Item = DVec2>, offset: f64) {
         let farthest = corners.map(|p| self.level(p)).fold(0.0, f64::max).sqrt();
         self.bound = (farthest + offset / self.half.min_element()).powi(2);
@@ -98,7 +98,7 @@ impl Quadric {
     }
 }
 
-/// Least squares of rows·c = side with weights.
+/// Weighted least squares of rows·c = b.
 fn least_squares<const N: usize>(rows: impl Iterator<Item = ([f64; N], f64, f64)>) -> Option<[f64; N]> {
     let mut normal = Mat::<f64>::zeros(N, N);
     let mut side = Col::<f64>::zeros(N);
@@ -115,7 +115,7 @@ fn least_squares<const N: usize>(rows: impl Iterator<Item = ([f64; N], f64, f64)
     c.iter().all(|c| c.is_finite()).then_some(c)
 }
 
-/// Centre and radius twice.
+/// Centre, and the radius as both half axes.
 fn circle(points: &[(DVec2, f64)]) -> Option<(DVec2, DVec2)> {
     let [c, d, e] = least_squares(points.iter().map(|(p, w)| ([p.x, p.y, 1.0], -p.length_squared(), *w)))?;
     let centre = DVec2::new(-0.5 * c, -0.5 * d);
@@ -153,13 +153,13 @@ mod tests {
         assert!(!found.by_moments);
         assert!(found.centre.distance(centre) < 1e-9 && found.half.distance(half) < 1e-9, "{found:?}");
         assert!(found.axis.perp_dot(DVec2::from_angle(0.7)).abs() < 1e-9);
-        // Of a circle three quarters are enough.
+        // Three quarters of a circle suffice.
         let found = Quadric::fit(&ring(centre, 0.0, DVec2::splat(0.05), 0.75), true).unwrap();
         assert!(found.centre.distance(centre) < 1e-9 && (found.half.x - 0.05).abs() < 1e-9, "{found:?}");
     }
 
     #[test]
-    fn what_is_no_ellipse_is_told_by_its_moments_and_bounded_all_the_same() {
+    fn points_without_an_ellipse_are_fitted_by_moments_and_bounded() {
         let line: Vec<(DVec2, f64)> = (0..9).map(|i| (DVec2::new(f64::from(i), 0.0), 1.0)).collect();
         let mut found = Quadric::fit(&line, false).unwrap();
         assert!(found.by_moments);

@@ -1,10 +1,9 @@
-//! The garment as masses and springs.
-//!
-//! Structural and bending springs by the fabric's constants: [`spring_list`](crate::methods::spring_list).
+//! The garment as masses and springs, with structural and bending springs by
+//! [`spring_list`](crate::methods::spring_list).
 //!
 //! Provot's limiting (Provot: "Deformation constraints in a mass-spring model to describe rigid cloth behaviour",
-//! Graphics Interface 1995): after a step, a structural spring that is longer than (1 + τ) L is shortened to that by
-//! moving its ends, each by the other's share of the mass; sweeps over all of them, a few a step.
+//! Graphics Interface 1995): after a step, a structural spring longer than (1 + τ) L is shortened to that length by
+//! moving its ends, each in proportion to the other's mass; several sweeps over all springs a step.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -16,39 +15,39 @@ use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::mesh::Lists;
-use crate::methods::MethodInput;
 use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::{BlockRows, Operator};
+use crate::methods::method::MethodInput;
 use crate::methods::spring_list::{Spring, springs};
 
-/// Sweeps of Provot's limiting after a step.
-const SWEEPS: usize = 30;
-/// Vertices of one task.
+/// Most sweeps of Provot's limiting after a step; it ends earlier once no spring is too long. A heuristic.
+const MAX_SWEEPS: usize = 30;
+/// Vertices of one parallel task. A heuristic.
 const CHUNK: usize = 256;
 
-/// A spring as its first vertex sees it.
+/// A spring in the list of one of its vertices.
 #[derive(Debug, Clone, Copy, Default)]
-struct Arm {
+struct HalfSpring {
     other: u32,
     block: u32,
     rest: f32,
     stiffness: f32,
 }
 
-/// A structural spring for the limiting.
+/// The longest length of a structural spring.
 #[derive(Debug, Clone, Copy)]
 struct Limit {
     ends: [u32; 2],
     longest: f64,
-    /// Share of a correction that the first end takes.
+    /// Share of a correction that moves the first end.
     share: f64,
 }
 
 /// All springs of a garment.
 #[derive(Debug, Clone)]
 pub(crate) struct Springs {
-    /// Of each vertex.
-    arms: Lists<Arm>,
+    /// The springs of each vertex.
+    springs: Lists<HalfSpring>,
     limits: Vec<Limit>,
     matrix: BlockRows,
 }
@@ -56,8 +55,8 @@ pub(crate) struct Springs {
 impl Springs {
     /// Springs of the garment by its rest shape.
     #[must_use]
-    pub(crate) fn new(dressing: &MethodInput<'_>, strain_limit: f64) -> Self {
-        let MethodInput { scene, fabric, cloth } = dressing;
+    pub(crate) fn new(input: &MethodInput<'_>, strain_limit: f64) -> Self {
+        let MethodInput { scene, fabric, cloth } = input;
         let [structural, bending] = springs(&scene.garment.triangles, &scene.topology, &scene.rest, fabric);
         let edges = structural.len();
         let springs = [structural, bending].concat();
@@ -74,16 +73,16 @@ impl Springs {
                 Limit { ends, longest: rest * (1.0 + strain_limit), share }
             })
             .collect();
-        // Each spring is seen by both its ends.
+        // Each spring is in the lists of both its ends.
         let ends =
             |s: &Spring| [(s.ends[0], s.ends[1]), (s.ends[1], s.ends[0])].map(|ends| (ends, s.rest, s.stiffness));
-        let arm = |((own, other), rest, stiffness): ((u32, u32), f64, f64)| {
+        let half = |((own, other), rest, stiffness): ((u32, u32), f64, f64)| {
             let row = matrix.columns.range(own as usize);
             let block = matrix.at(own, other).map_or(0, |k| k - row.start as u32);
-            (own, Arm { other, block, rest: rest as f32, stiffness: stiffness as f32 })
+            (own, HalfSpring { other, block, rest: rest as f32, stiffness: stiffness as f32 })
         };
-        let arms = Lists::gathered(matrix.rows(), || springs.iter().flat_map(ends).map(arm));
-        Self { arms, limits, matrix }
+        let springs = Lists::gathered(cloth.vertex_count(), || springs.iter().flat_map(ends).map(half));
+        Self { springs, limits, matrix }
     }
 }
 
@@ -94,14 +93,14 @@ impl Operator for Springs {
 }
 
 impl Elastic for Springs {
-    fn add_own(&self, own: &mut [Mat3A]) {
-        for (own, &k) in own.iter_mut().zip(&self.matrix.diagonal) {
-            *own += self.matrix.blocks[k as usize];
+    fn add_diagonal(&self, diagonal: &mut [Mat3A]) {
+        for (sum, &k) in diagonal.iter_mut().zip(&self.matrix.diagonal) {
+            *sum += self.matrix.blocks[k as usize];
         }
     }
 
     fn linearise(&mut self, x: &[DVec3], force: &mut [DVec3]) {
-        let Self { arms, matrix, .. } = self;
+        let Self { springs, matrix, .. } = self;
         let BlockRows { columns, diagonal, blocks } = matrix;
         let rows = columns.starts();
         blocks.fill(Mat3A::ZERO);
@@ -120,21 +119,21 @@ impl Elastic for Springs {
                 let row = (rows[v] - base) as usize;
                 let mut sum = Vec3A::ZERO;
                 let mut own = Mat3A::ZERO;
-                for arm in arms.of(v) {
-                    let to = (x[arm.other as usize] - x[v]).as_vec3a();
+                for spring in springs.of(v) {
+                    let to = (x[spring.other as usize] - x[v]).as_vec3a();
                     let length = to.length();
                     let n = to / length.max(f32::MIN_POSITIVE);
-                    sum += n * (arm.stiffness * (length - arm.rest));
-                    // Across itself a spring under compression would push sideways: that part is left out.
-                    let across = (1.0 - arm.rest / length).max(0.0);
+                    sum += n * (spring.stiffness * (length - spring.rest));
+                    // Under compression the geometric stiffness across the spring is negative; it is left out.
+                    let across = (1.0 - spring.rest / length).max(0.0);
                     let along = n * (1.0 - across);
                     let mut block = Mat3A::from_cols(along * n.x, along * n.y, along * n.z);
                     block.x_axis.x += across;
                     block.y_axis.y += across;
                     block.z_axis.z += across;
-                    block *= arm.stiffness;
+                    block *= spring.stiffness;
                     own += block;
-                    blocks[row + arm.block as usize] -= block;
+                    blocks[row + spring.block as usize] -= block;
                 }
                 blocks[(diagonal[v] - base) as usize] += own;
                 *force += sum.as_dvec3();
@@ -144,7 +143,7 @@ impl Elastic for Springs {
 
     fn limit(&mut self, x: &mut [DVec3]) -> Option<u64> {
         let mut corrections = 0;
-        for _ in 0..SWEEPS {
+        for _ in 0..MAX_SWEEPS {
             let before = corrections;
             for limit in &self.limits {
                 let [a, b] = limit.ends.map(|v| v as usize);

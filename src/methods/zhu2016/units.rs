@@ -1,23 +1,22 @@
 //! A unit of the body: its frame, its slices with their quadrics, and the leaf triangles of each slice by sectors.
 //!
-//! The frame's z runs along the unit: for a limb the direction in which its triangles spread most; for trunk and hip, which
-//! may be wider than high, the vertical.
-//! Slices are 4 cm high. A slice lists every triangle of the unit that comes within [`REACH`] of it, so that a point
-//! which has gone up to that deep into the body still finds the nearest one; a sector of a slice lists those of them
-//! that come within the same of the sector.
+//! The frame's z runs along the unit: for a limb the principal axis of its triangles; for trunk and hip, which
+//! may be wider than high, the vertical. Slices are 4 cm high. A slice lists every triangle of the unit within [`REACH`], so that a
+//! point up to that deep inside the body still finds the nearest one; a sector of a slice lists those of them within the same reach
+//! of the sector.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
 use crate::base::quantiles::extremes;
 use crate::mesh::{TriMesh, box_about};
-use crate::methods::segment::longest;
+use crate::methods::segment::principal_axis;
 
-/// Height of a slice h, m.
+/// Height of a slice h, m. Lower slices fit the body more closely, and are more. A heuristic.
 const HEIGHT: f64 = 0.04;
-/// How far a triangle counts beyond its slice and sector, m.
+/// Distance within which a triangle belongs to a slice and a sector, m. It bounds the depth at which the nearest triangle is exact.
 pub(crate) const REACH: f64 = 0.02;
-/// Sectors of a slice.
+/// Sectors of a slice. More sectors hold fewer triangles each. A heuristic.
 pub(crate) const SECTORS: usize = 24;
 
 /// A slice: its quadric, and for each sector its triangles.
@@ -32,21 +31,21 @@ pub(crate) struct Slice {
 /// A unit.
 #[derive(Debug, Clone)]
 pub(crate) struct BodyUnit {
-    /// Whether it ends: a limb or the head, fitted with cylinders.
+    /// Whether it is a limb or the head, which are fitted with cylinders.
     pub is_limb: bool,
-    /// Its box in the world, with the offset, m.
+    /// Its bounding box in the world, enlarged by the offset, m.
     pub bounds: (DVec3, DVec3),
     /// Its origin, m.
     origin: DVec3,
-    /// World to unit.
+    /// Rotation from the world to the unit.
     turn: DMat3,
-    /// z of the first slice's lower end, m.
+    /// Lower end of the first slice along z, m.
     low: f64,
     /// Height of a slice, m.
     height: f64,
-    /// Its slices, low to high; `None` where one has no triangle.
+    /// Its slices from low to high; `None` for a slice without triangles.
     pub slices: Vec<Option<Slice>>,
-    /// Triangles of the sectors, one after the other.
+    /// Triangles of the sectors, concatenated.
     pub leaves: Vec<u32>,
 }
 
@@ -64,7 +63,8 @@ impl BodyUnit {
             return None;
         }
         let origin = weighted.iter().map(|(p, w)| *p * *w).sum::<DVec3>() / weight;
-        let axis = if is_limb { longest(weighted.iter().map(|(p, w)| (*p - origin, *w / weight))) } else { DVec3::Z };
+        let axis =
+            if is_limb { principal_axis(weighted.iter().map(|(p, w)| (*p - origin, *w / weight))) } else { DVec3::Z };
         let turn = frame(axis);
         let local: Vec<[DVec3; 3]> = triangles.iter().map(|&t| corners(t).map(|p| turn * (p - origin))).collect();
         let z = |c: &[DVec3; 3]| extremes(c.map(|p| p.z));
@@ -92,7 +92,7 @@ impl BodyUnit {
         Some(unit)
     }
 
-    /// Adds a slice of the triangles `within` its reach; `touched` tells those that its quadric must bound.
+    /// Adds a slice of the triangles `within` its reach; its quadric bounds those for which `touched` is true.
     fn push_slice(
         &mut self,
         triangles: &[u32],
@@ -123,14 +123,14 @@ impl BodyUnit {
         self.slices.push(Some(Slice { quadric, sectors }));
     }
 
-    /// Where a point of the world is in the unit's frame, m.
+    /// A point of the world in the unit's frame, m.
     #[inline]
     #[must_use]
     pub(crate) fn local(&self, x: DVec3) -> DVec3 {
         self.turn * (x - self.origin)
     }
 
-    /// The slice at this height of the unit's frame: |z| < h/2 in the slice's own.
+    /// The slice at this height of the unit's frame: |z| < h/2 in the frame of the slice.
     #[inline]
     #[must_use]
     pub(crate) fn slice(&self, z: f64) -> Option<&Slice> {
@@ -156,7 +156,7 @@ impl BodyUnit {
 }
 
 impl Slice {
-    /// The range of the unit's leaves to be tested for a point of the slice's plane.
+    /// The range of the unit's leaves to test for a point of the slice's plane.
     #[inline]
     #[must_use]
     pub(crate) fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
@@ -167,14 +167,14 @@ impl Slice {
     }
 }
 
-/// Whether a triangle comes within `reach` of a sector about `centre` whose middle has this direction: by its circle
-/// about the middle of its corners.
+/// Whether a triangle comes within `reach` of a sector about `centre` whose middle has this direction, by a bounding circle about the
+/// centroid.
 fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> bool {
     let flat = corners.map(DVec3::truncate);
     let at = (flat[0] + flat[1] + flat[2]) / 3.0;
     let radius = flat.iter().map(|p| p.distance(at)).fold(0.0, f64::max) + reach;
     let off = at - centre;
-    // Distance from the two half planes that make the sector: outside it, one of them at least is as far as the sector or nearer.
+    // The sector is the intersection of two half planes; a point outside is no nearer to it than to the farther of them.
     let half = DVec2::from_angle(std::f64::consts::PI / SECTORS as f64);
     let (left, right) = (middle.rotate(half), middle.rotate(DVec2::new(half.x, -half.y)));
     left.perp_dot(off) <= radius && right.perp_dot(off) >= -radius && middle.dot(off) >= -radius
