@@ -116,7 +116,7 @@ fn all_files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Whether the exported garment has the figures that were told of it.
+/// Whether the exported garment loads and has the reported figures.
 fn agrees(folder: &Path, told: &str, converged: bool) -> Result<(), String> {
     let report: serde_json::Value = serde_json::from_str(told).map_err(|e| format!("no JSON: {e}: {told}"))?;
     let exported = fs::read_to_string(folder.join("out.obj")).map_err(|e| format!("no export: {e}"))?;
@@ -134,20 +134,20 @@ fn agrees(folder: &Path, told: &str, converged: bool) -> Result<(), String> {
         push_out: false,
         ..SceneSpec::new(place("body.obj"), place("out.obj"))
     };
-    let again = match spec.load() {
-        Ok(loaded) => loaded,
-        // Draped, it may have lost the area of a triangle, or have gone far off.
-        Err(_) => return Ok(()),
-    };
+    let again = spec.load().map_err(|e| format!("the export does not load: {e}"))?;
     let found = Placement::new(&again.scene.garment, &again.scene.body);
     let count = |key: &str| report[key].as_u64().unwrap_or(u64::MAX);
-    if count("vertices") != again.scene.garment.vertex_count() as u64 {
-        return Ok(());
+    let vertices = again.scene.garment.vertex_count() as u64;
+    if count("vertices") != vertices {
+        return Err(format!("{} vertices were reported, the export has {vertices}", count("vertices")));
     }
-    // A vertex nearer the surface than the digits written may count either way.
+    // A vertex closer to the surface than the written digits may count either way.
     let inside = found.penetrating_vertices as u64;
     if count("penetrating_vertices").abs_diff(inside) > 1 {
-        return Err(format!("{} vertices inside were told, the export has {inside}", count("penetrating_vertices")));
+        return Err(format!(
+            "{} vertices inside the body were reported, the export has {inside}",
+            count("penetrating_vertices")
+        ));
     }
     Ok(())
 }

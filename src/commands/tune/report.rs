@@ -62,7 +62,7 @@ impl Verdict {
             held_out: false,
             extent_factor: 1.0,
             levels: table.levels.len(),
-            cut_levels: table.levels.iter().filter(|l| l.extent.is_some_and(|e| e != Extent::UNCUT)).count(),
+            cut_levels: table.levels.iter().filter(|l| l.extent.is_some_and(|e| e.cuts())).count(),
             parts: on.parts(table).len(),
             table_3_parts: on.table_3.parts,
             translation_mm,

@@ -68,6 +68,12 @@ impl Extent {
         Self { width_cm: cm, height_cm: cm }
     }
 
+    /// Whether a level with this extent is cut.
+    #[must_use]
+    pub(crate) fn cuts(&self) -> bool {
+        *self != Self::UNCUT
+    }
+
     /// Factors for lengths along weft and warp after which the extent is the same along both, and that extent, m.
     #[must_use]
     pub(crate) fn evened(&self) -> ([f64; 2], f64) {
