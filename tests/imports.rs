@@ -395,6 +395,6 @@ fn no_files_import_each_other_in_a_circle() {
     }
     let new: Vec<_> = circles.iter().filter(|circle| circle.iter().any(|file| !KNOWN_CIRCLES.contains(file))).collect();
     assert!(new.is_empty(), "files that import each other: {new:#?}");
-    // The check sees imports, paths in code and re-exports: the sweep uses the mesh through several of them.
-    assert!(reach["src/study/sweep/mod.rs"].contains("src/mesh/topology.rs"));
+    // Imports are found through re-exports: the study reaches the mesh.
+    assert!(reach.iter().any(|(file, to)| file.starts_with("src/study/") && to.contains("src/mesh/topology.rs")));
 }

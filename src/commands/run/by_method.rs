@@ -8,7 +8,7 @@ use crate::DVec3;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
-use crate::methods::{self, MethodInput, METHODS, MethodDrape, RestRule};
+use crate::methods::{self, METHODS, MethodDrape, MethodInput, RestRule};
 use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
 use crate::scene::Loaded;
 use crate::study::certificate::{Certificate, certify};

@@ -10,7 +10,7 @@ use crate::garment::builtin::{BUILT_IN, TABLE_4_SIZES};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::Stop;
-use crate::methods::{self, MethodInput, Ended, RestRule, gross2003, thomaszewski2006, zhu2016};
+use crate::methods::{self, Ended, MethodInput, RestRule, gross2003, thomaszewski2006, zhu2016};
 use crate::scene::Scene;
 
 /// A compared method.
