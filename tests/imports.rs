@@ -28,6 +28,9 @@ fn sources() -> Vec<Source> {
     fn walk(folder: &Path, found: &mut Vec<Source>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
+            if path.file_stem().is_some_and(|stem| stem == "tests") {
+                continue;
+            }
             if path.is_dir() {
                 walk(&path, found);
             } else if path.extension().is_some_and(|ending| ending == "rs") {
@@ -261,13 +264,13 @@ fn expand(tree: &str, prefix: &[String], found: &mut Vec<(Vec<String>, String)>)
     }
 }
 
-/// All modules by their path in the crate; tests are left out.
+/// All modules by their path in the crate.
 fn modules() -> BTreeMap<Vec<String>, Module> {
     let mut all = BTreeMap::new();
     for Source { path, code, .. } in sources() {
         let mut name: Vec<String> = path.trim_end_matches(".rs").split('/').skip(1).map(str::to_owned).collect();
         match name.last().map(String::as_str) {
-            Some("tests" | "main") => continue,
+            Some("main") => continue,
             Some("mod" | "lib") => drop(name.pop()),
             _ => {}
         }

@@ -203,10 +203,7 @@ fn thin_and_whole_levels_are_left_out_where_asked() {
             let options = SearchOptions { thinnest_cm, uncut, ..options.clone() };
             let front = search(samples, &options, &unheard).unwrap().front().clone();
             let levels = front.points.iter().flat_map(|p| p.table("t", "test").unwrap().levels);
-            let whole = front
-                .points
-                .iter()
-                .any(|p| p.extents.iter().any(|e| *e == partwise::parts::range_table::Extent::UNCUT));
+            let whole = front.points.iter().any(|p| p.extents.iter().any(|e| !e.cuts()));
             (levels.map(|l| l.upper_cm - l.lower_cm).fold(f64::INFINITY, f64::min), whole)
         };
         let (any, whole) = thinnest(0.0, true);
