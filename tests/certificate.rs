@@ -215,7 +215,7 @@ fn a_point_under_a_triangle_touches_its_corners_and_no_others() {
         let x: Vec<DVec3> = scene.garment.positions.iter().map(|x| *x + DVec3::Z * height).collect();
         let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &jersey(), &scene.held).unwrap();
         let forces = Forces::new(&cloth, &scene.body, &x);
-        forces.touching.iter().filter(|t| t.of_body).flat_map(|t| &t.shares).map(|(v, _)| *v).collect()
+        forces.reactions.iter().filter(|t| t.of_body).flat_map(|t| &t.shares).map(|(v, _)| *v).collect()
     };
     let mut found = touched(thickness + 2e-4);
     found.sort_unstable();

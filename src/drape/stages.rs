@@ -149,7 +149,7 @@ impl Made {
 /// What the cloth meets at `x`: by planes where no step is taken, which need no more. `ground` are distances of the garment as placed.
 fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, ground: Option<&Distances>, x: &[DVec3]) -> Contacts<'b> {
     let known = ground.into_iter().flat_map(|ground| &ground.surface).map(|s| s.signed_distance);
-    cloth.contacts_knowing(&scene.body, x, refine == Refine::Steps(0), &scene.garment.positions, known)
+    cloth.contacts_from_distances(&scene.body, x, refine == Refine::Steps(0), &scene.garment.positions, known)
 }
 
 /// How deep those vertices at `x` are in the body, m, that can have come to it since they were placed.

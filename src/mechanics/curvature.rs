@@ -1,83 +1,88 @@
-//! How the energy curves about a state of rest: the softest ways out of it, and those on which it falls.
+//! Curvature of the energy about a state of equilibrium: its softest directions, and the directions in which it decreases.
 //!
-//! H is the Hessian of gravity, membrane and bending as it is, by differences of the gradient, with what contact and friction hold as
-//! they hold it there. B is any positive matrix near to it that is factorised: Newton's own, where what is negative was taken away.
-//! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y; most of the spectrum lies near one, so
-//! what is soft or negative stands apart and comes first. By Sylvester's law there are as many negative λ as H has ways on which the energy
-//! falls, whatever B, so that of single precision does. (On B⁻¹H in the inner product of B, which needs no halves of a solve, each vector
-//! and B times it part a little more every step, and after some 28 nothing is left but rounding.)
+//! H is the true Hessian of gravity, membrane and bending, from differences of the gradient, plus the stiffness of contact and friction
+//! as it is in that state. B is a positive definite matrix near H that has been factorised: the projected Hessian of Newton's method.
+//! With B = L Lᵀ, Lanczos' method on L⁻¹ H L⁻ᵀ finds the smallest λ with H z = λ B z, z = L⁻ᵀ y. Most of the spectrum lies near one, so
+//! soft and negative directions are separated from it and converge first. By Sylvester's law of inertia the number of negative λ equals the
+//! number of independent directions in which the energy decreases, for any B; a factor in single precision therefore suffices. (On B⁻¹H in the
+//! inner product of B, which needs no half solves, each vector and B times it diverge by rounding; after some 28 steps only
+//! rounding is left.)
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | H, B | Hessian, and what Newton takes for it | N/m |
+//! | H, B | true Hessian, and the factorised matrix near it | N/m |
 //! | λ | curvature relative to B | – |
-//! | L | B's factor | √(N/m) |
-//! | z | a way out, of every free vertex, of length one by B | m |
+//! | L | factor of B | √(N/m) |
+//! | z | direction over all free vertices, of norm one by B | m |
 //!
 //! Source: Lanczos' method for a pencil (Parlett: "The Symmetric Eigenvalue Problem", chapter 15), with full reorthogonalisation. Limits:
-//! contacts are kept as they are, so a way out that lifts cloth off the body is not seen; λ is that of so many steps, an upper bound.
+//! contacts are constant, so a direction that lifts cloth off the body is not found; λ is an upper bound after the given number of steps.
 
 use faer::{Mat, Side};
 use glam::DVec3;
 
-use super::columns::{Columns, dot};
-use super::energy::{Cloth, Contacts, Held, HessianLayout, Scratch};
+use super::energy::{Cloth, ContactBlock, Contacts, HessianLayout, Scratch};
+use super::linear_algebra::{Basis, dot_flat};
 use super::newton::Solver;
 
-/// Steps of Lanczos' method for whoever asks whether a rest lasts.
-pub(crate) const STEPS: usize = 40;
+/// Steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ later.
+pub(crate) const MAX_LANCZOS_STEPS: usize = 40;
 
-/// Damping ε in their B, 1/s²: under a thousandth of what a hanging cloth swings with (g over a metre).
-pub(crate) const DAMPING: f64 = 1e-2;
+/// Damping ε in B for that decision, 1/s²: under a thousandth of the squared frequency of hanging cloth (g over a metre).
+pub(crate) const LANCZOS_DAMPING: f64 = 1e-2;
 
-/// Longest move of a vertex in a difference of the gradient, m: the cloth's own non-linearity is of the order of its edges, a centimetre.
-const DIFFERENCE: f64 = 1e-6;
+/// Longest move of a vertex in a difference of the gradient, m. The energy is nonlinear over the length of an edge, a centimetre.
+const DIFFERENCE_STEP_M: f64 = 1e-6;
 
-/// λ above this is no way out but rounding.
-pub(crate) const NEGATIVE: f64 = -1e-6;
+/// λ below this is negative; above, it may be rounding.
+pub(crate) const NEGATIVE_CURVATURE: f64 = -1e-6;
 
-/// What is left of a step over what it was, under which it is rounding in single precision: the ways there are have been found.
+/// Ratio of the norm of a Lanczos vector after orthogonalisation to that before below which it is rounding in single precision: the space is
+/// exhausted.
 const EXHAUSTED: f64 = 1e-6;
 
-/// Steps after which the lowest λ is asked for again, and the changes of it that end a search: one that leads out need not be known well;
-/// of none one must be sure. Of some twenty searches none that had changed by less than a hundredth found a way out later.
-const AGAIN: usize = 4;
-const SETTLED: f64 = 0.05;
-const SURE: f64 = 0.01;
+/// Steps between two checks of the smallest λ.
+const CHECK_INTERVAL: usize = 4;
 
-/// How long to search.
+/// Relative change of the smallest λ that ends a search if λ is decisive: a direction of descent need not be accurate.
+const DECISIVE_CHANGE: f64 = 0.05;
+
+/// The same if λ is not decisive. Of some twenty searches none that had changed by less than a hundredth became decisive later.
+const INDECISIVE_CHANGE: f64 = 0.01;
+
+/// When to end a search.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Until {
-    /// Steps at most.
-    pub(crate) steps: usize,
-    /// λ under which a way leads out, if that alone is asked: once it has settled which side the lowest is on, that is enough.
-    pub(crate) clear: Option<f64>,
+pub(crate) struct LanczosOptions {
+    /// Most steps.
+    pub(crate) max_steps: usize,
+    /// λ below which the equilibrium is unstable. If given, the search ends once it is settled on which side of it the smallest λ lies.
+    pub(crate) decisive: Option<f64>,
 }
 
-/// H, over the free vertices in elimination order.
-pub(crate) struct Curved<'a> {
+/// H over the free vertices in elimination order.
+pub(crate) struct HessianOperator<'a> {
     pub(crate) cloth: &'a Cloth,
     pub(crate) layout: &'a HessianLayout,
-    /// Where, m.
+    /// Positions, m.
     pub(crate) x: &'a [DVec3],
-    pub(crate) held: Vec<Held>,
+    pub(crate) contacts: Vec<ContactBlock>,
 }
 
-/// What Lanczos' method has found.
+/// Ritz values and vectors of the smallest λ.
 pub(crate) struct Ritz {
     /// λ, ascending.
     pub(crate) values: Vec<f64>,
-    /// z of the lowest, and of all that are negative.
+    /// z of the smallest λ, and of all negative ones.
     pub(crate) vectors: Vec<Vec<DVec3>>,
 }
 
-impl Curved<'_> {
-    /// Values of the unknowns, in their order.
+impl HessianOperator<'_> {
+    /// Values of the unknowns from those of all vertices.
     pub(crate) fn gather(&self, all: &[DVec3]) -> Vec<DVec3> {
         self.layout.order.iter().map(|&v| all[v as usize]).collect()
     }
 
-    /// Values of all vertices, zero where held.
+    /// Values of all vertices from those of the unknowns; zero where held.
     pub(crate) fn scatter(&self, unknowns: &[DVec3]) -> Vec<DVec3> {
         let mut all = vec![DVec3::ZERO; self.x.len()];
         for (&v, z) in self.layout.order.iter().zip(unknowns) {
@@ -87,9 +92,9 @@ impl Curved<'_> {
     }
 
     /// H z.
-    pub(crate) fn turned(&self, z: &[DVec3], scratch: &mut Scratch) -> Vec<DVec3> {
+    pub(crate) fn apply(&self, z: &[DVec3], scratch: &mut Scratch) -> Vec<DVec3> {
         let longest = z.iter().map(|z| z.length()).fold(0.0, f64::max);
-        let h = DIFFERENCE / longest.max(f64::MIN_POSITIVE);
+        let h = DIFFERENCE_STEP_M / longest.max(f64::MIN_POSITIVE);
         let whole = self.scatter(z);
         let mut gradient_at = |h: f64| {
             let there: Vec<DVec3> = self.x.iter().zip(&whole).map(|(x, z)| *x + *z * h).collect();
@@ -99,54 +104,55 @@ impl Curved<'_> {
         };
         let (ahead, behind) = (self.gather(&gradient_at(h)), self.gather(&gradient_at(-h)));
         let differences = ahead.iter().zip(&behind).map(|(a, b)| (*a - *b) / (2.0 * h));
-        let mut turned: Vec<DVec3> = differences.collect();
-        for (members, block) in &self.held {
+        let mut product: Vec<DVec3> = differences.collect();
+        for ContactBlock { members, block } in &self.contacts {
             let across: DVec3 = members.iter().map(|&(i, w)| z[i as usize] * w).sum();
-            members.iter().for_each(|&(i, w)| turned[i as usize] += *block * across * w);
+            members.iter().for_each(|&(i, w)| product[i as usize] += *block * across * w);
         }
-        turned
+        product
     }
 
-    /// As many steps as asked for, by the factor in `solver`; each costs a solve with it and two gradients.
-    pub(crate) fn lanczos(&self, until: Until, solver: &mut Solver) -> Ritz {
+    /// Lanczos' method with the factor in `solver`; a step costs a solve and two gradients.
+    pub(crate) fn lanczos(&self, options: LanczosOptions, solver: &mut Solver) -> Ritz {
         let n = self.layout.order.len();
-        let mut basis = Columns::default();
+        let mut basis = Basis::default();
         let mut scratch = Scratch::default();
-        let mut matrix = Mat::<f64>::zeros(until.steps.min(3 * n), until.steps.min(3 * n));
-        // A start that leans to no side, the same on every machine: multiples of the golden section.
+        let mut matrix = Mat::<f64>::zeros(options.max_steps.min(3 * n), options.max_steps.min(3 * n));
+        // A start without symmetry, the same on every machine: multiples of the golden section.
         let start = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let begin: Vec<DVec3> =
             (0..n).map(|i| DVec3::new(start(3 * i + 1), start(3 * i + 2), start(3 * i + 3))).collect();
         let mut y = solver.lower(&begin);
         let (mut steps, mut before) = (0, 0.0);
         while steps < matrix.nrows() {
-            let whole = dot(&y, &y).sqrt();
-            // Of the last two first, which in exact arithmetic are all there is to take off; then of all, what rounding has left.
+            let norm_before = dot_flat(&y, &y).sqrt();
+            // First against the last two vectors, which suffices in exact arithmetic; then against all, for rounding.
             for first in [steps.saturating_sub(2), 0] {
-                let shares = basis.times(first, &y);
-                basis.less(first, &shares, &mut y);
+                let shares = basis.transposed_times(first, &y);
+                basis.subtract(first, &shares, &mut y);
             }
-            let length = dot(&y, &y).sqrt();
-            // Also where nothing was there.
-            if length.is_nan() || length <= EXHAUSTED * whole {
+            let norm = dot_flat(&y, &y).sqrt();
+            // The norm is NaN where there is no unknown.
+            if norm.is_nan() || norm <= EXHAUSTED * norm_before {
                 break;
             }
-            y.iter_mut().for_each(|y| *y /= length);
-            let turned = self.turned(&solver.upper(&y), &mut scratch);
-            basis.push(std::mem::replace(&mut y, solver.lower(&turned)));
-            // The whole row, not two of its numbers: H is by differences, and only nearly symmetric.
-            for (j, value) in basis.times(0, &y).into_iter().enumerate() {
+            y.iter_mut().for_each(|y| *y /= norm);
+            let product = self.apply(&solver.upper(&y), &mut scratch);
+            basis.push(std::mem::replace(&mut y, solver.lower(&product)));
+            // The whole row instead of its two entries: H comes from differences and is only nearly symmetric.
+            for (j, value) in basis.transposed_times(0, &y).into_iter().enumerate() {
                 matrix[(steps, j)] = value;
                 matrix[(j, steps)] = value;
             }
             steps += 1;
-            if steps % AGAIN == 0 {
-                let lowest = lowest_of(&matrix, steps);
-                let still = |clear: f64| if lowest < clear { SETTLED } else { SURE };
-                if until.clear.is_some_and(|clear| (lowest - before).abs() < still(clear) * before.abs()) {
+            if steps % CHECK_INTERVAL == 0 {
+                let small = matrix.submatrix(0, 0, steps, steps).to_owned();
+                let smallest = small.self_adjoint_eigenvalues(Side::Lower).map_or(0.0, |values| values[0]);
+                let limit = |decisive| if smallest < decisive { DECISIVE_CHANGE } else { INDECISIVE_CHANGE };
+                if options.decisive.is_some_and(|d| (smallest - before).abs() < limit(d) * before.abs()) {
                     break;
                 }
-                before = lowest;
+                before = smallest;
             }
         }
         let small = matrix.submatrix(0, 0, steps, steps).to_owned();
@@ -154,18 +160,12 @@ impl Curved<'_> {
             return Ritz { values: Vec::new(), vectors: vec![vec![DVec3::ZERO; n]] };
         };
         let values: Vec<f64> = (0..steps).map(|i| eigen.S()[i]).collect();
-        let wanted = values.iter().filter(|l| **l < NEGATIVE).count().max(1);
+        let wanted = values.iter().filter(|l| **l < NEGATIVE_CURVATURE).count().max(1);
         let vector = |k: usize| {
             let shares: Vec<f64> = (0..steps).map(|i| eigen.U()[(i, k)]).collect();
-            if k < steps { solver.upper(&basis.sum(&shares)) } else { vec![DVec3::ZERO; n] }
+            if k < steps { solver.upper(&basis.times(&shares)) } else { vec![DVec3::ZERO; n] }
         };
         let vectors = (0..wanted).map(vector).collect();
         Ritz { values, vectors }
     }
-}
-
-/// The lowest λ after so many steps.
-fn lowest_of(matrix: &Mat<f64>, steps: usize) -> f64 {
-    let small = matrix.submatrix(0, 0, steps, steps).to_owned();
-    small.self_adjoint_eigenvalues(Side::Lower).map_or(0.0, |values| values[0])
 }

@@ -1,24 +1,24 @@
-//! Fit: how far the cloth is stretched and how hard it presses on the body, which is what people in try-on look for.
+//! Fit: strain of the cloth and its pressure on the body, the readings of a virtual try-on.
 //!
-//! The strain of a triangle is its largest principal one, σ₁ − 1, σ₁² being the larger eigenvalue of FᵀF, with F the
-//! deformation gradient from the rest shape. A vertex shows the mean of its triangles, weighted by their rest areas. The pressure at a
+//! The strain of a triangle is its largest principal strain, σ₁ − 1, where σ₁² is the larger eigenvalue of FᵀF, and F the
+//! deformation gradient from the rest shape. A vertex has the mean of its triangles, weighted by rest area. The pressure at a
 //! vertex is the contact force κ A (h − q) over its rest area A.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | F | deformation gradient, columns along weft and warp | – |
-//! | ε | largest principal strain | % outside, – inside |
+//! | ε | largest principal strain | % in results, – inside |
 //! | p | contact pressure | kPa |
 //!
-//! Limits: strain that the mesh cannot show (wrinkles finer than an edge) is missing, and so is a negative strain across a
-//! fold. Pressure is that of the penalty at rest; it is smooth over about one edge.
+//! Limits: wrinkles finer than an edge are not resolved, and the negative strain across a fold is not reported. The pressure is that of the
+//! penalty at rest; it is smooth over about one edge.
 
 use glam::DVec3;
 
 use super::energy::{Cloth, Contacts};
 use crate::base::quantiles::nearest_rank;
 
-/// Principal strain above which a result is no garment that could be worn, %: more than fabrics bear.
+/// Principal strain above which a result is not a wearable garment, %: more than fabrics bear.
 pub(crate) const TORN_PERCENT: f64 = 50.0;
 
 /// Strain and pressure per vertex.
@@ -36,7 +36,7 @@ pub struct Fit {
     pub pressure_max_kpa: f64,
 }
 
-/// Measures `cloth` at `x` (m), where it settled against contacts of stiffness κ (N/m³).
+/// Measures `cloth` at rest at `x` (m) on contacts of stiffness κ (N/m³).
 #[must_use]
 pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiffness: f64) -> Fit {
     let mut sum = vec![0.0; x.len()];
@@ -67,7 +67,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
     }
 }
 
-/// Largest singular value of the deformation gradient with these columns, less one.
+/// Largest singular value of the deformation gradient with these columns, minus one.
 #[must_use]
 pub(crate) fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
@@ -82,7 +82,7 @@ mod tests {
     use crate::mesh::samples::cuboid;
 
     #[test]
-    fn a_stretched_sheet_pressed_on_a_table_reads_back() {
+    fn strain_and_pressure_of_a_stretched_sheet_on_a_table_are_those_imposed() {
         let flat = |s: f64, z: f64| {
             let at = |x: f64, y: f64| DVec3::new(s * x, y, z);
             vec![at(-0.1, -0.1), at(0.1, -0.1), at(0.1, 0.1), at(-0.1, 0.1)]

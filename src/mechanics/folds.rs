@@ -1,23 +1,23 @@
-//! Folds that no PART shows: how much more cloth there is than the surface has room for, and in which direction.
+//! Folds that no PART resolves: excess length of the cloth against its surface, and the direction of the excess.
 //!
-//! Where a PART is too wide to fold, tension field theory lets the cloth in it be compressed for next to nothing; what is compressed
-//! would lie in folds. With σ₂ the smaller singular value of a triangle's deformation gradient F, its excess length is 1 − σ₂ where
-//! that is positive, along F v₂ / σ₂: the direction across the folds. A vertex takes the sum over its triangles of the excess times
-//! d dᵀ, by rest area; the largest eigenvalue is its excess, the eigenvector its direction.
+//! Where a PART is too wide to fold, tension field theory lets its cloth be compressed at almost no cost in energy. Compressed cloth
+//! would lie in folds. With σ₂ the smaller singular value of the deformation gradient F of a triangle, its excess length is 1 − σ₂ where
+//! positive, along F v₂ / σ₂: the direction across the folds. A vertex sums the excess times d dᵀ over its triangles, weighted by
+//! rest area; the largest eigenvalue is its excess, the eigenvector its direction.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | F | deformation gradient, columns along weft and warp | – |
-//! | 1 − σ₂ | excess length | % outside, – inside |
-//! | d | direction across the folds, a line, not an arrow | – |
+//! | 1 − σ₂ | excess length | % in results, – inside |
+//! | d | direction across the folds, without a sign | – |
 //!
 //! Source: own, after the wrinkle strain of tension field theory (Roddeman and others: "The wrinkling of membranes", J. Appl. Mech. 54,
-//! 1987). Limits: it says nothing of how deep and how many the folds are; cloth that is held or pressed flat shows none.
+//! 1987). Limits: depth and number of the folds are unknown; cloth that is held or pressed flat shows none.
 
 use glam::{DMat3, DVec3};
 
 use super::energy::Cloth;
-use super::principal::principal;
+use super::linear_algebra::eigen;
 use crate::mesh::outer;
 
 /// Excess length per vertex.
@@ -29,7 +29,7 @@ pub struct Folds {
     pub across: Vec<DVec3>,
 }
 
-/// Reads the folds off `cloth` at `x` (m).
+/// The folds of `cloth` at `x` (m).
 #[must_use]
 pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut sum = vec![DMat3::ZERO; x.len()];
@@ -46,23 +46,23 @@ pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
         if *area <= 0.0 || *tensor == DMat3::ZERO {
             return (0.0, DVec3::ZERO);
         }
-        let (values, vectors) = principal(*tensor * area.recip());
-        let most = (0..3).fold(0, |best, k| if values[k] > values[best] { k } else { best });
-        (100.0 * values[most].max(0.0), vectors[most])
+        let (values, vectors) = eigen(*tensor * area.recip());
+        let largest = (0..3).fold(0, |best, k| if values[k] > values[best] { k } else { best });
+        (100.0 * values[largest].max(0.0), vectors[largest])
     };
     let (excess_percent, across) = sum.iter().zip(&area).map(of_vertex).unzip();
     Folds { excess_percent, across }
 }
 
-/// 1 − σ₂, at least zero, and the unit direction in space that is too long.
+/// 1 − σ₂, at least zero, and its unit direction in space.
 fn excess([fu, fv]: [DVec3; 2]) -> (f64, DVec3) {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
     let least = (0.5 * (a + b) - (0.5 * (a - b)).hypot(c)).max(0.0);
     let excess = (1.0 - least.sqrt()).max(0.0);
-    // (C − σ₂²) v₂ = 0 for C = [[a, c], [c, b]]: of the two rows the longer.
+    // (C − σ₂²) v₂ = 0 for C = [[a, c], [c, b]]; the longer of the two rows is better conditioned.
     let (p, q) = if (a - least).hypot(c) >= c.hypot(b - least) { (-c, a - least) } else { (b - least, -c) };
     let across = (fu * p + fv * q).normalize_or_zero();
-    // Compressed alike in every direction, or to nothing: along the weft.
+    // Equal compression in every direction, or compression to zero: the weft.
     (excess, if across == DVec3::ZERO { fu.normalize_or_zero() } else { across })
 }
 
@@ -71,12 +71,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn excess_is_what_is_too_long_and_lies_across_the_folds() {
+    fn excess_is_one_minus_the_smaller_singular_value_along_its_direction() {
         let (none, _) = excess([DVec3::X * 1.02, DVec3::Y]);
         assert!(none < 1e-12);
         let (excess_along, across) = excess([DVec3::X * 1.1, DVec3::Z * 0.7]);
         assert!((excess_along - 0.3).abs() < 1e-12 && across.dot(DVec3::Z).abs() > 1.0 - 1e-12);
-        // Turned by 45 degrees against the grain: F v = 0.8 v for v = (1, 1)/√2, and (1, −1)/√2 keeps its length.
+        // At 45 degrees to the grain: F v = 0.8 v for v = (1, 1)/√2, and (1, −1)/√2 keeps its length.
         let turned = excess([DVec3::new(0.9, -0.1, 0.0), DVec3::new(-0.1, 0.9, 0.0)]);
         assert!((turned.0 - 0.2).abs() < 1e-12);
         assert!(turned.1.dot(DVec3::new(1.0, 1.0, 0.0).normalize()).abs() > 1.0 - 1e-12);

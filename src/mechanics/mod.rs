@@ -1,13 +1,12 @@
-//! Mechanics: what moves the PARTs and the cloth.
+//! Stage two: the motion of PARTs and cloth under gravity, the body and their own stiffness.
 
-mod columns;
 pub mod coupled;
 pub(crate) mod curvature;
 pub mod energy;
 pub mod fit;
 pub mod folds;
+pub(crate) mod linear_algebra;
 pub(crate) mod newton;
 pub mod paper;
-pub(crate) mod principal;
 pub mod reactions;
 pub mod refine;

@@ -1,14 +1,13 @@
-//! Forces of a drape from its positions alone, and what no reaction of the body could balance.
+//! Forces of a drape from its positions alone: the residual that no reaction of body, cloth and friction can balance.
 //!
-//! With g = ∇E of gravity, membrane and bending, a vertex rests where something gives it the reaction R = g. A held vertex is given any.
-//! One that touches the body is given what lies in Coulomb's cone,
+//! With g = ∇E of gravity, membrane and bending, a vertex is in equilibrium where a reaction R = g acts on it. A held vertex admits any
+//! reaction. A vertex that touches the body admits those in Coulomb's cone,
 //!
 //! K = { R : R·n ≥ 0, |R − (R·n) n| ≤ μ_f R·n },
 //!
-//! and the nearest such force is P(R), R's projection on K. Where cloth touches cloth, the two places are given opposite forces of the same
-//! kind, shared among their corners; then the reactions are those that leave least, one cone after the other (block coordinate descent,
-//! exact in every step). What is left is the residual force r: zero if and only if reactions that body, cloth and friction can give hold
-//! every vertex where it is.
+//! and its reaction is the projection of g on K. Where cloth touches cloth, the two places receive opposite forces from such a
+//! cone, distributed to their corners. The reactions minimise the residual, by block coordinate descent: one cone after the other,
+//! exact in each step. The residual force r is zero if and only if admissible reactions hold every vertex in its place.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -17,211 +16,196 @@
 //! | μ_f | friction coefficient | – |
 //!
 //! Source: the projection on a second-order cone in closed form (Parikh and Boyd: "Proximal algorithms", 2014, section 6.3.2). Limits:
-//! a vertex touches within `TOUCHING` of the distance that the cloth keeps, which is the mesh's own and changes with its strain.
+//! a vertex touches within [`TOUCH_MARGIN_M`] of its offset, which depends on the mesh and changes with its strain.
 
 use glam::DVec3;
 
-use super::energy::contact::Touch;
-use super::energy::proximity::touching_between;
-use super::energy::{Cloth, Contacts, Friction};
-use super::newton::norm;
+use super::energy::{Cloth, Contacts, Touch, touching_places};
+use super::linear_algebra::norm;
 use crate::body::distance::Body;
 
-/// Within this of the distance that the cloth keeps a vertex counts as touching, m: a strain of a few percent changes that distance by a
-/// tenth of a millimetre.
-const TOUCHING: f64 = 2e-4;
+/// Distance beyond its offset up to which a vertex touches, m: a strain of a few percent changes the offset by a tenth of a millimetre.
+const TOUCH_MARGIN_M: f64 = 2e-4;
 
-/// A place between vertices counts as touching where it is nearer than it would keep by itself and this, m: it is kept farther off where the
-/// body is rougher than that (`energy::cover`).
-const BETWEEN_TOUCHING: f64 = 5e-4;
+/// The same for a place inside a triangle, m. The solver raises the offset of such places where the body is rougher than that.
+const PLACE_MARGIN_M: f64 = 5e-4;
 
-/// Turns in which reactions are given, at most, and the change of all of them, over the weight, that ends it.
-const TURNS: usize = 3000;
-const SETTLED: f64 = 1e-7;
+/// Most sweeps over all cones. Heuristic.
+const MAX_SWEEPS: usize = 3000;
 
-/// Share of μN from which a vertex counts as about to slip.
-const SLIPPING: f64 = 0.999;
+/// Total change of all reactions in a sweep, over the weight, that ends the iteration. Heuristic.
+const SWEEP_TOLERANCE: f64 = 1e-7;
 
-/// A place of the cloth that touches the body or another place of it, and what it is given there.
+/// Share of μN below which a reaction sticks.
+const STICKING_SHARE: f64 = 0.999;
+
+/// Share of force and residual above which a reaction of the body is counted as insufficient.
+const INSUFFICIENT_SHARE: f64 = 0.01;
+
+/// A place of the cloth that touches the body or another place of the cloth, and the force there.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Touching {
-    /// The vertices that the reaction goes to, with their shares: one on the body, up to three of a place between, up to four of a gap of the
+pub struct Reaction {
+    /// The vertices that the force acts on, with their shares: one on the body, up to three of a place in a triangle, up to four of a gap of the
     /// cloth with itself.
     pub shares: Vec<(u32, f64)>,
-    /// Unit normal that the reaction pushes along.
+    /// Unit normal of the contact.
     pub normal: DVec3,
-    /// How fast it grows as they come nearer, N/m.
+    /// Contact stiffness, N/m.
     pub stiffness: f64,
-    /// The reaction R, N.
-    pub reaction: DVec3,
+    /// The force R, N.
+    pub force: DVec3,
     /// Its normal part, N.
     pub normal_n: f64,
-    /// μ_f there.
+    /// μ_f.
     pub friction: f64,
-    /// Whether friction has something left.
+    /// Whether friction is below its limit.
     pub sticks: bool,
-    /// Whether it is the body that gives it.
+    /// Whether the body exerts the force.
     pub of_body: bool,
+}
+
+impl Reaction {
+    /// A reaction of zero.
+    fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, friction: f64, of_body: bool) -> Self {
+        Self { shares, normal, stiffness, force: DVec3::ZERO, normal_n: 0.0, friction, sticks: false, of_body }
+    }
 }
 
 /// All forces of a drape.
 #[derive(Debug, Clone)]
 pub struct Forces {
     /// r of each vertex, N; zero where it is held.
-    pub rest: Vec<DVec3>,
+    pub residual_forces: Vec<DVec3>,
     /// ‖r‖₂, N.
     pub residual: f64,
-    /// Sum of all reactions less the weight, N.
+    /// Sum of all reactions minus the weight, N.
     pub unbalanced: DVec3,
-    /// What the body gives, N.
+    /// Sum of the reactions of the body, N.
     pub carried: DVec3,
-    /// What held vertices are given, N.
+    /// Sum of the reactions at held vertices, N.
     pub held: DVec3,
-    /// ‖r‖₂ over the touching vertices, N: friction beyond its cone, and pull towards the body.
-    pub beyond: f64,
-    /// Touching vertices with more of it than a hundredth of what they are given.
-    pub beyond_count: usize,
-    /// Where it touches: vertices on the body ascending, places between them, then the cloth's gaps with itself.
-    pub touching: Vec<Touching>,
+    /// ‖r‖₂ over the touching vertices, N: friction beyond the cone, and adhesion.
+    pub touching_residual: f64,
+    /// Number of reactions of the body whose residual exceeds a hundredth of the total force there.
+    pub insufficient: usize,
+    /// The reactions: vertices on the body ascending, places inside triangles, then the gaps of the cloth with itself.
+    pub reactions: Vec<Reaction>,
 }
 
 impl Forces {
-    /// Of `cloth` on `body` with its vertices at `x` (m).
+    /// The forces of `cloth` on `body` at `x` (m).
     #[must_use]
     pub fn new(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
-        // The reaction of what is held is its own gradient, which a cloth leaves out.
-        let mut loose = cloth.clone();
-        loose.held = vec![false; x.len()];
-        let mut gradient = Vec::new();
-        loose.gradient(x, &Contacts::none(), &mut gradient);
-        let mut forces = Self {
-            rest: gradient,
-            residual: 0.0,
-            unbalanced: DVec3::NEG_Z * cloth.weight,
-            carried: DVec3::ZERO,
-            held: DVec3::ZERO,
-            beyond: 0.0,
-            beyond_count: 0,
-            touching: touching(cloth, body, x),
-        };
-        for (rest, _) in forces.rest.iter_mut().zip(&cloth.held).filter(|(_, held)| **held) {
-            forces.held += std::mem::take(rest);
+        // The gradient of a cloth is zero at held vertices; their reactions are the gradient with nothing held.
+        let mut free = cloth.clone();
+        free.held = vec![false; x.len()];
+        let mut residual_forces = Vec::new();
+        free.gradient(x, &Contacts::none(), &mut residual_forces);
+        let mut held = DVec3::ZERO;
+        for (force, _) in residual_forces.iter_mut().zip(&cloth.held).filter(|(_, held)| **held) {
+            held += std::mem::take(force);
         }
-        grant(&mut forces.touching, &mut forces.rest, cloth);
-        forces.residual = norm(&forces.rest);
-        let mut met = vec![false; x.len()];
-        for touching in &forces.touching {
-            for (v, _) in &touching.shares {
-                met[*v as usize] = true;
+        let mut reactions = contacts_at(cloth, body, x);
+        solve_reactions(&mut reactions, &mut residual_forces, cloth);
+        let (mut carried, mut insufficient) = (DVec3::ZERO, 0);
+        let mut touches = vec![false; x.len()];
+        for reaction in &reactions {
+            for (v, _) in &reaction.shares {
+                touches[*v as usize] = true;
             }
-            if touching.of_body {
-                forces.carried += touching.reaction;
-                let rest = touching.shares.iter().map(|(v, _)| forces.rest[*v as usize].length()).fold(0.0, f64::max);
-                forces.beyond_count += usize::from(rest > 0.01 * (touching.reaction.length() + rest));
+            if reaction.of_body {
+                carried += reaction.force;
+                let left =
+                    reaction.shares.iter().map(|(v, _)| residual_forces[*v as usize].length()).fold(0.0, f64::max);
+                insufficient += usize::from(left > INSUFFICIENT_SHARE * (reaction.force.length() + left));
             }
         }
-        let beyond = forces.rest.iter().zip(met).filter(|(_, met)| *met).map(|(r, _)| r.length_squared());
-        forces.beyond = beyond.sum::<f64>().sqrt();
-        forces.unbalanced += forces.carried + forces.held;
-        forces
+        let touching = residual_forces.iter().zip(touches).filter(|(_, touches)| *touches);
+        let touching_residual = touching.map(|(r, _)| r.length_squared()).sum::<f64>().sqrt();
+        let unbalanced = DVec3::NEG_Z * cloth.weight + (carried + held);
+        let residual = norm(&residual_forces);
+        Self { residual_forces, residual, unbalanced, carried, held, touching_residual, insufficient, reactions }
     }
 }
 
-/// Gives all places what leaves least of `rest` (N): each in turn what lies nearest in its cone, as long as that changes anything. One turn
-/// is enough where no two share a vertex.
-fn grant(touching: &mut [Touching], rest: &mut [DVec3], cloth: &Cloth) {
-    for touching in &*touching {
-        let free = touching.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
-        free.for_each(|(v, w)| rest[*v as usize] -= touching.reaction * *w);
+/// Minimises the residual forces (N) over the reactions, by sweeps over their cones. One sweep suffices if no two share a vertex.
+fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cloth: &Cloth) {
+    for reaction in &*reactions {
+        let free = reaction.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
+        free.for_each(|(v, w)| residual_forces[*v as usize] -= reaction.force * *w);
     }
-    for _ in 0..TURNS {
+    for _ in 0..MAX_SWEEPS {
         let mut changed = 0.0;
-        for touching in &mut *touching {
-            let free = || touching.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
+        for reaction in &mut *reactions {
+            let free = || reaction.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
             let squares: f64 = free().map(|(_, w)| w * w).sum();
             if squares <= 0.0 {
                 continue;
             }
-            let left: DVec3 = free().map(|(v, w)| rest[*v as usize] * *w).sum();
-            let given = within_cone(touching.reaction + left / squares, touching.normal, touching.friction);
-            let more = given - touching.reaction;
+            let left: DVec3 = free().map(|(v, w)| residual_forces[*v as usize] * *w).sum();
+            let force = project_on_cone(reaction.force + left / squares, reaction.normal, reaction.friction);
+            let change = force - reaction.force;
             for (v, w) in free() {
-                rest[*v as usize] -= more * *w;
+                residual_forces[*v as usize] -= change * *w;
             }
-            touching.reaction = given;
-            changed += more.length();
+            reaction.force = force;
+            changed += change.length();
         }
-        if changed <= SETTLED * cloth.weight {
+        if changed <= SWEEP_TOLERANCE * cloth.weight {
             break;
         }
     }
-    for touching in touching {
-        touching.normal_n = touching.reaction.dot(touching.normal);
-        let across = touching.reaction - touching.normal * touching.normal_n;
-        touching.sticks = across.length() < SLIPPING * touching.friction * touching.normal_n;
+    for reaction in reactions {
+        reaction.normal_n = reaction.force.dot(reaction.normal);
+        let tangential = reaction.force - reaction.normal * reaction.normal_n;
+        reaction.sticks = tangential.length() < STICKING_SHARE * reaction.friction * reaction.normal_n;
     }
 }
 
-/// Takes from `rest` (N) what the cloth can give itself at `x`, and the body where it keeps vertices farther off than `contacts`, which have
-/// pushed already, know of.
-pub(crate) fn grant_beside(cloth: &Cloth, body: &Body, contacts: &Contacts<'_>, x: &[DVec3], rest: &mut [DVec3]) {
+/// Reduces `residual_forces` (N), which contain the forces of `contacts`, by the reactions that `contacts` miss: those of the cloth with itself,
+/// of places inside triangles, and of vertices that the body keeps farther off.
+pub(crate) fn solve_remaining_reactions(
+    cloth: &Cloth,
+    body: &Body,
+    contacts: &Contacts<'_>,
+    x: &[DVec3],
+    residual_forces: &mut [DVec3],
+) {
     let mut pushed = vec![false; x.len()];
     contacts.touches().iter().for_each(|t| pushed[t.vertex as usize] = true);
-    let mut beside = touching(cloth, body, x);
-    beside.retain(|t| !t.of_body || t.shares.len() > 1 || !pushed[t.shares[0].0 as usize]);
-    grant(&mut beside, rest, cloth);
+    let mut reactions = contacts_at(cloth, body, x);
+    reactions.retain(|r| !r.of_body || r.shares.len() > 1 || !pushed[r.shares[0].0 as usize]);
+    solve_reactions(&mut reactions, residual_forces, cloth);
 }
 
-/// Where the cloth touches the body at `x`, and then where it touches itself.
-fn touching(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Touching> {
-    let stiffness = cloth.contact_stiffness();
-    let offsets: Vec<f64> = cloth.offsets.iter().map(|offset| offset + TOUCHING).collect();
-    let mut contacts = Contacts::new(body, [&cloth.areas, &offsets], &cloth.held, stiffness, Friction::none());
+/// Contacts of the cloth with the body at `x`, then with itself, before their reactions are solved.
+fn contacts_at(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
+    let mut contacts = cloth.new_contacts(body).with_margin(TOUCH_MARGIN_M);
     contacts.update(x);
-    let at_body = |t: &Touch| Touching {
-        of_body: true,
-        ..Touching::at(
-            vec![(t.vertex, 1.0)],
-            t.normal.normalize_or_zero(),
-            t.stiffness,
-            cloth.friction[t.vertex as usize],
-        )
+    let of_vertex = |t: &Touch| {
+        let friction = cloth.friction[t.vertex as usize];
+        Reaction::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, friction, true)
     };
-    let mut all: Vec<Touching> = contacts.touches().iter().map(at_body).collect();
-    for (corners, shares, normal) in touching_between(cloth, body, x, BETWEEN_TOUCHING) {
-        let mean = |of: &[f64]| corners.iter().zip(shares).map(|(&v, w)| of[v as usize] * w).sum::<f64>();
-        let (stiffness, friction) = (stiffness * mean(&cloth.areas), mean(&cloth.friction));
-        let shares = corners.into_iter().zip(shares).filter(|(_, w)| *w > 0.0).collect();
-        all.push(Touching { of_body: true, ..Touching::at(shares, normal, stiffness, friction) });
+    let mut all: Vec<Reaction> = contacts.touches().iter().map(of_vertex).collect();
+    for place in touching_places(&cloth.triangles, &cloth.thickness, body, x, PLACE_MARGIN_M) {
+        let shares = || place.corners.into_iter().zip(place.shares);
+        let mean = |of: &[f64]| shares().map(|(v, w)| of[v as usize] * w).sum::<f64>();
+        let (stiffness, friction) = (contacts.stiffness() * mean(&cloth.areas), mean(&cloth.friction));
+        all.push(Reaction::at(shares().filter(|(_, w)| *w > 0.0).collect(), place.normal, stiffness, friction, true));
     }
-    let mut itself = cloth.proximity();
-    itself.refresh(x);
-    let gaps = itself.gaps().filter(|gap| gap.depth(x) > -TOUCHING);
-    // What the solver's law pushes with is near to what is needed.
-    all.extend(gaps.map(|gap| Touching {
-        reaction: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
-        ..Touching::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction))
+    let mut proximity = cloth.proximity();
+    proximity.refresh_with(x, Vec::new());
+    let gaps = proximity.gaps().filter(|gap| gap.depth(x) > -TOUCH_MARGIN_M);
+    // The force of the penalty is a good start.
+    all.extend(gaps.map(|gap| Reaction {
+        force: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
+        ..Reaction::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction), false)
     }));
     all
 }
 
-impl Touching {
-    fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, friction: f64) -> Self {
-        Self {
-            shares,
-            normal,
-            stiffness,
-            reaction: DVec3::ZERO,
-            normal_n: 0.0,
-            friction,
-            sticks: false,
-            of_body: false,
-        }
-    }
-}
-
-/// The force nearest to `needed` that a body with normal `n` and friction μ can give.
-fn within_cone(needed: DVec3, n: DVec3, friction: f64) -> DVec3 {
+/// The projection of `needed` on Coulomb's cone about `n` with friction μ.
+fn project_on_cone(needed: DVec3, n: DVec3, friction: f64) -> DVec3 {
     let normal = needed.dot(n);
     let tangential = needed - n * normal;
     let t = tangential.length();
@@ -231,8 +215,8 @@ fn within_cone(needed: DVec3, n: DVec3, friction: f64) -> DVec3 {
     if friction * t <= -normal || t == 0.0 {
         return DVec3::ZERO;
     }
-    let given = (normal + friction * t) / (1.0 + friction * friction);
-    n * given + tangential * (friction * given / t)
+    let projected = (normal + friction * t) / (1.0 + friction * friction);
+    n * projected + tangential * (friction * projected / t)
 }
 
 #[cfg(test)]
@@ -245,17 +229,17 @@ mod tests {
     }
 
     proptest! {
-        /// Moreau: R = P + r with P in the cone, r in its polar, and the two at right angles.
+        /// Moreau's decomposition: R = P + r with P in the cone, r in its polar cone, and the two orthogonal.
         #[test]
-        fn what_is_given_and_what_is_left_are_at_right_angles(needed in vector(), n in vector(), friction in 0.0..1.5f64) {
+        fn projection_and_remainder_are_orthogonal(needed in vector(), n in vector(), friction in 0.0..1.5f64) {
             prop_assume!(n.length() > 0.1);
             let n = n.normalize();
-            let given = within_cone(needed, n, friction);
-            let left = needed - given;
-            prop_assert!(given.dot(left).abs() < 1e-12);
-            let normal = given.dot(n);
-            prop_assert!(normal >= -1e-12 && (given - n * normal).length() <= friction * normal + 1e-12);
-            let (away, along) = (left.dot(n), (left - n * left.dot(n)).length());
+            let projection = project_on_cone(needed, n, friction);
+            let remainder = needed - projection;
+            prop_assert!(projection.dot(remainder).abs() < 1e-12);
+            let normal = projection.dot(n);
+            prop_assert!(normal >= -1e-12 && (projection - n * normal).length() <= friction * normal + 1e-12);
+            let (away, along) = (remainder.dot(n), (remainder - n * remainder.dot(n)).length());
             prop_assert!(friction * along <= -away + 1e-9, "{away} {along}");
         }
     }

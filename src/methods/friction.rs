@@ -22,7 +22,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::mechanics::energy::contact::Touch;
+use crate::mechanics::energy::Touch;
 use crate::mechanics::energy::friction::ELASTIC_SLIP;
 use crate::mesh::outer;
 

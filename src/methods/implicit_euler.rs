@@ -25,7 +25,7 @@ use super::method::{
 };
 use crate::GRAVITY;
 use crate::mechanics::energy::Contacts;
-use crate::mechanics::energy::contact::Touch;
+use crate::mechanics::energy::Touch;
 
 /// Time step, damping and accuracy of the integration.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::garment::fabric::Fabric;
-use crate::mechanics::energy::contact::Touch;
+use crate::mechanics::energy::Touch;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::TriMesh;
 use crate::scene::Scene;

@@ -15,8 +15,7 @@ mod starts;
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec3};
-use partwise::GRAVITY;
+use glam::DVec3;
 use partwise::body::distance::Body;
 use partwise::drape::{Settings, drape, unobserved};
 use partwise::garment::fabric::Fabric;
@@ -81,107 +80,6 @@ fn rests(mesh: &TriMesh, held: &[u32], body: Option<&Body>, start: Vec<DVec3>) -
     assert_eq!(end.stop, Stop::Converged, "after {} steps: {}", end.steps, end.residual_over_weight);
     assert_eq!(crossings(mesh, &end.positions), 0);
     end
-}
-
-/// Two sheets that were placed apart and are half an offset apart now, all vertices a little off their places.
-fn near_sheets() -> (Cloth, Vec<DVec3>) {
-    let lower = sheet(6, 6, DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01);
-    let upper =
-        sheet(5, 5, DVec3::new(0.004, 0.003, 6e-3), DVec3::new(0.01, 0.001, 0.0), DVec3::new(-0.001, 0.01, 0.0));
-    let mesh = both(lower, upper);
-    let cloth = cloth(&mesh, &[0]);
-    let off = |i: usize| DVec3::new((1.3 * i as f64).sin(), (2.1 * i as f64).sin(), (0.7 * i as f64).sin()) * 1e-4;
-    let down = |i: usize| if i < 49 { DVec3::ZERO } else { DVec3::NEG_Z * 5.5e-3 };
-    let x = mesh.positions.iter().enumerate().map(|(i, p)| *p + off(i) + down(i)).collect();
-    (cloth, x)
-}
-
-#[test]
-fn the_gradient_is_that_of_the_energy() {
-    let (cloth, x) = near_sheets();
-    let mut contacts = Contacts::none();
-    contacts.proximity = Some(cloth.proximity());
-    contacts.refresh(&x);
-    // Slip and go on, so that friction has something to say.
-    let x: Vec<DVec3> =
-        x.iter().enumerate().map(|(i, p)| if i < 49 { *p } else { *p + DVec3::new(2e-4, 1e-4, -1e-4) }).collect();
-    let pressing = contacts.proximity.as_ref().unwrap().pressing(&x);
-    assert!(pressing > 50, "{pressing}");
-    let energy = |x: &[DVec3]| cloth.energy(x, &contacts) - cloth.energy(x, &Contacts::none());
-    let (mut with, mut without) = (Vec::new(), Vec::new());
-    cloth.gradient(&x, &contacts, &mut with);
-    cloth.gradient(&x, &Contacts::none(), &mut without);
-    let largest = with.iter().zip(&without).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-    let step = 1e-8;
-    for v in [1, 17, 24, 30, 52, 60, 70, 83] {
-        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            let at = |s: f64| {
-                let mut x = x.clone();
-                x[v] += axis * s;
-                energy(&x)
-            };
-            let slope = (at(step) - at(-step)) / (2.0 * step);
-            let told = (with[v] - without[v]).dot(axis);
-            assert!((slope - told).abs() < 1e-5 * largest, "vertex {v}: {slope} and {told}");
-        }
-    }
-    // What one side is given the other is given too; the held vertex takes its share away.
-    let sum: DVec3 = with.iter().zip(&without).skip(1).map(|(a, b)| *a - *b).sum();
-    assert!(sum.length() < largest, "{sum}");
-}
-
-#[test]
-fn own_blocks_are_those_of_the_gradients_change() {
-    let (cloth, x) = near_sheets();
-    let mut contacts = Contacts::none();
-    contacts.proximity = Some(cloth.proximity());
-    contacts.refresh(&x);
-    let (mut with, mut without) = (Vec::new(), Vec::new());
-    cloth.hessian(&x, &contacts, &mut with);
-    cloth.hessian(&x, &Contacts::none(), &mut without);
-    let force = |x: &[DVec3], v: usize| {
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        cloth.gradient(x, &contacts, &mut a);
-        cloth.gradient(x, &Contacts::none(), &mut b);
-        a[v] - b[v]
-    };
-    let step = 1e-9;
-    for (i, &v) in cloth.order().iter().enumerate().step_by(7) {
-        let block = cloth.pattern().starts[i] as usize;
-        let told = with[block] - without[block];
-        let column = |axis: DVec3| {
-            let at = |s: f64| {
-                let mut x = x.clone();
-                x[v as usize] += axis * s;
-                force(&x, v as usize)
-            };
-            (at(step) - at(-step)) / (2.0 * step)
-        };
-        let measured = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
-        let off = (told - measured).to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
-        let scale = told.to_cols_array().into_iter().map(f64::abs).fold(1.0, f64::max);
-        assert!(off < 1e-4 * scale, "vertex {v}: {told} and {measured}");
-    }
-}
-
-#[test]
-fn of_two_sheets_on_a_plate_the_lower_carries_the_upper() {
-    let h = 0.01;
-    let lower = sheet(10, 10, DVec3::new(-0.05, -0.05, 0.003), DVec3::X * h, DVec3::Y * h);
-    let upper = sheet(8, 8, DVec3::new(-0.04, -0.043, 0.006), DVec3::X * h, DVec3::Y * h);
-    let mesh = both(lower, upper);
-    let (body, cloth) = (plate(), cloth(&mesh, &[]));
-    let end = rests(&mesh, &[], Some(&body), mesh.positions.clone());
-    let mut contacts = cloth.contacts(&body, &end.positions);
-    contacts.stiffen(end.contact_stiffness / contacts.stiffness());
-    contacts.proximity = Some(cloth.proximity());
-    contacts.update(&end.positions);
-    contacts.refresh(&end.positions);
-    let carried: f64 = contacts.touches().iter().map(|t| t.force() * t.normal.z).sum();
-    assert!((carried - cloth.weight).abs() < 0.01 * cloth.weight, "{carried} of {} N", cloth.weight);
-    let upper_weight = GRAVITY * cloth.masses[121..].iter().sum::<f64>();
-    let between: f64 = contacts.proximity.as_ref().unwrap().forces(&end.positions).map(|f| f.z.abs()).sum();
-    assert!((between - upper_weight).abs() < 0.03 * upper_weight, "{between} of {upper_weight} N");
 }
 
 #[test]

@@ -99,14 +99,14 @@ impl Tangent for Reduced {
         let Self { solver, layout, blocks, undamped, unknowns, .. } = self;
         let (solved, ()) = rayon::join(
             || solver.solve(&layout.pattern, blocks, undamped, true, unknowns),
-            || here.cloth.own_blocks(here.x, here.contacts, here.damping, own),
+            || here.cloth.diagonal_blocks(here.x, here.contacts, here.damping, own),
         );
         solved?;
         self.motions.prolong(here.x, &self.unknowns, d);
         Ok(())
     }
 
-    fn pause(&mut self) -> bool {
+    fn fall_back(&mut self) -> bool {
         false
     }
 }

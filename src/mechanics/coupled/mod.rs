@@ -2,7 +2,7 @@
 //!
 //! Each PART moves by an affine map, blended over the seams ([`Motions`]): these maps are the unknowns, and the energy is the very one of
 //! [`energy`](super::energy) over all vertices, with its gravity (the paper's F⁰), its contact and friction (F¹) and the pull of the
-//! cloth (F²). What compresses a PART too wide to fold is taken up by folds finer than it (`slack.rs`), so a ring of a skirt falls as the
+//! cloth (F²). What compresses a PART too wide to fold is taken up by folds finer than it (`folding.rs`), so a ring of a skirt falls as the
 //! skirt does, without the folds. Newton's method in the unknowns (`hessian.rs`) with relaxed steps (`mechanics::newton`)
 //! lowers the energy until the steps are short: then Bᵀ∇E = 0, which says that forces and moments balance on every PART.
 //!
@@ -20,10 +20,10 @@
 
 mod clearance;
 mod elements;
+mod folding;
 mod hessian;
 mod motions;
 mod options;
-mod slack;
 mod sums;
 mod weights;
 
@@ -34,14 +34,15 @@ use glam::DVec3;
 
 use clearance::NEAR;
 pub use clearance::push_out;
+pub use folding::Folding;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
-pub use slack::Folding;
 pub use weights::Weights;
 
-use super::energy::{Cloth, Contacts, gravity};
+use super::energy::{Cloth, Contacts};
 use super::newton::{NewtonState, StepLimits};
 use super::refine::Record;
+use crate::GRAVITY;
 use crate::body::distance::Body;
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
@@ -125,15 +126,15 @@ pub(crate) fn solve_given(
     let began = Instant::now();
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
     let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion));
-    let loose = cloth.clone().with_slack(slack::shares(mesh, parts, cloth));
+    let loose = cloth.clone().with_compression_ratios(folding::compression_ratios(mesh, parts, cloth));
     // What is laid flat hangs no less for that: without a height its cloth would be as soft as air, and stretch over any head.
     let height = mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT * (high - low).max_element()));
     let soft = loose.softened(height, options.soft_strain).unwrap_or(loose);
     let setup = began.elapsed();
 
     let began = Instant::now();
-    let contacts = soft.contacts_knowing(body, start, true, &mesh.positions, given.distance_m.iter().copied());
-    let mut descent = NewtonState::new(&soft, contacts, start.to_vec(), options.damping).relaxed_to(RELAXED);
+    let contacts = soft.contacts_from_distances(body, start, true, &mesh.positions, given.distance_m.iter().copied());
+    let mut descent = NewtonState::new(&soft, contacts, start.to_vec(), options.damping).with_relaxation_end(RELAXED);
     let history = settle(&mut descent, &mut tangent, given, options, onlooker)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
@@ -175,11 +176,11 @@ fn settle(
     options: &CoupledOptions,
     onlooker: Onlooker<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
-    let pace =
+    let limits =
         StepLimits { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
     let mut history = vec![descent.record(0, None, true)];
     for iteration in 1..=options.max_steps {
-        let advance = descent.advance(tangent, pace)?;
+        let advance = descent.advance(tangent, limits)?;
         history.push(descent.record(iteration, Some(advance), true));
         if onlooker(&descent.x).is_break() {
             return Err(CoupledError::Interrupted);
@@ -206,8 +207,7 @@ fn balance(descent: &NewtonState<'_, '_>, parts: &Parts) -> Vec<PartResult> {
     let (cloth, x, contacts) = (descent.cloth, &descent.x, &descent.contacts);
     let mut all = Vec::new();
     cloth.gradient(x, &Contacts::none(), &mut all);
-    let mut weight = vec![DVec3::ZERO; x.len()];
-    gravity::add_gradient(&cloth.masses, &mut weight);
+    let weight = |v: usize| DVec3::new(0.0, 0.0, cloth.masses[v] * GRAVITY);
     let mut reaction = vec![DVec3::ZERO; x.len()];
     contacts.add_gradient(&mut reaction);
     contacts.friction.add_gradient(x, &mut reaction);
@@ -216,9 +216,9 @@ fn balance(descent: &NewtonState<'_, '_>, parts: &Parts) -> Vec<PartResult> {
         let reaction = -over(&|v| reaction[v]);
         PartResult {
             displacement: DVec3::ZERO,
-            gravity: -over(&|v| weight[v]),
+            gravity: -over(&weight),
             reaction,
-            pull: over(&|v| if cloth.held[v] { DVec3::ZERO } else { weight[v] - all[v] }),
+            pull: over(&|v| if cloth.held[v] { DVec3::ZERO } else { weight(v) - all[v] }),
             resultant: reaction.length(),
             in_contact: reaction != DVec3::ZERO,
             held: part.vertices.iter().any(|&v| cloth.held[v as usize]),

@@ -22,8 +22,8 @@ use super::options::Motion;
 use super::weights::Weights;
 use crate::base::simd::{Four, Lanes, Pack, Vectors};
 use crate::mechanics::energy::sparsity::Pattern;
+use crate::mechanics::linear_algebra::eigen;
 use crate::mechanics::newton::{SolveError, Solver};
-use crate::mechanics::principal::principal;
 use crate::mesh::{each_once, outer};
 use crate::parts::Parts;
 
@@ -138,7 +138,7 @@ impl Motions {
         for (((axes, spread), sum), _) in
             self.axes.iter_mut().zip(spread).zip(sum).zip(&self.count).filter(|(_, count)| **count == 4)
         {
-            let (squares, directions) = principal(spread * sum.max(f64::MIN_POSITIVE).recip());
+            let (squares, directions) = eigen(spread * sum.max(f64::MIN_POSITIVE).recip());
             let lengths = squares.map(|s| s.max(0.0).sqrt());
             let least = (FLATTEST * lengths.iter().copied().fold(0.0, f64::max)).max(LEAST_SPREAD);
             for ((axis, direction), length) in axes.iter_mut().zip(directions).zip(lengths) {

@@ -16,6 +16,7 @@ use glam::{DMat3, DVec3};
 use super::elements::Elements;
 use super::motions::Functions;
 use crate::base::simd::{Four, Lanes, Pack, Work, run};
+use crate::mechanics::energy::HessianKind;
 use crate::mechanics::newton::State;
 
 /// What is summed.
@@ -102,7 +103,8 @@ fn triangles<L: Lanes>(
     for k in sampled {
         let (i, standing_for) = all.sampled[k];
         let t = &cloth.triangles[i as usize];
-        let [huu, huv, hvv] = t.by_gradient(cloth.stiffness_of(t), cloth.slack[i as usize], x, false);
+        let [huu, huv, hvv] =
+            t.by_gradient(cloth.stiffness_of(t), cloth.compression_ratios[i as usize], x, HessianKind::Projected);
         let scale = t.area * standing_for;
         let h = [huu * scale, huv * scale, huv.transpose() * scale, hvv * scale];
         gradients.clear();

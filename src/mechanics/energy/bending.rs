@@ -8,14 +8,14 @@
 //! is a thin plate's energy whose stiffness towards weft, bias and warp is the measured B_u, B_45, B_v: exact for a
 //! cylinder in any direction on any mesh. It is quadratic in x (as in Bergou, Wardetzky, Harmon, Zorin, Grinspun: "A quadratic
 //! bending model for inextensible surfaces", SGP 2006), so its Hessian is constant: a scalar per pair of vertices. One
-//! hinge per edge would be cheaper, but bends up to three times too stiffly, by how the edges happen to run.
+//! hinge per edge would be cheaper, but is up to three times too stiff, depending on the direction of the edges.
 //!
-//! A triangle without an inner vertex (a corner, a belt one triangle wide) is in no ring; its edges take a hinge,
+//! A triangle without an inner vertex (a corner, a belt one triangle wide) is in no ring; each of its edges has a hinge,
 //! ½ 2B/(A₀ + A₁) |Σ c_i x_i|² with the cotangent weights c_i of the same paper and the factor that a mesh of equilateral
 //! triangles needs.
 //!
-//! Where fabrics meet, a ring or hinge has their mean by area: exact along the seam; across it, where the softer side would take more of
-//! the bend, an upper bound, as a seam with its allowances is stiffer than the cloth beside it.
+//! Where fabrics meet, a ring or hinge has their mean by area. Along the seam this is exact. Across it, where the softer side would bend
+//! more, it is an upper bound; a real seam with its allowances is stiffer than the cloth beside it, too.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -28,26 +28,25 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::bending_matrix::Plate;
-use super::fit::second_derivatives;
-use super::vertex_ring::Fan;
+use super::bending_matrix::BendingMatrix;
+use super::vertex_ring::VertexRing;
 use crate::garment::fabric::Fabric;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
-/// A floor for H as a share of B_u + B_v: a saddle always costs something.
-const LEAST_TWIST: f64 = 0.1;
+/// Least H as a share of B_u + B_v, so that a saddle has a positive energy. Heuristic.
+const MIN_TWIST: f64 = 0.1;
 
-/// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum.
+/// All bending elements of a cloth, as rows of weights over a few vertices each, and their sum as a matrix.
 #[derive(Debug, Clone, Default)]
-pub struct Bending {
+pub(crate) struct Bending {
     elements: Vec<Element>,
     vertices: Vec<u32>,
     weights: Vec<DVec3>,
-    /// All of them summed up.
-    pub(super) plate: Plate,
+    /// The sum of all elements.
+    pub(super) matrix: BendingMatrix,
 }
 
-/// One ring or hinge: its part of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
+/// One ring or hinge: its range of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
 #[derive(Debug, Clone, Copy)]
 struct Element {
     start: u32,
@@ -56,17 +55,17 @@ struct Element {
 }
 
 impl Bending {
-    /// Rings and hinges of a mesh in its rest shape.
+    /// The rings and hinges of a mesh in its rest shape.
     #[must_use]
     pub(crate) fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape, fabrics: &[Fabric]) -> Self {
         let stiffness: Vec<DVec3> = fabrics.iter().map(bending_stiffness).collect();
-        let fans = Fan::all(mesh, rest);
+        let rings = VertexRing::all(mesh, rest);
         let mut bending = Self::default();
         let mut share = vec![vec![0.0; mesh.vertex_count()]; fabrics.len()];
         let mut bare = vec![false; mesh.triangles.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             let corners = voronoi(rest.corners[t]);
-            let inner = || triangle.iter().zip(corners).filter(|&(&v, _)| fans[v as usize].is_some());
+            let inner = || triangle.iter().zip(corners).filter(|&(&v, _)| rings[v as usize].is_some());
             let sum: f64 = inner().map(|(_, part)| part).sum();
             bare[t] = sum == 0.0;
             let [a, b, c] = rest.corners[t];
@@ -76,12 +75,12 @@ impl Bending {
                 share[v as usize] += area * part / sum;
             }
         }
-        let weights_of = |fan: &Option<Fan>| fan.as_ref().and_then(|fan| second_derivatives(&fan.spokes));
-        let weights: Vec<Option<Vec<DVec3>>> = fans.par_iter().with_min_len(64).map(weights_of).collect();
-        for (v, (fan, weights)) in fans.iter().zip(weights).enumerate() {
-            if let (Some(fan), Some(weights)) = (fan, weights) {
+        let weights_of = |ring: &Option<VertexRing>| ring.as_ref().and_then(VertexRing::second_derivatives);
+        let weights: Vec<Option<Vec<DVec3>>> = rings.par_iter().with_min_len(64).map(weights_of).collect();
+        for (v, (ring, weights)) in rings.iter().zip(weights).enumerate() {
+            if let (Some(ring), Some(weights)) = (ring, weights) {
                 let whole = stiffness.iter().zip(&share).map(|(stiffness, share)| *stiffness * share[v]).sum();
-                bending.push_ring(v as u32, fan, weights, whole);
+                bending.push_ring(v as u32, ring, weights, whole);
             }
         }
         let mean: Vec<f64> = fabrics.iter().map(Fabric::mean_bending_nm).collect();
@@ -91,15 +90,15 @@ impl Bending {
                 bending.push_hinge(mesh, rest, edge, [s, t], &mean);
             }
         }
-        bending.plate = Plate::new(mesh.vertex_count(), &bending.elements().collect::<Vec<_>>());
+        bending.matrix = BendingMatrix::new(mesh.vertex_count(), &bending.elements().collect::<Vec<_>>());
         bending
     }
 
-    fn push_ring(&mut self, centre: u32, fan: &Fan, weights: Vec<DVec3>, stiffness: DVec3) {
+    fn push_ring(&mut self, centre: u32, ring: &VertexRing, weights: Vec<DVec3>, stiffness: DVec3) {
         let start = self.vertices.len() as u32;
         self.vertices.push(centre);
         self.weights.push(-weights.iter().copied().sum::<DVec3>());
-        self.vertices.extend(&fan.ring);
+        self.vertices.extend(&ring.neighbours);
         self.weights.extend(weights);
         self.elements.push(Element { start, end: self.vertices.len() as u32, stiffness });
     }
@@ -107,7 +106,7 @@ impl Bending {
     fn push_hinge(&mut self, mesh: &TriMesh, rest: &RestShape, [a, b]: [u32; 2], wings: [u32; 2], mean: &[f64]) {
         let mut weights = [0.0; 4];
         let mut vertices = [a, b, a, b];
-        let (mut area, mut more) = (0.0, 0.0);
+        let (mut area, mut excess) = (0.0, 0.0);
         let of_first = mean[rest.fabric_of(wings[0] as usize)];
         for (k, t) in wings.map(|t| t as usize).into_iter().enumerate() {
             let at = |v: u32| mesh.triangles[t].iter().position(|&c| c == v);
@@ -122,18 +121,13 @@ impl Bending {
             vertices[2 + k] = mesh.triangles[t][tip];
             let own = 0.5 * (q - p).perp_dot(r - p).abs();
             area += own;
-            more += own * (mean[rest.fabric_of(t)] - of_first);
+            excess += own * (mean[rest.fabric_of(t)] - of_first);
         }
-        let b_mean = of_first + more / area;
+        let b_mean = of_first + excess / area;
         let start = self.vertices.len() as u32;
         self.vertices.extend(vertices);
         self.weights.extend(weights.map(|w| DVec3::X * w));
         self.elements.push(Element { start, end: start + 4, stiffness: DVec3::X * (2.0 * b_mean / area) });
-    }
-
-    fn parts(&self, e: &Element) -> (&[u32], &[DVec3]) {
-        let range = e.start as usize..e.end as usize;
-        (&self.vertices[range.clone()], &self.weights[range])
     }
 
     /// Vertices, weights of x_uu, x_uv, x_vv, and stiffness A·(B_u, H, B_v) of every element.
@@ -143,43 +137,41 @@ impl Bending {
 
     /// One of [`elements`](Self::elements).
     pub(crate) fn element(&self, i: usize) -> (&[u32], &[DVec3], DVec3) {
-        let e = &self.elements[i];
-        let (vertices, weights) = self.parts(e);
-        (vertices, weights, e.stiffness)
+        let Element { start, end, stiffness } = self.elements[i];
+        let range = start as usize..end as usize;
+        (&self.vertices[range.clone()], &self.weights[range], stiffness)
     }
 
-    /// How many there are.
+    /// Number of elements.
     pub(crate) fn len(&self) -> usize {
         self.elements.len()
     }
 
-    /// Energy of all elements, J.
-    #[must_use]
-    pub fn energy(&self, x: &[DVec3]) -> f64 {
-        self.elements.iter().map(|e| self.cost(e, x)).sum()
-    }
-
-    fn cost(&self, e: &Element, x: &[DVec3]) -> f64 {
-        let (vertices, weights) = self.parts(e);
-        let mut d = [DVec3::ZERO; 3];
-        for (&v, w) in vertices.iter().zip(weights) {
-            for (d, w) in d.iter_mut().zip(w.to_array()) {
-                *d += x[v as usize] * w;
+    /// Energy of all elements one by one, J: the reference for [`BendingMatrix`].
+    #[cfg(test)]
+    pub(crate) fn energy(&self, x: &[DVec3]) -> f64 {
+        let energy = |(vertices, weights, stiffness): (&[u32], &[DVec3], DVec3)| {
+            let mut d = [DVec3::ZERO; 3];
+            for (&v, w) in vertices.iter().zip(weights) {
+                for (d, w) in d.iter_mut().zip(w.to_array()) {
+                    *d += x[v as usize] * w;
+                }
             }
-        }
-        0.5 * e.stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
+            0.5 * stiffness.dot(DVec3::from(d.map(DVec3::length_squared)))
+        };
+        self.elements().map(energy).sum()
     }
 }
 
 /// (B_u, H, B_v), N·m.
 pub(crate) fn bending_stiffness(fabric: &Fabric) -> DVec3 {
     let [weft, bias, warp] = fabric.bending_nm;
-    DVec3::new(weft, (4.0 * bias - weft - warp).max(LEAST_TWIST * (weft + warp)), warp)
+    DVec3::new(weft, (4.0 * bias - weft - warp).max(MIN_TWIST * (weft + warp)), warp)
 }
 
-/// Each corner's part of a triangle: its Voronoi cell, or halves and quarters where that leaves the triangle (Meyer,
-/// Desbrun, Schröder, Barr: "Discrete differential-geometry operators for triangulated 2-manifolds", 2003). A third each would
-/// weigh vertices by their valence, and a strip would bend more where the light ones lie.
+/// Share of each corner in the area of a triangle: its Voronoi cell, or halves and quarters where the cell leaves the triangle (Meyer,
+/// Desbrun, Schröder, Barr: "Discrete differential-geometry operators for triangulated 2-manifolds", 2003). With a third each, the weight
+/// of a vertex would depend on its valence, and a strip would bend more at vertices of low valence.
 fn voronoi(corners: [DVec2; 3]) -> [f64; 3] {
     let side = |i: usize| (corners[(i + 2) % 3] - corners[(i + 1) % 3]).length_squared();
     let squares = [side(0), side(1), side(2)];
@@ -201,7 +193,7 @@ mod tests {
     use super::*;
     use crate::mesh::samples::sheet;
 
-    /// Cuts a triangle in three by a point next to its first side.
+    /// Subdivides a triangle into three by a point next to its first side.
     fn cut(mesh: &mut TriMesh, t: usize) {
         let ([a, b, c], [at_a, at_b, at_c]) = (mesh.triangles[t], mesh.corners(t));
         let (middle, m) = (0.5 * (at_a + at_b), mesh.positions.len() as u32);
@@ -211,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sliver_cut_again_ties_nothing_stiffer() {
+    fn a_subdivided_sliver_does_not_stiffen_the_bending() {
         let mut mesh = sheet(6, 6, |i, j| DVec3::new(i, 0.0, j) * 0.01);
         let stiffest = |mesh: &TriMesh| {
             let rest = RestShape::from_edges(mesh).unwrap();

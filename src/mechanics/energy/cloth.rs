@@ -1,42 +1,114 @@
-//! A garment ready to be evaluated: E, ∇E and the positive part of ∇²E.
+//! The energy of a garment, E(x) = gravity + membrane + bending + contact + friction, with its gradient and Hessian.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | x | vertex positions | m |
 //! | E | energy | J |
-//! | ∇E | gradient, minus the force | N |
+//! | ∇E | gradient, the negative force | N |
 //! | ∇²E | Hessian in 3×3 blocks | N/m |
+//! | m_i | mass of vertex i: areal density times a third of the rest areas of its triangles | kg |
+//! | g | gravitational acceleration, [`GRAVITY`] | m/s² |
+//!
+//! Gravity is Σ m_i g z_i. Heights count from the origin, so the zero of the energy is arbitrary; the Hessian of gravity is zero.
+//!
+//! **Evaluation** takes most of the time of a drape. Triangles and bending pairs are divided into two halves, one for each of two
+//! cores and always the same two, so sums have the same bits on any number of threads. Each half adds to its own gradient; gravity and
+//! contact are added where the two are joined. Nothing is allocated once the [`Scratch`] has grown to the garment.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
-use super::EnergyError;
 use super::bending::Bending;
 use super::contact::Contacts;
+use super::face_contacts::FaceContacts;
 use super::friction::Friction;
-use super::layout::HessianLayout;
-use super::membrane::{Stiffness, Triangle};
-use super::membrane_simd::{TrianglePack, packed};
-use super::proximity::{Proximity, Skin};
-use super::sparsity::Pattern;
+use super::membrane::{HessianKind, Stiffness, Triangle};
+use super::membrane_simd::{self, TrianglePack, packed};
+use super::proximity::Proximity;
+use super::proximity::surface::Surface;
+use super::sparsity::{HELD, HessianLayout, Pattern};
 use crate::GRAVITY;
-use crate::base::simd::Four;
+use crate::base::simd::{Four, Lanes, Work, run};
 use crate::body::distance::Body;
 use crate::garment::fabric::{Fabric, at_vertices};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
-/// Contact pressure that takes up half the cloth's thickness, Pa: 2 kPa is what a tight elastic garment presses with
-/// (compression stockings reach 2 to 5 kPa), so a looser one stays well off the skin.
+/// Contact pressure that compresses half the thickness of the cloth, Pa. 2 kPa is the pressure of a tight elastic garment (compression
+/// stockings: 2 to 5 kPa), so a looser garment stays well off the skin.
 const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
 
-/// The tightest body the vertices alone keep off the triangles between them, m: a shoulder's ridge, a bust's apex.
-const TIGHTEST_RADIUS: f64 = 0.03;
+/// Radius of the most curved body that contact at vertices keeps off the triangles between them, m: a shoulder's ridge, a bust's apex.
+const MIN_BODY_RADIUS_M: f64 = 0.03;
 
-/// No mesh is so coarse that its cloth floats farther than this from the body, m: the gap cloth simulators commonly keep.
-const LARGEST_SAG: f64 = 3e-3;
+/// Largest distance that a coarse mesh adds to the offset, m: the gap that cloth simulators commonly keep.
+const MAX_SAG_M: f64 = 3e-3;
 
-/// The unchanging part of the energy of one garment in its fabrics.
+/// Least number of vertices a thread passes over where memory bandwidth limits the loop.
+const VERTICES_PER_TASK: usize = 16_384;
+
+/// Why a garment has no energy. The user can correct each of these.
+#[derive(Debug, thiserror::Error)]
+pub enum EnergyError {
+    /// The rest shape belongs to another mesh.
+    #[error("the rest shape has {rest} triangles and the garment {mesh}: give the rest shape of this very mesh")]
+    RestCount {
+        /// Triangles of the rest shape.
+        rest: usize,
+        /// Triangles of the mesh.
+        mesh: usize,
+    },
+    /// A triangle without rest area has no strain.
+    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
+    Degenerate {
+        /// Its index, from 0.
+        triangle: usize,
+    },
+    /// Triangles are cut from a fabric that is missing.
+    #[error("the garment is cut from {cut_from} fabrics and {given} given: give each, in the order of their numbers")]
+    Fabrics {
+        /// Fabrics that the rest shape names.
+        cut_from: usize,
+        /// Fabrics in the list.
+        given: usize,
+    },
+    /// A held vertex that does not exist.
+    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
+    Held {
+        /// The index, from 0.
+        vertex: u32,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// No vertex is free to move.
+    #[error(
+        "no vertex is free: all {count} are held, expected at least one that is not; hold an edge alone (--hold top)"
+    )]
+    NothingFree {
+        /// Number of vertices.
+        count: usize,
+    },
+}
+
+/// Buffers of an evaluation, reused by the next.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    /// Positions, padded.
+    x: Vec<Four>,
+    /// The gradient of each half, padded.
+    halves: [Vec<Four>; 2],
+}
+
+/// A contact's part of the Hessian: unknowns with their shares, and the matrix between them.
+pub(crate) struct ContactBlock {
+    pub(crate) members: Vec<(u32, f64)>,
+    /// N/m.
+    pub(crate) block: DMat3,
+}
+
+/// The constant data of the energy of one garment in its fabrics.
 #[derive(Debug, Clone)]
 pub struct Cloth {
     /// Mass of each vertex, kg.
@@ -49,38 +121,38 @@ pub struct Cloth {
     pub weight: f64,
     /// Distance each vertex keeps from the body, m.
     pub offsets: Vec<f64>,
-    /// Most of them, m.
+    /// Largest of these distances, m.
     pub offset: f64,
     /// Thickness of the cloth at each vertex, m.
     pub thickness: Arc<Vec<f64>>,
-    /// Coulomb friction at each vertex, against the body and against itself.
+    /// Coulomb friction at each vertex, against the body and against the cloth.
     pub friction: Arc<Vec<f64>>,
-    /// What it is cut from, as the triangles number them.
+    /// The fabrics, in the order that the triangles number them.
     pub fabrics: Arc<Vec<Fabric>>,
-    /// The triangles' rest data.
+    /// Rest data of the triangles.
     pub triangles: Arc<Vec<Triangle>>,
-    /// Share of each triangle's stiffness that is left under compression.
-    pub slack: Arc<Vec<f64>>,
-    /// The rings that bend.
-    pub bending: Arc<Bending>,
-    /// Of each fabric.
-    pub(super) stiffness: Vec<Stiffness>,
-    /// The triangles by fours, and their slack.
-    pub(super) packs: Arc<Vec<TrianglePack>>,
-    pub(super) packed_slack: Arc<Vec<Four>>,
+    /// Compression ratio of each triangle: the share of its stiffness left under compression.
+    pub(crate) compression_ratios: Arc<Vec<f64>>,
+    /// The bending elements.
+    pub(crate) bending: Arc<Bending>,
+    /// Membrane stiffness of each fabric.
+    stiffness: Vec<Stiffness>,
+    /// The triangles by fours, and their compression ratios.
+    packs: Arc<Vec<TrianglePack>>,
+    packed_ratios: Arc<Vec<Four>>,
     placed: Arc<Vec<DVec3>>,
-    /// Where to go back to where a start crosses.
+    /// Positions that an intersecting start returns to, m.
     clear: Arc<Vec<DVec3>>,
     layout: Arc<OnceLock<HessianLayout>>,
-    skin: Arc<OnceLock<Arc<Skin>>>,
+    surface: Arc<OnceLock<Arc<Surface>>>,
 }
 
 impl Cloth {
-    /// Precomputes everything that does not depend on positions. `fabric` is one, or all that the rest shape numbers; `held`
+    /// Precomputes everything that does not depend on positions. `fabric` is one fabric, or all fabrics that the rest shape numbers; `held`
     /// vertices do not move.
     ///
     /// # Errors
-    /// [`EnergyError`] names the triangle or vertex that is wrong.
+    /// [`EnergyError`] names the faulty triangle or vertex.
     pub fn new(
         mesh: &TriMesh,
         topology: &Topology,
@@ -119,7 +191,7 @@ impl Cloth {
                 by_fabric[t.fabric as usize][v as usize] += area.abs() / 3.0;
             }
         }
-        // A vertex of no triangle has no mass and nothing to balance: it keeps still.
+        // A vertex of no triangle has no mass: it is held.
         for (h, &area) in is_held.iter_mut().zip(&areas) {
             *h |= area == 0.0;
         }
@@ -135,10 +207,10 @@ impl Cloth {
             return Err(EnergyError::NothingFree { count: n });
         }
         let placed = Arc::new(mesh.positions.clone());
-        let slack: Vec<f64> = triangles.iter().map(Triangle::slack).collect();
+        let ratios: Vec<f64> = triangles.iter().map(Triangle::compression_ratio).collect();
         Ok(Self {
             packs: Arc::new(TrianglePack::all(&triangles)),
-            packed_slack: Arc::new(packed(&triangles, &slack)),
+            packed_ratios: Arc::new(packed(&triangles, &ratios)),
             weight: GRAVITY * masses.iter().sum::<f64>(),
             masses,
             areas,
@@ -149,22 +221,25 @@ impl Cloth {
             friction: Arc::new(at_vertices(mesh, rest, fabrics, |fabric| fabric.friction)),
             fabrics: Arc::new(fabrics.to_vec()),
             triangles: Arc::new(triangles),
-            slack: Arc::new(slack),
+            compression_ratios: Arc::new(ratios),
             bending: Arc::new(bending),
             stiffness: fabrics.iter().map(Stiffness::new).collect(),
             clear: Arc::clone(&placed),
             placed,
             layout: Arc::new(OnceLock::new()),
-            skin: Arc::new(OnceLock::new()),
+            surface: Arc::new(OnceLock::new()),
         })
     }
 
-    /// Unknowns and pattern of the Hessian, made when first asked for.
+    /// Unknowns and pattern of the Hessian, computed at the first use.
     #[must_use]
     pub(crate) fn layout(&self) -> &HessianLayout {
-        self.layout.get_or_init(|| {
-            HessianLayout::new(&self.placed, &self.triangles, &self.bending, &self.held, std::iter::empty())
-        })
+        self.layout.get_or_init(|| self.layout_with(&self.placed, std::iter::empty()))
+    }
+
+    /// The layout of a Hessian that has blocks for these pairs of vertices as well, ordered for the positions `x`.
+    pub(crate) fn layout_with(&self, x: &[DVec3], pairs: impl Iterator<Item = [u32; 2]>) -> HessianLayout {
+        HessianLayout::new(x, &self.triangles, &self.bending, &self.held, pairs)
     }
 
     /// The unknown vertices in elimination order.
@@ -173,35 +248,35 @@ impl Cloth {
         &self.layout().order
     }
 
-    /// Where the Hessian's blocks are.
+    /// The block pattern of the Hessian.
     #[must_use]
     pub fn pattern(&self) -> &Pattern {
         &self.layout().pattern
     }
 
-    /// The same cloth with its membrane no stiffer than what lets a length of `height_m` (m) of it stretch by `strain` where
-    /// it hangs by its weight; `None` where it is not that stiff, or no height or strain is given.
+    /// The same cloth with its membrane stiffness capped, so that a length of `height_m` (m) that hangs by its own weight stretches by `strain`.
+    /// `None` where no fabric is that stiff, or height or strain is zero.
     #[must_use]
     pub(crate) fn softened(&self, height_m: f64, strain: f64) -> Option<Self> {
-        let most = self.weight / self.areas.iter().sum::<f64>() * height_m / strain;
-        let softer: Vec<_> = self.stiffness.iter().map(|stiffness| stiffness.capped(most)).collect();
-        if !(most > 0.0 && most.is_finite() && softer.iter().any(Option::is_some)) {
+        let cap = self.weight / self.areas.iter().sum::<f64>() * height_m / strain;
+        let softer: Vec<_> = self.stiffness.iter().map(|stiffness| stiffness.capped(cap)).collect();
+        if !(cap > 0.0 && cap.is_finite() && softer.iter().any(Option::is_some)) {
             return None;
         }
         let stiffness = softer.iter().zip(&self.stiffness).map(|(softer, own)| softer.unwrap_or(*own)).collect();
         Some(Self { stiffness, ..self.clone() })
     }
 
-    /// The same cloth with another share of its membrane stiffness left under compression, triangle by triangle; slivers keep none.
+    /// The same cloth with other compression ratios of its triangles; slivers keep zero.
     #[must_use]
-    pub(crate) fn with_slack(mut self, mut slack: Vec<f64>) -> Self {
-        slack.iter_mut().zip(&*self.triangles).filter(|(_, t)| t.sliver).for_each(|(slack, _)| *slack = 0.0);
-        self.packed_slack = Arc::new(packed(&self.triangles, &slack));
-        self.slack = Arc::new(slack);
+    pub(crate) fn with_compression_ratios(mut self, mut ratios: Vec<f64>) -> Self {
+        ratios.iter_mut().zip(&*self.triangles).filter(|(_, t)| t.sliver).for_each(|(ratio, _)| *ratio = 0.0);
+        self.packed_ratios = Arc::new(packed(&self.triangles, &ratios));
+        self.compression_ratios = Arc::new(ratios);
         self
     }
 
-    /// The same cloth, which goes back towards `x` (m) where a start crosses itself, instead of how it was placed.
+    /// The same cloth with `x` (m) in place of the placement as the positions that an intersecting start returns to.
     #[must_use]
     pub(crate) fn clear_at(self, x: Vec<DVec3>) -> Self {
         Self { clear: Arc::new(x), ..self }
@@ -213,7 +288,7 @@ impl Cloth {
         self.masses.len()
     }
 
-    /// Contact stiffness κ to begin with, N/m³; of several fabrics for the thinnest.
+    /// Initial contact stiffness κ, N/m³; of several fabrics that of the thinnest.
     #[must_use]
     pub fn contact_stiffness(&self) -> f64 {
         HALF_THICKNESS_PRESSURE / (0.5 * self.offsets.iter().copied().fold(f64::INFINITY, f64::min))
@@ -224,54 +299,200 @@ impl Cloth {
         &self.stiffness[triangle.fabric as usize]
     }
 
-    /// Contacts of this cloth with a body, found at `x`, friction anchored where it touches there.
+    /// Contacts of this cloth with a body, before the first update.
+    pub(crate) fn new_contacts<'b>(&self, body: &'b Body) -> Contacts<'b> {
+        let friction = Friction::new(Arc::clone(&self.friction));
+        let face_contacts = FaceContacts::new(Arc::clone(&self.triangles), Arc::clone(&self.thickness));
+        let stiffness = self.contact_stiffness();
+        Contacts::new(body, [&self.areas, &self.offsets], &self.held, stiffness, friction, face_contacts)
+    }
+
+    /// Contacts of this cloth with a body at `x`, friction anchored at the points of contact.
     #[must_use]
     pub fn contacts<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
-        self.found(self.untouched(body), x)
+        self.contacts_from_distances(body, x, false, &[], std::iter::empty())
     }
 
     /// The same by tangent planes: see [`Contacts::by_planes`].
     #[must_use]
     pub(crate) fn contacts_by_planes<'b>(&self, body: &'b Body, x: &[DVec3]) -> Contacts<'b> {
-        self.found(self.untouched(body).by_planes(), x)
+        self.contacts_from_distances(body, x, true, &[], std::iter::empty())
     }
 
-    /// Where this cloth meets itself; ask [`Contacts::refresh`] before use.
+    /// The same, [by planes](Contacts::by_planes) or not, where the signed distances (m) of the vertices at `at` are known already.
     #[must_use]
-    pub fn proximity(&self) -> Proximity {
-        let skin = self.skin.get_or_init(|| Arc::new(Skin::new(&self.triangles, self.vertex_count())));
-        let of_vertices = [&self.thickness, &self.friction].map(Arc::clone);
-        Proximity::new(Arc::clone(skin), [&self.placed, &self.clear].map(Arc::clone), of_vertices)
-    }
-
-    /// The layout of a Hessian with blocks for these pairs of vertices as well, ordered as the cloth lies at `x`.
-    pub(crate) fn layout_with(&self, x: &[DVec3], pairs: impl Iterator<Item = [u32; 2]>) -> HessianLayout {
-        HessianLayout::new(x, &self.triangles, &self.bending, &self.held, pairs)
-    }
-
-    pub(super) fn untouched<'b>(&self, body: &'b Body) -> Contacts<'b> {
-        let friction = Friction::new(Arc::clone(&self.friction));
-        Contacts::new(body, [&self.areas, &self.offsets], &self.held, self.contact_stiffness(), friction)
-    }
-
-    pub(super) fn found<'b>(&self, mut contacts: Contacts<'b>, x: &[DVec3]) -> Contacts<'b> {
+    pub(crate) fn contacts_from_distances<'b>(
+        &self,
+        body: &'b Body,
+        x: &[DVec3],
+        by_planes: bool,
+        at: &[DVec3],
+        distance_m: impl Iterator<Item = f64>,
+    ) -> Contacts<'b> {
+        let contacts = self.new_contacts(body);
+        let contacts = if by_planes { contacts.by_planes() } else { contacts };
+        let mut contacts = contacts.with_distances(at, distance_m);
         contacts.update(x);
         contacts.refresh(x);
         contacts
+    }
+
+    /// Contact of this cloth with itself. Call [`Contacts::refresh`] before use.
+    #[must_use]
+    pub fn proximity(&self) -> Proximity {
+        let surface = self.surface.get_or_init(|| Arc::new(Surface::new(&self.triangles, self.vertex_count())));
+        let of_vertices = [&self.thickness, &self.friction].map(Arc::clone);
+        Proximity::new(Arc::clone(surface), [&self.placed, &self.clear].map(Arc::clone), of_vertices)
+    }
+
+    /// E at `x`, J; `contacts` must have been updated at `x`.
+    #[must_use]
+    pub fn energy(&self, x: &[DVec3], contacts: &Contacts) -> f64 {
+        self.evaluate(x, contacts, &mut Vec::new(), &mut Scratch::default())
+    }
+
+    /// ∇E at `x`, N, zero at held vertices; returns E, J. `contacts` must have been updated at `x`.
+    pub fn gradient(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>) -> f64 {
+        self.evaluate(x, contacts, gradient, &mut Scratch::default())
+    }
+
+    /// [`gradient`](Self::gradient) with buffers to reuse.
+    pub fn evaluate(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>, scratch: &mut Scratch) -> f64 {
+        let Scratch { x: padded, halves: [one, other] } = scratch;
+        padded.resize(x.len(), Four::ZERO);
+        let chunks = padded.par_chunks_mut(VERTICES_PER_TASK).zip(x.par_chunks(VERTICES_PER_TASK));
+        chunks.for_each(|(to, x)| to.iter_mut().zip(x).for_each(|(to, p)| *to = Four([p.x, p.y, p.z, 0.0])));
+        let middle = self.packs.len() / 2;
+        let ((first, second), (ratios, other_ratios)) =
+            (self.packs.split_at(middle), self.packed_ratios.split_at(middle));
+        let [above, below] = self.bending.matrix.halves();
+        let x_of_all = &*padded;
+        let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
+        let (a, b) =
+            rayon::join(|| run(half((first, ratios), above, one)), || run(half((second, other_ratios), below, other)));
+        let weight = self.join(padded, [one, other], gradient);
+        contacts.add_gradient(gradient);
+        contacts.friction.add_gradient(x, gradient);
+        let with_itself = contacts.proximity.as_ref().map_or(0.0, |p| p.add_gradient(x, &self.held, gradient));
+        weight + (a + b) + contacts.energy() + contacts.friction.energy(x) + with_itself
+    }
+
+    /// Adds the gradients of both halves and of gravity, zero at held vertices; returns the energy of gravity.
+    fn join(&self, x: &[Four], [one, other]: [&[Four]; 2], gradient: &mut Vec<DVec3>) -> f64 {
+        gradient.resize(x.len(), DVec3::ZERO);
+        let halves = one.par_chunks(VERTICES_PER_TASK).zip(other.par_chunks(VERTICES_PER_TASK));
+        let own = self.masses.par_chunks(VERTICES_PER_TASK).zip(self.held.par_chunks(VERTICES_PER_TASK));
+        let chunks = gradient.par_chunks_mut(VERTICES_PER_TASK).zip(x.par_chunks(VERTICES_PER_TASK));
+        let weights = chunks.zip(halves).zip(own).map(|(((gradient, x), (one, other)), (masses, held))| {
+            let mut energy = 0.0;
+            let vertices = x.iter().zip(one).zip(other).zip(masses).zip(held);
+            for (out, ((((x, Four(a)), Four(b)), &mass), &held)) in gradient.iter_mut().zip(vertices) {
+                let weight = mass * GRAVITY;
+                energy += weight * x.0[2];
+                *out = if held { DVec3::ZERO } else { DVec3::new(a[0] + b[0], a[1] + b[1], a[2] + b[2] + weight) };
+            }
+            energy
+        });
+        weights.collect::<Vec<f64>>().into_iter().sum()
+    }
+
+    /// Blocks of the projected Hessian at `x`, N/m, in the order of [`pattern`](Self::pattern): positive semi-definite.
+    pub fn hessian(&self, x: &[DVec3], contacts: &Contacts, blocks: &mut Vec<DMat3>) {
+        self.hessian_in(self.layout(), HessianKind::Projected, x, contacts, blocks);
+    }
+
+    /// Blocks of a Hessian at `x`, N/m, in the order of any layout.
+    pub(crate) fn hessian_in(
+        &self,
+        layout: &HessianLayout,
+        kind: HessianKind,
+        x: &[DVec3],
+        contacts: &Contacts,
+        blocks: &mut Vec<DMat3>,
+    ) {
+        blocks.clear();
+        blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
+        for ((t, &ratio), slots) in self.triangles.iter().zip(&*self.compression_ratios).zip(&layout.triangle_slots) {
+            let parts = t.hessian(self.stiffness_of(t), ratio, x, kind);
+            for (slot, part) in slots.iter().zip(&parts) {
+                if slot.block != HELD {
+                    blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
+                }
+            }
+        }
+        for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
+            let i = layout.unknown[v as usize];
+            if i != HELD {
+                blocks[layout.pattern.starts[i as usize] as usize] += block;
+            }
+        }
+        for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
+            layout.add(&layout.free(gap.members()), block, blocks);
+        }
+    }
+
+    /// The diagonal block of each vertex in the projected Hessian plus ε M at `x`, N/m.
+    pub(crate) fn diagonal_blocks(&self, x: &[DVec3], contacts: &Contacts, damping: f64, blocks: &mut Vec<DMat3>) {
+        let scalar = |(v, mass): (usize, &f64)| self.bending.matrix.diagonal(v) + damping * mass;
+        blocks.clear();
+        blocks.extend(self.masses.iter().enumerate().map(scalar).map(|s| DMat3::from_diagonal(DVec3::splat(s))));
+        for (t, &ratio) in self.triangles.iter().zip(&*self.compression_ratios) {
+            for (&v, block) in t.vertices.iter().zip(t.diagonal_blocks(self.stiffness_of(t), ratio, x)) {
+                blocks[v as usize] += block;
+            }
+        }
+        for (v, block) in contacts.hessian().chain(contacts.friction.hessian(x)) {
+            blocks[v as usize] += block;
+        }
+        for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
+            for (v, w) in gap.members() {
+                blocks[v as usize] += block * (w * w);
+            }
+        }
+    }
+
+    /// The parts of body contact, friction and gaps in the Hessian at `x`, over the unknowns of a layout.
+    pub(crate) fn contact_blocks(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts) -> Vec<ContactBlock> {
+        let with_body = contacts.hessian().chain(contacts.friction.hessian(x));
+        let by_body =
+            with_body.map(|(v, block)| ContactBlock { members: layout.free(std::iter::once((v, 1.0))), block });
+        let gaps = contacts.proximity.iter().flat_map(|p| p.hessian(x));
+        by_body.chain(gaps.map(|(gap, block)| ContactBlock { members: layout.free(gap.members()), block })).collect()
+    }
+}
+
+/// Membrane and bending of half the triangles and half the bending pairs.
+struct Half<'a> {
+    cloth: &'a Cloth,
+    packs: (&'a [TrianglePack], &'a [Four]),
+    vertices: Range<usize>,
+    x: &'a [Four],
+    gradient: &'a mut Vec<Four>,
+}
+
+impl Work for Half<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with<L: Lanes>(self, l: L) -> f64 {
+        self.gradient.clear();
+        self.gradient.resize(self.x.len(), Four::ZERO);
+        let bending = self.cloth.bending.matrix.add_gradient(l, self.vertices, self.x, self.gradient);
+        bending + membrane_simd::add_gradient(l, self.packs, &self.cloth.stiffness, self.x, self.gradient)
     }
 }
 
 #[cfg(test)]
 impl Cloth {
-    /// Of a mesh that is at rest as it lies, in a built-in fabric.
+    /// A cloth in a built-in fabric whose mesh is its rest shape.
     pub(crate) fn sample(mesh: &TriMesh, fabric: &str, held: &[u32]) -> Self {
         let (topology, rest) = (Topology::new(mesh), RestShape::from_edges(mesh).unwrap());
         Self::new(mesh, &topology, &rest, &Fabric::by_name(fabric).unwrap(), held).unwrap()
     }
 }
 
-/// How far a round body reaches through the triangles of a mesh whose vertices touch it, m: contact is felt at the vertices
-/// alone. A triangle of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
+/// Depth to which a round body passes through the triangles of a mesh whose vertices touch it, m. A triangle
+/// of side l, and so of circumradius l/√3, sags by l²/(6 R) over a sphere of radius R.
 fn sag(mesh: &TriMesh) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for t in 0..mesh.triangles.len() {
@@ -279,5 +500,5 @@ fn sag(mesh: &TriMesh) -> f64 {
         sum += a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
         count += 3.0;
     }
-    (sum / f64::max(count, 1.0) / (6.0 * TIGHTEST_RADIUS)).min(LARGEST_SAG)
+    (sum / f64::max(count, 1.0) / (6.0 * MIN_BODY_RADIUS_M)).min(MAX_SAG_M)
 }

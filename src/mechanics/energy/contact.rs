@@ -1,135 +1,171 @@
 //! Contact: the body pushes the cloth off its surface.
 //!
-//! E = Σ ½ κ A_i (h − q(x_i))² over the vertices with q < h: a pressure κ (h − q) along the body's normal ∇q, so that the
-//! cloth's middle surface rests a fraction of its thickness nearer than h. q is the body's distance without its creases,
-//! [`field`](super::field). The Hessian keeps κ A_i ∇q ∇qᵀ and drops the body's curvature times the pressure, which is
-//! negative on a convex body and second order in the penetration.
+//! E = Σ ½ κ A_i (h − q(x_i))² over the vertices with q < h: a pressure κ (h − q) along the normal ∇q of the body. At rest the
+//! middle surface of the cloth lies nearer to the body than h by a fraction of the thickness. q is the distance to the body without
+//! its creases, [`field`](super::field). The Hessian keeps κ A_i ∇q ∇qᵀ and drops the curvature of the body times the pressure, which
+//! is negative on a convex body and of second order in the penetration.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | q | signed distance to the body, creases rounded | m |
-//! | h | offset: the distance the cloth keeps, its thickness and what a triangle sags | m |
+//! | s | exact signed distance to the body | m |
+//! | h | offset: distance the cloth keeps, its thickness plus the sag of a triangle | m |
 //! | κ | contact stiffness: pressure over penetration | N/m³ |
 //! | A_i | rest area of vertex i | m² |
 //!
-//! A distance costs as much as ten triangles' energies, so each vertex remembers its last one: q has slope at most one,
-//! hence q(x) ≥ q(x') − |x − x'|, and a vertex whose bound stays above h is not asked again.
+//! **Queries are skipped where a bound excludes contact.** A distance costs as much as the energies of ten triangles. q is
+//! Lipschitz with constant one, so q(x) ≥ q(x') − |x − x'| with x' the position of the last query. A vertex whose bound exceeds h
+//! is not queried. Distances that the caller already has serve as the first query.
 //!
-//! Limits: vertices are tested, not edges or triangles; where the body pokes through a triangle all the same, places within it are
-//! kept off as well (`cover.rs`).
+//! **Penetration in narrow places.** At a concave edge q exceeds s by as much as a thin cloth is thick: a vertex may keep its offset
+//! h and still be inside the body. No stiffness changes that. Replacing h by h + q − s does, since κ A (h + q − s − q) = κ A (h − s).
+//! κ itself is too small only where q is negative. Limits: q − s is taken at the present position and changes as the vertex
+//! slides; vertices that do not touch by q are not examined; the contact pressure reported later (`mechanics::fit`) uses the
+//! original h and is too small at such a vertex.
+//!
+//! Limits: contact is evaluated at vertices. Triangles that intersect the body between their vertices receive contact places
+//! ([`face_contacts`](super::face_contacts)).
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::face_contacts::Cover;
+use super::face_contacts::FaceContacts;
 use super::field::{Field, SIDE};
-use super::friction::Friction;
+use super::friction::{Friction, Touch};
 use super::membrane::outer;
 use super::proximity::Proximity;
-use crate::body::distance::Body;
+use crate::body::distance::{Body, pull_off_protrusions};
+use crate::mesh::TriMesh;
+use crate::mesh::self_intersection::crossing_pairs;
 
-/// A vertex nearer to the body than the offset.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Touch {
-    /// The vertex.
-    pub vertex: u32,
-    /// h − q, m: positive.
-    pub depth: f64,
-    /// ∇q, outward; of unit length but where a crease is rounded.
-    pub normal: DVec3,
-    /// κ A_i, N/m.
-    pub stiffness: f64,
-}
+/// Distance from its foot up to which a tangent plane replaces the body, m. On a radius of 5 cm its error is then 0.04 mm.
+const PLANE_RADIUS_M: f64 = 2e-3;
 
-impl Touch {
-    /// The normal force κ A_i (h − q), N.
-    #[must_use]
-    pub fn force(&self) -> f64 {
-        self.stiffness * self.depth
-    }
-}
+/// Least number of vertices a thread filters: the filter is one comparison a vertex.
+const MIN_VERTICES_PER_TASK: usize = 8192;
 
-/// A plane stands for the body this far about the point it was taken at, m: over a radius of 5 cm it is then off by 0.04 mm.
-const PLANE: f64 = 2e-3;
+/// Factor on κ where a contact is pressed in. Heuristic.
+const STIFFENING: f64 = 4.0;
 
-/// Vertices that a thread passes over at least: what is near is a comparison.
-const STRETCH: usize = 8192;
+/// Times that the cloth is moved off protrusions of the body, at most. Heuristic.
+const MAX_PROTRUSION_FIXES: usize = 3;
 
-/// What there is to touch, and by which distance.
+/// The body, and the distance that contact takes from it.
 #[derive(Debug, Clone, Default)]
-pub(super) enum Obstacle<'b> {
+enum Obstacle<'b> {
     #[default]
     Nothing,
-    /// The exact distance's tangent plane where it was last asked.
+    /// The tangent plane of the exact distance at the last query.
     Planes(&'b Body),
+    /// The distance with rounded creases.
     Rounded(Field<'b>),
 }
 
-/// What the cloth meets at its current positions, with the memory that makes asking again cheap.
+/// Result of [`Contacts::update_face_contacts`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FaceUpdate {
+    /// The body does not intersect the cloth, or no place helps.
+    Unchanged,
+    /// Places were added, raised or released.
+    Places,
+    /// The cloth was moved off a protrusion of the body, and is far from equilibrium.
+    Moved,
+}
+
+/// A vertex inside the body.
+struct Penetration {
+    vertex: u32,
+    /// q, m.
+    rounded: f64,
+    /// s, m.
+    exact: f64,
+}
+
+/// The contacts of a cloth at its current positions, and the queries they were found by.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts<'b> {
-    pub(super) met: Obstacle<'b>,
+    obstacle: Obstacle<'b>,
     /// h of each vertex, m.
-    pub(super) offsets: Vec<f64>,
+    offsets: Vec<f64>,
     areas: Vec<f64>,
-    pub(super) held: Vec<bool>,
-    pub(super) asked_at: Vec<DVec3>,
-    pub(super) answer: Vec<f64>,
-    /// Normals of the tangent planes, zero where never asked.
+    held: Vec<bool>,
+    /// Position (m) and distance (m) of each vertex at its last query.
+    queried_at: Vec<DVec3>,
+    queried_distance: Vec<f64>,
+    /// Normals of the tangent planes; zero before the first query.
     normals: Vec<DVec3>,
-    /// Square of how far each vertex may go from where it was asked before it can be near, m²; negative where it is near there.
-    pub(super) leave: Vec<f64>,
-    /// The vertices that may be near, of the last [`update`](Self::update).
-    near: Vec<u32>,
+    /// Square of the move from the last query below which a vertex cannot touch, m²; negative where it touched there.
+    free_squared: Vec<f64>,
+    /// Vertices whose bound did not exclude contact in the last [`update`](Self::update).
+    candidates: Vec<u32>,
     stiffness: f64,
-    pub(super) touches: Vec<Touch>,
-    /// Where the cloth holds on to the body.
+    touches: Vec<Touch>,
+    /// Friction on the body.
     pub friction: Friction,
-    /// Where the cloth meets itself; not asked where there is none.
+    /// Contact of the cloth with itself, if it is to be considered.
     pub proximity: Option<Proximity>,
-    /// Places between the vertices that keep off the body.
-    pub(super) cover: Cover,
+    face_contacts: FaceContacts,
 }
 
 impl<'b> Contacts<'b> {
-    /// Nothing to touch.
+    /// Contacts without a body.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// Contacts of the vertices with `areas` (m²; those not in `held`) against `body` at their `offsets` (m) with
-    /// `stiffness` κ (N/m³). Ask [`update`](Self::update) before use.
+    /// Contacts of vertices with these `areas` (m²) and `offsets` (m), except those in `held`, against `body` with `stiffness` κ
+    /// (N/m³). Call [`update`](Self::update) before use.
     #[must_use]
-    pub(crate) fn new(
+    pub(super) fn new(
         body: &'b Body,
         [areas, offsets]: [&[f64]; 2],
         held: &[bool],
         stiffness: f64,
         friction: Friction,
+        face_contacts: FaceContacts,
     ) -> Self {
         let n = areas.len();
         Self {
-            met: Obstacle::Rounded(Field::new(body, n)),
+            obstacle: Obstacle::Rounded(Field::new(body, n)),
             offsets: offsets.to_vec(),
             areas: areas.to_vec(),
             held: held.to_vec(),
-            asked_at: vec![DVec3::ZERO; n],
-            answer: vec![f64::NEG_INFINITY; n],
+            queried_at: vec![DVec3::ZERO; n],
+            queried_distance: vec![f64::NEG_INFINITY; n],
             normals: vec![DVec3::ZERO; n],
-            // Who is held is never asked.
-            leave: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
+            // Held vertices are never queried.
+            free_squared: held.iter().map(|&held| if held { f64::INFINITY } else { f64::NEG_INFINITY }).collect(),
             stiffness,
             friction,
+            face_contacts,
             ..Self::none()
         }
     }
 
-    /// The same by tangent planes of the exact distance, asked anew where a vertex has moved by 2 mm: cheap for a cloth that
-    /// moves far and need not be told to a tenth of a millimetre. Not for contacts that were updated already.
+    /// The same by tangent planes of the exact distance, queried again after a move of 2 mm: cheaper, for cloth that moves far and needs
+    /// no accuracy of a tenth of a millimetre. Call before the first [`update`](Self::update).
     #[must_use]
     pub(crate) fn by_planes(self) -> Self {
-        Self { met: self.body().map_or(Obstacle::Nothing, Obstacle::Planes), ..self }
+        Self { obstacle: self.body().map_or(Obstacle::Nothing, Obstacle::Planes), ..self }
+    }
+
+    /// The same with signed distances (m) of the vertices at `at` as the first query.
+    pub(super) fn with_distances(mut self, at: &[DVec3], distance_m: impl Iterator<Item = f64>) -> Self {
+        // The rounded distance is smaller than the exact one by at most the side of the lattice.
+        let rounding = if matches!(self.obstacle, Obstacle::Rounded(_)) { SIDE } else { 0.0 };
+        for (v, (x, distance)) in at.iter().zip(distance_m).enumerate() {
+            if self.held.get(v) == Some(&false) {
+                self.store_query(v, *x, distance - rounding);
+            }
+        }
+        self
+    }
+
+    /// The same with every offset larger by `margin` (m).
+    pub(crate) fn with_margin(mut self, margin: f64) -> Self {
+        self.offsets.iter_mut().for_each(|offset| *offset += margin);
+        self
     }
 
     /// κ, N/m³.
@@ -143,27 +179,62 @@ impl<'b> Contacts<'b> {
         self.stiffness *= factor;
     }
 
-    /// Finds what touches at `x`. Same bits on any number of threads.
-    pub fn update(&mut self, x: &[DVec3]) {
-        self.touches.clear();
-        if let Obstacle::Planes(body) = self.met {
-            return self.update_planes(body, x);
-        }
-        self.bound(x);
-        self.find_near(x);
-        let Obstacle::Rounded(field) = &mut self.met else { return };
-        let near = std::mem::take(&mut self.near);
-        let found = field.at(&near, x);
-        for (&vertex, &(distance, normal)) in near.iter().zip(&found) {
-            let v = vertex as usize;
-            self.keep(v, x[v], distance);
-            self.touch(vertex, distance, normal);
-        }
-        self.near = near;
+    /// The vertices in contact, ascending.
+    #[must_use]
+    pub fn touches(&self) -> &[Touch] {
+        &self.touches
     }
 
-    /// A vertex touches where its distance is less than its offset.
-    fn touch(&mut self, vertex: u32, distance: f64, normal: DVec3) {
+    fn body(&self) -> Option<&'b Body> {
+        match &self.obstacle {
+            Obstacle::Nothing => None,
+            Obstacle::Planes(body) => Some(body),
+            Obstacle::Rounded(field) => Some(field.body()),
+        }
+    }
+
+    /// Finds the vertices in contact at `x`. Same bits on any number of threads.
+    pub fn update(&mut self, x: &[DVec3]) {
+        self.touches.clear();
+        if let Obstacle::Planes(body) = self.obstacle {
+            return self.update_planes(body, x);
+        }
+        self.query_new(x);
+        self.find_candidates(x);
+        let Obstacle::Rounded(field) = &mut self.obstacle else { return };
+        let candidates = std::mem::take(&mut self.candidates);
+        let found = field.at(&candidates, x);
+        for (&vertex, &(distance, normal)) in candidates.iter().zip(&found) {
+            let v = vertex as usize;
+            self.store_query(v, x[v], distance);
+            self.push_touch(vertex, distance, normal);
+        }
+        self.candidates = candidates;
+    }
+
+    /// [`update`](Self::update) by planes.
+    fn update_planes(&mut self, body: &Body, x: &[DVec3]) {
+        self.find_candidates(x);
+        let candidates = std::mem::take(&mut self.candidates);
+        let stale = |&v: &usize| {
+            self.normals[v] == DVec3::ZERO
+                || x[v].distance_squared(self.queried_at[v]) > PLANE_RADIUS_M * PLANE_RADIUS_M
+        };
+        let stale: Vec<usize> = candidates.iter().map(|&v| v as usize).filter(stale).collect();
+        let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());
+        for (v, found) in stale.into_iter().zip(found) {
+            self.store_query(v, x[v], found.signed_distance);
+            self.normals[v] = found.normal;
+        }
+        for &vertex in &candidates {
+            let v = vertex as usize;
+            let (normal, moved) = (self.normals[v], x[v] - self.queried_at[v]);
+            self.push_touch(vertex, self.queried_distance[v] + normal.dot(moved), normal);
+        }
+        self.candidates = candidates;
+    }
+
+    fn push_touch(&mut self, vertex: u32, distance: f64, normal: DVec3) {
         let v = vertex as usize;
         let depth = self.offsets[v] - distance;
         if depth > 0.0 {
@@ -171,81 +242,125 @@ impl<'b> Contacts<'b> {
         }
     }
 
-    /// Finds the vertices whose bound is less than the offset: a loop over all of them at every evaluation, so without roots.
-    fn find_near(&mut self, x: &[DVec3]) {
-        let Self { near, asked_at, leave, .. } = self;
-        let is_near = |((x, asked_at), leave): &((&DVec3, &DVec3), &f64)| x.distance_squared(**asked_at) > **leave;
-        near.clear();
-        if x.len() < 2 * STRETCH {
-            let vertices = (0..).zip(x.iter().zip(&*asked_at).zip(&*leave));
-            near.extend(vertices.filter(|(_, vertex)| is_near(vertex)).map(|(v, _)| v));
-        } else {
-            let vertices = x.par_iter().zip(&*asked_at).zip(&*leave).enumerate().with_min_len(STRETCH);
-            near.par_extend(vertices.filter(|(_, vertex)| is_near(vertex)).map(|(v, _)| v as u32));
-        }
-    }
-
-    /// Remembers a vertex's distance and where it was asked.
-    pub(super) fn keep(&mut self, v: usize, x: DVec3, distance: f64) {
+    fn store_query(&mut self, v: usize, x: DVec3, distance: f64) {
         let free = distance - self.offsets[v];
-        (self.asked_at[v], self.answer[v], self.leave[v]) = (x, distance, free * free.abs());
+        (self.queried_at[v], self.queried_distance[v], self.free_squared[v]) = (x, distance, free * free.abs());
     }
 
-    /// [`update`](Self::update) by planes.
-    fn update_planes(&mut self, body: &Body, x: &[DVec3]) {
-        self.find_near(x);
-        let near = std::mem::take(&mut self.near);
-        let stale =
-            |&v: &usize| self.normals[v] == DVec3::ZERO || x[v].distance_squared(self.asked_at[v]) > PLANE * PLANE;
-        let stale: Vec<usize> = near.iter().map(|&v| v as usize).filter(stale).collect();
-        let found = body.nearest_all(&stale.iter().map(|&v| x[v]).collect::<Vec<_>>());
-        for (v, found) in stale.into_iter().zip(found) {
-            self.keep(v, x[v], found.signed_distance);
-            self.normals[v] = found.normal;
+    /// Finds the vertices whose bound is below the offset. This loop runs over all vertices at every evaluation, so it takes no roots.
+    fn find_candidates(&mut self, x: &[DVec3]) {
+        let Self { candidates, queried_at, free_squared, .. } = self;
+        let may_touch = |((x, queried), free): &((&DVec3, &DVec3), &f64)| x.distance_squared(**queried) > **free;
+        candidates.clear();
+        if x.len() < 2 * MIN_VERTICES_PER_TASK {
+            let vertices = (0..).zip(x.iter().zip(&*queried_at).zip(&*free_squared));
+            candidates.extend(vertices.filter(|(_, vertex)| may_touch(vertex)).map(|(v, _)| v));
+        } else {
+            let vertices = x.par_iter().zip(&*queried_at).zip(&*free_squared).enumerate();
+            let candidate = vertices.with_min_len(MIN_VERTICES_PER_TASK).filter(|(_, vertex)| may_touch(vertex));
+            candidates.par_extend(candidate.map(|(v, _)| v as u32));
         }
-        for &vertex in &near {
-            let v = vertex as usize;
-            let (normal, moved) = (self.normals[v], x[v] - self.asked_at[v]);
-            self.touch(vertex, self.answer[v] + normal.dot(moved), normal);
-        }
-        self.near = near;
     }
 
-    /// Gives every vertex that was never asked a bound by the exact distance: most are far, and a lattice about each would
-    /// cost twenty times as much. The rounded distance is less by no more than the lattice's side.
-    fn bound(&mut self, x: &[DVec3]) {
-        let Obstacle::Rounded(field) = &self.met else { return };
+    /// Bounds every vertex without a query by the exact distance: most are far, and a lattice about each would cost twenty times as
+    /// much. The rounded distance is smaller by at most the side of the lattice.
+    fn query_new(&mut self, x: &[DVec3]) {
+        let Obstacle::Rounded(field) = &self.obstacle else { return };
         let body = field.body();
-        let fresh = |&v: &usize| !self.held[v] && self.answer[v] == f64::NEG_INFINITY;
-        let new: Vec<usize> = (0..x.len()).filter(fresh).collect();
+        let is_new = |&v: &usize| !self.held[v] && self.queried_distance[v] == f64::NEG_INFINITY;
+        let new: Vec<usize> = (0..x.len()).filter(is_new).collect();
         let found = body.nearest_all(&new.iter().map(|&v| x[v]).collect::<Vec<_>>());
         for (v, found) in new.into_iter().zip(found) {
-            self.keep(v, x[v], found.signed_distance - SIDE);
+            self.store_query(v, x[v], found.signed_distance - SIDE);
         }
     }
 
-    /// Refreshes at the positions `x` last updated what stays as it is between two steps: friction, gaps of the cloth, and places kept off.
+    /// Whether the last query proves that vertex v at `x` is farther than `distance_m` from the body.
+    pub(crate) fn is_clear(&self, v: usize, x: DVec3, distance_m: f64) -> bool {
+        self.queried_distance[v] - x.distance(self.queried_at[v]) > distance_m
+    }
+
+    /// Renews, at the positions `x` of the last update, the lagged quantities: friction anchors, gaps of the cloth with itself, and gaps of
+    /// contact places to the body.
     pub fn refresh(&mut self, x: &[DVec3]) {
         self.friction.refresh(&self.touches, x);
-        let to_body = self.cover.gaps(self.body(), x);
+        let to_body = self.face_contacts.gaps(self.body(), x);
         if let Some(proximity) = &mut self.proximity {
             proximity.refresh_with(x, to_body);
         }
     }
 
-    /// The vertices in contact, ascending.
+    /// Number of vertices inside the body at the positions `x` of the last update, and the depth of the deepest (m), by the exact distance.
     #[must_use]
-    pub fn touches(&self) -> &[Touch] {
-        &self.touches
+    pub(crate) fn penetration(&self, x: &[DVec3]) -> (usize, f64) {
+        self.penetrations(x).fold((0, 0.0), |(n, deepest), found| (n + 1, deepest.max(-found.exact)))
     }
 
-    /// The body, if there is one.
-    pub(super) fn body(&self) -> Option<&'b Body> {
-        match &self.met {
-            Obstacle::Nothing => None,
-            Obstacle::Planes(body) => Some(body),
-            Obstacle::Rounded(field) => Some(field.body()),
+    /// Raises offsets, and κ where needed, for the vertices inside the body at the positions `x` of the last update. Returns whether there
+    /// was one; takes effect with the next [`update`](Self::update).
+    pub(crate) fn resolve_penetrations(&mut self, x: &[DVec3]) -> bool {
+        let found: Vec<Penetration> = self.penetrations(x).collect();
+        for &Penetration { vertex, rounded, exact } in &found {
+            let v = vertex as usize;
+            self.offsets[v] += (rounded - exact).max(0.0);
+            self.store_query(v, x[v], rounded);
         }
+        if found.iter().any(|penetration| penetration.rounded <= 0.0) {
+            self.stiffen(STIFFENING);
+        }
+        !found.is_empty()
+    }
+
+    fn penetrations(&self, x: &[DVec3]) -> impl Iterator<Item = Penetration> {
+        let of_touch = move |&Touch { vertex, depth, .. }: &Touch| {
+            let rounded = self.offsets[vertex as usize] - depth;
+            // The rounded distance exceeds the exact one by less than the side of the lattice: see `field`.
+            let body = self.body().filter(|_| rounded < SIDE)?;
+            let exact = body.nearest(x[vertex as usize]).signed_distance;
+            (exact < 0.0).then_some(Penetration { vertex, rounded, exact })
+        };
+        self.touches.iter().filter_map(of_touch)
+    }
+
+    fn garment(&self, x: Vec<DVec3>) -> TriMesh {
+        TriMesh::new(x, self.face_contacts.triangles.iter().map(|t| t.vertices).collect())
+    }
+
+    /// Updates the contact places for the cloth at rest at `x` (m). Where a protrusion of the body sticks through a triangle, the cloth is
+    /// first moved off it. Takes effect with the next [`update`](Self::update) and [`refresh`](Self::refresh).
+    pub(crate) fn update_face_contacts(&mut self, x: &mut Vec<DVec3>) -> FaceUpdate {
+        let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return FaceUpdate::Unchanged };
+        let garment = self.garment(std::mem::take(x));
+        let pairs = crossing_pairs(&garment, body.mesh());
+        if !pairs.is_empty() && self.face_contacts.protrusions < MAX_PROTRUSION_FIXES {
+            self.face_contacts.protrusions += 1;
+            let moved = pull_off_protrusions(body, &garment, &self.held);
+            let proximity = self.proximity.as_mut();
+            if let Some(moved) = moved.filter(|to| proximity.is_none_or(|p| p.move_to(&garment.positions, to))) {
+                *x = moved;
+                return FaceUpdate::Moved;
+            }
+        }
+        *x = garment.positions;
+        let changed = self.face_contacts.update(body, x, &pairs);
+        if changed > 0 { FaceUpdate::Places } else { FaceUpdate::Unchanged }
+    }
+
+    /// Removes all contact places for good, because the cloth does not come to rest with them.
+    pub(crate) fn remove_face_contacts(&mut self) {
+        self.face_contacts.places.clear();
+        self.face_contacts.closed = true;
+    }
+
+    /// Adds contact places near rest, if there were some already; returns how many.
+    pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3]) -> usize {
+        let FaceContacts { closed: false, places, triangles, .. } = &self.face_contacts else { return 0 };
+        let (false, Some(body)) = (places.is_empty(), self.body()) else { return 0 };
+        let triangles = std::sync::Arc::clone(triangles);
+        let pairs = crossing_pairs(&self.garment(x.to_vec()), body.mesh());
+        let mut intersecting: Vec<u32> = pairs.into_iter().map(|[t, _]| t).collect();
+        intersecting.dedup();
+        intersecting.into_iter().map(|t| self.face_contacts.add(&triangles[t as usize], body, x, true)).sum()
     }
 
     /// Contact energy, J, without friction.
@@ -264,5 +379,32 @@ impl<'b> Contacts<'b> {
     /// Each touching vertex's Hessian block, N/m, without friction.
     pub(crate) fn hessian(&self) -> impl Iterator<Item = (u32, DMat3)> + '_ {
         self.touches.iter().map(|t| (t.vertex, outer(t.normal, t.normal) * t.stiffness))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanics::energy::Cloth;
+    use crate::mesh::samples::cuboid;
+
+    #[test]
+    fn contacts_from_known_distances_are_those_of_queries() {
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let placed = vec![at(0.0, 0.0, 0.001), at(0.1, 0.0, 0.05), at(0.1, 0.1, 0.2), at(0.0, 0.1, 0.0005)];
+        let mesh = TriMesh::new(placed.clone(), vec![[0, 1, 2], [0, 2, 3]]);
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
+        let distances: Vec<f64> = placed.iter().map(|x| body.nearest(*x).signed_distance).collect();
+        // The second vertex moves down to the body, the third stays off, the last moves into it.
+        let mut x = placed.clone();
+        (x[1].z, x[2].z, x[3].z) = (0.0004, 0.19, -0.001);
+        for planes in [false, true] {
+            let queried = cloth.contacts_from_distances(&body, &x, planes, &placed, std::iter::empty());
+            let bounded = cloth.contacts_from_distances(&body, &x, planes, &placed, distances.iter().copied());
+            assert!(queried.touches().len() >= 2, "{:?}", queried.touches());
+            assert_eq!(queried.touches(), bounded.touches());
+            assert!(bounded.is_clear(2, x[2], 0.1) && !bounded.is_clear(3, x[3], 0.0));
+        }
     }
 }

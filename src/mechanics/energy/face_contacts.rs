@@ -1,164 +1,216 @@
-//! Skin through cloth: where the body reaches through a triangle whose corners are all outside, places within it are kept off as well.
+//! Contact inside triangles: keeps the body from showing through a triangle whose corners are all outside.
 //!
-//! Contact is felt at the vertices. Where the body is rounder than the cloth's mesh is fine, it reaches through the middle of a triangle. What
-//! crosses is found exactly (`mesh::self_intersection`). In each such triangle and those beside it the places of a lattice that are deepest
-//! in the body become contacts of their own (`proximity::place`): they push the three corners by their shares, with friction, and let go as a
-//! vertex does. Where a triangle's places all are outside and it crosses still, they keep farther off. Each time follows when the cloth has
-//! come to rest again. An end of the body that sticks through is taken inside first (`distance::ends`).
+//! Contact is evaluated at the vertices. Where the body is more curved than the mesh of the cloth resolves, it passes through the
+//! interior of a triangle. Each triangle of the cloth that intersects the body, and each one that shares an edge with it, receives
+//! contact places: the points of a lattice in the triangle that are deepest in the body. A place is Σ w x over the corners. It
+//! acts as a gap between the cloth and a plane of the body ([`Gap`]), with friction, and releases as a vertex does. If the
+//! places of a triangle are all outside and the triangle still intersects the body, their offset is raised. [`Contacts`](super::Contacts)
+//! repeats this each time the cloth has come to rest.
 //!
-//! Limits: what is too tight to be covered is let go again, and counted by whoever asks.
+//! A place inside the body whose shortest way out leads back through the cloth, or along it, is ignored: pushing it out would pull
+//! a limb farther through.
+//!
+//! Limits: places that cannot be kept outside are released, and the intersections that remain are counted by the caller.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::membrane::Triangle;
-use super::proximity::{Gap, Place, offset};
-use super::{Cloth, Contacts};
-use crate::body::distance::{Body, pull_off_protrusions};
-use crate::mesh::TriMesh;
-use crate::mesh::lattice::lattice;
-use crate::mesh::self_intersection::crossing_pairs;
+use super::proximity::gap::{Gap, Key, Kind};
+use crate::body::distance::{Body, OUTWARD, SurfacePoint};
+use crate::mesh::{NONE, lattice};
 
-/// It is raised by so much at a time, and in all, m.
-const RAISE: f64 = 3e-4;
-const FARTHEST: f64 = 4e-3;
+/// Amount by which the offset of a place is raised at a time, m. Heuristic.
+const OFFSET_STEP_M: f64 = 3e-4;
+/// Largest total amount by which the offset of a place is raised, m. Heuristic.
+const MAX_OFFSET_RAISE_M: f64 = 4e-3;
 
-/// Pressure that takes up half of it, Pa: that of the contact at vertices.
+/// Pressure that compresses half the offset, Pa: the value used for contact at vertices.
 const HALF_OFFSET_PRESSURE: f64 = 2000.0;
 
-/// New places in a triangle at a time, and how far apart they are at least, in its longest side.
-const AT_A_TIME: usize = 6;
-const APART: f64 = 0.2;
+/// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
+const MIN_OFFSET_M: f64 = 6e-4;
 
-/// Share of what it keeps under which a place is near.
-const NEAR: f64 = 0.5;
+/// Deepest penetration that is pushed out, m. Contact at vertices may start too late by the sag of a triangle, not by more.
+const MAX_DEPTH_M: f64 = 0.015;
 
-/// Rounds that brought nothing after which it ends.
-const IDLE: usize = 3;
+/// Most places that are added to a triangle at a time. Heuristic.
+const MAX_NEW_PLACES: usize = 6;
+/// Least distance between places that are added at a time, in longest sides of the triangle. Heuristic.
+const MIN_SPACING: f64 = 0.2;
 
-/// Times that an end of the body is taken inside, at most.
-const ENDS: usize = 3;
+/// Share of its offset below which the distance of a place makes it a contact. Heuristic.
+const NEAR_SHARE: f64 = 0.5;
 
-/// The places that keep off the body, and what covering has done so far.
+/// Updates without fewer intersections after which the intersecting triangles are released. Heuristic.
+const MAX_IDLE_UPDATES: usize = 3;
+
+/// A contact place within a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    corners: [u32; 3],
+    /// w of each corner.
+    shares: [f64; 3],
+    /// Distance kept from the body, m.
+    offset: f64,
+    /// κ A, N/m; zero for a place that was released.
+    stiffness: f64,
+}
+
+impl Place {
+    /// Position, m.
+    fn at(&self, x: &[DVec3]) -> DVec3 {
+        lattice::place(self.corners.map(|v| x[v as usize]), self.shares)
+    }
+
+    /// The gap to the body with this number; `None` where the way out of the body does not lead out of the cloth.
+    fn gap(&self, number: u32, body: &Body, x: &[DVec3]) -> Option<Gap> {
+        let ([a, b, c], [s, t, u]) = (self.corners, self.shares);
+        let nearest = body.nearest(self.at(x));
+        if !self.leads_out(&nearest, x) {
+            return None;
+        }
+        let key = Key { kind: Kind::Body, vertices: [a, b, c, NONE, NONE], place: number };
+        let mut gap = Gap::new(key, [s, t, u, 0.0, 0.0], self.offset, self.stiffness);
+        (gap.body, gap.normal) = (nearest.point, nearest.normal);
+        Some(gap)
+    }
+
+    /// Whether the way to the nearest point of the body leads to the outer side of the cloth, which is wound outward.
+    fn leads_out(&self, nearest: &SurfacePoint, x: &[DVec3]) -> bool {
+        let [a, b, c] = self.corners.map(|v| x[v as usize]);
+        let out = (b - a).cross(c - a).normalize_or_zero();
+        nearest.signed_distance >= 0.0 || nearest.signed_distance > -MAX_DEPTH_M && nearest.normal.dot(out) > OUTWARD
+    }
+}
+
+/// Distance that places of a triangle keep from the body, m: the thickness of the cloth (m) there.
+fn place_offset(thickness: &[f64], triangle: &Triangle) -> f64 {
+    let mean = triangle.vertices.iter().map(|&v| thickness[v as usize]).sum::<f64>() / 3.0;
+    mean.max(MIN_OFFSET_M)
+}
+
+/// A point inside a triangle that touches the body.
+pub(in crate::mechanics) struct TouchingPlace {
+    pub(in crate::mechanics) corners: [u32; 3],
+    /// Barycentric coordinates.
+    pub(in crate::mechanics) shares: [f64; 3],
+    /// Outward normal of the body.
+    pub(in crate::mechanics) normal: DVec3,
+}
+
+/// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. The distance to the body is Lipschitz
+/// with constant one, so the distances of the corners exclude most points without a query.
+pub(in crate::mechanics) fn touching_places(
+    triangles: &[Triangle],
+    thickness: &[f64],
+    body: &Body,
+    x: &[DVec3],
+    margin: f64,
+) -> Vec<TouchingPlace> {
+    let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
+    let mut candidates: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
+    for t in triangles {
+        let reach = place_offset(thickness, t) + margin;
+        let corners = t.vertices.map(|v| x[v as usize]);
+        let clear = |at: DVec3| {
+            t.vertices.iter().zip(corners).any(|(&v, corner)| distances[v as usize] - corner.distance(at) > reach)
+        };
+        let all = lattice::lattice(t.longest_side_m()).map(|shares| (t, shares, lattice::place(corners, shares)));
+        candidates.extend(all.filter(|(_, _, at)| !clear(*at)));
+    }
+    let found = body.nearest_all(&candidates.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
+    let touches = |((t, ..), nearest): &((&Triangle, _, _), SurfacePoint)| {
+        nearest.signed_distance < place_offset(thickness, t) + margin
+    };
+    let place = |((t, shares, _), nearest): ((&Triangle, [f64; 3], _), SurfacePoint)| TouchingPlace {
+        corners: t.vertices,
+        shares,
+        normal: nearest.normal,
+    };
+    candidates.into_iter().zip(found).filter(touches).map(place).collect()
+}
+
+/// The contact places of a cloth, and the state of the updates so far.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Cover {
-    places: Vec<Place>,
+pub(super) struct FaceContacts {
+    pub(super) triangles: Arc<Vec<Triangle>>,
+    /// Thickness of the cloth at each vertex, m.
+    thickness: Arc<Vec<f64>>,
+    pub(super) places: Vec<Place>,
     fewest: Option<usize>,
     idle: usize,
-    ends: usize,
-    given_up: bool,
+    /// Updates that moved the cloth off a protrusion of the body.
+    pub(super) protrusions: usize,
+    /// Whether no place is added any more.
+    pub(super) closed: bool,
 }
 
-/// What covering asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Covered {
-    /// Nothing: no skin is through the cloth, or nothing helps.
-    Done,
-    /// Places are kept off that were not before, or farther, or are let go.
-    Places,
-    /// The cloth was taken off an end of the body, and is far from rest.
-    Moved,
-}
-
-impl Contacts<'_> {
-    /// Covers the skin that is through the cloth at `x` (m), where it rests. Takes effect with the next [`update`](Self::update) and
-    /// [`refresh`](Self::refresh).
-    pub(crate) fn cover(&mut self, cloth: &Cloth, x: &mut Vec<DVec3>) -> Covered {
-        let Some(body) = self.body() else { return Covered::Done };
-        if self.cover.given_up {
-            return Covered::Done;
-        }
-        let garment = mesh_of(cloth, std::mem::take(x));
-        let pairs = crossing_pairs(&garment, body.mesh());
-        if !pairs.is_empty() && self.cover.ends < ENDS {
-            self.cover.ends += 1;
-            let taken = pull_off_protrusions(body, &garment, &cloth.held);
-            let itself = self.proximity.as_mut();
-            if let Some(taken) = taken.filter(|taken| itself.is_none_or(|p| p.put(&garment.positions, taken))) {
-                *x = taken;
-                return Covered::Moved;
-            }
-        }
-        *x = garment.positions;
-        let changed = self.cover.around(cloth, body, x, &pairs);
-        if changed > 0 { Covered::Places } else { Covered::Done }
+impl FaceContacts {
+    pub(super) fn new(triangles: Arc<Vec<Triangle>>, thickness: Arc<Vec<f64>>) -> Self {
+        Self { triangles, thickness, ..Self::default() }
     }
 
-    /// Lets all places go, for good, where the cloth does not come to rest with them.
-    pub(crate) fn uncover(&mut self) {
-        self.cover = Cover { given_up: true, ..Cover::default() };
-    }
-
-    /// The same near rest, where places had to be kept off before: adds what is through the cloth by now. How many places are new.
-    pub(crate) fn cover_more(&mut self, cloth: &Cloth, x: &[DVec3]) -> usize {
-        let (false, false, Some(body)) = (self.cover.given_up, self.cover.places.is_empty(), self.body()) else {
-            return 0;
-        };
-        let garment = mesh_of(cloth, x.to_vec());
-        let mut crossing: Vec<u32> = crossing_pairs(&garment, body.mesh()).into_iter().map(|[t, _]| t).collect();
-        crossing.dedup();
-        crossing.into_iter().map(|t| self.cover.add(cloth, &cloth.triangles[t as usize], body, x, true)).sum()
-    }
-}
-
-fn mesh_of(cloth: &Cloth, x: Vec<DVec3>) -> TriMesh {
-    TriMesh::new(x, cloth.triangles.iter().map(|t| t.vertices).collect())
-}
-
-impl Cover {
     /// The gaps to `body` at `x` (m).
     pub(super) fn gaps(&self, body: Option<&Body>, x: &[DVec3]) -> Vec<Gap> {
         let Some(body) = body else { return Vec::new() };
-        let kept = (0..).zip(&self.places).filter(|(_, place)| place.stiffness > 0.0);
-        kept.filter_map(|(number, place)| place.gap(number, body, x)).collect()
+        let active = (0..).zip(&self.places).filter(|(_, place)| place.stiffness > 0.0);
+        active.filter_map(|(number, place)| place.gap(number, body, x)).collect()
     }
 
-    /// Keeps places about these `pairs` of triangles that cross off the body; returns how many are new, farther off or let go.
-    fn around(&mut self, cloth: &Cloth, body: &Body, x: &[DVec3], pairs: &[[u32; 2]]) -> usize {
+    /// Updates the places about these `pairs` of triangles of cloth and body that intersect. Returns how many places were added, raised or
+    /// released.
+    pub(super) fn update(&mut self, body: &Body, x: &[DVec3], pairs: &[[u32; 2]]) -> usize {
         let fewer = self.fewest.is_none_or(|fewest| pairs.len() < fewest);
         self.idle = if fewer { 0 } else { self.idle + 1 };
         self.fewest = Some(self.fewest.map_or(pairs.len(), |fewest| fewest.min(pairs.len())));
         if pairs.is_empty() {
             return 0;
         }
-        let mut crosses = vec![false; cloth.triangles.len()];
-        pairs.iter().for_each(|[t, _]| crosses[*t as usize] = true);
-        let crossing = || cloth.triangles.iter().zip(&crosses).filter(|(_, crosses)| **crosses).map(|(t, _)| t);
-        if self.idle >= IDLE {
-            self.given_up = true;
-            return self.let_go(crossing());
+        let triangles = Arc::clone(&self.triangles);
+        let mut intersects = vec![false; triangles.len()];
+        pairs.iter().for_each(|[t, _]| intersects[*t as usize] = true);
+        let intersecting = || triangles.iter().zip(&intersects).filter(|(_, intersects)| **intersects).map(|(t, _)| t);
+        if self.idle >= MAX_IDLE_UPDATES {
+            self.closed = true;
+            let tight: Vec<[u32; 3]> = intersecting().map(|t| t.vertices).collect();
+            let released = self.places.iter_mut().filter(|place| tight.contains(&place.corners));
+            return released.map(|place| place.stiffness = 0.0).count();
         }
         let mut at_corner = vec![false; x.len()];
-        crossing().flat_map(|t| t.vertices).for_each(|v| at_corner[v as usize] = true);
+        intersecting().flat_map(|t| t.vertices).for_each(|v| at_corner[v as usize] = true);
         let beside = |t: &Triangle| t.vertices.iter().filter(|v| at_corner[**v as usize]).count() > 1;
         let mut changed = 0;
-        for (t, &crosses) in cloth.triangles.iter().zip(&crosses).filter(|(t, _)| beside(t)) {
-            let new = self.add(cloth, t, body, x, crosses);
-            changed += if new == 0 && crosses { self.raise(cloth, t) } else { new };
+        for (t, &intersects) in triangles.iter().zip(&intersects).filter(|(t, _)| beside(t)) {
+            let new = self.add(t, body, x, intersects);
+            changed += if new == 0 && intersects { self.raise(t) } else { new };
         }
         changed
     }
 
-    /// Keeps the places of a triangle off that are deepest in the body; how many are new.
-    fn add(&mut self, cloth: &Cloth, triangle: &Triangle, body: &Body, x: &[DVec3], crosses: bool) -> usize {
+    /// Adds the points of a triangle that are deepest in the body; returns how many.
+    pub(super) fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], intersects: bool) -> usize {
         let (corners, longest) = (triangle.vertices, triangle.longest_side_m());
-        let offset = offset(cloth, triangle);
+        let offset = place_offset(&self.thickness, triangle);
         let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
-        let all: Vec<Place> = lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
+        let all: Vec<Place> =
+            lattice::lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
         let found = body.nearest_all(&at);
-        let out = found.iter().zip(0..).filter(|(near, i)| all[*i].leads_out(near, x));
-        let mut deepest: Vec<(f64, usize)> = out.map(|(near, i)| (near.signed_distance, i)).collect();
+        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x));
+        let mut deepest: Vec<(f64, usize)> = out.map(|(nearest, i)| (nearest.signed_distance, i)).collect();
         deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let of_triangle: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
+        let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added: Vec<DVec3> = Vec::new();
         for (distance, i) in deepest {
-            let first = crosses && added.is_empty() && distance < offset;
-            let wanted = first || distance < NEAR * offset;
-            let known = || of_triangle.iter().any(|p| p.shares == all[i].shares);
-            if !wanted || added.len() == AT_A_TIME {
+            let first = intersects && added.is_empty() && distance < offset;
+            let wanted = first || distance < NEAR_SHARE * offset;
+            if !wanted || added.len() == MAX_NEW_PLACES {
                 break;
             }
-            if added.iter().all(|p| p.distance(at[i]) > APART * longest) && !known() {
+            let is_new = present.iter().all(|p| p.shares != all[i].shares);
+            if is_new && added.iter().all(|p| p.distance(at[i]) > MIN_SPACING * longest) {
                 added.push(at[i]);
                 self.places.push(all[i]);
             }
@@ -166,33 +218,28 @@ impl Cover {
         added.len()
     }
 
-    /// Keeps the places of a triangle farther off; how many.
-    fn raise(&mut self, cloth: &Cloth, triangle: &Triangle) -> usize {
-        let most = offset(cloth, triangle) + FARTHEST;
-        let of_triangle = self.places.iter_mut().filter(|p| p.corners == triangle.vertices && p.offset < most);
-        of_triangle.map(|place| place.offset += RAISE).count()
-    }
-
-    /// A place too tight to be covered is not stretched for it; how many are let go.
-    fn let_go<'t>(&mut self, tight: impl Iterator<Item = &'t Triangle>) -> usize {
-        let tight: Vec<[u32; 3]> = tight.map(|t| t.vertices).collect();
-        let given_up = self.places.iter_mut().filter(|place| tight.contains(&place.corners));
-        given_up.map(|place| place.stiffness = 0.0).count()
+    /// Raises the offset of the places of a triangle; returns how many.
+    fn raise(&mut self, triangle: &Triangle) -> usize {
+        let max = place_offset(&self.thickness, triangle) + MAX_OFFSET_RAISE_M;
+        let raised = self.places.iter_mut().filter(|p| p.corners == triangle.vertices && p.offset < max);
+        raised.map(|place| place.offset += OFFSET_STEP_M).count()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mechanics::energy::{Cloth, Contacts, FaceUpdate};
+    use crate::mesh::TriMesh;
     use crate::mesh::samples::cuboid;
 
-    /// A box of this half width and depth under z = 0.
+    /// A box below z = 0 with this half width and half depth.
     fn post(half: f64) -> Body {
         let (at, half) = (DVec3::new(0.014, 0.01, 0.0), DVec3::new(half, half, 0.0));
         Body::new(&cuboid(at - half - DVec3::Z * 0.3, at + half)).unwrap()
     }
 
-    /// Two triangles of 3 cm with the post 1.5 mm through both.
+    /// Two triangles of 3 cm that the post pierces by 1.5 mm.
     fn pierced() -> (Cloth, Vec<DVec3>) {
         let at = |x: f64, y: f64| DVec3::new(x, y, -1.5e-3);
         let x = vec![at(0.0, 0.0), at(0.03, 0.0), at(0.0, 0.03), at(0.03, 0.03)];
@@ -200,20 +247,20 @@ mod tests {
         (Cloth::sample(&mesh, "jersey", &[3]), x)
     }
 
-    /// Contacts that cover the post, by now slid along it, and where the cloth is.
-    fn covered<'b>(cloth: &Cloth, body: &'b Body, mut x: Vec<DVec3>) -> (Contacts<'b>, Vec<DVec3>) {
+    /// Contacts with places on the post, and positions that have slipped since.
+    fn slipped<'b>(cloth: &Cloth, body: &'b Body, mut x: Vec<DVec3>) -> (Contacts<'b>, Vec<DVec3>) {
         let mut contacts = cloth.contacts(body, &x);
         contacts.proximity = Some(cloth.proximity());
         assert!(contacts.touches().is_empty(), "no corner touches");
-        assert_eq!(contacts.cover(cloth, &mut x), Covered::Places);
+        assert_eq!(contacts.update_face_contacts(&mut x), FaceUpdate::Places);
         contacts.refresh(&x);
-        // One more refresh, for friction to have a pressure.
+        // Friction takes its normal force from the refresh before.
         contacts.refresh(&x);
-        let slid = x.iter().enumerate().map(|(i, p)| *p + DVec3::new(2e-4, 1e-4 * i as f64, 5e-5)).collect();
-        (contacts, slid)
+        let slipped = x.iter().enumerate().map(|(i, p)| *p + DVec3::new(2e-4, 1e-4 * i as f64, 5e-5)).collect();
+        (contacts, slipped)
     }
 
-    fn force(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<DVec3> {
+    fn contact_gradient(cloth: &Cloth, contacts: &Contacts<'_>, x: &[DVec3]) -> Vec<DVec3> {
         let (mut with, mut without) = (Vec::new(), Vec::new());
         cloth.gradient(x, contacts, &mut with);
         cloth.gradient(x, &Contacts::none(), &mut without);
@@ -221,15 +268,15 @@ mod tests {
     }
 
     #[test]
-    fn gradient_and_blocks_of_what_is_kept_off_are_those_of_its_energy() {
+    fn gradient_and_hessian_of_face_contacts_match_differences() {
         let (body, (cloth, x)) = (post(0.005), pierced());
-        let (contacts, x) = covered(&cloth, &body, x);
+        let (contacts, x) = slipped(&cloth, &body, x);
         let pressing = contacts.proximity.as_ref().unwrap().pressing(&x);
         assert!(pressing > 1, "{pressing}");
         let energy = |x: &[DVec3]| cloth.energy(x, &contacts) - cloth.energy(x, &Contacts::none());
-        let told = force(&cloth, &contacts, &x);
-        assert_eq!(told[3], DVec3::ZERO, "it is held");
-        let largest = told.iter().map(|f| f.length()).fold(0.0, f64::max);
+        let gradient = contact_gradient(&cloth, &contacts, &x);
+        assert_eq!(gradient[3], DVec3::ZERO, "the vertex is held");
+        let largest = gradient.iter().map(|f| f.length()).fold(0.0, f64::max);
         let (mut blocks, mut without) = (Vec::new(), Vec::new());
         cloth.hessian(&x, &contacts, &mut blocks);
         cloth.hessian(&x, &Contacts::none(), &mut without);
@@ -243,28 +290,28 @@ mod tests {
                     x
                 };
                 let slope = (energy(&moved(step)) - energy(&moved(-step))) / (2.0 * step);
-                assert!((slope - told[v as usize].dot(axis)).abs() < 1e-5 * largest, "vertex {v}: {slope}");
-                let (ahead, behind) = (force(&cloth, &contacts, &moved(step)), force(&cloth, &contacts, &moved(-step)));
+                assert!((slope - gradient[v as usize].dot(axis)).abs() < 1e-5 * largest, "vertex {v}: {slope}");
+                let [ahead, behind] = [step, -step].map(|s| contact_gradient(&cloth, &contacts, &moved(s)));
                 let mut d = vec![DVec3::ZERO; cloth.order().len()];
                 d[i] = axis;
-                let mut change = Vec::new();
-                cloth.multiply(&blocks, &d, &mut change);
-                let scale = change.iter().map(|f| f.length()).fold(1.0, f64::max);
-                for (&w, change) in cloth.order().iter().zip(&change) {
+                let mut computed = Vec::new();
+                cloth.pattern().multiply(&blocks, &d, &mut computed);
+                let scale = computed.iter().map(|f| f.length()).fold(1.0, f64::max);
+                for (&w, computed) in cloth.order().iter().zip(&computed) {
                     let measured = (ahead[w as usize] - behind[w as usize]) / (2.0 * step);
-                    assert!(measured.distance(*change) < 1e-4 * scale, "{v} {w}: {measured} and {change}");
+                    assert!(measured.distance(*computed) < 1e-4 * scale, "{v} {w}: {measured} and {computed}");
                 }
             }
         }
     }
 
     #[test]
-    fn what_cannot_be_covered_is_let_go() {
+    fn places_that_cannot_be_kept_outside_are_released() {
         let (body, (cloth, mut x)) = (post(0.005), pierced());
-        let (mut contacts, _) = covered(&cloth, &body, x.clone());
-        // Nothing moves, so nothing comes of it.
-        let rounds = (0..200).take_while(|_| contacts.cover(&cloth, &mut x) != Covered::Done).count();
-        assert!((IDLE - 1..200).contains(&rounds), "{rounds}");
+        let (mut contacts, _) = slipped(&cloth, &body, x.clone());
+        // The cloth does not move, so no update reduces the intersections.
+        let updates = (0..200).take_while(|_| contacts.update_face_contacts(&mut x) != FaceUpdate::Unchanged).count();
+        assert!((MAX_IDLE_UPDATES - 1..200).contains(&updates), "{updates}");
         contacts.refresh(&x);
         assert_eq!(contacts.proximity.as_ref().unwrap().pressing(&x), 0);
     }

@@ -1,30 +1,29 @@
-//! The distance to the body as contact feels it: once continuously differentiable.
+//! The distance to the body with rounded creases: continuously differentiable.
 //!
-//! The exact distance q of a body made of triangles has a crease over every hollow edge, where the nearest triangle
-//! changes. A vertex that lies in one is pushed by both sides, but the gradient there is that of one or the other: Newton's
-//! method cannot settle it, and one such vertex stops the line search of a whole garment. So contact takes
+//! The exact distance q of a body made of triangles has a crease over every concave edge, where the nearest triangle
+//! changes. A vertex in a crease is pushed by both sides, but the gradient there is that of one side: Newton's
+//! method does not converge, and one such vertex stalls the line search of a whole garment. Contact therefore uses
 //!
 //! q̃(x) = Σ N(x/h − i) q(h i), N(t) = n(t₁) n(t₂) n(t₃),
 //!
-//! the quadratic B-spline n over a lattice of side h with the exact distances as coefficients. A crease is rounded over h and a
-//! bit; a plane is reproduced as it is, a curved surface to h²/8 times its curvature. Since q has slope at most one and the spline's
-//! weights a spread of √¾ h, |q̃ − q| < h everywhere.
+//! the quadratic B-spline n over a lattice of side h with the exact distances as coefficients. A crease is rounded over a
+//! little more than h. A plane is reproduced exactly, a curved surface to h²/8 times its curvature. Since q is Lipschitz with constant one
+//! and the weights of the spline have a spread of √¾ h, |q̃ − q| < h everywhere.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | q | exact signed distance | m |
 //! | h | side of the lattice, [`SIDE`] | m |
 //!
-//! Values are asked for where they are first needed and kept with the body; each is a function of its lattice point alone, so they are the
-//! same whatever was asked before and on any number of threads. Limits: what is thinner than h (a finger's tip, a brim) is
-//! rounded away. Whether a vertex is inside the body is always told by the exact distance.
+//! Lattice values are computed at the first use and kept with the body. Each depends on its lattice point alone, so the values are
+//! independent of the order of queries and of the number of threads. Limits: features thinner than h (a fingertip, a brim) are
+//! rounded away. Whether a vertex is inside the body is decided by the exact distance.
 
 use glam::{DVec3, IVec3};
 
 use crate::body::distance::{Body, LATTICE_SIDE};
 
-/// h, m. A surface of 5 cm radius is off by 0.06 mm for each of its curvatures; two planes that meet at 10 degrees by 0.1 to 0.2 mm
-/// in the crease.
+/// h, m. The error on a surface of 5 cm radius is 0.06 mm for each of its curvatures, in a crease of 10 degrees 0.1 to 0.2 mm.
 pub(crate) const SIDE: f64 = LATTICE_SIDE;
 
 /// Lattice values about one cell, x slowest.
@@ -34,15 +33,15 @@ type Stencil = [f64; 27];
 #[derive(Debug, Clone)]
 pub(crate) struct Field<'b> {
     body: &'b Body,
-    /// The cell each vertex was last seen in, and its values: it seldom leaves it in one step.
-    kept: Vec<Option<(IVec3, Box<Stencil>)>>,
+    /// The last cell of each vertex with its stencil: a vertex seldom leaves its cell in one step.
+    stencils: Vec<Option<(IVec3, Box<Stencil>)>>,
 }
 
 impl<'b> Field<'b> {
-    /// Of a body, for so many vertices.
+    /// The field of a body, for this many vertices.
     #[must_use]
     pub(crate) fn new(body: &'b Body, vertices: usize) -> Self {
-        Self { body, kept: vec![None; vertices] }
+        Self { body, stencils: vec![None; vertices] }
     }
 
     /// The body.
@@ -53,14 +52,15 @@ impl<'b> Field<'b> {
 
     /// q̃ (m) and its gradient at the positions of `vertices`, in their order.
     pub(crate) fn at(&mut self, vertices: &[u32], x: &[DVec3]) -> Vec<(f64, DVec3)> {
-        let moved = |&&v: &&u32| self.kept[v as usize].as_ref().is_none_or(|(cell, _)| *cell != cell_of(x[v as usize]));
+        let moved =
+            |&&v: &&u32| self.stencils[v as usize].as_ref().is_none_or(|(cell, _)| *cell != cell_of(x[v as usize]));
         let moved: Vec<u32> = vertices.iter().filter(moved).copied().collect();
         let cells: Vec<IVec3> = moved.iter().flat_map(|&v| around(cell_of(x[v as usize]))).collect();
         let values = self.body.at_lattice(&cells);
         for (&v, values) in moved.iter().zip(values.as_chunks::<27>().0) {
-            self.kept[v as usize] = Some((cell_of(x[v as usize]), Box::new(*values)));
+            self.stencils[v as usize] = Some((cell_of(x[v as usize]), Box::new(*values)));
         }
-        let value = |&v: &u32| match &self.kept[v as usize] {
+        let value = |&v: &u32| match &self.stencils[v as usize] {
             Some((cell, stencil)) => spline(x[v as usize] / SIDE - cell.as_dvec3(), stencil),
             None => (f64::INFINITY, DVec3::ZERO),
         };
@@ -73,12 +73,12 @@ fn cell_of(x: DVec3) -> IVec3 {
     (x / SIDE).round().as_ivec3()
 }
 
-/// It and its neighbours, x slowest.
+/// The cell and its neighbours, x slowest.
 fn around(cell: IVec3) -> impl Iterator<Item = IVec3> {
     (0..27).map(move |k| cell + IVec3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1))
 }
 
-/// Value and gradient (per metre) at `f` from the middle of the stencil, |f| ≤ ½ in each coordinate.
+/// Value and gradient (per metre) at `f` from the centre of the stencil, |f| ≤ ½ in each coordinate.
 fn spline(f: DVec3, stencil: &Stencil) -> (f64, DVec3) {
     let weights = |t: f64| [0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)];
     let slopes = |t: f64| [t - 0.5, -2.0 * t, t + 0.5];
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn over_a_plane_it_is_the_exact_distance() {
+    fn the_distance_to_a_plane_is_exact() {
         let body = cube();
         let x = [DVec3::new(0.1, 0.07, 0.2013), DVec3::new(0.11, 0.093, 0.1991)];
         for ((q, gradient), x) in Field::new(&body, 2).at(&[0, 1], &x).into_iter().zip(x) {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn its_gradient_is_that_of_its_value_over_an_edge_too() {
+    fn the_gradient_near_an_edge_matches_differences() {
         let body = cube();
         let mut field = Field::new(&body, 1);
         let x = DVec3::new(0.2011, 0.1993, 0.2007);

@@ -1,132 +1,142 @@
-//! Friction: where the cloth rests on the body it holds on, up to Coulomb's limit.
+//! Coulomb friction between the cloth and the body.
 //!
-//! Each touching vertex has an anchor a on the body and a tangential spring that yields at μ_f N:
+//! Each vertex in contact has an anchor a on the body and a tangential spring that yields at μ_f N:
 //!
-//! E = μ_f N φ(|u|), u = (I − n nᵀ)(x − a), φ(y) = y²/2ε for y < ε, y − ε/2 beyond,
+//! E = μ_f N φ(|u|), u = (I − n nᵀ)(x − a), φ(y) = y²/2ε for y < ε, y − ε/2 beyond.
 //!
-//! so the force is μ_f N u/ε while it sticks and μ_f N û once it slips. N, n and a are those of the last
-//! [`refresh`](Friction::refresh) (the lagging of Li and others: "Incremental potential contact", SIGGRAPH 2020), which makes
-//! the force the gradient of an energy in between. A refresh also drags the anchor of a slipped vertex to ε behind it: the
-//! return mapping of plasticity, here for statics. A state that repeats itself under a refresh is in equilibrium with
+//! The force is μ_f N u/ε while the vertex sticks and μ_f N û once it slips. N, n and a are those of the last
+//! [`refresh`](Friction::refresh) (lagged friction: Li and others: "Incremental potential contact", SIGGRAPH 2020), so the force
+//! is the gradient of an energy between two refreshes. A refresh drags the anchor of a slipped vertex to a distance of ε: the
+//! return mapping of plasticity, used here in statics. A state that a refresh leaves unchanged is in equilibrium with
 //! Coulomb's law: |f_t| ≤ μ_f N, opposed to the slip where equal.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | μ_f | friction coefficient | – |
 //! | N | normal force | N |
-//! | a | anchor: where the vertex touched first, dragged where it slipped | m |
+//! | a | anchor: the point of first contact, dragged by slip | m |
 //! | ε | elastic slip, [`ELASTIC_SLIP`] | m |
 //!
-//! Limits: statics has no history of its own; the anchors are where the solver's path first touched the body.
+//! Limits: statics has no history of its own; the anchors are the points where the solver's path first touched the body.
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::contact::Touch;
 use super::membrane::outer;
 
-/// ε, m: how far a vertex moves before friction is full. Smaller is truer to Coulomb and stiffer to solve: at 0.5 mm the
-/// tangential spring of a vertex under its own weight is some hundred times softer than a jersey.
+/// ε, m: the slip at which friction reaches its limit. A smaller value is closer to Coulomb's law and gives a stiffer system. At
+/// 0.5 mm the tangential spring of a vertex under its own weight is some hundred times softer than a jersey.
 pub(crate) const ELASTIC_SLIP: f64 = 5e-4;
 
-/// Share of ε from which a hold counts as slipping in the Hessian: a dragged anchor is left at ε exactly, up to rounding,
-/// and as a spring it would let the vertex creep by a fraction of ε a step.
+/// Share of ε from which the Hessian treats an anchor as slipping. A dragged anchor lies at ε up to rounding; treated as a
+/// spring it would let the vertex creep by a fraction of ε a step.
 const YIELDED: f64 = 0.999;
 
-/// One vertex's hold on the body.
+/// A vertex nearer to the body than its offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Hold {
+pub struct Touch {
+    /// The vertex.
+    pub vertex: u32,
+    /// h − q, m: positive.
+    pub depth: f64,
+    /// ∇q, outward. Its length is one except where a crease is rounded.
+    pub normal: DVec3,
+    /// κ A_i, N/m.
+    pub stiffness: f64,
+}
+
+impl Touch {
+    /// The normal force κ A_i (h − q), N.
+    #[must_use]
+    pub fn force(&self) -> f64 {
+        self.stiffness * self.depth
+    }
+}
+
+/// The tangential spring of one vertex.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Anchor {
     vertex: u32,
-    anchor: DVec3,
+    /// a, m.
+    position: DVec3,
     normal: DVec3,
     /// μ_f N, N.
     limit: f64,
 }
 
-impl Hold {
+impl Anchor {
     fn slip(&self, x: &[DVec3]) -> DVec3 {
-        let d = x[self.vertex as usize] - self.anchor;
+        let d = x[self.vertex as usize] - self.position;
         d - self.normal * self.normal.dot(d)
     }
 }
 
-/// Every hold of a cloth on the body.
+/// The tangential springs of a cloth on the body.
 #[derive(Debug, Clone, Default)]
 pub struct Friction {
-    /// Of each vertex.
+    /// Coulomb's coefficient of each vertex.
     coefficients: Arc<Vec<f64>>,
-    holds: Vec<Hold>,
+    anchors: Vec<Anchor>,
 }
 
 impl Friction {
-    /// No friction.
-    #[must_use]
-    pub fn none() -> Self {
-        Self::default()
-    }
-
-    /// With each vertex's coefficient of Coulomb.
+    /// Friction with Coulomb's coefficient of each vertex.
     #[must_use]
     pub(crate) fn new(coefficients: Arc<Vec<f64>>) -> Self {
-        Self { coefficients, holds: Vec::new() }
+        Self { coefficients, anchors: Vec::new() }
     }
 
-    /// Takes normal forces and normals from `touches` at `x`; keeps the anchors of those that held, drags those that
-    /// slipped, lets go of those that left.
+    /// Takes normal forces and normals from `touches` at `x`. Anchors of vertices that stick are kept, those of vertices that slip are
+    /// dragged, those of vertices that left the body are dropped.
     pub(crate) fn refresh(&mut self, touches: &[Touch], x: &[DVec3]) {
         if self.coefficients.iter().all(|coefficient| *coefficient <= 0.0) {
             return;
         }
-        let mut old = self.holds.iter().peekable();
-        let mut holds = Vec::with_capacity(touches.len());
+        let mut old = self.anchors.iter().peekable();
+        let mut anchors = Vec::with_capacity(touches.len());
         for t in touches {
-            while old.next_if(|h| h.vertex < t.vertex).is_some() {}
-            let position = x[t.vertex as usize];
-            let anchor = old.next_if(|h| h.vertex == t.vertex).map_or(position, |h| h.anchor);
-            // The rounded distance is flatter than a distance in a crease, and pushes less; where a body goes through itself it is
-            // steeper than any.
+            while old.next_if(|a| a.vertex < t.vertex).is_some() {}
+            let here = x[t.vertex as usize];
+            let position = old.next_if(|a| a.vertex == t.vertex).map_or(here, |a| a.position);
+            // The gradient of the rounded distance is shorter than one in a crease, where the body pushes less. Where a body
+            // intersects itself it may be longer.
             let slope = t.normal.length();
             let normal = t.normal / if slope > 0.0 { slope } else { 1.0 };
-            let mut hold = Hold {
-                vertex: t.vertex,
-                anchor,
-                normal,
-                limit: self.coefficients[t.vertex as usize] * t.force() * slope.min(1.0),
-            };
-            let slip = hold.slip(x);
-            // The anchor stays in the tangent plane through the vertex; only the slip within ε is elastic.
-            hold.anchor = position - slip.clamp_length_max(ELASTIC_SLIP);
-            holds.push(hold);
+            let limit = self.coefficients[t.vertex as usize] * t.force() * slope.min(1.0);
+            let mut anchor = Anchor { vertex: t.vertex, position, normal, limit };
+            // The anchor lies in the tangent plane through the vertex; only the slip within ε is elastic.
+            anchor.position = here - anchor.slip(x).clamp_length_max(ELASTIC_SLIP);
+            anchors.push(anchor);
         }
-        self.holds = holds;
+        self.anchors = anchors;
     }
 
     /// Energy at the lagged forces, J.
     #[must_use]
     pub fn energy(&self, x: &[DVec3]) -> f64 {
-        self.holds.iter().map(|h| h.limit * huber(h.slip(x).length())).sum()
+        self.anchors.iter().map(|a| a.limit * huber(a.slip(x).length())).sum()
     }
 
     /// Adds the gradient, N.
     pub fn add_gradient(&self, x: &[DVec3], gradient: &mut [DVec3]) {
-        for h in &self.holds {
-            let u = h.slip(x);
-            gradient[h.vertex as usize] += u * (h.limit / u.length().max(ELASTIC_SLIP));
+        for a in &self.anchors {
+            let u = a.slip(x);
+            gradient[a.vertex as usize] += u * (a.limit / u.length().max(ELASTIC_SLIP));
         }
     }
 
-    /// Each hold's Hessian block, N/m.
+    /// Each vertex's Hessian block, N/m.
     pub(crate) fn hessian<'a>(&'a self, x: &'a [DVec3]) -> impl Iterator<Item = (u32, DMat3)> + 'a {
-        self.holds.iter().map(|h| {
-            let tangent = DMat3::IDENTITY - outer(h.normal, h.normal);
-            (h.vertex, stiffening(h.limit, tangent, h.slip(x)))
+        self.anchors.iter().map(|a| {
+            let tangent = DMat3::IDENTITY - outer(a.normal, a.normal);
+            (a.vertex, tangential_stiffness(a.limit, tangent, a.slip(x)))
         })
     }
 }
 
-/// How the force stiffens with the slip u (m) along a plane with this `tangent` projection, N/m.
-pub(super) fn stiffening(limit: f64, tangent: DMat3, u: DVec3) -> DMat3 {
+/// Second derivative of the friction energy by the slip u (m) in the plane that `tangent` projects on, N/m.
+pub(super) fn tangential_stiffness(limit: f64, tangent: DMat3, u: DVec3) -> DMat3 {
     let y = u.length();
     if y < YIELDED * ELASTIC_SLIP {
         tangent * (limit / ELASTIC_SLIP)
@@ -144,12 +154,18 @@ pub(super) fn huber(y: f64) -> f64 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn in_a_crease_it_holds_along_the_surface_as_much_as_the_body_pushes() {
-        let normal = DVec3::new(0.3, 0.0, 0.4);
+    /// Friction of μ_f = 0.3 anchored at the origin under a contact with this gradient of the distance.
+    fn anchored(normal: DVec3) -> (Touch, Friction) {
         let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
         let mut friction = Friction::new(Arc::new(vec![0.3]));
         friction.refresh(&[touch], &[DVec3::ZERO]);
+        (touch, friction)
+    }
+
+    #[test]
+    fn friction_in_a_crease_is_tangential_and_limited_by_the_force_of_the_body() {
+        let normal = DVec3::new(0.3, 0.0, 0.4);
+        let (touch, friction) = anchored(normal);
         let mut gradient = [DVec3::ZERO];
         friction.add_gradient(&[DVec3::new(4e-3, 0.0, -3e-3)], &mut gradient);
         let pushed = touch.force() * normal.length();
@@ -157,11 +173,9 @@ mod tests {
     }
 
     #[test]
-    fn a_gradient_steeper_than_a_distance_leaves_the_hessian_positive_and_the_slip_along_the_surface() {
+    fn a_gradient_longer_than_one_leaves_the_hessian_positive_and_the_friction_tangential() {
         let normal = DVec3::new(12.0, -30.0, 20.0);
-        let touch = Touch { vertex: 0, depth: 1e-3, normal, stiffness: 100.0 };
-        let mut friction = Friction::new(Arc::new(vec![0.3]));
-        friction.refresh(&[touch], &[DVec3::ZERO]);
+        let (touch, friction) = anchored(normal);
         let x = [DVec3::new(3e-4, 1e-4, -2e-4)];
         let (_, block) = friction.hessian(&x).next().unwrap();
         let along = normal.normalize();

@@ -1,42 +1,43 @@
-//! Membrane: the cost of stretching and shearing each triangle.
+//! Membrane: the energy of stretching and shearing each triangle.
 //!
 //! With F = [F_u F_v] the deformation gradient of a triangle (columns: the images of the weft and warp unit vectors),
 //!
 //! ψ = ½ C_uu s_u² + C_uv s_u s_v + ½ C_vv s_v² + ½ μ γ²,  s_u = |F_u| − 1, s_v = |F_v| − 1, γ = F_u·F_v,
 //!
-//! and the energy is Σ A ψ. A uniaxial pull along the warp meets C_vv − C_uv²/C_uu, which is the measured stiffness k_v:
-//! C_uu = k_u/(1−ν²), C_vv = k_v/(1−ν²), C_uv = ν √(k_u k_v)/(1−ν²). Orthotropic, with the shear stiffness independent,
-//! as cloth is (Wang, O'Brien, Ramamoorthi: "Data-driven elastic models for cloth", SIGGRAPH 2011). The strain is that of
+//! and the energy is Σ A ψ. The stiffness of a uniaxial pull along the warp is C_vv − C_uv²/C_uu, the measured k_v:
+//! C_uu = k_u/(1−ν²), C_vv = k_v/(1−ν²), C_uv = ν √(k_u k_v)/(1−ν²). The material is orthotropic with an independent shear
+//! stiffness, as cloth is (Wang, O'Brien, Ramamoorthi: "Data-driven elastic models for cloth", SIGGRAPH 2011). The strain is that of
 //! length, after Baraff, Witkin ("Large steps in cloth simulation", SIGGRAPH 1998), not Green's: it does not soften under
-//! compression, so a triangle does not snap through.
+//! compression, so a triangle does not invert.
 //!
-//! Where a stress σ_u = C_uu s_u + C_uv s_v or σ_v would be compressive, wrinkles finer than the mesh take it up: the energy is
-//! r ψ + (1 − r) ψ_t, with ψ_t the relaxed energy of tension field theory (Pipkin: "The relaxed energy density for isotropic
-//! elastic membranes", IMA J. Appl. Math. 36, 1986): ψ in tension, ½ k_v s_v² or ½ k_u s_u² where one direction is slack,
-//! zero where both are. It is convex in the strains with continuous stress, and a uniaxial pull meets k_u or k_v as before.
+//! Where a stress σ_u = C_uu s_u + C_uv s_v or σ_v would be compressive, the cloth forms wrinkles finer than the mesh. The energy is
+//! r ψ + (1 − r) ψ_t with the compression ratio r and ψ_t the relaxed energy of tension field theory (Pipkin: "The relaxed energy
+//! density for isotropic elastic membranes", IMA J. Appl. Math. 36, 1986): ψ in tension, ½ k_v s_v² or ½ k_u s_u² where one direction
+//! is compressed, zero where both are. It is convex in the strains with continuous stress, and the stiffness of a uniaxial pull remains k_u
+//! or k_v.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | r | share of the stiffness left under compression, 0.1 | – |
+//! | r | compression ratio: share of the stiffness left under compression, 0.1 | – |
 //! | A | rest area | m² |
 //! | k_u, k_v | uniaxial stiffness along weft and warp | N/m |
 //! | μ | shear stiffness | N/m |
 //! | B | smallest bending stiffness | N·m |
 //! | ν | Poisson's ratio, the geometric mean of both directions | – |
-//! | b_i | gradient of corner i's shape function | 1/m |
+//! | b_i | gradient of the shape function of corner i | 1/m |
 //!
-//! There are two Hessians. The positive one is exact in tension up to terms of strain times stiffness within the plane,
-//! and without the negative stiffness that compression and shear have out of the plane (Teran and others: "Robust
-//! quasistatic finite elements and flesh simulation", SCA 2005, for the principle). The bearing one is exact, but that the
-//! compressive stress out of the plane is cut at what a triangle's bending bears: folds as narrow as a triangle, of half wave
-//! √(2A), buckle at B π²/2A, and as long as the stress stays well under that the whole is positive for the bending's
-//! sake. It sees the soft directions in which cloth folds, where the positive one is stiff and creeps.
+//! There are two Hessians ([`HessianKind`]). The projected one drops the negative stiffness that compression and shear have out of the plane
+//! (Teran and others: "Robust quasistatic finite elements and flesh simulation", SCA 2005, for the principle); in tension it is exact
+//! up to terms of strain times stiffness within the plane. The true one is exact up to buckling: it cuts the compressive stress
+//! out of the plane at the buckling stress of a triangle. Folds as narrow as a triangle, of half wave √(2A), buckle at B π²/2A. As
+//! long as the stress stays well below that, the bending makes the whole matrix positive definite. The true Hessian contains the soft
+//! directions in which cloth folds, where the projected one is too stiff and Newton's method takes short steps.
 //!
-//! A sliver, of height h under ℓ/50 over its longest side ℓ, would be stiffer across than its neighbours by ℓ/h, and turn over when a
-//! corner moves by h: solvers end there. It counts as ℓ/50 high, with its longest side along the weft and r = 0, so that it
-//! bears what stretches it along, and across only what has opened it that far.
+//! A sliver, of height h under ℓ/50 over its longest side ℓ, would be stiffer across than its neighbours by ℓ/h, and would invert when a
+//! corner moves by h, which stops a solver. It is given the height ℓ/50, with its longest side along the weft and r = 0, so that it
+//! resists stretch along that side, and across it only beyond that height.
 //!
-//! Limits: constants are those at zero strain; a measured curve's stiffening is not followed. Slivers have no grain, no shear
+//! Limits: constants are those at zero strain; the stiffening of a measured curve is not modelled. Slivers have no grain, no shear
 //! stiffness where they are closed, and may open by ℓ/50.
 
 use glam::{DMat3, DVec2, DVec3};
@@ -50,13 +51,13 @@ use crate::mesh::rest::raised;
 pub struct Triangle {
     /// Its vertices.
     pub vertices: [u32; 3],
-    /// Rest area A, m²; of a sliver that of what it counts as, which is no mass.
+    /// Rest area A, m²; of a sliver the area at its raised height, which does not count as mass.
     pub area: f64,
     /// Gradients b_i of the shape functions, 1/m.
     pub gradients: [DVec2; 3],
-    /// Whether it is a sliver, and counts as higher than it is.
+    /// Whether it is a sliver, whose height is raised.
     pub sliver: bool,
-    /// Number of the fabric it is cut from.
+    /// Number of its fabric.
     pub fabric: u16,
 }
 
@@ -71,60 +72,40 @@ pub struct Stiffness {
     pub(super) weft: f64,
     pub(super) warp: f64,
     poisson: f64,
-    /// What a triangle bears in compression times its area, N·m.
-    bearing: f64,
+    /// Compressive stress that the true Hessian keeps, times the area of the triangle, N·m.
+    buckling: f64,
 }
 
 impl Stiffness {
-    /// From a fabric's uniaxial constants.
+    /// The stiffness of a fabric with these uniaxial constants.
     #[must_use]
     pub fn new(fabric: &Fabric) -> Self {
         let least_bending = fabric.bending_nm.into_iter().fold(f64::INFINITY, f64::min);
-        let bearing = BORNE * std::f64::consts::PI.powi(2) * least_bending / 2.0;
+        let buckling = BUCKLING_SHARE * std::f64::consts::PI.powi(2) * least_bending / 2.0;
         Self::of(
             fabric.stretch_weft_n_per_m,
             fabric.stretch_warp_n_per_m,
             fabric.shear_n_per_m,
             fabric.poisson,
-            bearing,
+            buckling,
         )
     }
 
-    fn of(k_u: f64, k_v: f64, shear: f64, nu: f64, bearing: f64) -> Self {
+    fn of(k_u: f64, k_v: f64, shear: f64, nu: f64, buckling: f64) -> Self {
         let d = 1.0 - nu * nu;
         let (uu, uv, vv) = (k_u / d, nu * (k_u * k_v).sqrt() / d, k_v / d);
-        Self { uu, uv, vv, shear, weft: k_u, warp: k_v, poisson: nu, bearing }
+        Self { uu, uv, vv, shear, weft: k_u, warp: k_v, poisson: nu, buckling }
     }
 
-    /// The same with no constant over `most` (N/m); `None` where none is.
+    /// The same with no constant above `cap` (N/m); `None` where none is.
     #[must_use]
-    pub(crate) fn capped(&self, most: f64) -> Option<Self> {
-        let stiffer = self.weft.max(self.warp).max(self.shear) > most;
-        let (weft, warp, shear) = (self.weft.min(most), self.warp.min(most), self.shear.min(most));
-        stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.bearing))
+    pub(crate) fn capped(&self, cap: f64) -> Option<Self> {
+        let stiffer = self.weft.max(self.warp).max(self.shear) > cap;
+        let (weft, warp, shear) = (self.weft.min(cap), self.warp.min(cap), self.shear.min(cap));
+        stiffer.then(|| Self::of(weft, warp, shear, self.poisson, self.buckling))
     }
-}
 
-/// Share of the stiffness that is left where the cloth would be compressed. Cloth does not push: a strip of B = 10 µN·m held at
-/// every centimetre buckles between under B π²/ℓ² = 1 N/m, a hundredth of what a woven's k would put up at 2 %
-/// compression, into wrinkles finer than the mesh. A tenth drops most of that and keeps the triangles in shape; with all of
-/// it a stiff woven locks into facets.
-pub(crate) const SLACK: f64 = 0.1;
-
-/// Share of the buckling stress that the bearing Hessian keeps: at three tenths the whole is not positive every now
-/// and then, at one tenth hardly ever.
-const BORNE: f64 = 0.1;
-
-/// Stiffness of a strained state.
-#[derive(Debug, Clone, Copy)]
-struct Tangent {
-    uu: f64,
-    uv: f64,
-    vv: f64,
-}
-
-impl Stiffness {
-    /// The tangent at strains s_u, s_v: the energy is quadratic within each of the four states, so it also gives the
+    /// The tangent at strains s_u, s_v. The energy is quadratic within each of the four states, so the tangent also gives the
     /// stresses and the energy.
     fn tangent(&self, r: f64, su: f64, sv: f64) -> Tangent {
         let (tu, tv) = (self.uu * su + self.uv * sv, self.uv * su + self.vv * sv);
@@ -142,8 +123,34 @@ impl Stiffness {
     }
 }
 
-/// Shorter than this (relative to rest) a triangle's side has no direction: the strain is then constant to first order.
-pub(super) const SHORTEST: f64 = 1e-12;
+/// Compression ratio of the mesh: share of the stiffness left under compression. Real cloth buckles: a strip of B = 10 µN·m supported at
+/// every centimetre buckles between its supports under B π²/ℓ² = 1 N/m, a hundredth of the stress of a woven fabric at 2 %
+/// compression, into wrinkles finer than the mesh. A tenth removes most of that stress and keeps the triangles in shape; with the
+/// full stiffness a stiff woven fabric locks into facets.
+pub(crate) const COMPRESSION_RATIO: f64 = 0.1;
+
+/// Share of the buckling stress that the true Hessian keeps. With 0.3 the whole matrix is sometimes indefinite, with 0.1 hardly ever.
+const BUCKLING_SHARE: f64 = 0.1;
+
+/// The second derivatives that a Hessian contains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum HessianKind {
+    /// Without negative curvature: positive semi-definite.
+    Projected,
+    /// Exact up to buckling; possibly indefinite.
+    True,
+}
+
+/// Stiffness of a strained state.
+#[derive(Debug, Clone, Copy)]
+struct Tangent {
+    uu: f64,
+    uv: f64,
+    vv: f64,
+}
+
+/// Stretch below which |F_u| has no direction; the strain is then constant to first order.
+pub(super) const MIN_STRETCH: f64 = 1e-12;
 
 impl Triangle {
     /// Rest data of a triangle with flat corners `rest`; `None` where it has no area.
@@ -157,7 +164,7 @@ impl Triangle {
         }
         let (sliver, [a, b, c]) = raised(rest);
         let double = (b - a).perp_dot(c - a);
-        // ∇N_i is the opposite side turned by 90 degrees, over twice the signed area.
+        // ∇N_i is the opposite side rotated by 90 degrees, over twice the signed area.
         let gradient = |p: DVec2, q: DVec2| (q - p).perp() / double;
         Some(Self {
             vertices,
@@ -168,10 +175,10 @@ impl Triangle {
         })
     }
 
-    /// Share r of the stiffness that is left under compression: [`SLACK`], and of a sliver none.
+    /// Compression ratio r: [`COMPRESSION_RATIO`], zero for a sliver.
     #[must_use]
-    pub fn slack(&self) -> f64 {
-        if self.sliver { 0.0 } else { SLACK }
+    pub(crate) fn compression_ratio(&self) -> f64 {
+        if self.sliver { 0.0 } else { COMPRESSION_RATIO }
     }
 
     /// Length of its longest side at rest, m.
@@ -185,39 +192,39 @@ impl Triangle {
     pub fn deformation(&self, x: &[DVec3]) -> [DVec3; 2] {
         let [a, b, c] = self.vertices.map(|v| x[v as usize]);
         let [_, p, q] = self.gradients;
-        // The gradients sum to zero, so two edges carry everything.
+        // The gradients sum to zero, so two edges suffice.
         [(b - a) * p.x + (c - a) * q.x, (b - a) * p.y + (c - a) * q.y]
     }
 
-    /// Energy A ψ, J, with share r left under compression.
-    #[must_use]
-    pub fn energy(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> f64 {
+    /// Energy A ψ, J: with [`add_gradient`](Self::add_gradient) the reference for four triangles at a time.
+    #[cfg(test)]
+    pub(crate) fn energy(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> f64 {
         let [fu, fv] = self.deformation(x);
         let (su, sv, gamma) = (fu.length() - 1.0, fv.length() - 1.0, fu.dot(fv));
         let k = c.tangent(r, su, sv);
         self.area * (0.5 * k.uu * su * su + k.uv * su * sv + 0.5 * k.vv * sv * sv + 0.5 * c.shear * gamma * gamma)
     }
 
-    /// Adds the energy's gradient to `gradient`, N; returns the energy.
-    pub fn add_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+    /// Adds the gradient of the energy to `gradient`, N; returns the energy.
+    #[cfg(test)]
+    pub(crate) fn add_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let [fu, fv] = self.deformation(x);
         let (lu, lv) = (fu.length(), fv.length());
         let (su, sv, gamma) = (lu - 1.0, lv - 1.0, fu.dot(fv));
         let k = c.tangent(r, su, sv);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * gamma);
-        let pu = self.area * (fu * (tu / lu.max(SHORTEST)) + fv * tau);
-        let pv = self.area * (fv * (tv / lv.max(SHORTEST)) + fu * tau);
+        let pu = self.area * (fu * (tu / lu.max(MIN_STRETCH)) + fv * tau);
+        let pv = self.area * (fv * (tv / lv.max(MIN_STRETCH)) + fu * tau);
         for (&v, b) in self.vertices.iter().zip(&self.gradients) {
             gradient[v as usize] += pu * b.x + pv * b.y;
         }
         self.area * 0.5 * (tu * su + tv * sv + tau * gamma)
     }
 
-    /// The Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m: its positive part, or the `bearing` one, exact but for
-    /// compression past what the triangle bears and not always positive.
+    /// The Hessian as the blocks (0,0), (1,1), (2,2), (1,0), (2,0), (2,1), N/m.
     #[must_use]
-    pub(crate) fn hessian(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 6] {
-        let [huu, huv, hvv] = self.by_gradient(c, r, x, bearing);
+    pub(crate) fn hessian(&self, c: &Stiffness, r: f64, x: &[DVec3], kind: HessianKind) -> [DMat3; 6] {
+        let [huu, huv, hvv] = self.by_gradient(c, r, x, kind);
         let block = |i: usize, j: usize| {
             let (p, q) = (self.gradients[i] * self.area, self.gradients[j]);
             huu * (p.x * q.x) + hvv * (p.y * q.y) + huv * (p.x * q.y) + huv.transpose() * (p.y * q.x)
@@ -226,18 +233,20 @@ impl Triangle {
     }
 
     /// Second derivatives of ψ by F_u and F_v: uu, uv, vv, N/m.
-    pub(crate) fn by_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], bearing: bool) -> [DMat3; 3] {
+    pub(crate) fn by_gradient(&self, c: &Stiffness, r: f64, x: &[DVec3], kind: HessianKind) -> [DMat3; 3] {
         let [fu, fv] = self.deformation(x);
-        let (lu, lv) = (fu.length().max(SHORTEST), fv.length().max(SHORTEST));
+        let (lu, lv) = (fu.length().max(MIN_STRETCH), fv.length().max(MIN_STRETCH));
         let (u, v) = (fu / lu, fv / lv);
         let k = c.tangent(r, lu - 1.0, lv - 1.0);
         let (su, sv) = (lu - 1.0, lv - 1.0);
         let (tu, tv, tau) = (k.uu * su + k.uv * sv, k.uv * su + k.vv * sv, c.shear * fu.dot(fv));
         let n = fu.cross(fv).normalize_or_zero();
         let (wu, wv) = (n.cross(u), n.cross(v));
-        // Least stress out of the plane and sideways, and the shear's share within the plane.
-        let (least, sideways, in_plane) =
-            if bearing { (-c.bearing / self.area, f64::NEG_INFINITY, tau) } else { (0.0, 0.0, 0.0) };
+        // Least stress out of the plane and within it, and the shear stress that turns within the plane.
+        let (least, sideways, in_plane) = match kind {
+            HessianKind::True => (-c.buckling / self.area, f64::NEG_INFINITY, tau),
+            HessianKind::Projected => (0.0, 0.0, 0.0),
+        };
         let (a, b, t) = positive_part(tu / lu - least, tv / lv - least, tau);
         let nn = outer(n, n);
         let (su, sv) = ((tu / lu).max(sideways), (tv / lv).max(sideways));
@@ -247,9 +256,9 @@ impl Triangle {
         [huu, huv, hvv]
     }
 
-    /// The corners' own blocks of the positive [`hessian`](Self::hessian), N/m.
-    pub(crate) fn own_blocks(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> [DMat3; 3] {
-        let [huu, huv, hvv] = self.by_gradient(c, r, x, false);
+    /// The diagonal blocks of the projected [`hessian`](Self::hessian), N/m.
+    pub(crate) fn diagonal_blocks(&self, c: &Stiffness, r: f64, x: &[DVec3]) -> [DMat3; 3] {
+        let [huu, huv, hvv] = self.by_gradient(c, r, x, HessianKind::Projected);
         let both = huv + huv.transpose();
         self.gradients.map(|g| (huu * (g.x * g.x) + hvv * (g.y * g.y) + both * (g.x * g.y)) * self.area)
     }

@@ -1,47 +1,42 @@
-//! One energy for the whole drape: E(x) = gravity + membrane + bending + contact + friction.
+//! The energy of the whole drape: E(x) = gravity + membrane + bending + contact + friction.
 //!
-//! [`Cloth`] holds what does not change while a garment settles: rest shape, masses, bending rings, the held vertices and the
-//! pattern of the Hessian. [`Contacts`] holds what does: which vertices touch the body, and how they hold on to it.
-//! Forces are −∇E. Every Hessian here is positive semi-definite, but for the compression that a triangle bears
-//! ([`Cloth::hessian_bearing`]), so a Newton step always descends.
+//! [`Cloth`] holds the constant data of a garment: rest shape, masses, bending elements, held vertices and the pattern of the Hessian.
+//! [`Contacts`] holds the state of contact with the body and of the cloth with itself. Forces are −∇E. The projected Hessian is positive
+//! semi-definite, so Newton's method with it always has a descent direction; the true one may be indefinite ([`membrane`]).
 //!
-//! | term | file | equation |
+//! | term | module | energy |
 //! |---|---|---|
-//! | gravity | [`gravity`] | Σ m g z |
+//! | gravity | [`Cloth`] | Σ m g z |
 //! | membrane | [`membrane`] | Σ A ψ(F), orthotropic |
 //! | bending | [`bending`] | Σ ½ A (B_u \|x_uu\|² + H \|x_uv\|² + B_v \|x_vv\|²) |
-//! | contact | [`contact`] | Σ ½ κ A (h − q)² |
+//! | contact | `contact`, `face_contacts` | Σ ½ κ A (h − q)² |
 //! | friction | [`friction`] | Σ μ N φ(\|u\|) |
-//! | cloth on cloth | [`proximity`] | Σ ½ κ A (h − n·Σ w x)², and friction |
+//! | self-contact | `proximity` | Σ ½ κ A (h − n·Σ w x)², and friction |
 
-pub mod bending;
+pub(crate) mod bending;
 mod bending_matrix;
 mod cloth;
-pub mod contact;
-mod error;
-mod evaluate;
+mod contact;
 mod face_contacts;
-pub mod field;
-mod fit;
-pub mod friction;
-pub mod gravity;
-mod hessian;
-mod layout;
+mod field;
+pub(crate) mod friction;
 pub mod membrane;
 mod membrane_simd;
-pub mod ordering;
-mod penetration;
-pub mod proximity;
-mod seeded_contacts;
+pub(crate) mod ordering;
+mod proximity;
 pub mod sparsity;
-pub mod vertex_ring;
+mod vertex_ring;
 
-pub use cloth::Cloth;
+pub(crate) use cloth::ContactBlock;
+pub use cloth::{Cloth, EnergyError, Scratch};
 pub use contact::Contacts;
-pub use error::EnergyError;
-pub use evaluate::Scratch;
-pub(crate) use face_contacts::Covered;
-pub use friction::Friction;
-pub(crate) use hessian::Held;
-pub use layout::HessianLayout;
+pub(crate) use contact::FaceUpdate;
+pub(in crate::mechanics) use face_contacts::touching_places;
+pub use friction::{Friction, Touch};
+pub(crate) use membrane::HessianKind;
 pub use proximity::Proximity;
+pub(crate) use proximity::StepCheck;
+pub use sparsity::HessianLayout;
+
+#[cfg(test)]
+mod tests;

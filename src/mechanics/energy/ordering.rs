@@ -1,14 +1,14 @@
-//! Order of elimination: nested dissection by planes.
+//! Elimination order: nested dissection by planes.
 //!
-//! A direct factorisation of a surface's matrix costs O(n^1.5) where the unknowns are numbered so that each half comes
-//! before what separates it (George: "Nested dissection of a regular finite element mesh", SIAM J. Numer. Anal. 10(2),
-//! 1973). A garment is placed in space, so a plane through the median is a good cut: of the three axes the one whose
-//! separator is smallest. For a tube that is first a ring, then its generators.
+//! A direct factorisation of the matrix of a surface costs O(n^1.5) if the unknowns are numbered so that both halves come
+//! before their separator (George: "Nested dissection of a regular finite element mesh", SIAM J. Numer. Anal. 10(2),
+//! 1973). A garment has positions in space, so a plane through the median of one axis is a good cut; the axis with the smallest
+//! separator is taken. A tube is cut along rings first, then along generators.
 //!
-//! A separator is numbered in halves of halves too, so that what is near is numbered near: what the two sides add to it then comes
-//! in a few long runs.
+//! A separator is bisected recursively, too, so that neighbours have close numbers: the updates from both sides then consist
+//! of a few long runs.
 //!
-//! The halves go to the threads there are; neither reads what the other writes but for marks that cannot be its own.
+//! The halves run in parallel. Each reads only marks of its own cuts.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,18 +16,18 @@ use glam::DVec3;
 
 use crate::mesh::{Lists, box_about};
 
-/// This many vertices are cut no further: below it a separator costs as much as it saves.
-const LEAF: usize = 24;
+/// Largest set that is not dissected, in vertices: a separator of fewer costs as much as it saves.
+const MAX_LEAF: usize = 24;
 
-/// Fewer are no work for another thread.
-const ALONE: usize = 1000;
+/// Least number of vertices that are worth another thread. Heuristic.
+const MIN_PARALLEL: usize = 1000;
 
-/// Neighbours of each vertex, one list after the other.
+/// The neighbours of each vertex.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Adjacency(Lists<u32>);
 
 impl Adjacency {
-    /// Of `count` vertices, from pairs, in any order, repeated or not; a vertex is no neighbour of itself.
+    /// The adjacency of `count` vertices by these pairs, in any order, repeated or not; pairs of a vertex with itself are ignored.
     #[must_use]
     pub(crate) fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
         let both_ways = || pairs().filter(|[a, b]| a != b).flat_map(|[a, b]| [(a, b), (b, a)]);
@@ -48,7 +48,7 @@ impl Adjacency {
     }
 }
 
-/// The vertices of `members` in elimination order. Neighbours are those that share a Hessian block.
+/// The vertices of `members` in elimination order; `neighbours` share a block of the Hessian.
 #[must_use]
 pub(crate) fn nested_dissection(mut members: Vec<u32>, positions: &[DVec3], neighbours: &Adjacency) -> Vec<u32> {
     let side: Vec<AtomicU32> = positions.iter().map(|_| AtomicU32::new(0)).collect();
@@ -61,15 +61,15 @@ pub(crate) fn nested_dissection(mut members: Vec<u32>, positions: &[DVec3], neig
 struct Cut<'a> {
     positions: &'a [DVec3],
     neighbours: &'a Adjacency,
-    /// The last cut that had each vertex in its upper half.
+    /// Mark of the last cut that had each vertex in its upper half.
     side: &'a [AtomicU32],
 }
 
 impl Cut<'_> {
-    /// Puts `members` in order; `number` is this cut's own.
+    /// Orders `members`; `number` identifies this cut.
     fn dissect(self, members: &mut [u32], number: u32) {
-        if members.len() <= LEAF {
-            return self.lay_along(members);
+        if members.len() <= MAX_LEAF {
+            return self.bisect(members);
         }
         let mut best = (usize::MAX, 0);
         for axis in 0..3 {
@@ -89,9 +89,9 @@ impl Cut<'_> {
         members[low..].rotate_left(middle - low);
         let (below, rest) = members.split_at_mut(low);
         let (above, separator) = rest.split_at_mut(rest.len() - (middle - low));
-        self.lay_along(separator);
+        self.bisect(separator);
         let mut one = || self.dissect(below, 2 * number);
-        if low < ALONE {
+        if low < MIN_PARALLEL {
             one();
             self.dissect(above, 2 * number + 1);
         } else {
@@ -99,7 +99,8 @@ impl Cut<'_> {
         }
     }
 
-    /// The lower half of `members` along an axis first, the upper half marked; returns how many of the lower one touch it.
+    /// Moves the lower half of `members` along an axis to the front and marks the upper half; returns the size of the separator: vertices of
+    /// the lower half with a neighbour in the upper one.
     fn halve(self, members: &mut [u32], axis: usize, number: u32) -> usize {
         let middle = members.len() / 2;
         self.select(members, middle, axis);
@@ -114,14 +115,15 @@ impl Cut<'_> {
         self.neighbours.of(v).iter().any(|&w| self.side[w as usize].load(Ordering::Relaxed) == mark)
     }
 
-    /// Those before `middle` along an axis first. Ties (a ring at one height) fall by index, so the cut is the same on every run.
+    /// Moves the lowest `middle` members along an axis to the front. Ties (a ring at one height) are broken by index, so the cut is
+    /// deterministic.
     fn select(self, members: &mut [u32], middle: usize, axis: usize) {
         let along = |v: u32| self.positions[v as usize][axis];
         members.select_nth_unstable_by(middle, |&a, &b| along(a).total_cmp(&along(b)).then(a.cmp(&b)));
     }
 
-    /// In halves of halves, each across its longest side.
-    fn lay_along(self, members: &mut [u32]) {
+    /// Orders by recursive bisection, each across the longest side.
+    fn bisect(self, members: &mut [u32]) {
         if members.len() <= 2 {
             return members.sort_unstable();
         }
@@ -129,12 +131,12 @@ impl Cut<'_> {
         let middle = members.len() / 2;
         self.select(members, middle, (high - low).max_position());
         let (one, other) = members.split_at_mut(middle);
-        self.lay_along(one);
-        self.lay_along(other);
+        self.bisect(one);
+        self.bisect(other);
     }
 }
 
-/// No two cuts along no two axes have one mark: half of the vertices at most go on, so numbers stay small.
+/// The mark of a cut along an axis, unique among all cuts. The number doubles at each level and half of the vertices go on, so it stays small.
 fn mark(number: u32, axis: usize) -> u32 {
     4 * number + axis as u32
 }

@@ -1,14 +1,16 @@
-//! Where the Hessian's 3×3 blocks are: a symmetric sparse pattern over the free vertices, built once a garment.
+//! The unknowns of a cloth in elimination order, and the sparse symmetric pattern of its Hessian in 3×3 blocks.
 //!
-//! Two free vertices share a block if a triangle or a bending element holds both. Unknowns are numbered in the order of
-//! elimination ([`ordering`](super::ordering)), columns ascending, lower half only: block (i, j) with i ≥ j.
+//! Two free vertices share a block if a triangle or a bending element contains both. Unknowns are numbered in elimination order
+//! ([`ordering`](super::ordering)). A pattern stores the lower half by columns, rows ascending: block (i, j) with i ≥ j.
 
 use glam::{DMat3, DVec3};
 
-use super::ordering::Adjacency;
+use super::bending::Bending;
+use super::membrane::Triangle;
+use super::ordering::{Adjacency, nested_dissection};
 use crate::mesh::each_once;
 
-/// Marks a vertex that is held, and a block that falls away with it.
+/// Marks a held vertex, and a block that does not exist because of one.
 pub(crate) const HELD: u32 = u32::MAX;
 
 /// The lower half of a symmetric block pattern, by columns.
@@ -20,23 +22,23 @@ pub struct Pattern {
     pub rows: Vec<u32>,
 }
 
-/// A block and whether it is met transposed.
+/// A block, and whether the pair of unknowns addresses its transpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
-    /// Index of the block, [`HELD`] for none.
+    /// Index of the block; [`HELD`] for none.
     pub block: u32,
-    /// Whether the pair comes as (column, row).
+    /// Whether the pair is (column, row).
     pub transposed: bool,
 }
 
 impl Pattern {
-    /// From pairs (row, column) of unknowns, in any order, repeated or not; every diagonal block is there.
+    /// The pattern of these pairs (row, column) of unknowns, in any order, repeated or not, and of every diagonal block.
     #[must_use]
     pub(crate) fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let own = (0..unknowns as u32).map(|i| (i, i));
         let all = each_once(pairs.map(|(i, j)| (i.min(j), i.max(j))).chain(own));
         let mut pattern = Self { starts: vec![0], rows: Vec::with_capacity(all.len()) };
-        // Every column has its diagonal at least.
+        // No column is empty: each has its diagonal.
         for column in all.chunk_by(|a, b| a.0 == b.0) {
             pattern.rows.extend(column.iter().map(|(_, row)| row));
             pattern.starts.push(pattern.rows.len() as u32);
@@ -44,9 +46,9 @@ impl Pattern {
         pattern
     }
 
-    /// Of neighbours, with the vertex of each unknown in `order` and the unknown of each vertex.
+    /// The pattern of neighbouring vertices; `order` has the vertex of each unknown, `unknown` the unknown of each vertex.
     #[must_use]
-    pub(crate) fn of(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {
+    fn of_neighbours(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {
         let mut pattern = Self { starts: vec![0], rows: Vec::new() };
         for (j, &v) in (0u32..).zip(order) {
             let start = pattern.rows.len();
@@ -65,13 +67,13 @@ impl Pattern {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Blocks of a column.
+    /// Range of the blocks of a column.
     #[must_use]
     pub(crate) fn column(&self, j: usize) -> std::ops::Range<usize> {
         self.starts[j] as usize..self.starts[j + 1] as usize
     }
 
-    /// A d for a matrix in `blocks` of this pattern.
+    /// A d for a matrix A in the `blocks` of this pattern.
     pub(crate) fn multiply(&self, blocks: &[DMat3], d: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
         out.resize(d.len(), DVec3::ZERO);
@@ -100,5 +102,89 @@ impl Pattern {
         let found = self.rows[range.clone()].binary_search(&i.max(j));
         let block = found.map_or(HELD, |k| (range.start + k) as u32);
         Slot { block, transposed: i < j }
+    }
+}
+
+/// Elimination order, block pattern and element slots of one cloth. Computed at the first use, since a preview by PARTs factors no
+/// Hessian of the whole cloth.
+#[derive(Debug, Clone)]
+pub struct HessianLayout {
+    /// Vertex of each unknown, in elimination order.
+    pub order: Vec<u32>,
+    /// Unknown of each vertex; [`HELD`] where it is held.
+    pub unknown: Vec<u32>,
+    /// The blocks of the Hessian.
+    pub pattern: Pattern,
+    /// The blocks of each triangle: (0,0), (1,1), (2,2), (1,0), (2,0), (2,1).
+    pub(super) triangle_slots: Vec<[Slot; 6]>,
+    /// Bending's contribution to the diagonal of each block, N/m.
+    pub(super) bending_blocks: Vec<f64>,
+}
+
+impl HessianLayout {
+    /// The layout of the vertices that are not `held`, with blocks for the `extra` pairs beside those of the elements. Nested dissection takes
+    /// the vertices at `placed`.
+    pub(super) fn new(
+        placed: &[DVec3],
+        triangles: &[Triangle],
+        bending: &Bending,
+        held: &[bool],
+        extra: impl Iterator<Item = [u32; 2]>,
+    ) -> Self {
+        let n = held.len();
+        let sides = || {
+            triangles.iter().flat_map(|t| {
+                let [a, b, c] = t.vertices;
+                [[a, b], [b, c], [c, a]]
+            })
+        };
+        let extra: Vec<[u32; 2]> = extra.collect();
+        let all_pairs = || sides().chain(bending.matrix.pairs().map(|(pair, _)| pair)).chain(extra.iter().copied());
+        let neighbours = Adjacency::new(n, all_pairs);
+        let free: Vec<u32> = (0..n as u32).filter(|&v| !held[v as usize]).collect();
+        let order = nested_dissection(free, placed, &neighbours);
+        let mut unknown = vec![HELD; n];
+        for (i, &v) in order.iter().enumerate() {
+            unknown[v as usize] = i as u32;
+        }
+        let pattern = Pattern::of_neighbours(&order, &unknown, &neighbours);
+        let slot = |a: u32, b: u32| pattern.slot(unknown[a as usize], unknown[b as usize]);
+        let slots = |t: &Triangle| {
+            let [a, b, c] = t.vertices;
+            [slot(a, a), slot(b, b), slot(c, c), slot(b, a), slot(c, a), slot(c, b)]
+        };
+        let triangle_slots = triangles.iter().map(slots).collect();
+        let mut bending_blocks = vec![0.0; pattern.rows.len()];
+        let diagonal = order.iter().map(|&v| ([v, v], bending.matrix.diagonal(v as usize)));
+        for ([a, b], scalar) in bending.matrix.pairs().chain(diagonal) {
+            if let Some(sum) = bending_blocks.get_mut(slot(a, b).block as usize) {
+                *sum += scalar;
+            }
+        }
+        Self { order, unknown, pattern, triangle_slots, bending_blocks }
+    }
+
+    /// Unknowns and shares of those `members` (vertices with shares) that are free.
+    pub(crate) fn free(&self, members: impl Iterator<Item = (u32, f64)>) -> Vec<(u32, f64)> {
+        members.map(|(v, w)| (self.unknown[v as usize], w)).filter(|(i, _)| *i != HELD).collect()
+    }
+
+    /// Adds a symmetric `block` (N/m) between unknowns with these shares; pairs without a block in the pattern are skipped.
+    pub(crate) fn add(&self, members: &[(u32, f64)], block: DMat3, blocks: &mut [DMat3]) {
+        for (k, &(i, w)) in members.iter().enumerate() {
+            for &(j, other) in &members[..=k] {
+                if let Some(sum) = blocks.get_mut(self.pattern.slot(i, j).block as usize) {
+                    *sum += block * (w * other);
+                }
+            }
+        }
+    }
+
+    /// Whether the pattern has a block for each of these pairs of vertices; pairs with a held vertex need none.
+    pub(crate) fn has(&self, mut pairs: impl Iterator<Item = [u32; 2]>) -> bool {
+        pairs.all(|[a, b]| {
+            let (i, j) = (self.unknown[a as usize], self.unknown[b as usize]);
+            i == HELD || j == HELD || self.pattern.slot(i, j).block != HELD
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! How a step goes on from the one before: like it, and then farther, or back against it.
 //!
 //! Down a long valley the model is stiffer than the energy, and step after step goes the same way by the same length. With k the
-//! stiffness along it and k_m the model's, the next step is ρ = 1 − t k/k_m of the last, which went t of its length, so the bottom is
+//! stiffness along it and k_m the model's, the next step is ρ = 1 − t k/k_m of the last, which taken t of its length, so the bottom is
 //! t/(1 − ρ) = k_m/k steps off (Aitken's extrapolation, along d):
 //!
 //! ρ = d·d′/|d′|²,  t ← min(t/(1 − ρ), most).
@@ -15,54 +15,54 @@
 
 use glam::DVec3;
 
-use super::{dot, norm};
+use crate::mechanics::linear_algebra::{dot, norm};
 
-/// A step goes on like the one before where its cosine with it is over this.
-const ALIKE: f64 = 0.8;
+/// Cosine with the previous step above which a step continues it. Heuristic.
+const CONTINUES_COSINE: f64 = 0.8;
 
-/// A step goes back where its cosine with the one before is under minus this.
-const BACK: f64 = 0.3;
+/// Cosine below minus this value with which a step opposes the previous one. Heuristic.
+const OPPOSES_COSINE: f64 = 0.3;
 
 /// The last step.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Onward {
+pub(super) struct Extrapolation {
     /// d, m.
     step: Vec<DVec3>,
     /// t.
-    went: f64,
-    /// What all was moved by, m.
+    taken: f64,
+    /// Displacement of the last step, m.
     moved: Vec<DVec3>,
 }
 
-impl Onward {
-    /// How much of `step` to try first, between all of it and `most` times that.
-    pub(super) fn reach(&self, step: &[DVec3], most: f64) -> f64 {
+impl Extrapolation {
+    /// The factor on `step` that is tried first, between 1 and `max`.
+    pub(super) fn factor(&self, step: &[DVec3], max: f64) -> f64 {
         let (now, before) = (norm(step), norm(&self.step));
         let along = dot(step, &self.step);
-        // Also where nothing was before.
-        if along.is_nan() || along <= ALIKE * now * before {
+        // NaN where there is no previous step.
+        if along.is_nan() || along <= CONTINUES_COSINE * now * before {
             return 1.0;
         }
         let rho = along / (before * before);
-        if rho < 1.0 { (self.went / (1.0 - rho)).clamp(1.0, most) } else { most }
+        if rho < 1.0 { (self.taken / (1.0 - rho)).clamp(1.0, max) } else { max }
     }
 
-    /// Keeps a step, t of which was gone; 0 where none was.
-    pub(super) fn keep(&mut self, step: &[DVec3], went: f64) {
+    /// Stores a step, of which the share t was taken; 0 for a rejected one.
+    pub(super) fn store_step(&mut self, step: &[DVec3], taken: f64) {
         self.step.clear();
         self.step.extend_from_slice(step);
-        self.went = went;
+        self.taken = taken;
     }
 
-    /// Keeps what all was moved by; whether that was back, by and large, against the time before.
-    pub(super) fn back(&mut self, moved: Vec<DVec3>) -> bool {
-        let back = dot(&moved, &self.moved) < -BACK * norm(&moved) * norm(&self.moved);
+    /// Stores the displacement of a step; returns whether it opposes the previous one (negative inner product).
+    pub(super) fn opposes(&mut self, moved: Vec<DVec3>) -> bool {
+        let opposes = dot(&moved, &self.moved) < -OPPOSES_COSINE * norm(&moved) * norm(&self.moved);
         self.moved = moved;
-        back
+        opposes
     }
 
-    /// What comes next does not go on from here.
-    pub(super) fn forget(&mut self) {
+    /// Forgets the previous step.
+    pub(super) fn reset(&mut self) {
         self.step.clear();
     }
 }
@@ -72,28 +72,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_model_too_stiff_is_made_good_at_the_second_step() {
+    fn extrapolation_corrects_a_stiff_model_at_the_second_step() {
         // E = ½ k (x − 1)², and a model with 1.6 k: the first step leaves three eighths, the second nothing.
-        let (mut x, mut onward) = (0.0, Onward::default());
+        let (mut x, mut extrapolation) = (0.0, Extrapolation::default());
         for left in [0.375, 0.0] {
             let step = [DVec3::X * ((1.0 - x) / 1.6)];
-            let reach = onward.reach(&step, 2.0);
-            x += step[0].x * reach;
-            onward.keep(&step, reach);
+            let factor = extrapolation.factor(&step, 2.0);
+            x += step[0].x * factor;
+            extrapolation.store_step(&step, factor);
             assert!((1.0 - x - left).abs() < 1e-12, "{x}");
         }
     }
 
     #[test]
-    fn what_turns_or_shrinks_is_gone_as_it_is() {
-        let mut onward = Onward::default();
-        assert_eq!(onward.reach(&[DVec3::X], 2.0), 1.0);
-        onward.keep(&[DVec3::X], 1.0);
-        assert_eq!(onward.reach(&[DVec3::Y], 2.0), 1.0);
-        assert_eq!(onward.reach(&[DVec3::X * 1.1], 2.0), 2.0);
-        assert!((onward.reach(&[DVec3::X * 0.25], 2.0) - 4.0 / 3.0).abs() < 1e-12);
-        onward.forget();
-        assert_eq!(onward.reach(&[DVec3::X], 2.0), 1.0);
-        assert!(!onward.back(vec![DVec3::X]) && onward.back(vec![DVec3::NEG_X]));
+    fn steps_that_turn_or_shrink_are_not_extrapolated() {
+        let mut extrapolation = Extrapolation::default();
+        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0), 1.0);
+        extrapolation.store_step(&[DVec3::X], 1.0);
+        assert_eq!(extrapolation.factor(&[DVec3::Y], 2.0), 1.0);
+        assert_eq!(extrapolation.factor(&[DVec3::X * 1.1], 2.0), 2.0);
+        assert!((extrapolation.factor(&[DVec3::X * 0.25], 2.0) - 4.0 / 3.0).abs() < 1e-12);
+        extrapolation.reset();
+        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0), 1.0);
+        assert!(!extrapolation.opposes(vec![DVec3::X]) && extrapolation.opposes(vec![DVec3::NEG_X]));
     }
 }

@@ -2,27 +2,43 @@
 //!
 //! Front by front, children first (Duff, Reid: "The multifrontal solution of indefinite sparse symmetric linear equations", ACM Trans.
 //! Math. Softw. 9(3), 1983): a front's panel takes the matrix's own blocks and the updates of its children; it is factored densely,
-//! and what that takes from the rows below is the front's own update. Groves go side by side, each with its updates on a stack; in
-//! the crown above them the threads share each front's dense part. Nothing is allocated after the first time.
+//! and what that takes from the rows below is the front's own update. Subtrees go side by side, each with its updates on a stack; in
+//! the top above them the threads share each front's dense part. Nothing is allocated after the first time.
 
-use std::ops::{AddAssign, Neg, Range, SubAssign};
+use std::ops::Range;
 
 use faer::dyn_stack::MemBuffer;
-use faer::traits::RealField;
-use faer::traits::math_utils::{from_f64, zero};
-use faer::{Accum, MatMut, MatRef};
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::traits::math_utils::{from_f64, one, zero};
+use faer::{Accum, ColMut, ColRef, MatMut, MatRef, Par};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::SolveError;
-use super::dense::{memory, partial, subtract};
-use super::symbolic::{Forest, Front, Grove};
+use super::dense::{Precision, factor_panel, scratch_size, subtract_product};
+use super::symbolic::{Front, Subtree, SymbolicFactor};
 
-/// The two precisions.
-pub(super) trait Precision: RealField + Copy + Into<f64> + Neg<Output = Self> + AddAssign + SubAssign {}
-
-impl Precision for f32 {}
-impl Precision for f64 {}
+/// Why a linear system cannot be solved.
+#[derive(Debug, thiserror::Error)]
+pub enum SolveError {
+    /// Out of memory.
+    #[error("no memory to factorise the Hessian of {unknowns} unknowns ({reason}): take a garment of fewer vertices")]
+    NoRoom {
+        /// Scalar unknowns.
+        unknowns: usize,
+        /// The message of faer.
+        reason: String,
+    },
+    /// A pivot is not positive.
+    #[error(
+        "the forces of the cloth are not finite (unknown {index}): expected finite positions; check that rest shape and garment have the \
+         same unit"
+    )]
+    NotPositive {
+        /// Scalar unknown in elimination order.
+        index: usize,
+    },
+}
 
 /// The matrix A + D to factor.
 #[derive(Clone, Copy)]
@@ -36,92 +52,187 @@ pub(super) struct Matrix<'a> {
 /// The factor's numbers.
 #[derive(Default)]
 pub(super) struct Factor<T> {
-    pub(super) groves: Vec<Planted<T>>,
-    /// Panel and update of each front of the crown.
-    pub(super) crown: Vec<(Vec<T>, Vec<T>)>,
+    subtrees: Vec<SubtreeFactor<T>>,
+    /// Panel and update of each front of the top.
+    top: Vec<(Vec<T>, Vec<T>)>,
     memory: Option<MemBuffer>,
-    pub(super) side: Vec<T>,
+    right_side: Vec<T>,
 }
 
-/// A grove's numbers.
-pub(super) struct Planted<T> {
-    pub(super) panels: Vec<T>,
+/// A subtree's numbers.
+struct SubtreeFactor<T> {
+    panels: Vec<T>,
     /// Updates that no parent has taken yet, one on top of the other, and where each begins.
     stack: Vec<T>,
-    pub(super) live: Vec<(u32, usize)>,
+    live: Vec<(u32, usize)>,
     memory: MemBuffer,
-    /// Of a solve: what it adds to the crown's unknowns, and a front's rows.
-    pub(super) above: Vec<T>,
-    pub(super) rows: Vec<T>,
+    /// Of a solve: what it adds to the top's unknowns, and a front's rows.
+    above: Vec<T>,
+    rows: Vec<T>,
 }
 
 impl<T: Precision> Factor<T> {
     /// Makes room where there is none yet: a solver seldom needs both precisions.
-    fn plant(&mut self, forest: &Forest) -> Result<(), SolveError> {
+    fn allocate(&mut self, symbolic: &SymbolicFactor) -> Result<(), SolveError> {
         if self.memory.is_some() {
             return Ok(());
         }
-        let unknowns = 3 * forest.order.len();
+        let unknowns = 3 * symbolic.order.len();
         let room = || {
             let failed = |e| SolveError::NoRoom { unknowns, reason: format!("{e:?}") };
-            MemBuffer::try_new(memory::<T>()).map_err(failed)
+            MemBuffer::try_new(scratch_size::<T>()).map_err(failed)
         };
-        for grove in &forest.groves {
-            self.groves.push(Planted {
-                panels: vec![zero::<T>(); grove.panels_len],
-                stack: vec![zero::<T>(); grove.stack_len],
+        for subtree in &symbolic.subtrees {
+            self.subtrees.push(SubtreeFactor {
+                panels: vec![zero::<T>(); subtree.panels_len],
+                stack: vec![zero::<T>(); subtree.stack_len],
                 live: Vec::new(),
                 memory: room()?,
-                above: vec![zero::<T>(); unknowns - 3 * forest.crown.1],
+                above: vec![zero::<T>(); unknowns - 3 * symbolic.top.1],
                 rows: Vec::new(),
             });
         }
-        let crown = forest.fronts[forest.crown.0..].iter();
-        self.crown = crown.map(|f| (vec![zero::<T>(); f.panel_len()], vec![zero::<T>(); f.update_len()])).collect();
-        self.side = vec![zero::<T>(); unknowns];
+        let top = symbolic.fronts[symbolic.top.0..].iter();
+        self.top = top.map(|f| (vec![zero::<T>(); f.panel_len()], vec![zero::<T>(); f.update_len()])).collect();
+        self.right_side = vec![zero::<T>(); unknowns];
         self.memory = Some(room()?);
         Ok(())
     }
 
-    pub(super) fn factorise(&mut self, forest: &Forest, matrix: Matrix<'_>) -> Result<(), SolveError> {
-        self.plant(forest)?;
-        let Self { groves, crown, memory, .. } = self;
-        let done: Vec<Result<(), SolveError>> = (groves.par_iter_mut().zip(&forest.groves).with_max_len(1))
-            .map(|(planted, grove)| planted.factorise(forest, grove, matrix))
+    pub(super) fn factorise(&mut self, symbolic: &SymbolicFactor, matrix: Matrix<'_>) -> Result<(), SolveError> {
+        self.allocate(symbolic)?;
+        let Self { subtrees, top, memory, .. } = self;
+        let done: Vec<Result<(), SolveError>> = (subtrees.par_iter_mut().zip(&symbolic.subtrees).with_max_len(1))
+            .map(|(factor, subtree)| factor.factorise(symbolic, subtree, matrix))
             .collect();
         done.into_iter().collect::<Result<(), _>>()?;
         let Some(memory) = memory else { return Ok(()) };
-        for at in 0..crown.len() {
-            let (before, here) = crown.split_at_mut(at);
+        for at in 0..top.len() {
+            let (before, here) = top.split_at_mut(at);
             let Some((panel, update)) = here.first_mut() else { break };
-            let front = &forest.fronts[forest.crown.0 + at];
+            let front = &symbolic.fronts[symbolic.top.0 + at];
             let of = |&child: &u32| {
-                let front = &forest.fronts[child as usize];
-                let numbers = match (child as usize).checked_sub(forest.crown.0) {
-                    Some(crown) => &before[crown].1[..],
-                    None => left_in(groves, forest, child),
+                let front = &symbolic.fronts[child as usize];
+                let numbers = match (child as usize).checked_sub(symbolic.top.0) {
+                    Some(top) => &before[top].1[..],
+                    None => left_in(subtrees, symbolic, child),
                 };
                 (front, &numbers[..front.update_len()])
             };
-            eliminate(forest, front, matrix, panel, update, memory, || front.children.iter().map(of))?;
+            eliminate(symbolic, front, matrix, panel, update, memory, || front.children.iter().map(of))?;
         }
         Ok(())
     }
+
+    /// L⁻ᵀ L⁻¹ x, in place.
+    pub(super) fn solve(&mut self, symbolic: &SymbolicFactor, x: &mut [DVec3]) {
+        self.take(symbolic, x);
+        self.forward(symbolic);
+        self.backward(symbolic);
+        self.give(symbolic, x);
+    }
+
+    /// L⁻¹ x, in the factor's own order.
+    pub(super) fn lower(&mut self, symbolic: &SymbolicFactor, x: &[DVec3]) -> Vec<f64> {
+        self.take(symbolic, x);
+        self.forward(symbolic);
+        self.right_side.iter().map(|&s| s.into()).collect()
+    }
+
+    /// L⁻ᵀ y, of what is in the factor's own order.
+    pub(super) fn upper(&mut self, symbolic: &SymbolicFactor, y: &[f64]) -> Vec<DVec3> {
+        self.right_side.iter_mut().zip(y).for_each(|(s, y)| *s = from_f64(*y));
+        self.backward(symbolic);
+        let mut x = vec![DVec3::ZERO; symbolic.order.len()];
+        self.give(symbolic, &mut x);
+        x
+    }
+
+    fn take(&mut self, symbolic: &SymbolicFactor, x: &[DVec3]) {
+        for (s, &old) in self.right_side.chunks_exact_mut(3).zip(&symbolic.order) {
+            s.copy_from_slice(&x[old as usize].to_array().map(from_f64));
+        }
+    }
+
+    fn give(&self, symbolic: &SymbolicFactor, x: &mut [DVec3]) {
+        for (s, &old) in self.right_side.chunks_exact(3).zip(&symbolic.order) {
+            x[old as usize] = DVec3::new(s[0].into(), s[1].into(), s[2].into());
+        }
+    }
+
+    /// L⁻¹ of what is in `right_side`, numbered anew.
+    fn forward(&mut self, symbolic: &SymbolicFactor) {
+        let Self { subtrees, top, right_side, .. } = self;
+        let (mut own, high) = by_subtree(symbolic, right_side);
+        (subtrees.par_iter_mut().zip(&symbolic.subtrees).zip(&mut own).with_max_len(1))
+            .for_each(|((factor, subtree), own)| factor.forward(symbolic, subtree, own));
+        for factor in &mut *subtrees {
+            for &(root, _) in &factor.live {
+                for &row in &symbolic.rows[symbolic.fronts[root as usize].rows.clone()] {
+                    let at = 3 * (row as usize - symbolic.top.1);
+                    for (x, more) in high[at..at + 3].iter_mut().zip(&mut factor.above[at..at + 3]) {
+                        *x -= std::mem::replace(more, zero());
+                    }
+                }
+            }
+        }
+        let mut rows = Vec::new();
+        for (front, (panel, _)) in symbolic.fronts[symbolic.top.0..].iter().zip(&*top) {
+            let at = 3 * (front.first - symbolic.top.1);
+            down(front, panel, &mut high[at..at + 3 * front.columns], &mut rows);
+            for (&row, some) in symbolic.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
+                let at = 3 * (row as usize - symbolic.top.1);
+                take(&mut high[at..], some);
+            }
+        }
+    }
+
+    /// L⁻ᵀ of what is in `right_side`, numbered anew.
+    fn backward(&mut self, symbolic: &SymbolicFactor) {
+        let Self { subtrees, top, right_side, .. } = self;
+        let (mut own, high) = by_subtree(symbolic, right_side);
+        let mut rows = Vec::new();
+        for (front, (panel, _)) in symbolic.fronts[symbolic.top.0..].iter().zip(&*top).rev() {
+            gather(symbolic, front, &mut rows, |row| &high[3 * (row - symbolic.top.1)..]);
+            let at = 3 * (front.first - symbolic.top.1);
+            up(front, panel, &mut high[at..at + 3 * front.columns], &rows);
+        }
+        let high = &*high;
+        (subtrees.par_iter_mut().zip(&symbolic.subtrees).zip(&mut own).with_max_len(1))
+            .for_each(|((factor, subtree), own)| factor.backward(symbolic, subtree, own, high));
+    }
 }
 
-/// The update that a front at the top of a grove has left.
-fn left_in<'a, T>(groves: &'a [Planted<T>], forest: &Forest, front: u32) -> &'a [T] {
-    let grove = forest.groves.partition_point(|g| g.fronts.end <= front as usize);
-    let found = groves[grove].live.iter().find(|(f, _)| *f == front);
-    found.map_or(&[], |&(_, at)| &groves[grove].stack[at..])
+/// The unknowns of each subtree, and the top's.
+fn by_subtree<'a, T>(symbolic: &SymbolicFactor, right_side: &'a mut [T]) -> (Vec<&'a mut [T]>, &'a mut [T]) {
+    let (mut low, high) = right_side.split_at_mut(3 * symbolic.top.1);
+    let mut own = Vec::with_capacity(symbolic.subtrees.len());
+    for subtree in &symbolic.subtrees {
+        let (one, others) = low.split_at_mut(3 * subtree.unknowns.len());
+        own.push(one);
+        low = others;
+    }
+    (own, high)
 }
 
-impl<T: Precision> Planted<T> {
-    fn factorise(&mut self, forest: &Forest, grove: &Grove, matrix: Matrix<'_>) -> Result<(), SolveError> {
+/// The update that a front at the top of a subtree has left.
+fn left_in<'a, T>(subtrees: &'a [SubtreeFactor<T>], symbolic: &SymbolicFactor, front: u32) -> &'a [T] {
+    let subtree = symbolic.subtrees.partition_point(|g| g.fronts.end <= front as usize);
+    let found = subtrees[subtree].live.iter().find(|(f, _)| *f == front);
+    found.map_or(&[], |&(_, at)| &subtrees[subtree].stack[at..])
+}
+
+impl<T: Precision> SubtreeFactor<T> {
+    fn factorise(
+        &mut self,
+        symbolic: &SymbolicFactor,
+        subtree: &Subtree,
+        matrix: Matrix<'_>,
+    ) -> Result<(), SolveError> {
         let Self { panels, stack, live, memory, .. } = self;
         live.clear();
         let (mut height, mut panels) = (0, &mut panels[..]);
-        for (number, front) in grove.fronts.clone().zip(&forest.fronts[grove.fronts.clone()]) {
+        for (number, front) in subtree.fronts.clone().zip(&symbolic.fronts[subtree.fronts.clone()]) {
             let (panel, rest) = panels.split_at_mut(front.panel_len());
             panels = rest;
             let taken = live.len() - front.children.len();
@@ -129,11 +240,11 @@ impl<T: Precision> Planted<T> {
             let update = &mut above[..front.update_len()];
             let children = || {
                 live[taken..].iter().map(|&(child, at)| {
-                    let front = &forest.fronts[child as usize];
+                    let front = &symbolic.fronts[child as usize];
                     (front, &below[at..at + front.update_len()])
                 })
             };
-            eliminate(forest, front, matrix, panel, update, memory, children)?;
+            eliminate(symbolic, front, matrix, panel, update, memory, children)?;
             let base = live.get(taken).map_or(height, |&(_, at)| at);
             live.truncate(taken);
             if base < height {
@@ -144,11 +255,52 @@ impl<T: Precision> Planted<T> {
         }
         Ok(())
     }
+
+    /// `own` are the subtree's unknowns; what it takes from the top's is summed up in `above`.
+    fn forward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [T]) {
+        let Self { panels, above, rows, .. } = self;
+        let mut panels = &panels[..];
+        for front in &symbolic.fronts[subtree.fronts.clone()] {
+            let (panel, rest) = panels.split_at(front.panel_len());
+            panels = rest;
+            let at = 3 * (front.first - subtree.unknowns.start);
+            down(front, panel, &mut own[at..at + 3 * front.columns], rows);
+            for (&row, some) in symbolic.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
+                match (row as usize).checked_sub(subtree.unknowns.end) {
+                    None => {
+                        let at = 3 * (row as usize - subtree.unknowns.start);
+                        take(&mut own[at..], some);
+                    }
+                    Some(_) => {
+                        let at = 3 * (row as usize - symbolic.top.1);
+                        for (x, more) in above[at..at + 3].iter_mut().zip(some) {
+                            *x += *more;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn backward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [T], high: &[T]) {
+        let Self { panels, rows, .. } = self;
+        let mut panels = &panels[..];
+        for front in symbolic.fronts[subtree.fronts.clone()].iter().rev() {
+            let (rest, panel) = panels.split_at(panels.len() - front.panel_len());
+            panels = rest;
+            gather(symbolic, front, rows, |row| match row.checked_sub(subtree.unknowns.end) {
+                None => &own[3 * (row - subtree.unknowns.start)..],
+                Some(_) => &high[3 * (row - symbolic.top.1)..],
+            });
+            let at = 3 * (front.first - subtree.unknowns.start);
+            up(front, panel, &mut own[at..at + 3 * front.columns], rows);
+        }
+    }
 }
 
 /// Fills and factors a front's panel, and leaves its update.
 fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
-    forest: &Forest,
+    symbolic: &SymbolicFactor,
     front: &Front,
     matrix: Matrix<'_>,
     panel: &mut [T],
@@ -159,7 +311,7 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
     let height = front.height();
     let (columns, rows) = (3 * front.columns, 3 * front.rows.len());
     panel.fill(zero());
-    for entry in &forest.entries[front.entries.clone()] {
+    for entry in &symbolic.entries[front.entries.clone()] {
         let block = matrix.blocks[entry.block as usize];
         let block = if entry.transposed { block.transpose() } else { block };
         for (c, column) in block.to_cols_array_2d().into_iter().enumerate() {
@@ -167,26 +319,26 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
             panel[at..at + 3].copy_from_slice(&column.map(from_f64));
         }
     }
-    for (k, &unknown) in forest.order[front.first..front.first + front.columns].iter().enumerate() {
+    for (k, &unknown) in symbolic.order[front.first..front.first + front.columns].iter().enumerate() {
         let shift: T = from_f64(matrix.diagonal[unknown as usize]);
         for c in 3 * k..3 * k + 3 {
             panel[c * (height + 1)] += shift;
         }
     }
     for (child, numbers) in children() {
-        extend(forest, child, numbers, 0..child.inner, panel, height, 0);
+        extend(symbolic, child, numbers, 0..child.inner, panel, height, 0);
     }
     let lost = |index: usize| SolveError::NotPositive { index: 3 * front.first + index };
-    partial(MatMut::from_column_major_slice_mut(panel, height, columns), memory).map_err(lost)?;
+    factor_panel(MatMut::from_column_major_slice_mut(panel, height, columns), memory).map_err(lost)?;
     if rows > 0 {
         let panel = MatRef::from_column_major_slice(&*panel, height, columns);
-        subtract(
+        subtract_product(
             MatMut::from_column_major_slice_mut(update, rows, rows),
             panel.split_at_row(columns).1,
             Accum::Replace,
         );
         for (child, numbers) in children() {
-            extend(forest, child, numbers, child.inner..child.rows.len(), update, rows, front.columns);
+            extend(symbolic, child, numbers, child.inner..child.rows.len(), update, rows, front.columns);
         }
     }
     Ok(())
@@ -194,7 +346,7 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
 
 /// Adds some columns of a child's update to a matrix of so many rows, whose first row is the parent's row `skip`.
 fn extend<T: Precision>(
-    forest: &Forest,
+    symbolic: &SymbolicFactor,
     child: &Front,
     update: &[T],
     columns: Range<usize>,
@@ -202,7 +354,7 @@ fn extend<T: Precision>(
     rows: usize,
     skip: usize,
 ) {
-    let runs = &forest.runs[child.runs.clone()];
+    let runs = &symbolic.runs[child.runs.clone()];
     let height = 3 * child.rows.len();
     let mut first = 0;
     for k in columns {
@@ -226,41 +378,52 @@ fn extend<T: Precision>(
     }
 }
 
-/// Right sides and solutions: see `substitute.rs`.
-impl<T: Precision> Factor<T> {
-    /// L⁻ᵀ L⁻¹ x, in place.
-    pub(super) fn solve(&mut self, forest: &Forest, x: &mut [DVec3]) {
-        self.take(forest, x);
-        self.forward(forest);
-        self.backward(forest);
-        self.give(forest, x);
-    }
+/// x ← x − less, as many as these are.
+fn take<T: Precision>(x: &mut [T], less: &[T]) {
+    x.iter_mut().zip(less).for_each(|(x, less)| *x -= *less);
+}
 
-    /// L⁻¹ x, in the factor's own order.
-    pub(super) fn lower(&mut self, forest: &Forest, x: &[DVec3]) -> Vec<f64> {
-        self.take(forest, x);
-        self.forward(forest);
-        self.side.iter().map(|&s| s.into()).collect()
+/// The unknowns of a front's rows.
+fn gather<'a, T: Precision + 'a>(
+    symbolic: &SymbolicFactor,
+    front: &Front,
+    rows: &mut Vec<T>,
+    of: impl Fn(usize) -> &'a [T],
+) {
+    rows.clear();
+    for &row in &symbolic.rows[front.rows.clone()] {
+        rows.extend_from_slice(&of(row as usize)[..3]);
     }
+}
 
-    /// L⁻ᵀ y, of what is in the factor's own order.
-    pub(super) fn upper(&mut self, forest: &Forest, y: &[f64]) -> Vec<DVec3> {
-        self.side.iter_mut().zip(y).for_each(|(s, y)| *s = from_f64(*y));
-        self.backward(forest);
-        let mut x = vec![DVec3::ZERO; forest.order.len()];
-        self.give(forest, &mut x);
-        x
+/// x ← L₁₁⁻¹ x; `rows` ← L₂₁ x.
+fn down<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &mut Vec<T>) {
+    let n = x.len();
+    let panel = MatRef::from_column_major_slice(panel, front.height(), n);
+    let (top, bottom) = panel.split_at_row(n);
+    solve_lower_triangular_in_place(top, MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
+    rows.clear();
+    rows.resize(bottom.nrows(), zero());
+    if !rows.is_empty() {
+        let (x, rows) = (ColRef::from_slice(&*x), ColMut::from_slice_mut(rows));
+        matmul(rows, Accum::Replace, bottom, x, one(), Par::Seq);
     }
+}
 
-    fn take(&mut self, forest: &Forest, x: &[DVec3]) {
-        for (s, &old) in self.side.chunks_exact_mut(3).zip(&forest.order) {
-            s.copy_from_slice(&x[old as usize].to_array().map(from_f64));
-        }
+/// x ← L₁₁⁻ᵀ (x − L₂₁ᵀ rows).
+fn up<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &[T]) {
+    let n = x.len();
+    let panel = MatRef::from_column_major_slice(panel, front.height(), n);
+    let (top, bottom) = panel.split_at_row(n);
+    if !rows.is_empty() {
+        matmul(
+            ColMut::from_slice_mut(x),
+            Accum::Add,
+            bottom.transpose(),
+            ColRef::from_slice(rows),
+            -one::<T>(),
+            Par::Seq,
+        );
     }
-
-    fn give(&self, forest: &Forest, x: &mut [DVec3]) {
-        for (s, &old) in self.side.chunks_exact(3).zip(&forest.order) {
-            x[old as usize] = DVec3::new(s[0].into(), s[1].into(), s[2].into());
-        }
-    }
+    solve_upper_triangular_in_place(top.transpose(), MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
 }

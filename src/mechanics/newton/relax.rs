@@ -25,7 +25,7 @@ use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};
 
 /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
-const LONGEST_MOVE: f64 = 3e-3;
+const MAX_MOVE_M: f64 = 3e-3;
 
 /// γ of the first iteration: neighbours pull as much as a vertex itself.
 const FIRST_SCALE: f64 = 0.3;
@@ -33,11 +33,11 @@ const FIRST_SCALE: f64 = 0.3;
 /// The share of the predicted decrease that an iteration must bring.
 const ARMIJO: f64 = 1e-4;
 
-/// Iterations by which the end of a relaxation is told.
-const LATE: usize = 3;
+/// Number of the last iterations whose contribution decides on the end of a relaxation.
+const LAST_ITERATIONS: usize = 3;
 
 /// Shorter than this share of an iteration is rounding.
-const SHORTEST: f64 = 1e-3;
+const MIN_STEP_LENGTH: f64 = 1e-3;
 
 /// D⁻¹ and the vectors of the iteration, kept from call to call; by vertex, zero where it is held.
 #[derive(Debug, Default)]
@@ -56,8 +56,8 @@ pub(crate) struct Relaxation {
     gradient: Vec<DVec3>,
     energies: Vec<f64>,
     scratch: Scratch,
-    /// Share of the decrease under which the last iterations end a call; 0 never does.
-    pub(super) ending: f64,
+    /// A call ends where its last iterations contribute less than this share of the energy decrease; 0 never ends one.
+    pub(super) end_share: f64,
 }
 
 impl Relaxation {
@@ -94,12 +94,12 @@ impl Relaxation {
         self.energies.clear();
         self.energies.push(energy);
         for _ in 0..iterations {
-            if self.has_ended() {
+            if self.has_converged() {
                 break;
             }
             self.touch(contacts);
             let [slope, longest] = vectors::turn(&self.pairs, &self.inverse, scale, &self.down, &mut self.direction);
-            let mut t = (LONGEST_MOVE / longest).min(1.0);
+            let mut t = (MAX_MOVE_M / longest).min(1.0);
             loop {
                 self.direction.added_to(x, t, &mut self.trial);
                 contacts.update(&self.trial);
@@ -111,7 +111,7 @@ impl Relaxation {
                 }
                 t *= 0.3;
                 // Also where t is not a number: nothing pulls any more.
-                if t.is_nan() || t <= SHORTEST {
+                if t.is_nan() || t <= MIN_STEP_LENGTH {
                     contacts.update(x);
                     return energy;
                 }
@@ -124,11 +124,12 @@ impl Relaxation {
         energy
     }
 
-    /// Whether the last [`LATE`] of these energies fell by too little to go on.
-    fn has_ended(&self) -> bool {
+    /// Whether the last [`LAST_ITERATIONS`] of these energies fell by too little to go on.
+    fn has_converged(&self) -> bool {
         let energies = &self.energies;
         let [first, .., last] = energies[..] else { return false };
-        energies.len() > 2 * LATE && energies[energies.len() - 1 - LATE] - last < self.ending * (first - last)
+        energies.len() > 2 * LAST_ITERATIONS
+            && energies[energies.len() - 1 - LAST_ITERATIONS] - last < self.end_share * (first - last)
     }
 
     /// Adds κ A n nᵀ to the D of vertices that have come to touch (Sherman and Morrison's formula).
@@ -175,7 +176,7 @@ mod tests {
     fn relaxed(cloth: &Cloth, x: &mut Vec<DVec3>, iterations: usize) -> [f64; 2] {
         let mut contacts = Contacts::none();
         let (mut blocks, mut relaxation) = (Vec::new(), Relaxation::default());
-        cloth.own_blocks(x, &contacts, 100.0, &mut blocks);
+        cloth.diagonal_blocks(x, &contacts, 100.0, &mut blocks);
         relaxation.prepare(cloth, &contacts, &blocks);
         let before = cloth.energy(x, &contacts);
         let after = relaxation.run(cloth, &mut contacts, x, iterations);
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn takes_off_what_is_as_short_as_a_triangle() {
+    fn relaxation_removes_displacements_of_the_length_of_a_triangle() {
         let (cloth, flat) = hanging();
         let weight_alone = cloth.energy(&flat, &Contacts::none());
         let mut x = flat.clone();
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn several_stretches_give_the_same_bits_on_one_thread_and_on_two() {
+    fn relaxation_of_several_chunks_has_the_same_bits_on_one_thread_and_on_two() {
         let n = 150;
         let mesh = sheet(n - 1, n - 1, |i, j| DVec3::new(i, 0.1 * (i * j).sin(), j) * 0.01);
         let cloth = Cloth::sample(&mesh, "cotton", &(n * (n - 1)..n * n).collect::<Vec<_>>());

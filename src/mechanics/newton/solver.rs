@@ -2,8 +2,8 @@
 //!
 //! LLᵀ by fronts in the garment's own elimination order (`factor.rs`), with the same bits on any number of threads.
 //!
-//! It factors in single precision, which takes half the time, and mends the solution in double: d ← d + S⁻¹ (b − A d) until
-//! what is left of b is under [`REST`] (iterative refinement; Higham: "Accuracy and Stability of Numerical Algorithms",
+//! It factors in single precision, which takes half the time, and refines the solution in double: d ← d + S⁻¹ (b − A d) until
+//! what is left of b is under [`REFINEMENT_TOLERANCE`] (iterative refinement; Higham: "Accuracy and Stability of Numerical Algorithms",
 //! chapter 12). That works while the matrix's condition is under some 1e7: for knits, and for wovens while they are soft. The
 //! first time it does not, or a pivot is lost that double precision holds, the solver takes double from then on.
 //!
@@ -14,45 +14,23 @@
 
 use glam::{DMat3, DVec3};
 
-use super::factor::{Factor, Matrix};
-use super::norm;
-use super::symbolic::{Forest, Front};
+use super::factor::{Factor, Matrix, SolveError};
+use super::symbolic::{Front, SymbolicFactor};
 use crate::mechanics::energy::sparsity::Pattern;
+use crate::mechanics::linear_algebra::norm;
 
-/// What can go wrong in a solve.
-#[derive(Debug, thiserror::Error)]
-pub enum SolveError {
-    /// No memory to factorise in.
-    #[error("no memory to factorise the Hessian of {unknowns} unknowns ({reason}): take a garment of fewer vertices")]
-    NoRoom {
-        /// Scalar unknowns.
-        unknowns: usize,
-        /// What faer said.
-        reason: String,
-    },
-    /// A pivot was not positive.
-    #[error(
-        "the forces of the cloth are no finite numbers (unknown {index}): are rest shape and garment as worn of different orders of \
-         magnitude?"
-    )]
-    NotPositive {
-        /// Scalar unknown in elimination order.
-        index: usize,
-    },
-}
+/// Largest residual of a refined solution, relative to the right side.
+const REFINEMENT_TOLERANCE: f64 = 1e-3;
 
-/// Share of the right side that a mended solution may leave.
-const REST: f64 = 1e-3;
-
-/// Times a solution in single precision is mended at most: each takes off a factor of the condition times 1e-7.
-const MENDS: usize = 4;
+/// Most steps of iterative refinement: each reduces the error by the condition number times 1e-7.
+const MAX_REFINEMENTS: usize = 4;
 
 /// Shares of the sums of its rows that are added to the diagonal of a matrix which double precision loses, one after the other.
 const RIDGES: [f64; 6] = [1e-13, 1e-11, 1e-9, 1e-6, 1e-3, 2.0];
 
 /// A factorisation whose pattern is fixed.
 pub struct Solver {
-    forest: Forest,
+    symbolic: SymbolicFactor,
     single: Option<Factor<f32>>,
     double: Factor<f64>,
 }
@@ -60,7 +38,7 @@ pub struct Solver {
 impl std::fmt::Debug for Solver {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Solver")
-            .field("unknowns", &(3 * self.forest.order.len()))
+            .field("unknowns", &(3 * self.symbolic.order.len()))
             .field("factor", &self.factor_len())
             .finish()
     }
@@ -70,13 +48,13 @@ impl Solver {
     /// Analyses the pattern.
     #[must_use]
     pub fn new(pattern: &Pattern) -> Self {
-        Self { forest: Forest::new(pattern), single: Some(Factor::default()), double: Factor::default() }
+        Self { symbolic: SymbolicFactor::new(pattern), single: Some(Factor::default()), double: Factor::default() }
     }
 
     /// Numbers in the factor: a measure of its cost.
     #[must_use]
     pub(crate) fn factor_len(&self) -> usize {
-        self.forest.fronts.iter().map(Front::panel_len).sum()
+        self.symbolic.fronts.iter().map(Front::panel_len).sum()
     }
 
     /// Solves (A + D) x = b for the matrix A of `blocks` and the diagonal D of `diagonal` (N/m for each unknown vertex); `x`
@@ -96,19 +74,19 @@ impl Solver {
     ) -> Result<(), SolveError> {
         let matrix = Matrix { blocks, diagonal };
         if let Some(single) = &mut self.single {
-            match single.factorise(&self.forest, matrix) {
-                Ok(()) if mended(single, &self.forest, pattern, matrix, x) => return Ok(()),
+            match single.factorise(&self.symbolic, matrix) {
+                Ok(()) if refined_solve(single, &self.symbolic, pattern, matrix, x) => return Ok(()),
                 Err(lost) if !positive => return Err(lost),
                 _ => self.single = None,
             }
         }
         self.factorise_in_double(pattern, matrix, positive)?;
-        self.double.solve(&self.forest, x);
+        self.double.solve(&self.symbolic, x);
         Ok(())
     }
 
     fn factorise_in_double(&mut self, pattern: &Pattern, matrix: Matrix<'_>, positive: bool) -> Result<(), SolveError> {
-        let mut done = self.double.factorise(&self.forest, matrix);
+        let mut done = self.double.factorise(&self.symbolic, matrix);
         if done.is_ok() || !positive {
             return done;
         }
@@ -117,7 +95,7 @@ impl Solver {
             let raised =
                 matrix.diagonal.iter().zip(&sums).map(|(shift, sum)| shift + share * sum + f64::MIN_POSITIVE.sqrt());
             let diagonal: Vec<f64> = raised.collect();
-            done = self.double.factorise(&self.forest, Matrix { diagonal: &diagonal, ..matrix });
+            done = self.double.factorise(&self.symbolic, Matrix { diagonal: &diagonal, ..matrix });
             if done.is_ok() {
                 break;
             }
@@ -127,47 +105,47 @@ impl Solver {
 
     /// L⁻¹ x with the factor of the last [`solve`](Self::solve), L Lᵀ being a positive matrix near to that one; in an order of its own.
     pub(crate) fn lower(&mut self, x: &[DVec3]) -> Vec<f64> {
-        let Self { forest, single, double } = self;
-        single.as_mut().map_or_else(|| double.lower(forest, x), |single| single.lower(forest, x))
+        let Self { symbolic, single, double } = self;
+        single.as_mut().map_or_else(|| double.lower(symbolic, x), |single| single.lower(symbolic, x))
     }
 
     /// L⁻ᵀ y, y being as [`lower`](Self::lower) gives it.
     pub(crate) fn upper(&mut self, y: &[f64]) -> Vec<DVec3> {
-        let Self { forest, single, double } = self;
-        single.as_mut().map_or_else(|| double.upper(forest, y), |single| single.upper(forest, y))
+        let Self { symbolic, single, double } = self;
+        single.as_mut().map_or_else(|| double.upper(symbolic, y), |single| single.upper(symbolic, y))
     }
 }
 
-/// Solves with a factor in single precision and mends the solution; where that fails, `x` is left as it was.
-fn mended(
+/// Solves with a factor in single precision and iterative refinement. Returns whether that converged; otherwise `x` is unchanged.
+fn refined_solve(
     single: &mut Factor<f32>,
-    forest: &Forest,
+    symbolic: &SymbolicFactor,
     pattern: &Pattern,
     Matrix { blocks, diagonal }: Matrix<'_>,
     x: &mut [DVec3],
 ) -> bool {
-    let side = x.to_vec();
-    let most = REST * norm(&side);
-    let mut rest = Vec::new();
-    single.solve(forest, x);
-    for _ in 0..=MENDS {
-        pattern.multiply(blocks, x, &mut rest);
-        for (((r, b), d), shift) in rest.iter_mut().zip(&side).zip(x.iter()).zip(diagonal) {
+    let right_side = x.to_vec();
+    let tolerance = REFINEMENT_TOLERANCE * norm(&right_side);
+    let mut residual = Vec::new();
+    single.solve(symbolic, x);
+    for _ in 0..=MAX_REFINEMENTS {
+        pattern.multiply(blocks, x, &mut residual);
+        for (((r, b), d), shift) in residual.iter_mut().zip(&right_side).zip(x.iter()).zip(diagonal) {
             *r = *b - *r - *d * *shift;
         }
-        let left = norm(&rest);
-        if left <= most {
+        let left = norm(&residual);
+        if left <= tolerance {
             return true;
         }
         if !left.is_finite() {
             break;
         }
-        single.solve(forest, &mut rest);
-        for (d, r) in x.iter_mut().zip(&rest) {
+        single.solve(symbolic, &mut residual);
+        for (d, r) in x.iter_mut().zip(&residual) {
             *d += *r;
         }
     }
-    x.copy_from_slice(&side);
+    x.copy_from_slice(&right_side);
     false
 }
 
@@ -195,7 +173,7 @@ mod tests {
 
     /// Nothing holds a sheet that has no mass in the matrix either: it may go anywhere, and the matrix is singular.
     #[test]
-    fn what_double_precision_loses_is_solved_and_what_is_no_number_is_refused() {
+    fn matrices_that_lose_a_pivot_are_solved_and_non_finite_ones_are_refused() {
         let mesh = sheet(5, 5, |i, j| DVec3::new(i, 0.0, j) * 0.01);
         let cloth = Cloth::sample(&mesh, "denim", &[]);
         let mut blocks = Vec::new();

@@ -7,12 +7,20 @@
 //! method", ACM Trans. Math. Softw. 15(4), 1989): a dense kernel is worth more than the zeros cost.
 //!
 //! All of it is in blocks of 3 by 3: a ninth of the work that scalars would take.
+//!
+//! The tree is cut into subtrees of about as much work each, and the top above them.
 
 use crate::mechanics::energy::sparsity::Pattern;
 use crate::mesh::{Lists, NONE, renumbered};
 
 /// Up to so many columns may be put together with that share of zeros.
-const RELAXED: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
+const MAX_ZEROS: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
+
+/// A subtree has at most this share of all the work.
+const MAX_WORK_SHARE: f64 = 1.0 / 12.0;
+
+/// What is less work than this, in multiplications of blocks, is not worth a thread.
+const MIN_WORK: f64 = 2e5;
 
 /// Columns that are eliminated together.
 #[derive(Debug, Clone, Default)]
@@ -118,7 +126,7 @@ fn relax(node: &mut Supernode, nodes: &mut [Supernode]) {
         let (more, columns) = (child.columns.len(), child.columns.len() + node.columns.len());
         let zeros = node.zeros + child.zeros + more * (node.columns.len() + node.rows - child.rows);
         let stored = columns * (columns + 1) / 2 + columns * node.rows;
-        let bound = RELAXED.iter().find(|(most, _)| columns <= *most).map_or(0.0, |(_, share)| *share);
+        let bound = MAX_ZEROS.iter().find(|(most, _)| columns <= *most).map_or(0.0, |(_, share)| *share);
         if zeros as f64 <= bound * stored as f64 {
             let mut taken = std::mem::take(child);
             taken.columns.append(&mut node.columns);
@@ -145,4 +153,56 @@ fn tidy(mut nodes: Vec<Supernode>) -> Vec<Supernode> {
         nodes[s].children = children;
     }
     nodes
+}
+
+/// Multiplications of blocks that a front takes.
+fn work(node: &Supernode) -> f64 {
+    let (columns, rows) = (node.columns.len() as f64, node.rows as f64);
+    columns * (columns * columns / 3.0 + columns * rows + rows * rows)
+}
+
+/// Subtrees by subtrees, and the nodes above them, children before parents.
+pub(super) fn cut(nodes: &[Supernode]) -> (Vec<Vec<u32>>, Vec<u32>) {
+    let mut total: Vec<f64> = nodes.iter().map(work).collect();
+    for s in 0..nodes.len() {
+        total[s] += nodes[s].children.iter().map(|&c| total[c as usize]).sum::<f64>();
+    }
+    let mut trees: Vec<u32> = (0..nodes.len() as u32).filter(|&s| nodes[s as usize].parent.is_none()).collect();
+    let most = (MAX_WORK_SHARE * trees.iter().map(|&s| total[s as usize]).sum::<f64>()).max(MIN_WORK);
+    let mut top = Vec::new();
+    let heaviest = |trees: &[u32]| {
+        let heavy = (0..trees.len()).filter(|&i| total[trees[i] as usize] > most);
+        heavy.max_by(|&i, &j| total[trees[i] as usize].total_cmp(&total[trees[j] as usize]))
+    };
+    while let Some(i) = heaviest(&trees) {
+        let s = trees[i];
+        top.push(s);
+        trees.splice(i..=i, nodes[s as usize].children.iter().copied());
+    }
+    top.sort_unstable();
+    let mut subtrees: Vec<Vec<u32>> = Vec::new();
+    let mut filled = f64::INFINITY;
+    for s in trees {
+        if filled + total[s as usize] > most {
+            subtrees.push(Vec::new());
+            filled = 0.0;
+        }
+        filled += total[s as usize];
+        if let Some(subtree) = subtrees.last_mut() {
+            subtree.push(s);
+        }
+    }
+    (subtrees, top)
+}
+
+/// The nodes of a subtree, children right before what is above them.
+pub(super) fn postorder(nodes: &[Supernode], root: u32, out: &mut Vec<u32>) {
+    // The other way round: a node, then its children's subtrees from the last to the first.
+    let begin = out.len();
+    let mut open = vec![root];
+    while let Some(s) = open.pop() {
+        out.push(s);
+        open.extend(&nodes[s as usize].children);
+    }
+    out[begin..].reverse();
 }

@@ -1,13 +1,12 @@
 //! The elimination's plan: fronts in their order, what goes into each, and which of them are done side by side.
 //!
-//! Unknowns are numbered anew, supernode by supernode. The tree of supernodes is cut into a crown and [`Grove`]s below it: whole
+//! Unknowns are numbered anew, supernode by supernode. The tree of supernodes is cut into a top and [`Subtree`]s below it: whole
 //! subtrees with about as much work each, that depend on none but themselves. Where the cut runs depends on the pattern alone, so the
 //! factor has the same bits on any number of threads.
 
 use std::ops::Range;
 
-use super::subtrees::{cut, postorder};
-use super::supernodes::{Supernode, Upper, supernodes, upper};
+use super::supernodes::{Supernode, Upper, cut, postorder, supernodes, upper};
 use crate::mechanics::energy::sparsity::Pattern;
 
 /// A block of the matrix and where its first number goes in the front's panel.
@@ -35,7 +34,7 @@ pub(super) struct Front {
     pub(super) first: usize,
     /// Unknowns eliminated, in blocks as all here.
     pub(super) columns: usize,
-    /// Its rows in [`Forest::rows`].
+    /// Its rows in [`SymbolicFactor::rows`].
     pub(super) rows: Range<usize>,
     pub(super) entries: Range<usize>,
     /// Runs of its rows, split where the parent's columns end.
@@ -65,7 +64,7 @@ impl Front {
 
 /// Fronts that are done one after the other on one thread.
 #[derive(Debug, Clone)]
-pub(super) struct Grove {
+pub(super) struct Subtree {
     pub(super) fronts: Range<usize>,
     /// Its unknowns, numbered anew.
     pub(super) unknowns: Range<usize>,
@@ -76,62 +75,62 @@ pub(super) struct Grove {
 
 /// The plan.
 #[derive(Debug, Clone)]
-pub(super) struct Forest {
+pub(super) struct SymbolicFactor {
     /// Unknown of the pattern by its new number.
     pub(super) order: Vec<u32>,
-    /// All fronts, groves first, then the crown.
+    /// All fronts, subtrees first, then the top.
     pub(super) fronts: Vec<Front>,
     pub(super) rows: Vec<u32>,
     pub(super) entries: Vec<Entry>,
     pub(super) runs: Vec<Run>,
-    pub(super) groves: Vec<Grove>,
-    /// First front and first unknown of the crown.
-    pub(super) crown: (usize, usize),
+    pub(super) subtrees: Vec<Subtree>,
+    /// First front and first unknown of the top.
+    pub(super) top: (usize, usize),
 }
 
-impl Forest {
+impl SymbolicFactor {
     pub(super) fn new(pattern: &Pattern) -> Self {
         let upper = upper(pattern);
         let nodes = supernodes(pattern, &upper);
-        let (groves, crown) = cut(&nodes);
-        // Nodes in their final order, and each grove's share of them.
+        let (subtrees, top) = cut(&nodes);
+        // Nodes in their final order, and each subtree's share of them.
         let mut sequence = Vec::with_capacity(nodes.len());
-        let mut ends = Vec::with_capacity(groves.len());
-        for subtrees in &groves {
-            for &root in subtrees {
+        let mut ends = Vec::with_capacity(subtrees.len());
+        for roots in &subtrees {
+            for &root in roots {
                 postorder(&nodes, root, &mut sequence);
             }
             ends.push(sequence.len());
         }
-        let first_of_crown = sequence.len();
-        sequence.extend(crown);
+        let first_of_top = sequence.len();
+        sequence.extend(top);
         let mut place = vec![0; nodes.len()];
         for (at, &s) in sequence.iter().enumerate() {
             place[s as usize] = at as u32;
         }
         let order: Vec<u32> = sequence.iter().flat_map(|&s| &nodes[s as usize].columns).copied().collect();
-        let mut forest = Self {
+        let mut symbolic = Self {
             order,
             fronts: Vec::with_capacity(nodes.len()),
             rows: Vec::new(),
             entries: Vec::with_capacity(pattern.rows.len()),
             runs: Vec::new(),
-            groves: Vec::with_capacity(groves.len()),
-            crown: (first_of_crown, 0),
+            subtrees: Vec::with_capacity(subtrees.len()),
+            top: (first_of_top, 0),
         };
-        forest.fill(pattern, &upper, &nodes, &sequence, &place);
-        forest.connect(&nodes, &sequence, &place);
-        let first = |front: usize| forest.fronts.get(front).map_or(forest.order.len(), |f| f.first);
-        forest.crown.1 = first(first_of_crown);
+        symbolic.fill(pattern, &upper, &nodes, &sequence, &place);
+        symbolic.connect(&nodes, &sequence, &place);
+        let first = |front: usize| symbolic.fronts.get(front).map_or(symbolic.order.len(), |f| f.first);
+        symbolic.top.1 = first(first_of_top);
         let mut begin = 0;
         let mut all = Vec::with_capacity(ends.len());
         for end in ends {
-            let (panels_len, stack_len) = forest.room(begin..end);
-            all.push(Grove { fronts: begin..end, unknowns: first(begin)..first(end), panels_len, stack_len });
+            let (panels_len, stack_len) = symbolic.room(begin..end);
+            all.push(Subtree { fronts: begin..end, unknowns: first(begin)..first(end), panels_len, stack_len });
             begin = end;
         }
-        forest.groves = all;
-        forest
+        symbolic.subtrees = all;
+        symbolic
     }
 
     /// Rows and entries of every front.
@@ -231,15 +230,15 @@ impl Forest {
 
     /// Numbers that the panels of some fronts take, and their updates at most.
     fn room(&self, fronts: Range<usize>) -> (usize, usize) {
-        let (mut panels, mut most, mut height) = (0, 0, 0);
+        let (mut panels, mut largest, mut height) = (0, 0, 0);
         let mut live: Vec<usize> = Vec::new();
         for front in &self.fronts[fronts] {
             panels += front.panel_len();
-            most = most.max(height + front.update_len());
+            largest = largest.max(height + front.update_len());
             let taken: usize = live.drain(live.len() - front.children.len()..).sum();
             height = height - taken + front.update_len();
             live.push(front.update_len());
         }
-        (panels, most)
+        (panels, largest)
     }
 }

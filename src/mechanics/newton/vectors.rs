@@ -204,9 +204,9 @@ impl Work for Longest<'_> {
 mod tests {
     use glam::{DMat3, DVec3};
 
-    use super::super::dot as product;
     use super::super::soa::STRETCH_VERTICES;
     use super::*;
+    use crate::mechanics::linear_algebra::dot as product;
     use crate::mesh::outer;
 
     fn noise(vertices: usize, seed: f64) -> Vec<DVec3> {

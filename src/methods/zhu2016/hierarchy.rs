@@ -17,7 +17,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::units::{BodyUnit, REACH};
-use crate::mechanics::energy::contact::Touch;
+use crate::mechanics::energy::Touch;
 use crate::methods::implicit_euler::Obstacle;
 use crate::methods::method::MethodInput;
 use crate::methods::segment::Segments;

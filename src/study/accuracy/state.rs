@@ -18,7 +18,7 @@ use crate::base::quantiles::nearest_rank;
 use crate::body::distance::Body;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::principal_strain;
-use crate::mechanics::reactions::grant_beside;
+use crate::mechanics::reactions::solve_remaining_reactions;
 
 /// Metrics of one state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ impl State {
         // New contacts have anchors at `x`, so the gradient holds no friction force yet.
         let energy_j = cloth.gradient(x, &contacts, &mut gradient);
         subtract_friction(cloth, &contacts, &mut gradient);
-        grant_beside(cloth, body, &contacts, x, &mut gradient);
+        solve_remaining_reactions(cloth, body, &contacts, x, &mut gradient);
         let residual = gradient.iter().map(|g| g.length_squared()).sum::<f64>().sqrt();
         let strains: Vec<f64> = cloth.triangles.iter().map(|t| principal_strain(t.deformation(x))).collect();
         let (penetrating_vertices, depth) = contacts.penetration(x);

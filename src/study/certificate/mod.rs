@@ -143,18 +143,19 @@ fn of_forces(forces: &Forces, cloth: &Cloth) -> [Finding; 3] {
         cloth.weight,
         of_weight(forces.held)
     );
-    let friction = format!("{} of {} touching vertices slip or are pulled", forces.beyond_count, forces.touching.len());
+    let friction =
+        format!("{} of {} touching vertices slip or are pulled", forces.insufficient, forces.reactions.len());
     [
         at_most("residual", forces.residual / cloth.weight, "of the weight", REST, worst(forces)),
         at_most("forces add up", forces.unbalanced.length() / cloth.weight, "of the weight", BALANCE, carried),
-        at_most("friction", forces.beyond / cloth.weight, "of the weight", REST, friction),
+        at_most("friction", forces.touching_residual / cloth.weight, "of the weight", REST, friction),
     ]
 }
 
 /// Location of the largest unbalanced force.
 fn worst(forces: &Forces) -> String {
     let (vertex, force) = forces
-        .rest
+        .residual_forces
         .iter()
         .map(|r| r.length())
         .enumerate()

@@ -1,13 +1,14 @@
-//! Which places of a cloth are near each other.
+//! Search for the gaps of a cloth with itself.
 //!
-//! Candidates are the triangles that are near each other ([`near`](super::verlet_list)). A vertex faces the nearest point of a triangle; where
-//! that lies on an edge or a corner, it faces the edge or the corner, and only if it does so from every triangle there: else another
-//! of them is nearer (the feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges face
-//! each other between their ends alone; at the ends a vertex faces something.
+//! Candidates are the pairs of near triangles of the [`VerletList`]. A vertex forms a gap with the nearest point of a triangle. If that
+//! point lies on an edge or a corner, the gap is with the edge or the corner, and exists only if every triangle there yields it: otherwise
+//! another triangle is nearer (feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges form
+//! a gap only while the nearest points lie between their ends; at an end a vertex has a gap.
 //!
-//! Neighbours are near because they are neighbours. Where the garment as placed kept them well apart they count as any other places do;
-//! else they press only where they come to less than half as near as they were placed, and are left out across a sliver. No gap is kept
-//! wider than it was placed.
+//! Topological neighbours are always near. If the placement kept them well apart, they count as any other places. Otherwise they press
+//! only below half of their distance as placed, and are ignored across a sliver. No gap is kept wider than it was placed.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
@@ -16,66 +17,117 @@ use parry3d_f64::query::details::closest_points_segment_segment_with_locations_n
 use parry3d_f64::shape::{SegmentPointLocation, Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
-use super::Apart;
 use super::gap::{Gap, Key, Kind};
-use super::surface::Skin;
-use super::verlet_list::Near;
+use super::surface::Surface;
+use super::verlet_list::VerletList;
 use crate::mesh::NONE;
 
-/// Nearer than this (m) there is no direction between two places any more, and they wait for the next time.
-const COINCIDENT: f64 = 1e-9;
+/// Pressure that compresses half the offset, Pa. The layers of a garment press on each other by their weight, some 2 Pa each; where more
+/// is needed a gap grows stiffer.
+const HALF_OFFSET_PRESSURE: f64 = 200.0;
 
-/// Neighbours count as far apart where the garment as placed keeps them this many times as far as they are looked for.
-const KEPT_APART: f64 = 2.0;
+/// Least offset in mean edges, so that contact is distinguished from intersection. Heuristic.
+const MIN_OFFSET_OF_EDGE: f64 = 0.1;
 
-/// Neighbours press where they are nearer than this share of how far apart they were placed,
-const OF_NEIGHBOURS: f64 = 0.5;
+/// Largest value of that least offset on a coarse mesh, m. Heuristic.
+const MAX_MIN_OFFSET_M: f64 = 4e-3;
 
-/// and not at all where that is less than this, m.
-const LEAST_GOAL: f64 = 1e-5;
+/// Largest offset in mean edges: places two triangles apart on a flat cloth must not form a gap.
+const MAX_OFFSET_OF_EDGE: f64 = 0.25;
 
-/// A share of a vertex's area that its edges stand for, of which it has some three and each faces several others.
-const OF_EDGES: f64 = 0.25;
+/// Distance below which two places have no normal, m; they form no gap until the next refresh.
+const COINCIDENT_M: f64 = 1e-9;
 
-/// All gaps under `reach` (m) at `x`, sorted by key, among triangles that are `near`; `placed` is where nothing was folded yet. Same bits on
-/// any number of threads.
-pub(super) fn gaps(skin: &Skin, near: &Near, x: &[DVec3], placed: &[DVec3], apart: &Apart, reach: f64) -> Vec<Gap> {
-    let look = Look { skin, x, placed, reach, apart };
-    let mut found: Vec<Found> = near
+/// Distance as placed, in search reaches, from which topological neighbours count as any other places. Heuristic.
+const NEIGHBOURS_APART: f64 = 2.0;
+
+/// Share of their distance as placed below which topological neighbours press. Heuristic.
+const NEIGHBOUR_SHARE: f64 = 0.5;
+
+/// Offset below which a gap is ignored, m.
+const MIN_GOAL_M: f64 = 1e-5;
+
+/// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
+const EDGE_AREA_SHARE: f64 = 0.25;
+
+/// Offsets of a cloth from itself.
+#[derive(Debug, Clone)]
+pub(super) struct Spacing {
+    /// Thickness at each vertex, m.
+    thickness: Arc<Vec<f64>>,
+    /// Least and largest offset on this mesh, m.
+    bounds: [f64; 2],
+}
+
+impl Spacing {
+    /// Offsets of a cloth of this thickness (m) at each vertex with this mean edge (m).
+    pub(super) fn new(thickness: Arc<Vec<f64>>, edge_m: f64) -> Self {
+        let min = (MIN_OFFSET_OF_EDGE * edge_m).min(MAX_MIN_OFFSET_M);
+        Self { thickness, bounds: [min, (MAX_OFFSET_OF_EDGE * edge_m).max(min)] }
+    }
+
+    /// h of two places with this mean thickness (m), m.
+    fn offset(&self, thickness: f64) -> f64 {
+        thickness.clamp(self.bounds[0], self.bounds[1])
+    }
+
+    /// κ for this offset (m), N/m³.
+    pub(super) fn stiffness(offset: f64) -> f64 {
+        HALF_OFFSET_PRESSURE / (0.5 * offset)
+    }
+
+    /// Largest offset, m.
+    pub(super) fn max_offset(&self) -> f64 {
+        self.offset(self.thickness.iter().copied().fold(0.0, f64::max))
+    }
+}
+
+/// All gaps under `reach` (m) at `x`, sorted by key, among the pairs of a list that holds at `x`; `placed` are the positions before any
+/// folding. Same bits on any number of threads.
+pub(super) fn gaps(
+    surface: &Surface,
+    list: &VerletList,
+    x: &[DVec3],
+    placed: &[DVec3],
+    spacing: &Spacing,
+    reach: f64,
+) -> Vec<Gap> {
+    let search = Search { surface, x, placed, reach, spacing };
+    let mut found: Vec<Found> = list
         .pairs(reach)
         .flat_map_iter(|[t, u]| {
             let mut found = Vec::new();
-            look.vertices_of(t, u, &near.bounds(u).loosened(reach), &mut found);
-            look.vertices_of(u, t, &near.bounds(t).loosened(reach), &mut found);
-            look.edges_of(t, u, &mut found);
+            search.vertices_of(t, u, &list.bounds(u).loosened(reach), &mut found);
+            search.vertices_of(u, t, &list.bounds(t).loosened(reach), &mut found);
+            search.edges_of(t, u, &mut found);
             found
         })
         .collect();
-    // Stable: of the same gap, seen from several triangles, the first counts, whatever the list was made for.
+    // The sort is stable: of the same gap found from several triangles the first counts, whenever the list was built.
     found.par_sort_by_key(|f| f.gap.key);
-    let seen_from_all = |same: &[Found]| same.len() as u32 >= same[0].faces;
-    found.chunk_by(|a, b| a.gap.key == b.gap.key).filter(|same| seen_from_all(same)).map(|same| same[0].gap).collect()
+    let found_from_all = |same: &[Found]| same.len() as u32 >= same[0].triangles;
+    found.chunk_by(|a, b| a.gap.key == b.gap.key).filter(|same| found_from_all(same)).map(|same| same[0].gap).collect()
 }
 
-/// A gap, and from how many triangles it must be found to be one.
+/// A gap, and the number of triangles that must yield it.
 struct Found {
     gap: Gap,
-    faces: u32,
+    triangles: u32,
 }
 
-struct Look<'a> {
-    skin: &'a Skin,
+struct Search<'a> {
+    surface: &'a Surface,
     x: &'a [DVec3],
     placed: &'a [DVec3],
     reach: f64,
-    apart: &'a Apart,
+    spacing: &'a Spacing,
 }
 
-impl Look<'_> {
-    /// The vertices that triangle `t` owns, against triangle `u`, whose box loosened by the reach is `around`.
+impl Search<'_> {
+    /// Gaps of the vertices that triangle `t` owns with triangle `u`; `around` is the box of `u` enlarged by the reach.
     fn vertices_of(&self, t: usize, u: usize, around: &Aabb, found: &mut Vec<Found>) {
-        let corners = self.skin.triangles[u];
-        for v in self.skin.own_vertices[t].into_iter().filter(|v| *v != NONE && !corners.contains(v)) {
+        let corners = self.surface.triangles[u];
+        for v in self.surface.own_vertices[t].into_iter().filter(|v| *v != NONE && !corners.contains(v)) {
             let p = self.x[v as usize];
             if !around.contains_local_point(p) {
                 continue;
@@ -86,8 +138,8 @@ impl Look<'_> {
                 continue;
             }
             let Some(shares) = at.barycentric_coordinates() else { continue };
-            let faces = match at {
-                TrianglePointLocation::OnVertex(i) => self.skin.vertex_triangles[corners[i as usize] as usize],
+            let triangles = match at {
+                TrianglePointLocation::OnVertex(i) => self.surface.vertex_triangles[corners[i as usize] as usize],
                 TrianglePointLocation::OnEdge(i, _) => self.triangles_at(corners, i),
                 _ => 1,
             };
@@ -98,31 +150,31 @@ impl Look<'_> {
             to.sort_unstable_by_key(|(v, _)| *v);
             let key = Key { kind: Kind::Vertex, vertices: [v, to[0].0, to[1].0, to[2].0, NONE], place: NONE };
             let weights = [1.0, to[0].1, to[1].1, to[2].1, 0.0];
-            let area = self.skin.vertex_areas[v as usize];
+            let area = self.surface.vertex_areas[v as usize];
             if let Some(gap) = self.gap(key, weights, area) {
-                found.push(Found { gap, faces });
+                found.push(Found { gap, triangles });
             }
         }
     }
 
-    /// How many triangles there are at side `i` of one with these corners, as parry3d counts sides.
+    /// Number of triangles at side `i` (in parry3d's order) of the triangle with these corners.
     fn triangles_at(&self, corners: [u32; 3], i: u32) -> u32 {
         let [a, b, c] = corners;
         let side = [[a, b], [b, c], [a, c]][i as usize];
-        self.skin.topology.edge_between(side[0], side[1]).map_or(1, |e| self.skin.topology.edge_valence[e])
+        self.surface.topology.edge_between(side[0], side[1]).map_or(1, |e| self.surface.topology.edge_valence[e])
     }
 
-    /// The edges that triangle `t` owns against those that `u` owns.
+    /// Gaps of the edges that triangle `t` owns with those that `u` owns.
     fn edges_of(&self, t: usize, u: usize, found: &mut Vec<Found>) {
-        for e in self.skin.own_edges[t].into_iter().filter(|e| *e != NONE) {
-            for f in self.skin.own_edges[u].into_iter().filter(|f| *f != NONE) {
+        for e in self.surface.own_edges[t].into_iter().filter(|e| *e != NONE) {
+            for f in self.surface.own_edges[u].into_iter().filter(|f| *f != NONE) {
                 self.edges(e, f, found);
             }
         }
     }
 
     fn edges(&self, e: u32, f: u32, found: &mut Vec<Found>) {
-        let edges = &self.skin.topology.edges;
+        let edges = &self.surface.topology.edges;
         let ([a, b], [c, d]) = (edges[e as usize], edges[f as usize]);
         if a == c || a == d || b == c || b == d {
             return;
@@ -142,37 +194,37 @@ impl Look<'_> {
             return;
         }
         let key = Key { kind: Kind::Edges, vertices: [a, b, c, d, NONE], place: NONE };
-        let area = OF_EDGES * self.skin.edge_areas[e as usize].min(self.skin.edge_areas[f as usize]);
+        let area = EDGE_AREA_SHARE * self.surface.edge_areas[e as usize].min(self.surface.edge_areas[f as usize]);
         if let Some(gap) = self.gap(key, [p_share, q_share, -r_share, -s_share, 0.0], area) {
-            found.push(Found { gap, faces: 1 });
+            found.push(Found { gap, triangles: 1 });
         }
     }
 
     fn gap(&self, key: Key, weights: [f64; 5], area: f64) -> Option<Gap> {
         let mut gap = Gap::new(key, weights, 0.0, 0.0);
-        let thickness = gap.mean(&self.apart.thickness);
-        let offset = self.apart.offset(thickness);
-        (gap.goal, gap.stiffness) = (offset, Apart::stiffness(offset) * area);
+        let thickness = gap.mean(&self.spacing.thickness);
+        let offset = self.spacing.offset(thickness);
+        (gap.goal, gap.stiffness) = (offset, Spacing::stiffness(offset) * area);
         gap.first = gap.stiffness;
-        // What was placed nearer than that is not pushed farther apart than it was.
+        // Places that were placed nearer are not pushed farther apart than that.
         let placed = gap.across(self.placed).length();
         gap.goal = gap.goal.min(placed.max(thickness));
-        if placed < KEPT_APART * self.reach && self.belongs(&gap) {
-            gap.goal = gap.goal.min(OF_NEIGHBOURS * placed);
+        if placed < NEIGHBOURS_APART * self.reach && self.are_neighbours(&gap) {
+            gap.goal = gap.goal.min(NEIGHBOUR_SHARE * placed);
         }
         gap.from = gap.across(self.x);
         let distance = gap.from.length();
         gap.normal = gap.from / distance;
-        (distance > COINCIDENT && gap.goal > LEAST_GOAL).then_some(gap)
+        (distance > COINCIDENT_M && gap.goal > MIN_GOAL_M).then_some(gap)
     }
 
-    /// Whether the two places are near because they are neighbours.
-    fn belongs(&self, gap: &Gap) -> bool {
+    /// Whether the two places are topological neighbours or touch a sliver.
+    fn are_neighbours(&self, gap: &Gap) -> bool {
         let (one, other): (Vec<_>, Vec<_>) = gap.members().partition(|(_, w)| *w > 0.0);
         let near = |(a, _): &(u32, f64)| {
-            let around = self.skin.topology.neighbours(*a);
+            let around = self.surface.topology.neighbours(*a);
             other.iter().any(|(b, _)| around.contains(b))
         };
-        one.iter().any(near) || gap.members().any(|(v, _)| self.skin.frail[v as usize])
+        one.iter().any(near) || gap.members().any(|(v, _)| self.surface.near_sliver[v as usize])
     }
 }

@@ -1,14 +1,15 @@
 //! A cloth of two fabrics: each triangle, ring and vertex has its own constants.
 
+use crate::GRAVITY;
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::{Cloth, Contacts, EnergyError};
+use crate::mesh::{RestShape, Topology, TriMesh};
 use glam::DVec3;
-use partwise::garment::fabric::Fabric;
-use partwise::mechanics::energy::{Cloth, Contacts, EnergyError};
-use partwise::mesh::{RestShape, Topology, TriMesh};
 
-use crate::derivatives::{block, check_gradient, check_hessian, grazing};
-use crate::patch::{deformed, fabric, jitters, sheet};
+use super::derivatives::{block, check_gradient, check_hessian, grazing};
+use super::patch::{deformed, fabric, jitters, sheet};
 
-/// Unlike [`fabric`] in everything.
+/// Different from [`fabric`] in every constant.
 fn other() -> Fabric {
     Fabric {
         density_kg_per_m2: 0.45,
@@ -34,7 +35,7 @@ fn cloth(mesh: &TriMesh, fabrics: &[Fabric], held: &[u32]) -> Cloth {
 }
 
 #[test]
-fn the_gradient_is_that_of_the_energy() {
+fn gradient_of_two_fabrics_matches_differences() {
     let (mesh, body) = (sheet(), block());
     let cloth = cloth(&mesh, &[fabric(), other()], &[]);
     let anchored = cloth.contacts(&body, &grazing(&mesh));
@@ -53,7 +54,7 @@ fn the_gradient_is_that_of_the_energy() {
 }
 
 #[test]
-fn the_hessian_of_a_flat_stretched_sheet_is_exact() {
+fn hessian_of_a_flat_stretched_sheet_of_two_fabrics_is_exact() {
     let (mesh, body) = (sheet(), block());
     let cloth = cloth(&mesh, &[fabric(), other()], &[0, 7, 20]);
     let x: Vec<DVec3> = mesh.positions.iter().map(|p| DVec3::new(1.05 * p.x, 5e-4, 1.08 * p.z)).collect();
@@ -61,13 +62,13 @@ fn the_hessian_of_a_flat_stretched_sheet_is_exact() {
 }
 
 #[test]
-fn mass_offset_and_friction_are_those_of_the_cloth_about_a_vertex() {
+fn mass_offset_and_friction_of_a_vertex_are_means_over_its_triangles() {
     let mesh = sheet();
     let (rest, fabrics) = (rest(&mesh), [fabric(), other()]);
     let cloth = cloth(&mesh, &fabrics, &[]);
     let areas = rest.areas();
     let weight: f64 = (0..areas.len()).map(|t| areas[t] * fabrics[rest.fabric_of(t)].density_kg_per_m2).sum();
-    assert!((cloth.weight - partwise::GRAVITY * weight).abs() < 1e-14, "{} N", cloth.weight);
+    assert!((cloth.weight - GRAVITY * weight).abs() < 1e-14, "{} N", cloth.weight);
     let (one, two) = ([fabric()], [other()]);
     let alone = [&one, &two].map(|fabric| {
         let rest = RestShape::from_edges(&mesh).unwrap();
@@ -93,14 +94,14 @@ fn mass_offset_and_friction_are_those_of_the_cloth_about_a_vertex() {
 }
 
 #[test]
-fn two_fabrics_that_are_one_are_one() {
+fn two_equal_fabrics_act_as_one() {
     let mesh = sheet();
     let x = deformed(&mesh);
-    let (twice, once) = (cloth(&mesh, &[fabric(), fabric()], &[]), crate::patch::cloth(&mesh, &[]));
+    let (twice, once) = (cloth(&mesh, &[fabric(), fabric()], &[]), super::patch::cloth(&mesh, &[]));
     let (mut of_twice, mut of_once) = (Vec::new(), Vec::new());
     let energies =
         [twice.gradient(&x, &Contacts::none(), &mut of_twice), once.gradient(&x, &Contacts::none(), &mut of_once)];
-    // Summed in another order.
+    // The order of the sums differs.
     assert!((energies[0] - energies[1]).abs() < 1e-13 * energies[1].abs(), "{energies:?}");
     for (a, b) in of_twice.iter().zip(&of_once) {
         assert!(a.distance(*b) < 1e-12, "{a} {b}");
@@ -109,7 +110,7 @@ fn two_fabrics_that_are_one_are_one() {
 }
 
 #[test]
-fn a_fabric_that_is_not_given_is_named() {
+fn a_missing_fabric_is_refused() {
     let mesh = sheet();
     let found = Cloth::new(&mesh, &Topology::new(&mesh), &rest(&mesh), &fabric(), &[]).unwrap_err();
     assert!(matches!(found, EnergyError::Fabrics { cut_from: 2, given: 1 }), "{found}");

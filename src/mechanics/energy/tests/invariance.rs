@@ -1,20 +1,21 @@
-//! Rigid motion, hand-worked values, and sums that must balance.
+//! Rigid motions, closed forms, and balance of the internal forces.
 
+use crate::GRAVITY;
+use crate::mechanics::energy::{Cloth, Contacts, EnergyError, membrane::Stiffness};
+use crate::mesh::{RestShape, Topology};
 use glam::{DQuat, DVec3};
-use partwise::GRAVITY;
-use partwise::mechanics::energy::{Cloth, Contacts, EnergyError, membrane::Stiffness};
-use partwise::mesh::{RestShape, Topology};
 
-use crate::patch::{cloth, deformed, fabric, sheet};
+use super::patch::{cloth, deformed, fabric, sheet};
 
-/// Membrane plus bending: the cloth's own energy.
+/// The elastic energy: membrane plus bending.
 fn elastic(cloth: &Cloth, x: &[DVec3]) -> f64 {
     let stiffness = Stiffness::new(&fabric());
-    cloth.triangles.iter().map(|t| t.energy(&stiffness, t.slack(), x)).sum::<f64>() + cloth.bending.energy(x)
+    cloth.triangles.iter().map(|t| t.energy(&stiffness, t.compression_ratio(), x)).sum::<f64>()
+        + cloth.bending.energy(x)
 }
 
 #[test]
-fn a_rigid_motion_costs_nothing() {
+fn elastic_energy_is_invariant_under_rigid_motions() {
     let mesh = sheet();
     let cloth = cloth(&mesh, &[]);
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 1.3);
@@ -45,7 +46,7 @@ fn internal_forces_have_no_resultant_and_no_moment() {
 }
 
 #[test]
-fn a_stretched_square_costs_what_the_formula_says() {
+fn energy_of_a_stretched_sheet_is_its_closed_form() {
     // 5 % along the weft alone: ½ k_u/(1 − ν²) s² per area.
     let mesh = sheet();
     let cloth = cloth(&mesh, &[]);
@@ -56,10 +57,9 @@ fn a_stretched_square_costs_what_the_formula_says() {
 }
 
 #[test]
-fn a_cylinder_costs_what_its_direction_says() {
-    // Rolled about an axis at 90, 45 and 0 degrees from the weft the curvature runs along weft, bias and warp:
-    // ½ B/r² per area, whatever the mesh. The sheet is uneven, so its edges run in no special direction; its two corner
-    // triangles (4 % of it) are in no ring.
+fn bending_energy_of_a_cylinder_is_its_closed_form_in_any_direction() {
+    // About an axis at 90, 45 and 0 degrees from the weft the curvature is along weft, bias and warp: ½ B/r² per area on any mesh. The
+    // edges of the jittered sheet have no special direction; its two corner triangles (4 % of it) are in no ring.
     let mesh = sheet();
     let cloth = cloth(&mesh, &[]);
     let r = 0.2;
@@ -78,7 +78,7 @@ fn a_cylinder_costs_what_its_direction_says() {
 }
 
 #[test]
-fn wrong_data_is_refused_with_its_place() {
+fn faulty_data_is_refused_with_its_place() {
     let mesh = sheet();
     let topology = Topology::new(&mesh);
     let rest = RestShape::from_edges(&mesh).unwrap();

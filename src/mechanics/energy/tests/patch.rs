@@ -1,11 +1,11 @@
-//! A small cloth away from kinks: uneven, curved, stretched and sheared by known amounts.
+//! A small cloth in general position: uneven, curved, stretched and sheared by known amounts.
 
+use crate::garment::fabric::Fabric;
+use crate::mechanics::energy::Cloth;
+use crate::mesh::{RestShape, Topology, TriMesh};
 use glam::DVec3;
-use partwise::garment::fabric::Fabric;
-use partwise::mechanics::energy::Cloth;
-use partwise::mesh::{RestShape, Topology, TriMesh};
 
-/// A number in [-1, 1] that looks random and is the same on every machine.
+/// A pseudorandom number in [-1, 1], the same on every machine.
 pub(crate) fn jitter(i: usize) -> f64 {
     let h = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let h = (h ^ (h >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -17,7 +17,7 @@ pub(crate) fn jitters(i: usize) -> DVec3 {
     DVec3::new(jitter(3 * i + 1), jitter(3 * i + 2), jitter(3 * i + 3))
 }
 
-/// A 6 × 6 sheet of 5 cm, upright, its inner vertices out of line.
+/// An upright 6 × 6 sheet of 5 cm with jittered vertices.
 pub(crate) fn sheet() -> TriMesh {
     let n = 6;
     let mut positions = Vec::new();
@@ -39,11 +39,11 @@ pub(crate) fn sheet() -> TriMesh {
     TriMesh::new(positions, triangles)
 }
 
-/// Unequal in every direction, so that a swapped index shows.
+/// Different constants in every direction, so that a swapped index is detected.
 pub(crate) fn fabric() -> Fabric {
     Fabric {
         name: "test".into(),
-        source: "made up: unequal in every direction".into(),
+        source: "made up: different in every direction".into(),
         density_kg_per_m2: 0.2,
         thickness_m: 1e-3,
         stretch_weft_n_per_m: 90.0,
@@ -56,14 +56,14 @@ pub(crate) fn fabric() -> Fabric {
 }
 
 pub(crate) fn cloth(mesh: &TriMesh, held: &[u32]) -> Cloth {
-    of(mesh, &fabric(), held)
+    cloth_of(mesh, &fabric(), held)
 }
 
-pub(crate) fn of(mesh: &TriMesh, fabric: &Fabric, held: &[u32]) -> Cloth {
+pub(crate) fn cloth_of(mesh: &TriMesh, fabric: &Fabric, held: &[u32]) -> Cloth {
     Cloth::new(mesh, &Topology::new(mesh), &RestShape::from_edges(mesh).unwrap(), fabric, held).unwrap()
 }
 
-/// The sheet's positions stretched, sheared and bent: every triangle is under tension.
+/// The positions of the sheet stretched, sheared and bent: every triangle is in tension.
 pub(crate) fn deformed(mesh: &TriMesh) -> Vec<DVec3> {
     let bend = |p: DVec3| DVec3::new(1.08 * p.x + 0.03 * p.z, 4.0 * p.x * p.x - 2.0 * p.z * p.x, 1.06 * p.z);
     mesh.positions.iter().enumerate().map(|(i, &p)| bend(p) + jitters(i + 100) * 1e-4).collect()

@@ -31,7 +31,7 @@ use glam::DVec3;
 use crate::GRAVITY;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
-use crate::mechanics::energy::membrane::{SLACK, Triangle};
+use crate::mechanics::energy::membrane::{COMPRESSION_RATIO, Triangle};
 use crate::mesh::TriMesh;
 use crate::parts::{Part, Parts, UNASSIGNED};
 
@@ -71,20 +71,24 @@ impl Folding {
 }
 
 /// Share r of each triangle: that of the widest PART it touches, in its own fabric.
-pub(super) fn shares(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Vec<f64> {
+pub(super) fn compression_ratios(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Vec<f64> {
     let widths: Vec<f64> = parts.map(|_, part| width(mesh, &part.vertices));
     let share = |(fabric, fold): (&Fabric, f64)| -> Vec<f64> {
         let stiffness = fabric.stretch_weft_n_per_m.min(fabric.stretch_warp_n_per_m);
         let bending = fabric.bending_nm.into_iter().fold(0.0, f64::max);
         let of_part = |&width: &f64| {
-            if width <= NARROW * fold { SLACK } else { (PI * PI * bending / (stiffness * width * width)).min(SLACK) }
+            if width <= NARROW * fold {
+                COMPRESSION_RATIO
+            } else {
+                (PI * PI * bending / (stiffness * width * width)).min(COMPRESSION_RATIO)
+            }
         };
         widths.iter().map(of_part).collect()
     };
     let of_part: Vec<Vec<f64>> = cloth.fabrics.iter().zip(fold_widths(mesh, cloth)).map(share).collect();
     let of_triangle = |t: &Triangle| {
         let parts = t.vertices.iter().map(|&v| parts.part_of_vertex[v as usize]).filter(|&p| p != UNASSIGNED);
-        parts.map(|p| of_part[t.fabric as usize][p as usize]).fold(SLACK, f64::min)
+        parts.map(|p| of_part[t.fabric as usize][p as usize]).fold(COMPRESSION_RATIO, f64::min)
     };
     cloth.triangles.iter().map(of_triangle).collect()
 }

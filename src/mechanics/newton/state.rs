@@ -1,0 +1,295 @@
+//! The state of a Newton minimisation, and one iteration of it: Newton step, line search, relaxation, collision check.
+
+use glam::{DMat3, DVec3};
+
+use super::extrapolation::Extrapolation;
+use super::factor::SolveError;
+use super::relax::Relaxation;
+use crate::mechanics::energy::{Cloth, Contacts, Scratch, StepCheck};
+use crate::mechanics::linear_algebra::{dot, norm};
+
+/// Armijo's constant: the share of the predicted decrease that a step must bring.
+const ARMIJO: f64 = 1e-4;
+
+/// Step length below which the line search ends: rounding.
+const MIN_STEP_LENGTH: f64 = 1e-6;
+
+/// Most trials of a line search that are relaxed. Heuristic.
+const MAX_RELAXED_TRIALS: usize = 2;
+
+/// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that starts
+/// far from its rest shape is moved as far by its relaxation however short the step.
+const MAX_REJECTED_RELAXATIONS: usize = 8;
+
+/// The inputs of a Newton step.
+pub(crate) struct State<'a> {
+    pub(crate) cloth: &'a Cloth,
+    pub(crate) x: &'a [DVec3],
+    pub(crate) contacts: &'a Contacts<'a>,
+    pub(crate) gradient: &'a [DVec3],
+    /// ε, 1/s².
+    pub(crate) damping: f64,
+}
+
+/// Coordinates to take Newton steps in, and the Hessian in them.
+pub(crate) trait Tangent {
+    /// The step of every vertex, m, zero where held, and every free vertex's own block of a positive H + ε M, N/m.
+    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError>;
+
+    /// After a rejected step: switches to another Hessian, if there is one; returns whether there was.
+    fn fall_back(&mut self) -> bool;
+}
+
+/// Limits of a step and of its relaxations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepLimits {
+    /// Longest move of a vertex in one step, m.
+    pub(crate) longest_move_m: f64,
+    /// Iterations of a relaxation after a step.
+    pub(crate) relaxing: usize,
+    /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation.
+    pub(crate) relaxing_trial: usize,
+}
+
+/// Result of an iteration.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Advance {
+    /// Whether a step was taken.
+    pub(crate) accepted: bool,
+    /// Its length t over the longest that was tried.
+    pub(crate) share: f64,
+    /// Its length t; over one where it goes on like the one before.
+    pub(crate) step_length: f64,
+    /// Largest move of a vertex, m.
+    pub(crate) largest_move_m: f64,
+    /// Whether the step opposes the previous one (negative inner product), a sign of cycling.
+    pub(crate) opposes: bool,
+}
+
+/// One step of the history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Record {
+    /// Steps done.
+    pub iteration: usize,
+    /// Energy, J.
+    pub energy: f64,
+    /// ‖∇E‖₂ over the weight.
+    pub residual_over_weight: f64,
+    /// Step length t of the line search.
+    pub step_length: f64,
+    /// Largest move of a vertex, m.
+    pub largest_move_m: f64,
+    /// Damping ε, 1/s².
+    pub damping: f64,
+    /// Whether the energy is that of the softened cloth.
+    pub softened: bool,
+}
+
+/// The state of a minimisation.
+pub(crate) struct NewtonState<'c, 'b> {
+    /// The energy that falls.
+    pub(crate) cloth: &'c Cloth,
+    /// The contacts at `x`.
+    pub(crate) contacts: Contacts<'b>,
+    /// Positions, m.
+    pub(crate) x: Vec<DVec3>,
+    /// E at `x`, J.
+    pub(crate) energy: f64,
+    /// ‖∇E‖₂ over the weight at `x`.
+    pub(crate) residual: f64,
+    /// ε, 1/s².
+    pub(crate) damping: f64,
+    /// Share of every step that is taken: under one where lagged quantities make the steps cycle.
+    pub(crate) step_share: f64,
+    pub(super) gradient: Vec<DVec3>,
+    relaxation: Relaxation,
+    blocks: Vec<DMat3>,
+    pub(super) direction: Vec<DVec3>,
+    pub(super) trial: Vec<DVec3>,
+    pub(super) trial_gradient: Vec<DVec3>,
+    /// Largest factor by which a step that continues the previous one is extrapolated.
+    pub(crate) max_extrapolation: f64,
+    pub(super) extrapolation: Extrapolation,
+    pub(super) scratch: Scratch,
+}
+
+impl<'c, 'b> NewtonState<'c, 'b> {
+    /// Starts at `x`, where `contacts` are up to date.
+    pub(crate) fn new(cloth: &'c Cloth, contacts: Contacts<'b>, x: Vec<DVec3>, damping: f64) -> Self {
+        let mut state = Self {
+            cloth,
+            contacts,
+            trial: x.clone(),
+            x,
+            energy: 0.0,
+            residual: 0.0,
+            damping,
+            step_share: 1.0,
+            gradient: Vec::new(),
+            relaxation: Relaxation::default(),
+            blocks: Vec::new(),
+            direction: Vec::new(),
+            trial_gradient: Vec::new(),
+            max_extrapolation: 1.0,
+            extrapolation: Extrapolation::default(),
+            scratch: Scratch::default(),
+        };
+        state.evaluate();
+        state
+    }
+
+    /// The same with relaxations that end where the last iterations contribute less than this share of the decrease.
+    pub(crate) fn with_relaxation_end(mut self, share: f64) -> Self {
+        self.relaxation.end_share = share;
+        self
+    }
+
+    /// The inputs of a Newton step.
+    pub(crate) fn state(&self) -> State<'_> {
+        let Self { cloth, x, contacts, gradient, damping, .. } = self;
+        State { cloth, x, contacts, gradient, damping: *damping }
+    }
+
+    /// Evaluates energy and residual, after positions, contacts or the cloth have changed.
+    pub(crate) fn evaluate(&mut self) {
+        let Self { cloth, x, contacts, gradient, scratch, .. } = self;
+        self.energy = cloth.evaluate(x, contacts, gradient, scratch);
+        self.residual = norm(&self.gradient) / self.cloth.weight;
+    }
+
+    /// Relaxes the start itself, `beside` something else, by a Hessian's own blocks.
+    pub(crate) fn relax<T: Send>(&mut self, iterations: usize, beside: impl FnOnce() -> T + Send) -> T {
+        self.cloth.diagonal_blocks(&self.x, &self.contacts, self.damping, &mut self.blocks);
+        self.relaxation.prepare(self.cloth, &self.contacts, &self.blocks);
+        let Self { cloth, contacts, x, relaxation, trial, .. } = self;
+        trial.clone_from(x);
+        let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
+        match contacts.proximity.as_mut().map(|p| p.check_step(trial, x)) {
+            None | Some(StepCheck::Clear) => {}
+            Some(StepCheck::Cut) => contacts.update(x),
+            Some(StepCheck::Crosses) => {
+                x.clone_from(trial);
+                contacts.update(x);
+            }
+        }
+        self.contacts.refresh(&self.x);
+        self.evaluate();
+        out
+    }
+
+    /// One iteration. The damping is the caller's to change afterwards.
+    pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, limits: StepLimits) -> Result<Advance, SolveError> {
+        let Self { cloth, x, contacts, gradient, direction, blocks, damping, .. } = self;
+        tangent.step(&State { cloth, x, contacts, gradient, damping: *damping }, direction, blocks)?;
+        let Self {
+            cloth,
+            contacts,
+            x,
+            relaxation,
+            direction,
+            trial,
+            gradient,
+            energy,
+            trial_gradient,
+            scratch,
+            step_share,
+            max_extrapolation,
+            extrapolation,
+            ..
+        } = self;
+        let cloth = *cloth;
+        relaxation.prepare(cloth, contacts, &self.blocks);
+        let slope = dot(gradient, direction);
+        let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
+        let first = (limits.longest_move_m / longest).min(1.0);
+        let mut t = (first * extrapolation.factor(direction, *max_extrapolation)).min(limits.longest_move_m / longest);
+        let (mut relaxed, mut crossed) = (0, 0);
+        let accepted = loop {
+            trial.clear();
+            trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
+            contacts.update(trial);
+            let bound = *energy + ARMIJO * t * slope;
+            let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound;
+            if !falls {
+                relaxed += usize::from(t <= first);
+                falls = relaxed <= MAX_RELAXED_TRIALS
+                    && crossed < MAX_REJECTED_RELAXATIONS
+                    && limits.relaxing_trial > 0
+                    && relaxation.run(cloth, contacts, trial, limits.relaxing_trial) <= bound;
+            }
+            if falls {
+                if crossed < MAX_REJECTED_RELAXATIONS {
+                    relaxation.run(cloth, contacts, trial, limits.relaxing);
+                }
+                if *step_share < 1.0 {
+                    trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *step_share));
+                    contacts.update(trial);
+                }
+                match contacts.proximity.as_mut().map(|p| p.check_step(x, trial)) {
+                    None | Some(StepCheck::Clear) => break true,
+                    Some(StepCheck::Cut) => {
+                        contacts.update(trial);
+                        break true;
+                    }
+                    Some(StepCheck::Crosses) => crossed += 1,
+                }
+            }
+            t = if t > first { first } else { 0.5 * t };
+            // t is NaN where the direction is zero.
+            if t.is_nan() || t < MIN_STEP_LENGTH {
+                break false;
+            }
+        };
+        extrapolation.store_step(direction, if accepted { t } else { 0.0 });
+        let mut largest_move_m = 0.0;
+        let mut opposes = false;
+        if accepted {
+            std::mem::swap(x, trial);
+            largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
+            opposes = extrapolation.opposes(x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect());
+        } else {
+            contacts.update(x);
+        }
+        self.contacts.refresh(&self.x);
+        self.evaluate();
+        Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m, opposes })
+    }
+
+    /// [`untangle`](Self::untangle); once more from the clear positions where much more is left than intersects there
+    /// ([`Proximity::restart`](crate::mechanics::energy::Proximity)).
+    pub(crate) fn untangle_or_restart(&mut self, rounds: usize, iterations: usize) {
+        self.untangle(rounds, iterations);
+        let Self { contacts, x, .. } = self;
+        if let Some(there) = contacts.proximity.as_mut().and_then(|proximity| proximity.restart(x)) {
+            *x = there;
+            contacts.update(x);
+            contacts.refresh(x);
+            self.evaluate();
+            self.untangle(rounds, iterations);
+        }
+    }
+
+    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in `rounds` relaxations at most. No
+    /// factorisation is needed.
+    pub(crate) fn untangle(&mut self, rounds: usize, iterations: usize) {
+        for _ in 0..rounds {
+            if self.contacts.proximity.as_mut().is_none_or(|proximity| proximity.crossings(&self.x) == 0) {
+                return;
+            }
+            self.relax(iterations, || ());
+        }
+    }
+
+    /// The record of the step `advance`.
+    pub(crate) fn record(&self, iteration: usize, advance: Option<Advance>, softened: bool) -> Record {
+        Record {
+            iteration,
+            energy: self.energy,
+            residual_over_weight: self.residual,
+            step_length: advance.map_or(0.0, |a| a.step_length),
+            largest_move_m: advance.map_or(0.0, |a| a.largest_move_m),
+            damping: self.damping,
+            softened,
+        }
+    }
+}
