@@ -11,12 +11,13 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::error::DrapeError;
 use super::levels::Levels;
-use super::parts::stage_one;
-use super::stages::{Distances, Made, refine_from, settled};
-use super::{
-    Drape, DrapeError, Moved, PartOutcome, Settings, StageTimes, StageTwo, StartsFrom, moved, needs_cloth, timed,
-};
+use super::parts::{StageTwo, stage_one};
+use super::pipeline::{Moved, moved, needs_cloth, timed};
+use super::result::{Drape, PartOutcome, StageTimes};
+use super::settings::Settings;
+use super::stages::{Distances, Made, StartsFrom, refine_from, settled};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Observer, Record, Step};
@@ -25,10 +26,10 @@ use crate::parts::{Parts, UNASSIGNED};
 use crate::scene::{Layer, Scene};
 
 /// Steps that a garment takes by itself at most: what is below stands still meanwhile, so rest is not to be had yet.
-const STEPS_ALONE: usize = 30;
+const MAX_STEPS_ALONE: usize = 30;
 
-/// What has come of the garments so far.
-struct Worn<'a> {
+/// The garments draped so far.
+struct LayerState<'a> {
     scene: &'a Scene,
     /// Where they are, m: as placed, if nothing was done with them yet.
     positions: Vec<DVec3>,
@@ -47,7 +48,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
     let ground = timed(&mut times.distance, || Distances::of(scene))?;
     let table = settings.table.resolve(&ground.unsigned_m)?;
     let parts = timed(&mut times.segment, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
-    let mut worn = Worn {
+    let mut worn = LayerState {
         scene,
         positions: scene.garment.positions.clone(),
         stages: Vec::new(),
@@ -77,7 +78,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
             observer(&Step { iteration: steps + step.iteration, ..*step })
         })?;
         let (positions, mut reached) = settled(scene, settings, &cloth, None, refined);
-        worn.go_on(&reached.history);
+        worn.append_history(&reached.history);
         (reached.steps, reached.history) = (steps + reached.steps, std::mem::take(&mut worn.history));
         state = Some((positions, reached));
         times.refine += refining.elapsed();
@@ -90,7 +91,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
     Ok(drape)
 }
 
-impl Worn<'_> {
+impl LayerState<'_> {
     /// Stage two and the steps after it for one garment.
     fn put_on(
         &mut self,
@@ -111,21 +112,21 @@ impl Worn<'_> {
         let steps = self.history.last().map_or(0, |r| r.iteration);
         let mut all = self.positions.clone();
         let stopped = &mut self.stopped;
-        let mut told = |step: &Step<'_>| {
+        let mut observe = |step: &Step<'_>| {
             all[layer.vertices.clone()].copy_from_slice(step.positions);
-            let told = observer(&Step { iteration: steps + step.iteration, positions: &all, ..*step });
-            *stopped |= told.is_break();
-            if *stopped || step.iteration >= STEPS_ALONE { ControlFlow::Break(()) } else { told }
+            let flow = observer(&Step { iteration: steps + step.iteration, positions: &all, ..*step });
+            *stopped |= flow.is_break();
+            if *stopped || step.iteration >= MAX_STEPS_ALONE { ControlFlow::Break(()) } else { flow }
         };
         let parts = share(parts, layer, &alone.topology);
         let Moved { stage, folds, state, .. } =
-            moved(alone, settings, &ground, parts, levels.as_ref(), &mut own, &mut told)?;
+            moved(alone, settings, &ground, parts, levels.as_ref(), &mut own, &mut observe)?;
         times.mechanics += own.mechanics;
         times.refine += own.refine;
         let reached = state.as_ref().map_or(&stage.positions, |(positions, _)| positions);
         self.positions[layer.vertices.clone()].copy_from_slice(reached);
         if let Some((_, state)) = &state {
-            self.go_on(&state.history);
+            self.append_history(&state.history);
         }
         self.stages.push(stage);
         self.folds.extend(folds);
@@ -133,7 +134,7 @@ impl Worn<'_> {
     }
 
     /// More steps, after those that were.
-    fn go_on(&mut self, history: &[Record]) {
+    fn append_history(&mut self, history: &[Record]) {
         let steps = self.history.last().map_or(0, |r| r.iteration);
         let again = usize::from(!self.history.is_empty());
         self.history.extend(history.iter().skip(again).map(|r| Record { iteration: steps + r.iteration, ..*r }));

@@ -19,7 +19,7 @@ use crate::scene::Scene;
 const RATIO: usize = 4;
 
 /// No level is made with fewer vertices than this: there is nothing left to save.
-const LEAST_VERTICES: usize = 400;
+const MIN_LEVEL_VERTICES: usize = 400;
 
 /// A coarser garment.
 #[derive(Debug)]
@@ -93,7 +93,7 @@ impl Level {
     fn below(scene: &Scene, above: Option<&Self>, fabrics: &[Fabric]) -> Option<Self> {
         let (mesh, rest) = above.map_or((&scene.garment, &scene.rest), |a| (&a.coarse.mesh, &a.coarse.rest));
         let count = mesh.vertex_count() / RATIO;
-        if count < LEAST_VERTICES {
+        if count < MIN_LEVEL_VERTICES {
             return None;
         }
         Self::of(scene, above, Arc::new(Coarse::new(mesh, rest, count)?), fabrics)

@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::levels::{Level, Levels};
 use super::parts::Asked;
-use super::{Model, Refine, Settings};
+use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
 use crate::mechanics::coupled::{self, CoupledOptions, Garment, Hints, Motion};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
@@ -22,15 +22,15 @@ use crate::scene::Scene;
 
 /// Extent of the finer PARTs, m: about half a fold, so that they make the folds which rings leave to tension field theory. Without them a
 /// skirt takes 21 steps from Table 3 and a dress 12; with them 12 and 2, each dearer than ten of these.
-const EXTENT: f64 = 0.12;
+const FINE_EXTENT_M: f64 = 0.12;
 
 /// Steps of these PARTs: the later ones bring less than a step at full resolution does.
-const STEPS: usize = 10;
+const FINE_STEPS: usize = 10;
 
 /// Vertices that a coarser garment must have to be brought to rest first. On one machine within hours, without and with: a knit skirt of 64,000
 /// vertices 77 and 20 s, a dress of 16,000 19.6 and 6.8 s (cotton 23 and 16), a jumpsuit of 9,330 in cotton 40 and 13; a pullover of 5,000, whose
 /// coarser one has 1,275, would take 1.2 for 0.9 (cotton 3.3 for 2.4). A dress of 10,861 in cotton loses, 15 for 9, and one of 9,867 gains, 8 for 10.
-const LEAST_VERTICES: usize = 1500;
+const MIN_COARSE_VERTICES: usize = 1500;
 
 /// Steps on a coarser garment, at most: a stiff one takes over a hundred to its rest, of which the first bring it into the right folds.
 /// With eighty, five stiff garments of 16,000 take 239 steps at full resolution for 213.
@@ -52,15 +52,15 @@ pub(crate) fn approach(
         return start.to_vec();
     }
     let Scene { garment: mesh, topology, body, .. } = scene;
-    let finer = parts.cut_to_extent(mesh, topology, EXTENT);
+    let finer = parts.cut_to_extent(mesh, topology, FINE_EXTENT_M);
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let by_parts = |garment: &Garment<'_>, finer: &Parts, distance_m: &[f64], start: Vec<DVec3>| {
-        let options = CoupledOptions { max_steps: STEPS, motion: Motion::Affine, ..options.clone() };
+        let options = CoupledOptions { max_steps: FINE_STEPS, motion: Motion::Affine, ..options.clone() };
         let given = Hints { distance_m, least_share: 0.0 };
         let solved = coupled::solve_given(garment, body, finer, &start, given, &options, &mut |_| asked());
         solved.map_or(start, |result| result.positions)
     };
-    let large = |level: &&Level| level.mesh().vertex_count() >= LEAST_VERTICES;
+    let large = |level: &&Level| level.mesh().vertex_count() >= MIN_COARSE_VERTICES;
     let coarsest = levels.coarser.iter().take_while(large).count();
     let self_contact = settings.self_contact;
     let at_most = RefineOptions { max_steps: Some(COARSE_STEPS), self_contact, ..RefineOptions::default() };

@@ -4,8 +4,10 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
+use super::error::DrapeError;
 use super::levels::{Level, Levels};
-use super::{DrapeError, Model, PartOutcome, Settings};
+use super::result::PartOutcome;
+use super::settings::{Model, Settings};
 use crate::body::distance::SurfacePoint;
 use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Hints};
 use crate::mechanics::paper::{self, Cut, PartForces};
@@ -52,11 +54,11 @@ pub(crate) fn stage_two(
         Model::Paper(options) => {
             let cut = Cut { rest: &scene.rest, fabrics: &scene.fabrics(fabric) };
             let result = paper::solve_cut(mesh, topology, body, surface, &parts, &cut, options)?;
-            let outcome =
+            let of_part =
                 |p: &PartForces| PartOutcome { force_n: p.resultant, displacement: p.displacement, contact: p.contact };
             Ok(StageTwo {
                 parts,
-                outcomes: result.parts.iter().map(outcome).collect(),
+                outcomes: result.parts.iter().map(of_part).collect(),
                 positions: result.positions,
                 warnings: result.warnings.iter().map(ToString::to_string).collect(),
             })
@@ -81,7 +83,7 @@ fn couple(
     for &extent in if options.extents_m.is_empty() { &uncut[..] } else { &options.extents_m } {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
         let result = through_levels(scene, levels, surface, (&stage.parts, &stage.positions), options, asked)?;
-        stage.outcomes = result.parts.iter().map(told).collect();
+        stage.outcomes = result.parts.iter().map(outcome).collect();
         stage.positions = result.positions;
         stage.warnings.extend(result.warnings);
     }
@@ -93,8 +95,8 @@ fn couple(
     Ok(stage)
 }
 
-/// What a solve says of a PART.
-pub(crate) fn told(p: &coupled::PartResult) -> PartOutcome {
+/// The outcome of a PART in the coupled model.
+pub(crate) fn outcome(p: &coupled::PartResult) -> PartOutcome {
     PartOutcome { force_n: p.reaction, displacement: p.displacement, contact: p.in_contact }
 }
 

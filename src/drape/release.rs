@@ -8,16 +8,17 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{DrapeError, Refine, Settings};
+use super::error::DrapeError;
+use super::settings::{Refine, Settings};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
 
 /// A waist that sinks farther than this slides, m: from the waist to the hips it is twice as far.
-const FARTHEST: f64 = 0.1;
+const MAX_SINK_M: f64 = 0.1;
 
 /// Steps it may take to rest again.
-const STEPS: usize = 80;
+const MAX_RELEASED_STEPS: usize = 80;
 
 /// What came of letting go.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,18 +82,18 @@ pub(crate) fn let_go(
         down / scene.held.len().max(1) as f64
     };
     let self_contact = settings.self_contact;
-    let options = RefineOptions { max_steps: Some(STEPS), self_contact, ..RefineOptions::default() };
+    let options = RefineOptions { max_steps: Some(MAX_RELEASED_STEPS), self_contact, ..RefineOptions::default() };
     let mut stopped = false;
     let again = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
-        if sank(step.positions) > FARTHEST {
+        if sank(step.positions) > MAX_SINK_M {
             return ControlFlow::Break(());
         }
-        let told = observer(&Step { iteration: held.steps + step.iteration, ..*step });
-        stopped |= told.is_break();
-        told
+        let flow = observer(&Step { iteration: held.steps + step.iteration, ..*step });
+        stopped |= flow.is_break();
+        flow
     })?;
     let sank_m = sank(&again.positions);
-    if again.stop == Stop::Converged && sank_m <= FARTHEST {
+    if again.stop == Stop::Converged && sank_m <= MAX_SINK_M {
         let later = |r: &Record| Record { iteration: held.steps + r.iteration, ..*r };
         let history = held.history.iter().copied().chain(again.history.iter().skip(1).map(later)).collect();
         let all = Refined { steps: held.steps + again.steps, history, ..again };

@@ -4,7 +4,12 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{ClothState, Drape, DrapeError, LetGo, Levels, Model, Refine, Settings, StageTimes, StageTwo};
+use super::error::DrapeError;
+use super::levels::Levels;
+use super::parts::StageTwo;
+use super::release::LetGo;
+use super::result::{ClothState, Drape, StageTimes};
+use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::fit;
@@ -75,7 +80,7 @@ pub(crate) fn refine_from(
     };
     let damping = if from == StartsFrom::Rest { DAMPING_FROM_REST } else { RefineOptions::default().damping };
     let options = RefineOptions { max_steps, damping, self_contact: settings.self_contact, ..RefineOptions::default() };
-    let contacts = met(cloth, scene, settings.refine, ground, &start);
+    let contacts = contacts_at(cloth, scene, settings.refine, ground, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
         if scene.fallen(step.positions).is_some() { ControlFlow::Break(()) } else { observer(step) }
     })?;
@@ -90,7 +95,7 @@ pub(crate) fn settled(
     ground: Option<&Distances>,
     refined: Refined,
 ) -> (Vec<DVec3>, ClothState) {
-    let contacts = met(cloth, scene, settings.refine, ground, &refined.positions);
+    let contacts = contacts_at(cloth, scene, settings.refine, ground, &refined.positions);
     let fit = fit(cloth, contacts, &refined.positions, refined.contact_stiffness);
     let Refined { positions, energy, residual_over_weight, steps, history, stop, .. } = refined;
     (positions, ClothState { energy, residual_over_weight, steps, stop, history, fit })
@@ -146,8 +151,14 @@ impl Made {
     }
 }
 
-/// What the cloth meets at `x`: by planes where no step is taken, which need no more. `ground` are distances of the garment as placed.
-fn met<'b>(cloth: &Cloth, scene: &'b Scene, refine: Refine, ground: Option<&Distances>, x: &[DVec3]) -> Contacts<'b> {
+/// The contacts of the cloth at `x`, by planes if no step is taken. `ground` are distances of the garment as placed.
+fn contacts_at<'b>(
+    cloth: &Cloth,
+    scene: &'b Scene,
+    refine: Refine,
+    ground: Option<&Distances>,
+    x: &[DVec3],
+) -> Contacts<'b> {
     let known = ground.into_iter().flat_map(|ground| &ground.surface).map(|s| s.signed_distance);
     cloth.contacts_from_distances(&scene.body, x, refine == Refine::Steps(0), &scene.garment.positions, known)
 }

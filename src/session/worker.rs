@@ -15,7 +15,7 @@ use super::task::{COARSE_STEPS, Refinement, Target, Task, reactions};
 use crate::base::error_text::with_causes;
 use crate::drape::{
     ClothState, Distances, Drape, DrapeError, Levels, Made, Model, Refine, Released, StageTimes, StageTwo, StartsFrom,
-    approach, drape, folds_of, let_go, refine_from, settled, stage_two, told,
+    approach, drape, folds_of, let_go, outcome, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;
@@ -263,7 +263,7 @@ impl Worker {
         for ((part, result), sum) in parts.parts.iter().zip(&mut solved.parts).zip(sums) {
             result.displacement = sum / part.vertices.len() as f64;
         }
-        let outcomes = Arc::new(solved.parts.iter().map(told).collect());
+        let outcomes = Arc::new(solved.parts.iter().map(outcome).collect());
         let shown = Arc::new(Preview { done: true, outcomes, ..preview(&solved.positions) });
         self.preview = Some(WarmStart { generation, positions: Arc::clone(&shown.positions) });
         task.publish(|state| state.snapshot.preview = Some(shown));

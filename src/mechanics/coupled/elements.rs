@@ -13,11 +13,11 @@ use super::motions::Motions;
 use super::weights::Weights;
 
 /// Elements of this many for each PART are sampled for the Hessian: a PART has twelve unknowns, a triangle says three things. The
-/// energy and its gradient take them all. Where a PART has more than [`MANY`], one in [`BEYOND`] of those as well: beside a gradient of so many
+/// energy and its gradient take them all. Where a PART has more than [`MANY_ELEMENTS`], one in [`SAMPLING_INTERVAL`] of those as well: beside a gradient of so many
 /// they cost nothing, and twelve of 6,000 are luck. (No cure: a skirt of 62,500 vertices in 22 PARTs has crept for 40 steps with either.)
-const ENOUGH: f64 = 12.0;
-const MANY: f64 = 4000.0;
-const BEYOND: f64 = 50.0;
+const SAMPLES_PER_PART: f64 = 12.0;
+const MANY_ELEMENTS: f64 = 4000.0;
+const SAMPLING_INTERVAL: f64 = 50.0;
 
 /// The PARTs of those elements of one kind that the Hessian is summed over.
 #[derive(Debug, Clone, Default)]
@@ -114,7 +114,7 @@ fn sample(count: usize, parts: &Lists<u32>) -> Vec<(u32, f64)> {
     }
     let mut sampled = Vec::new();
     for i in 0..parts.len() {
-        let rate = parts.of(i).iter().map(|&p| enough(size[p as usize])).fold(0.0, f64::max).min(1.0);
+        let rate = parts.of(i).iter().map(|&p| sampling_rate(size[p as usize])).fold(0.0, f64::max).min(1.0);
         if (i as f64 * GOLDEN).fract() < rate {
             sampled.push((i as u32, rate.recip()));
         }
@@ -123,8 +123,8 @@ fn sample(count: usize, parts: &Lists<u32>) -> Vec<(u32, f64)> {
 }
 
 /// Share of the elements of a PART of this size that is sampled.
-fn enough(size: f64) -> f64 {
-    (ENOUGH + (size - MANY).max(0.0) / BEYOND) / size
+fn sampling_rate(size: f64) -> f64 {
+    (SAMPLES_PER_PART + (size - MANY_ELEMENTS).max(0.0) / SAMPLING_INTERVAL) / size
 }
 
 /// Elements of all kinds.

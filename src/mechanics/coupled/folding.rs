@@ -1,4 +1,4 @@
-//! Folds finer than a PART: how much of the membrane's stiffness is left under compression.
+//! Folds finer than a PART: the compression ratio of the membrane.
 //!
 //! A PART cannot fold within itself, and the cloth in it can: a ring of a skirt takes up what is too wide for where it hangs in
 //! folds that no motion of the ring shows. Tension field theory says what that costs ([`membrane`]): next to nothing. A
@@ -12,11 +12,11 @@
 //! λ = 2 √π (B/T)^¼ L^½
 //!
 //! wide (Cerda, Mahadevan: "Geometry and physics of wrinkling", Phys. Rev. Lett. 90, 2003), with T = ½ ρ g L what hangs below on average
-//! and L the height of the garment: 21 cm for a jersey skirt of 60 cm. A PART counts as narrow up to [`NARROW`] λ.
+//! and L the height of the garment: 21 cm for a jersey skirt of 60 cm. A PART counts as narrow up to [`MAX_FOLD_WIDTHS`] λ.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | r | share of the stiffness under compression | – |
+//! | r | compression ratio: share of the stiffness under compression | – |
 //! | B, k | largest bending, least membrane stiffness | N·m, N/m |
 //! | ℓ | width of a PART: twice its farthest vertex's distance from its middle | m |
 //! | λ, L, T | width of a fold, its length, the tension along it | m, m, N/m |
@@ -40,7 +40,7 @@ use crate::mechanics::energy::membrane;
 
 /// Widths of a fold up to which a PART folds with its neighbours. Between one and three a dress in knit cut to 36 cm comes
 /// from 28 to 5 mm of its rest; cut to 60 cm it comes no nearer at five.
-const NARROW: f64 = 2.0;
+const MAX_FOLD_WIDTHS: f64 = 2.0;
 
 /// What folds there are to make, by how wide the PARTs are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +62,7 @@ impl Folding {
         }
         let folding = |part: &Part| {
             let width = width(mesh, &part.vertices);
-            part.vertices.iter().filter(|&&v| width <= NARROW * fold_of_vertex[v as usize]).count()
+            part.vertices.iter().filter(|&&v| width <= MAX_FOLD_WIDTHS * fold_of_vertex[v as usize]).count()
         };
         let vertices: usize = parts.parts.iter().map(folding).sum();
         let width_m = folds.into_iter().fold(f64::INFINITY, f64::min);
@@ -77,7 +77,7 @@ pub(super) fn compression_ratios(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -
         let stiffness = fabric.stretch_weft_n_per_m.min(fabric.stretch_warp_n_per_m);
         let bending = fabric.bending_nm.into_iter().fold(0.0, f64::max);
         let of_part = |&width: &f64| {
-            if width <= NARROW * fold {
+            if width <= MAX_FOLD_WIDTHS * fold {
                 COMPRESSION_RATIO
             } else {
                 (PI * PI * bending / (stiffness * width * width)).min(COMPRESSION_RATIO)

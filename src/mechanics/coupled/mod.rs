@@ -15,10 +15,12 @@
 //! Source: Luo, Jiang and Cong's two stages, with one displacement a PART generalised to an affine map, and "the force from the adjacent
 //! PARTs" to the energy of the cloth between them; springs or coarse triangles between PARTs were tried and left (see ARCHITECTURE.md).
 //!
+//! At the end no vertex is left inside the body: a vertex nearer than its offset moves along ∇q, again where another part of the body is then
+//! too near.
+//!
 //! Limits: folds narrower than some two PARTs do not show. The relaxations move vertices beyond what the maps can, by as much as the seams
 //! were strained, and with fine PARTs farther: a result may be nearer to its rest than the best affine maps are.
 
-mod clearance;
 mod elements;
 mod folding;
 mod hessian;
@@ -31,9 +33,8 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use clearance::NEAR;
-pub use clearance::push_out;
 pub use folding::Folding;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
@@ -49,19 +50,25 @@ use crate::parts::Parts;
 use hessian::Reduced;
 
 /// Longest move of a vertex in one step, m: about the extent of a PART, over which the Hessian says nothing any more.
-const LONGEST_MOVE: f64 = 0.1;
+const MAX_MOVE_M: f64 = 0.1;
 
-/// A relaxation ends where its last three iterations bring less than this share of what all brought: half of them go, and nothing
-/// with them.
-const RELAXED: f64 = 0.03;
+/// Share of the energy decrease of a relaxation below which its last three iterations end it: this saves half of the iterations without
+/// a loss.
+const RELAXATION_END_SHARE: f64 = 0.03;
 
-/// Range of the damping ε, 1/s²: from next to nothing to a millimetre's fall a step.
-const DAMPING: [f64; 2] = [1e-2, 1e4];
+/// Range of the damping ε, 1/s²: with the largest a free fall of a step is a millimetre. Heuristic.
+const DAMPING_RANGE: [f64; 2] = [1e-2, 1e4];
 
-/// Damping under which a step's length is the cloth's own: at 1/s² it would let what is free fall ten metres.
-const FREE_DAMPING: f64 = 1.0;
+/// Damping below which the length of a step measures convergence, 1/s²: at 1 it allows a free fall of ten metres.
+const MAX_FINAL_DAMPING: f64 = 1.0;
 
-/// What is draped.
+/// Most moves of a vertex out of the body: the second is for narrow places (an armpit). Heuristic.
+const MAX_PUSHES: usize = 4;
+
+/// Share of its offset below which a vertex is pushed out; the rest is tolerance for rounding. Heuristic.
+const NEAR_SHARE: f64 = 0.875;
+
+/// The garment at one resolution.
 #[derive(Debug, Clone, Copy)]
 pub struct Garment<'a> {
     /// The garment as placed: the blending weights are measured along it.
@@ -72,7 +79,7 @@ pub struct Garment<'a> {
     pub cloth: &'a Cloth,
 }
 
-/// Told of the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
+/// Called with the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
 pub(crate) type Onlooker<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
 
 /// Solves the PARTs together from the vertex positions `start`.
@@ -89,20 +96,20 @@ pub fn solve(
     solve_given(garment, body, parts, start, Hints::default(), options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// What a solve may take for given, and when it is good enough for what comes after it.
+/// Known distances, and the accuracy that the next stage needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Hints<'a> {
     /// Signed distances of the garment as placed, m; none where they are not known.
     pub distance_m: &'a [f64],
-    /// The solve ends where its last six steps brought less than this share of what all have.
+    /// The solve ends early when the last six steps contribute less than this share of the total energy decrease.
     pub least_share: f64,
 }
 
-/// Length that hangs of a garment laid flat, over its widest extent.
-const FLAT: f64 = 0.25;
+/// Hanging length of a garment laid flat, over its widest extent. Heuristic.
+const FLAT_HEIGHT_SHARE: f64 = 0.25;
 
-/// Steps by which the end of a solve is told that need not be followed to it.
-const LATE: usize = 6;
+/// Number of the last steps whose contribution ends a solve early: see [`Hints::least_share`].
+const LAST_STEPS: usize = 6;
 
 /// [`solve`] with something [`Hints`], before an onlooker.
 ///
@@ -127,20 +134,22 @@ pub(crate) fn solve_given(
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
     let mut tangent = Reduced::new(cloth, Motions::new(parts, weights, start, options.motion));
     let loose = cloth.clone().with_compression_ratios(folding::compression_ratios(mesh, parts, cloth));
-    // What is laid flat hangs no less for that: without a height its cloth would be as soft as air, and stretch over any head.
-    let height = mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT * (high - low).max_element()));
+    // A garment laid flat has no height, but hangs later: without this floor its softened cloth would have no stiffness.
+    let height =
+        mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT_HEIGHT_SHARE * (high - low).max_element()));
     let soft = loose.softened(height, options.soft_strain).unwrap_or(loose);
     let setup = began.elapsed();
 
     let began = Instant::now();
     let contacts = soft.contacts_from_distances(body, start, true, &mesh.positions, given.distance_m.iter().copied());
-    let mut descent = NewtonState::new(&soft, contacts, start.to_vec(), options.damping).with_relaxation_end(RELAXED);
+    let mut descent =
+        NewtonState::new(&soft, contacts, start.to_vec(), options.damping).with_relaxation_end(RELAXATION_END_SHARE);
     let history = settle(&mut descent, &mut tangent, given, options, onlooker)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
     let mut positions = descent.x;
     let leave =
-        |(v, &held): (usize, &bool)| held || descent.contacts.is_clear(v, positions[v], NEAR * cloth.offsets[v]);
+        |(v, &held): (usize, &bool)| held || descent.contacts.is_clear(v, positions[v], NEAR_SHARE * cloth.offsets[v]);
     let leave: Vec<bool> = cloth.held.iter().enumerate().map(leave).collect();
     let pushed_out = push_out(body, &leave, &cloth.offsets, &mut positions);
     for (part, out) in parts.parts.iter().zip(&mut results) {
@@ -177,7 +186,7 @@ fn settle(
     onlooker: Onlooker<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
     let limits =
-        StepLimits { longest_move_m: LONGEST_MOVE, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
+        StepLimits { longest_move_m: MAX_MOVE_M, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
     let mut history = vec![descent.record(0, None, true)];
     for iteration in 1..=options.max_steps {
         let advance = descent.advance(tangent, limits)?;
@@ -186,17 +195,17 @@ fn settle(
             return Err(CoupledError::Interrupted);
         }
         let still = advance.accepted && advance.step_length >= 1.0 && advance.largest_move_m < options.least_move_m;
-        if still && descent.damping <= FREE_DAMPING || !advance.accepted && descent.damping >= DAMPING[1] {
+        if still && descent.damping <= MAX_FINAL_DAMPING || !advance.accepted && descent.damping >= DAMPING_RANGE[1] {
             break;
         }
         let fell = |steps: usize| history[history.len() - 1 - steps].energy - descent.energy;
-        if iteration > LATE && fell(LATE) < given.least_share * fell(iteration) {
+        if iteration > LAST_STEPS && fell(LAST_STEPS) < given.least_share * fell(iteration) {
             break;
         }
         if advance.share >= 1.0 {
-            descent.damping = (descent.damping * 0.3).max(DAMPING[0]);
+            descent.damping = (descent.damping * 0.3).max(DAMPING_RANGE[0]);
         } else if advance.share < 0.3 {
-            descent.damping = (descent.damping * 3.0).min(DAMPING[1]);
+            descent.damping = (descent.damping * 3.0).min(DAMPING_RANGE[1]);
         }
     }
     Ok(history)
@@ -228,4 +237,27 @@ fn balance(descent: &NewtonState<'_, '_>, parts: &Parts) -> Vec<PartResult> {
 
 fn check(what: &'static str, found: usize, expected: usize) -> Result<(), CoupledError> {
     if found == expected { Ok(()) } else { Err(CoupledError::Count { what, found, expected }) }
+}
+
+/// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
+pub fn push_out(body: &Body, held: &[bool], offsets_m: &[f64], positions: &mut [DVec3]) -> usize {
+    let moved: Vec<bool> = positions
+        .par_iter_mut()
+        .with_min_len(128)
+        .zip(held)
+        .zip(offsets_m)
+        .map(|((x, &held), &offset_m)| {
+            let mut moved = false;
+            for _ in 0..if held { 0 } else { MAX_PUSHES } {
+                let near = body.nearest(*x);
+                if near.signed_distance >= NEAR_SHARE * offset_m {
+                    break;
+                }
+                *x += near.normal * (offset_m - near.signed_distance);
+                moved = true;
+            }
+            moved
+        })
+        .collect();
+    moved.iter().filter(|&&m| m).count()
 }

@@ -50,13 +50,13 @@ impl Functions {
 }
 
 /// Vertices of a PART that has its displacement alone.
-const SMALL: usize = 3;
+const MAX_TRANSLATED: usize = 3;
 
 /// Least spread along an axis, relative to the largest: a flat PART is not turned by what it is thick.
-const FLATTEST: f64 = 0.05;
+const MIN_SPREAD_RATIO: f64 = 0.05;
 
 /// No PART is smaller than this, m.
-const LEAST_SPREAD: f64 = 1e-4;
+const MIN_SPREAD_M: f64 = 1e-4;
 
 /// Share of a diagonal block's trace that is added to it: flat PARTs leave some of their functions nearly alike.
 pub(super) const RIDGE: f64 = 1e-6;
@@ -79,7 +79,7 @@ impl Motions {
     /// Motions of `parts` about `x`, blended by `weights` (none at vertices that do not move).
     #[must_use]
     pub fn new(parts: &Parts, weights: Weights, x: &[DVec3], motion: Motion) -> Self {
-        let affine = |vertices: usize| motion == Motion::Affine && vertices > SMALL;
+        let affine = |vertices: usize| motion == Motion::Affine && vertices > MAX_TRANSLATED;
         let mut count: Vec<u8> = parts.parts.iter().map(|p| if affine(p.vertices.len()) { 4 } else { 1 }).collect();
         let mut moves = vec![false; parts.len()];
         for v in 0..x.len() {
@@ -140,7 +140,7 @@ impl Motions {
         {
             let (squares, directions) = eigen(spread * sum.max(f64::MIN_POSITIVE).recip());
             let lengths = squares.map(|s| s.max(0.0).sqrt());
-            let least = (FLATTEST * lengths.iter().copied().fold(0.0, f64::max)).max(LEAST_SPREAD);
+            let least = (MIN_SPREAD_RATIO * lengths.iter().copied().fold(0.0, f64::max)).max(MIN_SPREAD_M);
             for ((axis, direction), length) in axes.iter_mut().zip(directions).zip(lengths) {
                 *axis = direction / length.max(least);
             }

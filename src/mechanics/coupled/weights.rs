@@ -22,7 +22,7 @@ use crate::mesh::{Flow, Lists, Topology};
 use crate::parts::{Parts, UNASSIGNED};
 
 /// Weights under this share are left out: they cost as much as any and move nothing.
-const LEAST: f64 = 0.03;
+const MIN_WEIGHT: f64 = 0.03;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -52,7 +52,7 @@ impl Weights {
         let mut weights = Self::default();
         for mut row in rows {
             let sum: f64 = row.iter().map(|e| e.1).sum();
-            row.retain(|e| e.1 >= LEAST * sum);
+            row.retain(|e| e.1 >= MIN_WEIGHT * sum);
             let sum: f64 = row.iter().map(|e| e.1).sum();
             row.sort_unstable_by_key(|e| e.0);
             weights.0.push(row.into_iter().map(|(p, kernel)| (p, kernel / sum)));

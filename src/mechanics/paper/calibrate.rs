@@ -1,25 +1,24 @@
-//! The two coefficients that the paper names and gives no value for: p_f and q_f.
+//! The two coefficients that the paper introduces without a value: p_f and q_f.
 //!
-//! **p_f** (N/m⁵). A strip of density ρ and membrane stiffness k, held at its top and hanging to length L, sinks at depth s by
+//! **p_f** (N/m⁵). A strip of density ρ and membrane stiffness k, held at its top and hanging to length L, moves down at depth s by
 //!
 //! ```text
 //! u(s) = ∫₀ˢ ρ g (L − r)/k dr = (ρ g/k) (L s − s²/2),     u(L) = ρ g L²/(2k)
 //! ```
 //!
-//! (the load at depth r is what hangs below it). The PART that covers some of the strip sinks by the mean of u over its
-//! vertices, D̄ = (ρ g/k) c̄ with c̄ the area mean of L s − s²/2 (m²). Equation (9) gives D = F⁰/Fᵃ = ρ g A/Fᵃ, so the strip asks for
+//! (the load at depth r is the weight below it). A PART of the strip moves down by the mean of u over its
+//! vertices, D̄ = (ρ g/k) c̄ with c̄ the area mean of L s − s²/2 (m²). Equation (9) gives D = F⁰/Fᵃ = ρ g A/Fᵃ, so the strip requires
 //! Fᵃ = k A/c̄. Equation (2) gives Fᵃ = p_f Σ |cos γ_p| q ΔV = p_f t A w̄ with w̄ the area mean of |cos γ_p| q, hence, PART by PART,
 //!
 //! ```text
 //! p_f = k / (t w̄ c̄)
 //! ```
 //!
-//! and D is the closed form however many PARTs the strip is cut into. Along z the factors cos γ_p and q thus only say how a
-//! PART shares its stiffness among its vertices; along x and y Fᵃ keeps the ratio of the cosines. (With one w̄ for the whole
-//! garment a tight PART, whose q is small, was a hundred times softer than a loose one, and contact pushed a skirt's hip 4 m
-//! away.) Depth s is z_top − z and L the garment's height. A PART at the very top has c̄ = 0: it is held, p_f is infinite; so is
-//! a garment without height, which has nothing that hangs. w̄ takes the positive readings whatever the options say, so that
-//! a failing reading shows in D; where the cloth is vertical and w̄ vanishes, the mean of q stands in.
+//! and D is the closed form for any number of PARTs of the strip. Along z the factors cos γ_p and q thus only determine how a
+//! PART distributes its stiffness over its vertices; along x and y Fᵃ keeps the ratio of the cosines. (With one w̄ for the whole
+//! garment a tight PART, whose q is small, was a hundred times softer than a loose one, and contact moved the hip of a skirt by 4 m.) Depth s is z_top − z and L the garment's height. A PART at the top has c̄ = 0: it is held, and p_f is infinite, as for
+//! a garment without height. w̄ uses the positive readings for any options, so that
+//! a failing reading is visible in D; where the cloth is vertical and w̄ vanishes, the mean of q replaces it.
 //!
 //! **q_f** (N/m³). One scalar so that the contact PARTs carry the garment: Σ q_f cos γ_q ΔV = weight.
 
@@ -28,7 +27,7 @@ use crate::body::distance::SurfacePoint;
 use crate::mesh::TriMesh;
 use glam::DVec3;
 
-/// The part of `n` that counts towards stiffness, axis by axis.
+/// The stiffness factor of the normal `n` along each axis.
 pub(super) fn share(n: DVec3, reading: Cosine) -> DVec3 {
     match reading {
         Cosine::Absolute => n.abs(),
@@ -45,13 +44,13 @@ pub(super) fn clearance(signed_distance: f64, thickness_m: f64, reading: Clearan
     }
 }
 
-/// What p_f needs to know of the whole garment.
+/// The data of the whole garment that p_f depends on.
 pub(super) struct HangingStrip<'a> {
     /// The garment.
     pub(super) garment: &'a TriMesh,
-    /// Its unit vertex normals.
+    /// Unit vertex normals.
     pub(super) normals: &'a [DVec3],
-    /// Its barycentric vertex areas, m².
+    /// Barycentric vertex areas, m².
     pub(super) areas: &'a [f64],
     /// The nearest body point of each vertex.
     pub(super) surface: &'a [SurfacePoint],
@@ -66,7 +65,7 @@ pub(super) struct HangingStrip<'a> {
 }
 
 impl HangingStrip<'_> {
-    /// p_f of a PART, N/m⁵; infinite at the very top. `top_z` and `height_m` are the garment's.
+    /// p_f of a PART, N/m⁵; infinite at the top. `top_z` and `height_m` are the garment's.
     pub(super) fn line_force(&self, vertices: &[u32], top_z: f64, height_m: f64) -> f64 {
         let positive = if self.cosine == Cosine::InSurface { Cosine::InSurface } else { Cosine::Absolute };
         let (mut compliance, mut weighted, mut plain, mut area) = (0.0, 0.0, 0.0, 0.0);
@@ -79,7 +78,7 @@ impl HangingStrip<'_> {
             plain += a * q;
             area += a;
         }
-        // Vertices without triangles have no area and no force either; any value does.
+        // Vertices without triangles have neither area nor force, so any value is correct.
         if area <= 0.0 {
             return 0.0;
         }

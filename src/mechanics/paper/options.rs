@@ -1,5 +1,5 @@
-//! The readings of equations (2) to (9): what the page leaves open or gets wrong, one option each. The defaults work; the
-//! literal ones can be run and seen to fail.
+//! Readings of equations (2) to (9): one option for each ambiguity or error of the printed equations. The defaults work; the
+//! literal readings are available to reproduce their failure.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ pub enum Cosine {
     /// cos, as printed. Fails: around a closed ring the cosines cancel and D = F/Fᵃ grows without bound.
     Signed,
     /// sin(•_p) = √(1 − cos²): the share of the axis that lies in the cloth, where a membrane's force is. Not on the page; it
-    /// gives hanging cloth, whose normal is horizontal, the vertical stiffness that both others deny it.
+    /// gives hanging cloth, whose normal is horizontal, a vertical stiffness, which the other two do not.
     InSurface,
 }
 
@@ -46,11 +46,11 @@ pub enum Clearance {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Contactless {
-    /// −F⁰/Fᵃ, which is (6) with F¹ = 0: cloth sinks.
+    /// −F⁰/Fᵃ, which is (6) with F¹ = 0: cloth moves down.
     #[default]
     #[serde(rename = "as-equation-6")]
     AsEquation6,
-    /// F⁰/Fᵃ, as printed. Fails: cloth rises.
+    /// F⁰/Fᵃ, as printed. Fails: cloth moves up.
     AsPrinted,
 }
 
@@ -70,8 +70,8 @@ pub enum BodyForce {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LineForce {
-    /// From the fabric's membrane stiffness along the warp, so that a strip hanging from its top sinks as its closed form
-    /// says, however it is cut into PARTs.
+    /// From the membrane stiffness of the fabric along the warp, so that a hanging strip stretches as its closed form for any
+    /// number of PARTs.
     #[default]
     #[serde(rename = "membrane")]
     FromMembrane,
@@ -79,19 +79,18 @@ pub enum LineForce {
     Given(f64),
 }
 
-/// What "directly attached" means for a garment none of whose vertices is within the contact distance, as one that is placed
-/// around the body and not yet draped.
+/// The meaning of "directly attached" for a garment without a vertex within the contact distance, as before a drape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Untouched {
-    /// The contact distance counts from the garment's nearest vertex, where it will touch first; a warning says so.
+    /// The contact distance counts from the nearest vertex of the garment; a warning is issued.
     #[default]
     FromNearest,
-    /// All PARTs are contactless, as (9) has it; nothing carries the garment, which is warned of.
+    /// All PARTs are contactless, as in (9), and nothing carries the garment; a warning is issued.
     Contactless,
 }
 
-/// How to read equations (2) to (9).
+/// The readings of equations (2) to (9).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PaperOptions {
@@ -110,10 +109,10 @@ pub struct PaperOptions {
     /// A PART is in contact if any of its vertices is at most this far from the body, m. Default 0.5 cm, the upper value of
     /// level 7 in Table 3: the paper only says "directly attached" and "contactless".
     pub contact_distance_m: f64,
-    /// Which PARTs are in contact where none is within that distance.
+    /// The PARTs in contact if no vertex is within that distance.
     pub untouched: Untouched,
     /// An axis has no stiffness where |Σ cos q ΔV| is at most this share of Σ |q| ΔV. Default 0.02: cloth within about one
-    /// degree of the axis, closer than the normals of a triangle mesh mean it. The same share of Σ ΔV decides whether the
+    /// degree of the axis, less than the accuracy of the normals of a triangle mesh. The same share of Σ ΔV decides whether the
     /// contact PARTs can carry the garment at all.
     pub degenerate_below: f64,
 }
