@@ -1,96 +1,81 @@
-//! Triangles that bridge open seams, and what they are at rest.
+//! Triangles that bridge open seams, and their rest shape.
 //!
-//! A garment that was sewn before it was put on, as GarmentCode writes it, has one vertex for both sides of a seam, half-way between panels
-//! that float about the body: the triangles along its seams are many times as long as all others and say nothing of the cloth. The others do,
-//! for a panel is still as flat as it was cut. A bridging triangle is taken to be like its neighbours: sides that are longer than
-//! twice what half of all sides are become as long as these, so that at rest the seam is shut.
+//! A garment sewn before it is put on, as GarmentCode exports it, has one vertex for both sides of a seam, half-way between
+//! panels that float around the body. The triangles along its seams are many times as long as all others, and their shape
+//! is not that of the cloth. All others keep theirs, since a panel is as flat as it was cut. Sides of a bridging triangle
+//! longer than twice the median are shortened to the median, so that the seam is closed at rest.
 //!
-//! Limits: a strip one triangle wide along the seams is known to a few millimetres, and its grain not at all. Where panels begin less than two
-//! sides apart the seam keeps that much cloth too many.
+//! Limits: a strip one triangle wide along the seams is accurate to a few millimetres, and its grain is unknown. Panels less
+//! than two sides apart keep that much excess cloth in the seam.
 
 use glam::DVec2;
 
-use super::import::Imported;
-use super::report::Repair;
 use super::{RestShape, TriMesh, sides};
 use crate::base::quantiles::nearest_rank;
 
-/// A mesh has bridges where a side is longer than so many times the usual, and than this, m: no remesher leaves such.
-const BRIDGE: f64 = 5.0;
-const BRIDGE_M: f64 = 0.1;
+/// A mesh has bridges if its longest side exceeds the median this many times. A heuristic: no remesher leaves such sides.
+const BRIDGE_RATIO: f64 = 5.0;
+/// And if it exceeds this, m. A heuristic.
+const BRIDGE_LENGTH: f64 = 0.1;
 
-/// Seams are lines: where more than this share of all triangles are so long, they are how the mesh is drawn (one polygon of thousands
-/// of corners, a mesh that is fine in its details alone), not bridges. GarmentCode's T-shirt of 7,166 vertices has 7 %.
-const MOST_SHARE: f64 = 1.0 / 3.0;
+/// Largest share of long triangles. Seams are lines; a larger share comes from the meshing (one polygon of thousands of corners, a
+/// mesh with fine details only). GarmentCode's T-shirt of 7,166 vertices has 7 %.
+const MAX_LONG_SHARE: f64 = 1.0 / 3.0;
 
-/// Where it has, sides longer than so many times the usual are theirs.
-const LONG: f64 = 2.0;
+/// In a mesh with bridges, sides longer than this many times the median are shortened. A heuristic.
+const LONG_RATIO: f64 = 2.0;
 
-/// Least length of a leg over the base of a triangle that is given shape, so that it has some height.
-const LEG: f64 = 0.75;
+/// Least ratio of a shortened side to the base of its triangle, which keeps the triangle from collapsing.
+const MIN_LEG_RATIO: f64 = 0.75;
 
-/// What bridges a garment's open seams.
+/// The triangles that bridge a garment's open seams.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bridges {
-    /// How many triangles.
+    /// Number of triangles.
     pub triangles: usize,
     /// Longest of their sides, m.
     pub longest_m: f64,
-    /// What half of all sides are at most, m.
+    /// Median length of all sides, m.
     pub usual_m: f64,
 }
 
-impl Imported {
-    /// The mesh as it stands, at rest; with what bridges open seams `shut`, and told, if that is asked.
-    pub(crate) fn own_rest(&mut self, shut: bool) -> RestShape {
-        let mut rest = RestShape::edges_of(&self.mesh);
-        if let Some(bridges) = Bridges::of(&self.mesh).filter(|_| shut) {
-            bridges.shut(&mut rest);
-            let Bridges { triangles, longest_m, usual_m } = bridges;
-            self.report.repairs.push(Repair::BridgesShut { triangles, longest_m, usual_m });
-        }
-        rest
-    }
-}
-
 impl Bridges {
-    /// Those of `mesh`; `None` where it has none.
+    /// The bridges of `mesh`; `None` if it has none.
     #[must_use]
     pub(crate) fn of(mesh: &TriMesh) -> Option<Self> {
         let all: Vec<[f64; 3]> = (0..mesh.triangles.len()).map(|t| sides(mesh.corners(t))).collect();
         let usual_m = nearest_rank(all.as_flattened(), 0.5);
         let longest_m = all.as_flattened().iter().copied().fold(0.0, f64::max);
-        let triangles = all.iter().filter(|sides| sides.iter().any(|s| *s > LONG * usual_m)).count();
-        let few = triangles as f64 <= MOST_SHARE * all.len() as f64;
-        (few && longest_m > BRIDGE_M.max(BRIDGE * usual_m)).then_some(Self { triangles, longest_m, usual_m })
+        let triangles = all.iter().filter(|sides| sides.iter().any(|s| *s > LONG_RATIO * usual_m)).count();
+        let few = triangles as f64 <= MAX_LONG_SHARE * all.len() as f64;
+        (few && longest_m > BRIDGE_LENGTH.max(BRIDGE_RATIO * usual_m)).then_some(Self { triangles, longest_m, usual_m })
     }
 
-    /// Gives the triangles that bridge a shape at rest: `rest` is the mesh's own (m), and is changed there.
+    /// Replaces the shape of the bridging triangles in `rest`, the rest shape from the mesh's own edges.
     pub(crate) fn shut(self, rest: &mut RestShape) {
         for corners in &mut rest.corners {
             let own = sides(corners.map(|p| p.extend(0.0)));
-            let long = own.map(|s| s > LONG * self.usual_m);
+            let long = own.map(|s| s > LONG_RATIO * self.usual_m);
             if let Some(shaped) = long.contains(&true).then(|| self.shaped(own, long)).flatten() {
                 *corners = turned_like(*corners, shaped, long);
             }
         }
     }
 
-    /// Sides of a triangle whose long ones are none.
+    /// Side lengths with the long ones shortened; `None` if they form no triangle.
     fn shaped(self, own: [f64; 3], long: [bool; 3]) -> Option<[f64; 3]> {
         let base = own.iter().zip(long).filter(|(_, long)| !long).map(|(s, _)| *s).fold(0.0, f64::max);
-        let leg = self.usual_m.max(LEG * base);
+        let leg = self.usual_m.max(MIN_LEG_RATIO * base);
         let to: [f64; 3] = std::array::from_fn(|k| if long[k] { leg } else { own[k] });
         let longest = to.iter().copied().fold(0.0, f64::max);
         (to.iter().sum::<f64>() > 2.0 * longest * 1.02).then_some(to)
     }
 }
 
-/// A triangle of these sides, turned as `was` is along a side that is not long, or else along its first.
-fn turned_like(was: [DVec2; 3], [a, b, c]: [f64; 3], long: [bool; 3]) -> [DVec2; 3] {
+/// A triangle of these side lengths, with the direction of `was` along its first side that is not long, or else along its first.
+fn turned_like(was: [DVec2; 3], lengths: [f64; 3], long: [bool; 3]) -> [DVec2; 3] {
     // Side k lies opposite corner k.
     let k = (0..3).find(|&k| !long[k]).unwrap_or(0);
-    let lengths = [a, b, c];
     let (base, left, right) = (lengths[k], lengths[(k + 2) % 3], lengths[(k + 1) % 3]);
     let [from, to] = [was[(k + 1) % 3], was[(k + 2) % 3]];
     let along = (to - from).normalize_or(DVec2::X);
@@ -120,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bridged_seam_is_shut_at_rest_and_all_else_as_it_was() {
+    fn a_bridged_seam_is_closed_at_rest_and_the_rest_unchanged() {
         let mesh = bridged();
         let found = Bridges::of(&mesh).unwrap();
         assert_eq!(found.triangles, 40, "{found:?}");
@@ -141,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_of_even_or_of_long_triangles_throughout_has_none() {
+    fn a_mesh_of_even_triangles_or_of_long_ones_throughout_has_no_bridges() {
         let mut mesh = bridged();
         for p in &mut mesh.positions {
             p.y *= 0.05;

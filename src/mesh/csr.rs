@@ -1,38 +1,38 @@
-//! A list for each of many owners, all in one memory: the neighbours of every vertex, the triangles about it.
+//! A list for each of many owners in one allocation (compressed sparse rows): neighbours or triangles of each vertex.
 
 use std::ops::Range;
 
-/// Lists one after the other.
+/// The lists of owners 0, 1, 2, ..., one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Lists<T> {
-    /// First entry of each, and one past the last.
+pub(crate) struct Csr<T> {
+    /// Index of the first entry of each owner, and one past the last entry.
     starts: Vec<u32>,
     entries: Vec<T>,
 }
 
-impl<T> Default for Lists<T> {
+impl<T> Default for Csr<T> {
     fn default() -> Self {
         Self { starts: vec![0], entries: Vec::new() }
     }
 }
 
-impl<T> Lists<T> {
-    /// How many there are.
+impl<T> Csr<T> {
+    /// Number of owners.
     pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// First entry of each, and one past the last.
+    /// Index of the first entry of each owner, and one past the last entry.
     pub(crate) fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// Places of one's entries among those of all.
+    /// Indices of an owner's entries among all entries.
     pub(crate) fn range(&self, owner: usize) -> Range<usize> {
         self.starts[owner] as usize..self.starts[owner + 1] as usize
     }
 
-    /// One's entries.
+    /// The entries of an owner.
     pub(crate) fn of(&self, owner: usize) -> &[T] {
         &self.entries[self.range(owner)]
     }
@@ -42,7 +42,7 @@ impl<T> Lists<T> {
         &mut self.entries[range]
     }
 
-    /// Entries of all.
+    /// The entries of all owners.
     pub(crate) fn entries(&self) -> &[T] {
         &self.entries
     }
@@ -61,8 +61,9 @@ impl<T> Lists<T> {
     }
 }
 
-impl<T: Copy + Default> Lists<T> {
-    /// Of so many owners, from entries with theirs, in any order: each one's stay in it. They are gone through twice.
+impl<T: Copy + Default> Csr<T> {
+    /// The lists of `owners`, from entries with their owners in any order; an owner's entries keep theirs. `entries` is called
+    /// twice.
     pub(crate) fn gathered<P: Iterator<Item = (u32, T)>>(owners: usize, entries: impl Fn() -> P) -> Self {
         let mut starts = vec![0u32; owners + 1];
         entries().for_each(|(owner, _)| starts[owner as usize + 1] += 1);
@@ -85,13 +86,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn entries_are_their_owners_in_the_order_they_came() {
+    fn entries_of_an_owner_keep_their_order() {
         let pairs = [(2, 'c'), (0, 'a'), (2, 'd'), (0, 'b')];
-        let mut lists = Lists::gathered(3, || pairs.into_iter());
-        assert_eq!([lists.of(0), lists.of(1), lists.of(2)], [&['a', 'b'][..], &[], &['c', 'd']]);
-        let mut more = Lists::default();
+        let mut csr = Csr::gathered(3, || pairs.into_iter());
+        assert_eq!([csr.of(0), csr.of(1), csr.of(2)], [&['a', 'b'][..], &[], &['c', 'd']]);
+        let mut more = Csr::default();
         more.push(['e']);
-        lists.append(more);
-        assert_eq!((lists.len(), lists.of(3), lists.range(2)), (4, &['e'][..], 2..4));
+        csr.append(more);
+        assert_eq!((csr.len(), csr.of(3), csr.range(2)), (4, &['e'][..], 2..4));
     }
 }

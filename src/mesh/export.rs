@@ -1,7 +1,7 @@
-//! OBJ out: a displaced garment in its file's own faces, groups, texture coordinates, unit and axes; or any mesh.
+//! Writes OBJ files: a draped garment with the faces, groups, texture coordinates, unit and axes of its file, or any mesh.
 //!
-//! Vertices that no face uses are left out, so numbers are those of the file where it had none. Normals are not
-//! written: they would be those of the old shape.
+//! Vertices that no face uses are left out, so a file without any keeps its numbers. Normals are left out, as those of the
+//! file belong to its shape.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,10 +9,10 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::TriMesh;
 use super::error::MeshError;
 use super::import::Imported;
 use super::topology::NONE;
+use super::{TriMesh, renumbered};
 use crate::base::atomic_file::WholeFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
@@ -20,12 +20,12 @@ pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> 
     write(path, imported_text(imported, positions)?)
 }
 
-/// Writes a mesh as it is: metres, z up, a `g` line before each run of triangles of one group.
+/// Writes a mesh in metres, z up, with a `g` line before each run of triangles of one group.
 pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
     write(path, mesh_text(mesh))
 }
 
-/// The same with the texture coordinates of each triangle's corners, m: each is written once for every group.
+/// Writes a mesh with the texture coordinates of each triangle's corners, m; each is written once.
 pub fn write_textured(path: &Path, mesh: &TriMesh, texture: &[[DVec2; 3]]) -> Result<(), MeshError> {
     write(path, text_of(mesh, Some(texture)))
 }
@@ -79,40 +79,30 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
     if positions.len() != expected {
         return Err(MeshError::WrongCount { found: positions.len(), expected });
     }
-    let mut used = vec![NONE; source.mesh_vertex.len()];
-    let mut textured = vec![NONE; source.textures.len()];
-    for corner in source.faces.iter().flat_map(|face| source.corners_of(face)) {
-        used[corner.vertex as usize] = 0;
-        if corner.texture != NONE {
-            textured[corner.texture as usize] = 0;
-        }
-    }
+    let used = source.used_vertices();
+    let vertex = renumbered(used.len(), |v| used[v]);
+    let mut textured = vec![false; source.textures.len()];
+    let corners = source.faces.iter().flat_map(|face| source.corners_of(face));
+    corners.filter(|corner| corner.texture != NONE).for_each(|corner| textured[corner.texture as usize] = true);
+    let texture = renumbered(textured.len(), |t| textured[t]);
     let mut text = String::new();
-    let frame = &source.frame;
+    let frame = &imported.report.frame;
     let _ = writeln!(text, "# {} {}, {} up", env!("CARGO_PKG_NAME"), frame.unit, frame.up);
     let mut statements = source.statements.iter().peekable();
-    // A material file is named before anything uses it, also where its line stood late.
+    // Material files come first, also those named late in the file.
     for (_, library) in source.statements.iter().filter(|(_, line)| line.starts_with("mtllib")) {
         let _ = writeln!(text, "{library}");
     }
-    let mut count = 0;
-    for (file_vertex, slot) in used.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
-        count += 1;
-        *slot = count;
-        let v = source.mesh_vertex[file_vertex];
-        // What did not move keeps its digits, a unit apart or not; so does a vertex of degenerate faces alone, which is
-        // in no triangle.
+    for file_vertex in (0..used.len()).filter(|&v| used[v]) {
+        let v = imported.mesh_vertex[file_vertex];
+        // A vertex that did not move keeps its digits; so does one of degenerate faces only, which is in no triangle.
         let p = match (positions.get(v as usize), imported.mesh.positions.get(v as usize)) {
             (Some(now), Some(then)) if now != then => frame.to_file(*now),
             _ => source.positions[file_vertex],
         };
         write_vertex(&mut text, p);
     }
-    count = 0;
-    for (t, slot) in textured.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
-        count += 1;
-        *slot = count;
-        let uv = source.textures[t];
+    for uv in (0..textured.len()).filter(|&t| textured[t]).map(|t| source.textures[t]) {
         let _ = writeln!(text, "vt {} {}", uv.x, uv.y);
     }
     let mut pending: Vec<&str> = Vec::new();
@@ -127,10 +117,10 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
         }
         text.push('f');
         for corner in source.corners_of(face) {
-            let _ = match corner.texture {
-                NONE => write!(text, " {}", used[corner.vertex as usize]),
-                t => write!(text, " {}/{}", used[corner.vertex as usize], textured[t as usize]),
-            };
+            let _ = write!(text, " {}", vertex[corner.vertex as usize] + 1);
+            if corner.texture != NONE {
+                let _ = write!(text, "/{}", texture[corner.texture as usize] + 1);
+            }
         }
         text.push('\n');
     }
@@ -139,7 +129,7 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
 
 /// Shortest digits that read back as the same number. Writing into a String cannot fail.
 fn write_vertex(text: &mut String, p: DVec3) {
-    // Adding zero makes of minus zero zero.
+    // Adding zero turns -0 into 0.
     let p = p + 0.0;
     let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
 }

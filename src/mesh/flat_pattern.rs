@@ -1,37 +1,39 @@
-//! Whether texture coordinates are the pattern that a garment was cut by, and in which unit.
+//! Recognises texture coordinates that are the flat pattern of a garment, and their unit.
 //!
-//! Each triangle has a map from its texture coordinates to its place; σ₁ ≥ σ₂ are its singular values, metres per unit. Cloth that
-//! lies or hangs as it was cut has one scale s and σ₁, σ₂ within a few percent of it, except where seams are still open or it
-//! is stretched. An atlas made for pictures is unfolded at any scale and stretched everywhere.
+//! The map from the texture coordinates of a triangle to its corners in space has singular values σ₁ ≥ σ₂, metres per unit.
+//! Undraped cloth has one scale s, with σ₁ and σ₂ within a few percent of it except along open seams and where it is stretched.
+//! An atlas made for pictures is unfolded at any scale and stretched everywhere.
 //!
-//! s is the median of √(σ₁ σ₂), weighted by area in the pattern; a round unit (m, dm, cm, mm, in) stands in for it where it is near one. It is the
-//! pattern where triangles of `SHARE` of the area are within `NEAR` of s, and there is room for them all: a texture tiled over the
-//! cloth lies over itself. Limits: a garment modelled as a cylinder and unrolled is one, too, and rightly so.
+//! s is the median of √(σ₁ σ₂), weighted by area in the pattern, or the unit (m, dm, cm, mm, in) within `UNIT_TOLERANCE` of it.
+//! The coordinates are a pattern if triangles of `MIN_SHARE` of the area are within `SCALE_TOLERANCE` of s, and if the area
+//! fits into the box around the coordinates: a tiled texture overlaps itself.
+//!
+//! Limits: a garment modelled as a cylinder and unrolled counts as a pattern, which it is.
 
 use glam::DVec2;
 
 use super::{TriMesh, Unit};
 
-/// How far σ/s may be from 1 in cloth as cut.
-const NEAR: f64 = 0.03;
-/// Share of the area that must be so: triangles along open seams, and where cloth is stretched, take up to a third.
-const SHARE: f64 = 0.6;
-/// How near s must be to a unit for that to be meant.
-const ROUND: f64 = 0.03;
+/// Largest deviation of σ/s from 1 in undraped cloth. A heuristic.
+const SCALE_TOLERANCE: f64 = 0.03;
+/// Least share of the area within the tolerance: a garment has up to a third along open seams and in stretched cloth.
+const MIN_SHARE: f64 = 0.6;
+/// Largest deviation of s from a unit that replaces it. A heuristic.
+const UNIT_TOLERANCE: f64 = 0.03;
 
 /// A flat pattern found in texture coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlatPattern {
-    /// Metres of one unit of them.
+    /// Metres in one unit of the texture coordinates.
     pub metres_per_unit: f64,
-    /// The unit, where the scale is one's.
+    /// The unit of that length, if there is one.
     pub unit: Option<Unit>,
-    /// Share of the pattern's area that lies as it was cut.
+    /// Share of the pattern's area within the tolerance.
     pub share: f64,
 }
 
 impl FlatPattern {
-    /// Looks for it; `None` where triangles have no texture coordinates or these are no pattern.
+    /// The pattern in the texture coordinates of a mesh; `None` if a triangle has none or they are no pattern.
     #[must_use]
     pub(crate) fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
         let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
@@ -41,7 +43,7 @@ impl FlatPattern {
             let [a, b, c] = (*corners)?;
             let [p, q, r] = mesh.corners(t);
             let flat = (b - a).perp_dot(c - a);
-            // By area in the pattern: what bridges an open seam is long in space and an edge wide there.
+            // Weighted by area in the pattern, where triangles that bridge an open seam are small.
             let area = 0.5 * flat.abs();
             whole += area;
             (low, high) = (low.min(a).min(b).min(c), high.max(a).max(b).max(c));
@@ -59,7 +61,7 @@ impl FlatPattern {
             }
         }
         let room = (high - low).element_product();
-        if whole > (1.0 + NEAR) * room {
+        if whole > (1.0 + SCALE_TOLERANCE) * room {
             return None;
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -70,11 +72,11 @@ impl FlatPattern {
             below >= half
         })?;
         let units = [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm, Unit::In];
-        let unit = units.into_iter().find(|unit| (median.0 / unit.metres() - 1.0).abs() < ROUND);
+        let unit = units.into_iter().find(|unit| (median.0 / unit.metres() - 1.0).abs() < UNIT_TOLERANCE);
         let scale = unit.map_or(median.0, Unit::metres);
-        let near = |f: &&(f64, f64, [f64; 2])| f.2.iter().all(|sigma| (sigma / scale - 1.0).abs() < NEAR);
+        let near = |f: &&(f64, f64, [f64; 2])| f.2.iter().all(|sigma| (sigma / scale - 1.0).abs() < SCALE_TOLERANCE);
         let share = found.iter().filter(near).map(|f| f.1).sum::<f64>() / whole;
-        (share >= SHARE).then_some(Self { metres_per_unit: scale, unit, share })
+        (share >= MIN_SHARE).then_some(Self { metres_per_unit: scale, unit, share })
     }
 }
 
@@ -137,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn open_seams_do_not_hide_it() {
+    fn open_seams_do_not_hide_the_pattern() {
         let (mut mesh, texture) = rolled(0.01, 1.0);
         mesh.positions[..22].iter_mut().for_each(|p| p.z += 0.3);
         let found = FlatPattern::find(&mesh, &texture).unwrap();

@@ -1,19 +1,36 @@
 //! The unit and the up axis of a mesh file: how its numbers become metres with z up.
+//!
+//! An OBJ file states neither. Both are options, or guessed from the body and applied to body and garment alike, which
+//! fit each other in one frame only. A body is taken to be 0.5 to 2.5 m tall, which leaves at most one of metre,
+//! decimetre, centimetre and millimetre; inch and foot overlap with these and are never guessed. Up is the axis along
+//! which a body is tall and its upper and lower half differ. The left and the right of a body are alike, so a T pose as
+//! wide as it is tall is recognised.
 
 use std::fmt;
 use std::str::FromStr;
 
 use glam::DVec3;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::box_about;
 use super::error::MeshError;
 use crate::base::serde_name;
 
+/// Height of a body, m: from a toddler's torso form to a tall adult in heels.
+const BODY_HEIGHT: std::ops::RangeInclusive<f64> = 0.5..=2.5;
+/// Units that a guess chooses among.
+const GUESSED_UNITS: [Unit; 4] = [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm];
+/// An axis may be up if the body is at least this share as long along it as along its longest: an arm span is rarely
+/// more than 1.1 of the stature.
+const TALL_ENOUGH: f64 = 0.8;
+
 /// Length of one unit in the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// Metre.
+    #[default]
     M,
     /// Decimetre.
     Dm,
@@ -31,14 +48,7 @@ impl Unit {
     /// Metres in one unit.
     #[must_use]
     pub(crate) fn metres(self) -> f64 {
-        match self {
-            Self::M => 1.0,
-            Self::Dm => 0.1,
-            Self::Cm => 0.01,
-            Self::Mm => 0.001,
-            Self::In => 0.0254,
-            Self::Ft => 0.3048,
-        }
+        [1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048][self as usize]
     }
 }
 
@@ -52,13 +62,18 @@ impl FromStr for Unit {
     type Err = MeshError;
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
-        let unknown = || MeshError::UnknownUnit { found: text.to_owned() };
-        serde_name::parse(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
+        named(text, "unit", "one of m, dm, cm, mm, in, ft")
     }
 }
 
+/// The value that a word names, in capitals or not.
+fn named<T: DeserializeOwned>(text: &str, what: &'static str, expected: &'static str) -> Result<T, MeshError> {
+    let unknown = || MeshError::UnknownName { what, found: text.to_owned(), expected };
+    serde_name::parse(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
+}
+
 /// The axis of the file that points against gravity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
     /// The first coordinate.
@@ -66,6 +81,7 @@ pub enum Axis {
     /// The second coordinate.
     Y,
     /// The third coordinate.
+    #[default]
     Z,
 }
 
@@ -85,13 +101,12 @@ impl FromStr for Axis {
     type Err = MeshError;
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
-        let unknown = || MeshError::UnknownAxis { found: text.to_owned() };
-        serde_name::parse(&text.trim().to_ascii_lowercase()).ok_or_else(unknown)
+        named(text, "up axis", "x, y or z")
     }
 }
 
 /// How the numbers in a file become metres with z up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Unit of the file.
     pub unit: Unit,
@@ -99,7 +114,7 @@ pub struct Frame {
     pub up: Axis,
     /// Whether any of the two was guessed.
     pub guessed: bool,
-    /// Why these, in plain words.
+    /// Grounds for both, as a sentence.
     pub reason: String,
 }
 
@@ -134,6 +149,108 @@ impl Frame {
     }
 }
 
+/// Unit and up axis of a body from its vertices `raw` in the file's frame; a given unit or axis is not guessed.
+///
+/// # Errors
+/// The height in units of the file, where it is a body's in no unit.
+pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
+    if let (Some(unit), Some(up)) = (unit, up) {
+        return Ok(given(raw, unit, up));
+    }
+    let (lo, hi) = box_about(raw.iter().copied());
+    let extent = (hi - lo).to_array();
+    let up_found = up.unwrap_or_else(|| guess_up(raw, lo, hi));
+    let height = extent[up_found.index()];
+    let unit_found = unit.or_else(|| unit_of_a_body(height)).ok_or(height)?;
+    let tall = height * unit_found.metres();
+    let axis = if up.is_some() { "given" } else { "guessed" };
+    let scale = if unit.is_some() { "given" } else { "guessed" };
+    let reason = format!(
+        "the body is {height:.4} units along {up_found} (up, {axis}), {tall:.2} m in {unit_found} ({scale}, a body being \
+         0.5 to 2.5 m tall)"
+    );
+    Ok(Frame { unit: unit_found, up: up_found, guessed: true, reason })
+}
+
+/// The unit in which a body of this height (in units of the file) is 0.5 to 2.5 m tall.
+fn unit_of_a_body(height: f64) -> Option<Unit> {
+    GUESSED_UNITS.into_iter().find(|unit| BODY_HEIGHT.contains(&(height * unit.metres())))
+}
+
+/// The given frame. Its reason names another unit, if the body has a body's height in that one alone.
+fn given(raw: &[DVec3], unit: Unit, up: Axis) -> Frame {
+    let mut frame = Frame::given(unit, up);
+    let (lo, hi) = box_about(raw.iter().copied());
+    let height = (hi - lo)[up.index()];
+    let tall = height * unit.metres();
+    if let Some(other) = unit_of_a_body(height).filter(|_| !BODY_HEIGHT.contains(&tall)) {
+        let would = height * other.metres();
+        frame.reason += &format!("; the body is {tall:.2} m tall in that, and would be {would:.2} m in {other}");
+    }
+    frame
+}
+
+/// Unit and up axis of a garment from its vertices `raw` in the file's frame, for a body within these bounds (m, z up):
+/// the frame in which the boxes of garment and body share the largest part of their volume.
+pub(super) fn guess_frame_around(
+    raw: &[DVec3],
+    body: (DVec3, DVec3),
+    unit: Option<Unit>,
+    up: Option<Axis>,
+) -> Option<Frame> {
+    if let (Some(unit), Some(up)) = (unit, up) {
+        return Some(Frame::given(unit, up));
+    }
+    let units = unit.map_or(GUESSED_UNITS.to_vec(), |unit| vec![unit]);
+    let ups = up.map_or(vec![Axis::Z, Axis::Y], |up| vec![up]);
+    let mut best = (0.0, None);
+    for frame in ups.iter().flat_map(|&up| units.iter().map(move |&unit| Frame::given(unit, up))) {
+        let overlap = overlap(box_about(raw.iter().map(|&p| frame.to_metres(p))), body);
+        if overlap > best.0 {
+            best = (overlap, Some(frame));
+        }
+    }
+    let (overlap, frame) = (100.0 * best.0, best.1?);
+    let reason = format!(
+        "in {}, {} up, the garment's box and the body's share {overlap:.0} % of their volume, the most of all frames",
+        frame.unit, frame.up
+    );
+    Some(Frame { guessed: true, reason, ..frame })
+}
+
+fn guess_up(raw: &[DVec3], lo: DVec3, hi: DVec3) -> Axis {
+    let extent = (hi - lo).to_array();
+    let tallest = extent.into_iter().fold(0.0, f64::max);
+    // y before z before x where they tie: the commonest first.
+    [Axis::Y, Axis::Z, Axis::X]
+        .into_iter()
+        .filter(|axis| extent[axis.index()] >= TALL_ENOUGH * tallest)
+        .map(|axis| (lopsidedness(raw, axis.index(), lo, hi), axis))
+        .fold((-1.0, Axis::Y), |best, next| if next.0 > best.0 { next } else { best })
+        .1
+}
+
+/// How far the heights are from their mirror image, on average, as a share of the extent: 0 for a symmetric axis.
+fn lopsidedness(raw: &[DVec3], axis: usize, lo: DVec3, hi: DVec3) -> f64 {
+    let (lo, hi) = (lo[axis], hi[axis]);
+    let mut heights: Vec<f64> = raw.iter().map(|p| p[axis]).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    let unlike: f64 = heights.iter().zip(heights.iter().rev()).map(|(up, down)| ((up - lo) - (hi - down)).abs()).sum();
+    if hi > lo { unlike / ((hi - lo) * heights.len() as f64) } else { 0.0 }
+}
+
+/// Shared volume over united volume of two boxes; thin boxes are thickened to a millimetre.
+fn overlap(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> f64 {
+    let volume =
+        |lo: DVec3, hi: DVec3| (hi - lo).max(DVec3::ZERO).to_array().iter().map(|e| e.max(1e-3)).product::<f64>();
+    let (lo, hi) = (a.0.max(b.0), a.1.min(b.1));
+    if lo.cmpgt(hi).any() {
+        return 0.0;
+    }
+    let shared = volume(lo, hi);
+    shared / (volume(a.0, a.1) + volume(b.0, b.1) - shared)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,8 +273,49 @@ mod tests {
     fn names_are_read_and_unknown_ones_listed() {
         assert_eq!("CM".parse::<Unit>().unwrap(), Unit::Cm);
         assert_eq!("z".parse::<Axis>().unwrap(), Axis::Z);
-        let said = "furlong".parse::<Unit>().unwrap_err().to_string();
-        assert!(said.contains("furlong") && said.contains("mm"), "{said}");
+        let message = "furlong".parse::<Unit>().unwrap_err().to_string();
+        assert!(message.contains("furlong") && message.contains("mm"), "{message}");
         assert!("w".parse::<Axis>().unwrap_err().to_string().contains("x, y or z"));
+    }
+
+    /// A stick figure in a T pose, y up, `h` tall and as wide: dense at the top, as heads are, alike left and right.
+    fn t_pose(h: f64) -> Vec<DVec3> {
+        let mut points = Vec::new();
+        for i in 0..=40 {
+            let s = f64::from(i) / 40.0;
+            points.push(DVec3::new(0.0, h * s, 0.1 * h * s));
+            points.push(DVec3::new(h * (s - 0.5), 0.82 * h, 0.0));
+        }
+        points
+    }
+
+    #[test]
+    fn a_t_pose_is_not_laid_on_its_side() {
+        for (h, unit) in [(1.7, Unit::M), (16.8, Unit::Dm), (171.0, Unit::Cm), (1650.0, Unit::Mm)] {
+            let frame = guess_frame(&t_pose(h), None, None).unwrap();
+            assert_eq!((frame.unit, frame.up), (unit, Axis::Y), "{}", frame.reason);
+            let z_up: Vec<_> = t_pose(h).iter().map(|p| DVec3::new(p.x, -p.z, p.y)).collect();
+            assert_eq!(guess_frame(&z_up, None, None).unwrap().up, Axis::Z);
+        }
+    }
+
+    #[test]
+    fn given_values_are_not_guessed_and_impossible_heights_are_refused() {
+        assert_eq!(guess_frame(&t_pose(66.0), Some(Unit::In), None).unwrap().unit, Unit::In);
+        assert_eq!(guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X)).unwrap(), Frame::given(Unit::M, Axis::X));
+        // The given unit is taken, and the reason names the unit in which the height is a body's.
+        let tiny = guess_frame(&t_pose(16.8), Some(Unit::Cm), Some(Axis::Y)).unwrap();
+        assert_eq!((tiny.unit, tiny.up), (Unit::Cm, Axis::Y));
+        assert!(tiny.reason.contains("0.17 m tall in that, and would be 1.68 m in dm"), "{}", tiny.reason);
+        assert!((guess_frame(&t_pose(40.0), None, None).unwrap_err() - 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_garment_finds_the_frame_of_a_known_body() {
+        let body = (DVec3::new(-0.3, -0.2, 0.0), DVec3::new(0.3, 0.2, 1.7));
+        // A shirt in centimetres, y up.
+        let shirt = [DVec3::new(-28.0, 90.0, -18.0), DVec3::new(28.0, 145.0, 18.0)];
+        let frame = guess_frame_around(&shirt, body, None, None).unwrap();
+        assert_eq!((frame.unit, frame.up), (Unit::Cm, Axis::Y));
     }
 }

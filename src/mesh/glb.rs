@@ -1,7 +1,8 @@
-//! glTF out: one mesh as a binary `.glb`, as viewers and try-on programs load it.
+//! Writes one mesh as binary glTF (`.glb`) for viewers and try-on programs.
 //!
-//! Metres, y up, the body's front at +z, counter-clockwise from outside, as glTF 2.0 wants (Khronos Group, 2021, sections 3.4 and 4.4); positions and
-//! vertex normals in single precision, colours in eight bits where they are given. Cloth has two sides, and the material says so.
+//! Metres, y up, the body's front at +z, counter-clockwise from outside, as glTF 2.0 requires (Khronos Group, 2021, sections
+//! 3.4 and 4.4). Positions and vertex normals are in single precision, optional colours in eight bits. The material is
+//! double-sided.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use super::TriMesh;
 use super::error::MeshError;
 use super::export::write;
 
-/// Numbers of the format: what a chunk holds, what a component is, what a buffer is for.
+/// Codes of the format for chunk types, component types and buffer targets.
 const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BINARY_CHUNK: u32 = 0x004E_4942;
 const FLOAT: u32 = 5126;
@@ -21,7 +22,7 @@ const UNSIGNED_BYTE: u32 = 5121;
 const ARRAY: u32 = 34962;
 const ELEMENTS: u32 = 34963;
 
-/// Writes a mesh (m, z up) as `.glb`, with a colour for each vertex (red, green, blue, opacity) where there are any.
+/// Writes a mesh (m, z up) as `.glb`, with an optional colour for each vertex (red, green, blue, opacity).
 ///
 /// # Errors
 /// [`MeshError::WrongCount`] where there are not as many colours as vertices, [`MeshError::Unwritable`].
@@ -97,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_chunks_hold_what_the_header_says() {
+    fn chunk_lengths_and_contents_agree_with_the_header() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, -2.0, 3.0)];
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]);
         let file = bytes(&mesh, Some(&[[1, 2, 3, 255]; 3]));

@@ -1,12 +1,32 @@
-//! The triangle mesh under change: half-edges stored three to a triangle, with the four local operations on them.
+//! The triangle mesh under change: half-edges stored three to a triangle, with split, collapse and flip.
 //!
 //! Half-edge h = 3t + i runs from its origin to the origin of the next one of its triangle; its twin runs back in the
 //! neighbouring triangle and is [`NONE`] on a boundary. Every operation keeps the surface manifold with the same genus
 //! and the same number of boundary loops (for the collapse: the link condition; Dey, Edelsbrunner, Guha, Nekhayev, 1999).
+//! Inner edges are flipped towards even neighbour counts, or towards the Delaunay condition.
 
 use glam::DVec3;
 
 use super::{NONE, TriMesh, renumbered, retain};
+
+/// A collapse may turn no triangle by more than 60°: the least cosine. A heuristic.
+const MAX_TURN: f64 = 0.5;
+/// A flip may turn neither triangle of the pair by more than 30° from their mean normal: the least cosine. A heuristic.
+const MAX_FLIP_TURN: f64 = 0.866;
+/// A flip by valence may make no triangle lower than this share of its longest side. A heuristic.
+const MIN_FLIP_HEIGHT: f64 = 0.3;
+/// Passes of Delaunay flips at most. A flip may violate the condition at a neighbouring edge.
+const MAX_DELAUNAY_PASSES: usize = 3;
+
+/// A triangle one of whose corners moves.
+pub(crate) struct Moved {
+    /// The corners before, the moving one first, m.
+    pub(crate) corners: [DVec3; 3],
+    /// Whether the triangle turns too far, or is left without area.
+    pub(crate) turns: bool,
+    /// Its longer side at the moving corner afterwards, m.
+    pub(crate) longest: f64,
+}
 
 /// A manifold triangle mesh that can be split, collapsed and flipped.
 #[derive(Debug, Clone, Default)]
@@ -181,12 +201,6 @@ impl HalfEdgeMesh {
         self.out[b as usize] = g2;
     }
 
-    /// The two vertices opposite an edge.
-    pub(crate) fn opposite(&self, h: u32) -> (u32, Option<u32>) {
-        let g = self.twin(h);
-        (self.origin(previous(h)), (g != NONE).then(|| self.origin(previous(g))))
-    }
-
     /// Whether collapsing `h` onto its target keeps the surface a manifold.
     pub(crate) fn can_collapse(&self, h: u32) -> bool {
         let (v0, v1) = (self.origin(h), self.target(h));
@@ -194,14 +208,14 @@ impl HalfEdgeMesh {
         if self.is_boundary(v0) && (!self.is_boundary(v1) || g != NONE) {
             return false;
         }
-        let (a, b) = self.opposite(h);
+        let has_twin = g != NONE;
         let mut common = 0;
         self.neighbours(v0, |w| common += usize::from(self.adjacent(w, v1)));
-        if common != 1 + usize::from(b.is_some()) || Some(a) == b {
+        if common != 1 + usize::from(has_twin) || has_twin && self.origin(previous(h)) == self.origin(previous(g)) {
             return false;
         }
         let leaf = |h: u32| self.twin(next(h)) == NONE && self.twin(previous(h)) == NONE;
-        !(leaf(h) || g != NONE && leaf(g))
+        !(leaf(h) || has_twin && leaf(g))
     }
 
     /// Removes the origin of `h`, joining it to the target, which moves to `at`.
@@ -235,7 +249,37 @@ impl HalfEdgeMesh {
         }
     }
 
-    /// Turns an inner edge to join the two opposite vertices; false where they are joined already.
+    /// Whether `h` is the first half of an edge between two triangles.
+    fn is_inner(&self, h: u32) -> bool {
+        self.is_first(h) && self.twin(h) != NONE
+    }
+
+    /// The ends of an inner edge, and the two vertices opposite to it.
+    fn diamond(&self, h: u32) -> [u32; 4] {
+        [self.origin(h), self.target(h), self.origin(previous(h)), self.origin(previous(self.twin(h)))]
+    }
+
+    /// Whether the angles opposite an inner edge add up to more than 180°.
+    fn violates_delaunay(&self, h: u32) -> bool {
+        let [p0, p1, pa, pb] = self.diamond(h).map(|v| self.positions[v as usize]);
+        let cot = |x: DVec3, y: DVec3| x.dot(y) / x.cross(y).length().max(1e-30);
+        cot(p0 - pa, p1 - pa) + cot(p0 - pb, p1 - pb) < -1e-9
+    }
+
+    /// Whether the pair still faces the same way after a flip, and neither triangle is lower than a share of its longest side.
+    fn may_flip(&self, h: u32, min_height: f64) -> bool {
+        let [p0, p1, pa, pb] = self.diamond(h).map(|v| self.positions[v as usize]);
+        let old = (p1 - p0).cross(pa - p0).normalize_or_zero() + (p0 - p1).cross(pb - p1).normalize_or_zero();
+        let old = old.normalize_or_zero();
+        let diagonal = pa.distance(pb);
+        let fits = |normal: DVec3, apex: DVec3| {
+            let longest = diagonal.max(apex.distance(pa)).max(apex.distance(pb));
+            normal.length() >= min_height * longest.powi(2) && normal.normalize_or_zero().dot(old) > MAX_FLIP_TURN
+        };
+        fits((p0 - pa).cross(pb - pa), p0) && fits((p1 - pb).cross(pa - pb), p1)
+    }
+
+    /// Replaces an inner edge by one between the two opposite vertices; false if these are neighbours already.
     pub(crate) fn flip(&mut self, h0: u32) -> bool {
         let g0 = self.twin(h0);
         let (h1, h2, g1, g2) = (next(h0), previous(h0), next(g0), previous(g0));
@@ -258,7 +302,21 @@ impl HalfEdgeMesh {
         true
     }
 
-    /// The living triangles and vertices, renumbered in order, with the vertices' tags.
+    /// Calls `f` with every triangle at `v` that does not contain `gone`, as it is when `v` moves to `to`, m.
+    pub(crate) fn around_moved(&self, v: u32, gone: u32, to: DVec3, mut f: impl FnMut(Moved)) {
+        let from = self.positions[v as usize];
+        self.around(v, |h| {
+            let ends = [self.target(h), self.origin(previous(h))];
+            if !ends.contains(&gone) {
+                let [b, c] = ends.map(|v| self.positions[v as usize]);
+                let (old, new) = ((b - from).cross(c - from), (b - to).cross(c - to));
+                let turns = new.dot(old) < MAX_TURN * new.length() * old.length() || new.length_squared() <= 0.0;
+                f(Moved { corners: [from, b, c], turns, longest: b.distance(to).max(c.distance(to)) });
+            }
+        });
+    }
+
+    /// The remaining triangles and vertices, renumbered in order, with the vertices' tags.
     pub(crate) fn compact(&self) -> (TriMesh, Vec<u8>) {
         let number = renumbered(self.out.len(), |v| self.out[v] != NONE);
         let (mut positions, mut tags) = (self.positions.clone(), self.tags.clone());
@@ -282,4 +340,80 @@ pub(crate) fn next(h: u32) -> u32 {
 /// The previous half-edge of the same triangle.
 pub(crate) fn previous(h: u32) -> u32 {
     if h.is_multiple_of(3) { h + 2 } else { h - 1 }
+}
+
+/// Flips inner edges where that brings the neighbour counts of the four vertices nearer to six (four on the boundary).
+///
+/// Neighbours are counted once for all vertices, then updated with every flip: counting them around four vertices for
+/// every edge of a large mesh is bound by memory.
+pub(crate) fn flip_by_valence(mesh: &mut HalfEdgeMesh) {
+    let mut excess: Vec<i64> =
+        (0..mesh.positions.len() as u32).map(|v| if mesh.is_boundary(v) { -4 } else { -6 }).collect();
+    for h in (0..mesh.half_edge_count() as u32).filter(|&h| mesh.is_first(h)) {
+        excess[mesh.origin(h) as usize] += 1;
+        excess[mesh.target(h) as usize] += 1;
+    }
+    for h in 0..mesh.half_edge_count() as u32 {
+        if !mesh.is_inner(h) {
+            continue;
+        }
+        let [v0, v1, a, b] = mesh.diamond(h).map(|v| v as usize);
+        let changes = [(v0, -1), (v1, -1), (a, 1), (b, 1)];
+        let squares = |by: i64| changes.iter().map(|&(v, change)| (excess[v] + by * change).pow(2)).sum::<i64>();
+        if squares(1) < squares(0) && mesh.may_flip(h, MIN_FLIP_HEIGHT) && mesh.flip(h) {
+            changes.iter().for_each(|&(v, change)| excess[v] += change);
+        }
+    }
+}
+
+/// Flips inner edges whose opposite angles add up to more than 180°.
+pub(crate) fn flip_to_delaunay(mesh: &mut HalfEdgeMesh) {
+    for _ in 0..MAX_DELAUNAY_PASSES {
+        let mut flips = 0;
+        for h in 0..mesh.half_edge_count() as u32 {
+            let flipped = mesh.is_inner(h) && mesh.violates_delaunay(h) && mesh.may_flip(h, 0.0) && mesh.flip(h);
+            flips += usize::from(flipped);
+        }
+        if flips == 0 {
+            break;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::samples::sheet;
+
+    /// Σ (neighbours − those it should have)², from the triangles alone.
+    fn uneven(mesh: &HalfEdgeMesh) -> i64 {
+        let mut over: Vec<i64> = mesh.tags.iter().map(|&tag| if tag == 0 { -6 } else { -4 }).collect();
+        for v in 0..over.len() as u32 {
+            mesh.neighbours(v, |_| over[v as usize] += 1);
+        }
+        over.iter().map(|over| over * over).sum()
+    }
+
+    #[test]
+    fn flips_by_valence_even_out_the_neighbour_counts() {
+        let n: u32 = 12;
+        let mut crossed = sheet(n, n, |i, j| DVec3::new(i, j, 0.0) * 0.01);
+        // Every other diagonal the other way: eight neighbours and four by turns.
+        for (square, pair) in (0..).zip(crossed.triangles.as_chunks_mut::<2>().0) {
+            let [[a, b, d], [_, _, c]] = *pair;
+            if (square + square / n).is_multiple_of(2) {
+                *pair = [[a, b, c], [b, d, c]];
+            }
+        }
+        let rim = |p: &DVec3| u8::from([p.x, p.y].iter().any(|&x| x < 1e-9 || x > 0.01 * f64::from(n) - 1e-9));
+        let tags = crossed.positions.iter().map(rim).collect();
+        let mut mesh = HalfEdgeMesh::new(&crossed, tags).unwrap();
+        let before = uneven(&mesh);
+        flip_by_valence(&mut mesh);
+        let after = uneven(&mesh);
+        assert!(after < before / 3, "{before} to {after}");
+        // A second pass recounts the neighbours; it improves on the first only if the counts of the first were right.
+        flip_by_valence(&mut mesh);
+        assert!(uneven(&mesh) <= after, "{after} to {}", uneven(&mesh));
+    }
 }

@@ -1,4 +1,4 @@
-//! The state of a mesh in figures: what `partwise check` prints of a body and of a garment, each by itself.
+//! Mesh quality metrics: the figures that `partwise check` prints for a body and for a garment.
 
 use serde::Serialize;
 
@@ -6,11 +6,11 @@ use super::self_intersection::self_intersecting_pairs;
 use super::{Topology, TriMesh, winding};
 use crate::base::quantiles::Percentiles;
 
-/// A triangle lower than this share of its longest edge has no area worth the name: with coordinates written to seven
-/// digits, its normal would be noise.
+/// A triangle lower than this share of its longest edge counts as without area: with coordinates of seven digits its normal
+/// is noise.
 const NO_AREA: f64 = 1e-6;
 
-/// What is wrong with a mesh, counted.
+/// Irregular edges, vertices and triangles of a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Findings {
     /// Edges of three triangles and more.
@@ -38,9 +38,9 @@ impl Findings {
     }
 }
 
-/// A mesh in figures.
+/// Quality metrics of a mesh.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
+#[allow(missing_docs, reason = "the names are the documentation")]
 pub struct Health {
     pub vertices: usize,
     pub triangles: usize,
@@ -67,7 +67,7 @@ pub struct Health {
     pub edge_length_m: Percentiles,
 }
 
-/// Takes every figure of a mesh; O(n log n).
+/// Computes the metrics of a mesh; O(n log n).
 #[must_use]
 pub fn health(mesh: &TriMesh) -> Health {
     let topology = Topology::new(mesh);
@@ -101,14 +101,14 @@ fn min_angle(mesh: &TriMesh, t: usize) -> f64 {
     let corners = mesh.corners(t);
     let angle = |k: usize| {
         let (a, b) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
-        // By the tangent: exact near zero, where the cosine is not.
+        // The tangent is accurate near zero, where the cosine is not.
         a.cross(b).length().atan2(a.dot(b)).to_degrees()
     };
     angle(0).min(angle(1)).min(angle(2))
 }
 
 impl Health {
-    /// Name and value of each figure, as a table wants them.
+    /// Name and value of each metric, as rows of a table.
     #[must_use]
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let closed = match self.volume_m3 {

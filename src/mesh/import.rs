@@ -2,26 +2,27 @@
 //!
 //! The mesh has the vertices of the file that a face uses, in the order of the file: corners that differ only in their
 //! texture coordinate share a vertex. Vertices are welded by position only on request, because welding can make a clean
-//! mesh non-manifold.
+//! mesh non-manifold. Polygons are cut into triangles; degenerate triangles, duplicates and unused vertices are dropped;
+//! neighbours are turned to agree; a body is turned to face outward.
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::cleanup::Cleaned;
+use super::bridges::Bridges;
+use super::duplicates::{duplicate_parts, first_triangles, same_place};
 use super::error::MeshError;
-use super::frame::{Axis, Frame, Unit};
-use super::frame_guess::{guess_frame, guess_frame_around};
-use super::obj_lines::{Face, ObjContents, used};
-use super::obj_source::{ObjSource, read};
-use super::orientation::face_outward;
+use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around};
+use super::health::Findings;
+use super::obj_source::{Corner, ObjSource};
 use super::report::{MeshReport, Remark, Repair};
+use super::rest::RestShape;
 use super::topology::{NONE, Topology};
-use super::{TriMesh, each_once};
+use super::{TriMesh, longest_side, polygon, renumbered, retain, winding};
 
-/// Name of the triangles without a group in a file that has groups.
-const UNGROUPED: &str = "(none)";
+/// Ratio of a triangle's longest sides at rest and as worn, either way, from which a remark is made. A heuristic:
+/// stretched or gathered cloth is off by tens of percent, a triangle of a torn pattern by more than this.
+const MAX_SIZE_RATIO: f64 = 4.0;
 
 /// Options of an import.
 #[derive(Debug, Clone, Default)]
@@ -47,73 +48,24 @@ pub enum Beside<'a> {
     Bounds(DVec3, DVec3),
 }
 
-/// An imported mesh, its report and its source.
-#[derive(Debug, Clone)]
-pub struct Imported {
-    /// The mesh: metres, z up.
-    pub mesh: TriMesh,
-    /// Counts, repairs and remarks.
-    pub report: MeshReport,
-    /// The file, for the export.
-    pub source: ObjSource,
-    /// Texture coordinates of the corners of each triangle; `None` if a corner has none.
-    pub texture: Vec<Option<[DVec2; 3]>>,
-    /// Index into [`ObjSource::faces`] of the face that each triangle was cut from.
-    pub(super) face: Vec<u32>,
-}
-
-impl Imported {
-    /// The frame the file was read in.
-    #[must_use]
-    pub fn frame(&self) -> &Frame {
-        &self.source.frame
-    }
-
-    /// This mesh at the positions of `other`, a file of the same faces that holds the rest shape.
-    pub fn in_the_shape_of(&self, other: &Self) -> Result<TriMesh, MeshError> {
-        let differs = |difference: String| MeshError::OtherTopology {
-            file: other.source.file.clone(),
-            other: self.source.file.clone(),
-            difference,
-        };
-        let (ours, theirs) = (&self.source, &other.source);
-        if ours.faces.len() != theirs.faces.len() {
-            return Err(differs(format!("{} faces, expected {}", theirs.faces.len(), ours.faces.len())));
-        }
-        for (i, (a, b)) in ours.faces.iter().zip(&theirs.faces).enumerate() {
-            let vertices =
-                |source: &ObjSource, face| source.corners_of(face).iter().map(|c| c.vertex).collect::<Vec<_>>();
-            if vertices(ours, a) != vertices(theirs, b) {
-                return Err(differs(format!("face {} has other vertices", i + 1)));
-            }
-        }
-        // The polygons agree. The triangles are those of `self`: another shape may cut its quads along other diagonals.
-        let place = |&v: &u32| theirs.mesh_vertex.get(v as usize).and_then(|&w| other.mesh.positions.get(w as usize));
-        let positions: Option<Vec<DVec3>> = ours.file_vertices().iter().map(|v| place(v).copied()).collect();
-        Ok(self.mesh.with_positions(positions.ok_or_else(|| differs("vertices are missing".to_owned()))?))
-    }
-}
-
 /// Imports a body.
 ///
 /// # Errors
 /// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; a unit that
 /// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
 pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
-    let contents = read(file)?;
-    let faces = chosen_faces(file, &contents, options)?;
-    let frame = guess_frame(&used_positions(&contents, &faces), options.unit, options.up)
-        .map_err(|height| MeshError::UnknownScale { file: file.to_owned(), height })?;
-    let mut imported = build(file, contents, faces, frame, options)?;
-    face_outward(&mut imported);
-    let topology = Topology::new(&imported.mesh);
-    if let Some([a, b]) = topology.boundary_edges().next() {
+    let mut imported = Imported::new(file, options, |source| {
+        guess_frame(&source.used_positions(), options.unit, options.up)
+            .map_err(|height| MeshError::UnknownScale { file: file.to_owned(), height })
+    })?;
+    imported.face_outward();
+    if let Some(edge) = Topology::new(&imported.mesh).boundary_edges().next() {
         let (edges, loops) = (imported.report.boundary_edges, imported.report.boundary_loops);
         if !options.open_body {
-            let number = imported.source.file_vertices();
-            let [a, b] = [a, b].map(|v| number[v as usize] as usize + 1);
+            let number = imported.file_vertices();
+            let [a, b] = edge.map(|v| number[v as usize] as usize + 1);
             let hint = open_hint(&imported.report, options);
-            return Err(MeshError::BodyOpen { file: imported.source.file, edges, loops, a, b, hint });
+            return Err(MeshError::BodyOpen { file: file.to_owned(), edges, loops, a, b, hint });
         }
         imported.report.remarks.push(Remark::Open { edges, loops });
     }
@@ -126,33 +78,26 @@ pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, Mes
 /// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; no frame that
 /// puts it around the body.
 pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
-    let contents = read(file)?;
-    let faces = chosen_faces(file, &contents, options)?;
-    let frame = match (body, options.unit, options.up) {
-        (_, Some(unit), Some(up)) => Frame::given(unit, up),
-        (Beside::File(frame), unit, up) => Frame {
+    Imported::new(file, options, |source| match (body, options.unit, options.up) {
+        (_, Some(unit), Some(up)) => Ok(Frame::given(unit, up)),
+        (Beside::File(frame), unit, up) => Ok(Frame {
             unit: unit.unwrap_or(frame.unit),
             up: up.unwrap_or(frame.up),
             guessed: frame.guessed,
             reason: "as the body".to_owned(),
-        },
-        (&Beside::Bounds(lo, hi), unit, up) => {
-            guess_frame_around(&used_positions(&contents, &faces), (lo, hi), unit, up)
-                .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() })?
-        }
-    };
-    build(file, contents, faces, frame, options)
+        }),
+        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&source.used_positions(), (lo, hi), unit, up)
+            .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() }),
+    })
 }
 
 /// Suggests a remedy for an open body: welding, or choosing the body's group.
 fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
-    let apart = report.remarks.iter().find_map(|remark| match remark {
-        Remark::Coincident { vertices } => Some(*vertices),
-        _ => None,
-    });
     let mut hint = String::new();
-    if let Some(vertices) = apart {
-        hint += &format!("{vertices} vertices lie exactly on another: try --weld. ");
+    for remark in &report.remarks {
+        if let Remark::Coincident { vertices } = remark {
+            hint += &format!("{vertices} vertices lie exactly on another: try --weld. ");
+        }
     }
     if report.groups > 1 && options.group.is_none() {
         hint += &format!("The file has {} groups: choose the body with --body-group. ", report.groups);
@@ -160,103 +105,280 @@ fn open_hint(report: &MeshReport, options: &ImportOptions) -> String {
     hint
 }
 
-fn chosen_faces(file: &Path, contents: &ObjContents, options: &ImportOptions) -> Result<Vec<Face>, MeshError> {
-    let faces = match &options.group {
-        None => contents.faces.clone(),
-        Some(asked) => {
-            let wanted = contents.number_of(asked);
-            let chosen =
-                contents.faces.iter().filter(|face| wanted.is_some_and(|w| face.group == w || face.object == w));
-            let chosen: Vec<Face> = chosen.copied().collect();
-            if chosen.is_empty() {
-                let used: BTreeSet<u32> = contents.faces.iter().flat_map(|face| [face.group, face.object]).collect();
-                let available =
-                    (0u32..).zip(&contents.names).filter(|(i, _)| used.contains(i)).map(|(_, name)| name.clone());
-                let (file, asked) = (file.to_owned(), asked.clone());
-                return Err(MeshError::UnknownGroup { file, asked, available: available.collect() });
-            }
-            chosen
+/// An imported mesh, its report and its source.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    /// The mesh: metres, z up.
+    pub mesh: TriMesh,
+    /// Counts, repairs and remarks.
+    pub report: MeshReport,
+    /// The file, for the export.
+    pub source: ObjSource,
+    /// Texture coordinates of the corners of each triangle; `None` if a corner has none.
+    pub texture: Vec<Option<[DVec2; 3]>>,
+    /// Index into [`ObjSource::faces`] of the face that each triangle was cut from.
+    face: Vec<u32>,
+    /// Mesh vertex of each file vertex, or [`NONE`] where no triangle uses it.
+    pub(super) mesh_vertex: Vec<u32>,
+}
+
+impl Imported {
+    /// Reads a file, whose frame is `frame_of` its contents, and repairs it.
+    fn new(
+        file: &Path,
+        options: &ImportOptions,
+        frame_of: impl FnOnce(&ObjSource) -> Result<Frame, MeshError>,
+    ) -> Result<Self, MeshError> {
+        let mut source = ObjSource::read(file)?;
+        let mut repairs = Vec::new();
+        if let Some(name) = &options.group {
+            let left_out = source.choose_group(name)?;
+            repairs.push(Repair::GroupChosen { name: name.clone(), left_out });
         }
-    };
-    if faces.is_empty() {
-        let file = file.to_owned();
-        return Err(MeshError::Empty { file, vertices: contents.positions.len(), faces: 0 });
-    }
-    Ok(faces)
-}
+        let empty = |source: &ObjSource, faces| MeshError::Empty {
+            file: file.to_owned(),
+            vertices: source.positions.len(),
+            faces,
+        };
+        if source.faces.is_empty() {
+            return Err(empty(&source, 0));
+        }
+        let frame = frame_of(&source)?;
+        let positions: Vec<DVec3> = source.positions.iter().map(|&p| frame.to_metres(p)).collect();
+        let used = source.used_vertices();
+        let (place, mut coincident) = same_place(&positions, &used);
+        let mesh_vertex = if options.weld { place.clone() } else { (0..positions.len() as u32).collect() };
+        let (name, faces) = (file.display().to_string(), source.faces.len());
+        let report = MeshReport { file: name, frame, faces, repairs, ..MeshReport::default() };
+        let mesh = TriMesh::new(positions, Vec::new());
+        let mut imported = Self { mesh, report, source, texture: Vec::new(), face: Vec::new(), mesh_vertex };
 
-fn used_positions(contents: &ObjContents, faces: &[Face]) -> Vec<DVec3> {
-    let used = used(contents.positions.len(), faces, &contents.corners);
-    contents.positions.iter().zip(used).filter(|&(_, used)| used).map(|(&p, _)| p).collect()
-}
+        let [quads, larger, degenerate] = imported.triangulate();
+        imported.repaired(quads + larger, Repair::PolygonsCut { quads, larger });
+        if options.weld {
+            let vertices = std::mem::take(&mut coincident);
+            imported.repaired(vertices, Repair::Welded { vertices });
+        }
+        imported.repaired(degenerate, Repair::DegenerateDropped { triangles: degenerate });
+        let triangles = imported.keep(&first_triangles(&imported.mesh.triangles));
+        imported.repaired(triangles, Repair::DuplicatesDropped { triangles });
+        if coincident > 0
+            && let Some(found) = duplicate_parts(&imported.mesh.triangles, &imported.face, &place)
+        {
+            coincident -= found.stand_in.len();
+            found.stand_in.iter().for_each(|(&v, &kept)| imported.mesh_vertex[v as usize] = kept);
+            let triangles = imported.keep(&found.keep);
+            imported.repaired(triangles, Repair::DuplicatePartsDropped { parts: found.parts, triangles });
+        }
+        if imported.face.is_empty() {
+            return Err(empty(&imported.source, imported.source.faces.len()));
+        }
+        let vertices = used.iter().filter(|&&used| !used).count();
+        imported.repaired(vertices, Repair::UnusedDropped { vertices });
+        imported.drop_unused_vertices();
+        (imported.mesh.groups, imported.mesh.triangle_group) = imported.source.groups(&imported.face);
+        imported.report.groups = imported.mesh.groups.len();
+        let count = imported.source.small_faces;
+        imported.remark(count, Remark::SmallFaces { count });
+        if let Some((line, text)) = imported.source.first_unknown.take() {
+            imported.report.remarks.push(Remark::UnknownLines { count: imported.source.unknown, line, text });
+        }
 
-fn build(
-    file: &Path,
-    contents: ObjContents,
-    faces: Vec<Face>,
-    frame: Frame,
-    options: &ImportOptions,
-) -> Result<Imported, MeshError> {
-    let placed: Vec<DVec3> = contents.positions.iter().map(|&p| frame.to_metres(p)).collect();
-    let mut repairs = Vec::new();
-    let mut remarks = Vec::new();
-    if let Some(name) = &options.group {
-        repairs.push(Repair::GroupChosen { name: name.clone(), left_out: contents.faces.len() - faces.len() });
+        let (turned, patches) = winding::agree(&imported.mesh);
+        turned.iter().for_each(|&t| imported.turn(t));
+        imported.repaired(turned.len(), Repair::WindingTurned { triangles: turned.len() });
+        imported.remark(coincident, Remark::Coincident { vertices: coincident });
+        imported.remark(patches, Remark::OneSided { patches });
+        imported.report_topology();
+        Ok(imported)
     }
-    let cleaned = Cleaned::new(&placed, &contents.corners, &faces, options.weld, &mut repairs);
-    if cleaned.triangles.is_empty() {
-        let (file, vertices) = (file.to_owned(), contents.positions.len());
-        return Err(MeshError::Empty { file, vertices, faces: faces.len() });
-    }
-    let group: Vec<u32> = cleaned.face.iter().map(|&f| contents.group_of(&faces[f as usize])).collect();
-    let (groups, triangle_group) = named_groups(&group, &contents.names);
-    let texture = cleaned.corner.iter().map(|corners| {
-        let known = corners.map(|c| contents.corners[c as usize].texture);
-        known.iter().all(|&t| t != NONE).then(|| known.map(|t| contents.textures[t as usize]))
-    });
-    let texture: Vec<_> = texture.collect();
-    let mesh = TriMesh { positions: cleaned.positions, triangles: cleaned.triangles, groups, triangle_group };
-    if contents.small_faces > 0 {
-        remarks.push(Remark::SmallFaces { count: contents.small_faces });
-    }
-    if let Some((line, text)) = contents.first_unknown.clone() {
-        remarks.push(Remark::UnknownLines { count: contents.unknown, line, text });
-    }
-    let report = MeshReport {
-        file: file.display().to_string(),
-        frame: frame.clone(),
-        vertices: mesh.vertex_count(),
-        triangles: mesh.triangles.len(),
-        faces: faces.len(),
-        components: 0,
-        groups: mesh.groups.len(),
-        boundary_edges: 0,
-        boundary_loops: 0,
-        repairs,
-        remarks,
-    };
-    let source = ObjSource {
-        file: file.to_owned(),
-        frame,
-        corners: contents.corners,
-        faces,
-        statements: contents.statements,
-        positions: contents.positions,
-        textures: contents.textures,
-        mesh_vertex: cleaned.mesh_vertex,
-    };
-    let mut imported = Imported { mesh, report, source, texture, face: cleaned.face };
-    imported.make_agree(cleaned.coincident);
-    Ok(imported)
-}
 
-/// Names of the groups that have triangles, in the order of the file, and the index of each triangle's group.
-fn named_groups(group: &[u32], names: &[String]) -> (Vec<String>, Vec<u32>) {
-    let used = each_once(group.iter().copied());
-    if used == [NONE] {
-        return (Vec::new(), Vec::new());
+    /// Cuts the faces into triangles of different vertices; returns the numbers of quads, of larger polygons and of degenerate
+    /// triangles.
+    fn triangulate(&mut self) -> [usize; 3] {
+        let (mut quads, mut larger, mut degenerate) = (0, 0, 0);
+        for (number, face) in self.source.faces.iter().enumerate() {
+            quads += usize::from(face.count == 4);
+            larger += usize::from(face.count > 4);
+            // Consecutive equal corners are one corner of the outline.
+            let mut outline = self.source.corners_of(face).to_vec();
+            let vertex = |corner: &Corner| self.mesh_vertex[corner.vertex as usize];
+            outline.dedup_by_key(|corner| vertex(corner));
+            while outline.len() > 1 && vertex(&outline[0]) == vertex(&outline[outline.len() - 1]) {
+                outline.pop();
+            }
+            degenerate += (face.count as usize - outline.len()).min(face.count as usize - 2);
+            let places: Vec<DVec3> = outline.iter().map(|c| self.mesh.positions[vertex(c) as usize]).collect();
+            for corners in polygon::triangulate(&places) {
+                let [a, b, c] = corners.map(|i| vertex(&outline[i]));
+                if a == b || b == c || c == a {
+                    degenerate += 1;
+                    continue;
+                }
+                self.mesh.triangles.push([a, b, c]);
+                self.face.push(number as u32);
+                let [a, b, c] = corners.map(|i| self.source.textures.get(outline[i].texture as usize).copied());
+                self.texture.push(a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]));
+            }
+        }
+        [quads, larger, degenerate]
     }
-    let name = |&g: &u32| names.get(g as usize).map_or(UNGROUPED, String::as_str).to_owned();
-    let place = |g: &u32| used.partition_point(|u| u < g) as u32;
-    (used.iter().map(name).collect(), group.iter().map(place).collect())
+
+    /// The file vertex, from 0, of each mesh vertex: the first of those welded into it.
+    #[must_use]
+    pub fn file_vertices(&self) -> Vec<u32> {
+        let mut file_vertices = vec![NONE; self.mesh.vertex_count()];
+        for (file_vertex, &v) in self.mesh_vertex.iter().enumerate().rev().filter(|(_, v)| **v != NONE) {
+            file_vertices[v as usize] = file_vertex as u32;
+        }
+        file_vertices
+    }
+
+    /// This mesh at the positions of `other`, a file of the same faces that holds the rest shape.
+    pub fn in_the_shape_of(&self, other: &Self) -> Result<TriMesh, MeshError> {
+        let (ours, theirs) = (&self.source, &other.source);
+        let differs =
+            |difference| MeshError::OtherTopology { file: theirs.file.clone(), other: ours.file.clone(), difference };
+        if ours.faces.len() != theirs.faces.len() {
+            return Err(differs(format!("{} faces, expected {}", theirs.faces.len(), ours.faces.len())));
+        }
+        let vertices = |source: &ObjSource, face| source.corners_of(face).iter().map(|c| c.vertex).collect::<Vec<_>>();
+        let mut pairs = ours.faces.iter().zip(&theirs.faces);
+        if let Some(i) = pairs.position(|(a, b)| vertices(ours, a) != vertices(theirs, b)) {
+            return Err(differs(format!("face {} has other vertices", i + 1)));
+        }
+        // The polygons agree. The triangles are those of `self`: another shape may cut its quads along other diagonals.
+        let place = |&v: &u32| other.mesh.positions.get(*other.mesh_vertex.get(v as usize)? as usize).copied();
+        let positions: Option<Vec<DVec3>> = self.file_vertices().iter().map(place).collect();
+        Ok(self.mesh.with_positions(positions.ok_or_else(|| differs("vertices are missing".to_owned()))?))
+    }
+
+    /// The mesh itself as rest shape. If `shut`, the triangles that bridge open seams get the size of the others.
+    pub(crate) fn own_rest(&mut self, shut: bool) -> RestShape {
+        let mut rest = RestShape::edges_of(&self.mesh);
+        if let Some(bridges) = Bridges::of(&self.mesh).filter(|_| shut) {
+            bridges.shut(&mut rest);
+            let Bridges { triangles, longest_m, usual_m } = bridges;
+            self.report.repairs.push(Repair::BridgesShut { triangles, longest_m, usual_m });
+        }
+        rest
+    }
+
+    /// Drops triangles (not all), the vertices that only they use, and the faces of which nothing is left.
+    pub(crate) fn drop_triangles(&mut self, drop: &[bool]) {
+        let Some(first) = drop.iter().position(|&drop| drop) else { return };
+        let first = self.file_face(first);
+        let mut left = vec![true; self.source.faces.len()];
+        self.face.iter().zip(drop).filter(|(_, drop)| **drop).for_each(|(&f, _)| left[f as usize] = false);
+        let triangles = self.keep(&drop.iter().map(|drop| !drop).collect::<Vec<_>>());
+        self.face.iter().for_each(|&f| left[f as usize] = true);
+        let number = renumbered(left.len(), |f| left[f]);
+        self.face.iter_mut().for_each(|f| *f = number[*f as usize]);
+        retain(&mut self.source.faces, |f| left[f]);
+        self.drop_unused_vertices();
+        self.report.repairs.push(Repair::NoAreaDropped { triangles, first });
+        self.report_topology();
+    }
+
+    /// Keeps the marked triangles and returns the number dropped.
+    fn keep(&mut self, keep: &[bool]) -> usize {
+        retain(&mut self.mesh.triangles, |t| keep[t]);
+        retain(&mut self.mesh.triangle_group, |t| keep[t]);
+        retain(&mut self.texture, |t| keep[t]);
+        retain(&mut self.face, |t| keep[t]);
+        keep.len() - self.face.len()
+    }
+
+    /// Drops the vertices that no triangle uses.
+    fn drop_unused_vertices(&mut self) {
+        let mut used = vec![false; self.mesh.vertex_count()];
+        self.mesh.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
+        let number = renumbered(used.len(), |v| used[v]);
+        retain(&mut self.mesh.positions, |v| used[v]);
+        self.mesh.triangles.as_flattened_mut().iter_mut().for_each(|v| *v = number[*v as usize]);
+        self.mesh_vertex.iter_mut().filter(|v| **v != NONE).for_each(|v| *v = number[*v as usize]);
+    }
+
+    /// Turns the triangles that face inward, which are whole connected parts.
+    pub fn turn_outward(&mut self, inward: &[bool]) {
+        let (component, count) = Topology::new(&self.mesh).components();
+        let mut turned = vec![false; count];
+        for t in (0..inward.len()).filter(|&t| inward[t]) {
+            turned[component[self.mesh.triangles[t][0] as usize] as usize] = true;
+            self.turn(t);
+        }
+        let components = turned.iter().filter(|&&turned| turned).count();
+        self.repaired(components, Repair::TurnedOutward { components });
+    }
+
+    /// Turns the connected parts that enclose a negative volume.
+    fn face_outward(&mut self) {
+        let (component, count) = Topology::new(&self.mesh).components();
+        let volumes = winding::signed_volumes(&self.mesh, &component, count);
+        let part = |triangle: &[u32; 3]| component[triangle[0] as usize] as usize;
+        let inward: Vec<bool> = self.mesh.triangles.iter().map(|triangle| volumes[part(triangle)] < 0.0).collect();
+        self.turn_outward(&inward);
+    }
+
+    /// Reverses one triangle and its texture coordinates.
+    fn turn(&mut self, t: usize) {
+        self.mesh.triangles[t].swap(1, 2);
+        if let Some(corners) = &mut self.texture[t] {
+            corners.swap(1, 2);
+        }
+    }
+
+    /// The file's face, from 1, of a triangle.
+    fn file_face(&self, triangle: usize) -> usize {
+        self.source.faces[self.face[triangle] as usize].number as usize + 1
+    }
+
+    /// Remarks on slivers of the rest shape, and on triangles of another size at rest than as worn.
+    pub(crate) fn remark_on(&mut self, rest: &RestShape) {
+        let triangles = rest.slivers();
+        self.remark(triangles, Remark::Slivers { triangles });
+        let at_rest = rest.corners.iter().map(|c| longest_side(c.map(|p| p.extend(0.0))));
+        let sizes = at_rest.enumerate().map(|(t, rest)| (t, rest, longest_side(self.mesh.corners(t))));
+        let off: Vec<(f64, usize, f64, f64)> = sizes
+            .map(|(t, rest, worn)| ((rest / worn).max(worn / rest), t, rest, worn))
+            .filter(|(ratio, ..)| *ratio > MAX_SIZE_RATIO)
+            .collect();
+        if let Some(&(_, t, rest_m, worn_m)) = off.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let (triangles, first) = (off.len(), self.file_face(t));
+            self.report.remarks.push(Remark::OtherThanWorn { triangles, first, rest_m, worn_m });
+        }
+    }
+
+    /// Counts vertices, triangles, parts and boundaries, and remarks on irregular edges, vertices and triangles.
+    fn report_topology(&mut self) {
+        let topology = Topology::new(&self.mesh);
+        let findings = Findings::new(&self.mesh, &topology);
+        let report = &mut self.report;
+        report.vertices = self.mesh.vertex_count();
+        report.triangles = self.mesh.triangles.len();
+        report.components = topology.components().1;
+        report.boundary_edges = topology.boundary_edges().count();
+        report.boundary_loops = topology.boundary_loops().len();
+        let is_of_topology =
+            |r: &Remark| matches!(r, Remark::NonManifold { .. } | Remark::Pinched { .. } | Remark::NoArea { .. });
+        report.remarks.retain(|remark| !is_of_topology(remark));
+        let Findings { non_manifold_edges: edges, pinched_vertices: vertices, no_area: triangles } = findings;
+        self.remark(edges, Remark::NonManifold { edges });
+        self.remark(vertices, Remark::Pinched { vertices });
+        self.remark(triangles, Remark::NoArea { triangles });
+    }
+
+    /// Reports a repair of `count` things, if there are any.
+    fn repaired(&mut self, count: usize, repair: Repair) {
+        if count > 0 {
+            self.report.repairs.push(repair);
+        }
+    }
+
+    /// Reports a remark on `count` things, if there are any.
+    fn remark(&mut self, count: usize, remark: Remark) {
+        if count > 0 {
+            self.report.remarks.push(remark);
+        }
+    }
 }

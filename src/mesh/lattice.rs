@@ -1,19 +1,20 @@
-//! A lattice of places over a triangle, to ask what vertices and edges do not tell.
+//! A lattice of sample points over a triangle, for contacts that vertices and edges miss.
 
 use glam::DVec3;
 
-/// Pieces that a side is cut into, least and most, and how long one is at least, m: a fingertip is twice as wide.
-const PIECES: [u32; 2] = [3, 12];
-const PIECE: f64 = 4e-3;
+/// Least and largest number of intervals of a side.
+const INTERVALS: [u32; 2] = [3, 12];
+/// Length of an interval, m: half the width of a fingertip.
+const INTERVAL: f64 = 4e-3;
 
-/// The shares of the corners at each place, of a triangle whose longest side is so long (m); the corners themselves are left out.
+/// Barycentric coordinates of the sample points of a triangle with this longest side (m), without the corners.
 pub(crate) fn lattice(longest_side: f64) -> impl Iterator<Item = [f64; 3]> {
-    let n = ((longest_side / PIECE).ceil() as u32).clamp(PIECES[0], PIECES[1]);
+    let n = ((longest_side / INTERVAL).ceil() as u32).clamp(INTERVALS[0], INTERVALS[1]);
     let all = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [i, j, n - i - j]));
     all.filter(move |at| !at.contains(&n)).map(move |at| at.map(|k| f64::from(k) / f64::from(n)))
 }
 
-/// The place of these corners with these shares, m.
+/// The point of a triangle with these barycentric coordinates, m.
 pub(crate) fn place([a, b, c]: [DVec3; 3], [s, t, u]: [f64; 3]) -> DVec3 {
     a * s + b * t + c * u
 }
@@ -23,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_all_of_a_triangle_but_its_corners() {
+    fn sample_points_cover_a_triangle_except_its_corners() {
         for (longest, count) in [(0.001, 7), (0.016, 12), (1.0, 88)] {
             let all: Vec<[f64; 3]> = lattice(longest).collect();
             assert_eq!(all.len(), count);

@@ -1,53 +1,41 @@
-//! Triangle meshes: what the body and the garment are made of.
+//! Triangle meshes, of which the body and the garment consist.
 //!
 //! Positions are metres, z up. Winding is counter-clockwise seen from outside (for a garment: from the side away from the
 //! body). Area of a triangle is half the norm of the cross product of two edges; a vertex owns a third of each of its
 //! triangles (barycentric area).
 
 pub mod bridges;
-mod cleanup;
 pub mod coarse;
-mod collapse;
 mod csr;
-mod decimate;
-mod dijkstra;
 mod duplicates;
 mod error;
 pub mod export;
 pub mod flat_pattern;
-pub(crate) mod flip;
 mod frame;
-mod frame_guess;
 pub mod glb;
 pub(crate) mod half_edge;
 pub mod health;
 pub mod import;
 pub(crate) mod lattice;
 pub(crate) mod morton;
-mod obj_lines;
 mod obj_source;
-mod orientation;
 pub(crate) mod polygon;
 pub(crate) mod remesh;
 pub mod report;
 pub mod rest;
-#[cfg(test)]
-pub(crate) mod samples;
 pub mod self_intersection;
 mod topology;
-pub(crate) mod triangle_crossing;
 pub(crate) mod winding;
 
 use glam::{DMat3, DVec3};
 
-pub(crate) use csr::Lists;
-pub(crate) use dijkstra::Flow;
-pub use error::{Keyword, LineProblem, MeshError};
+pub(crate) use csr::Csr;
+pub use error::MeshError;
 pub use frame::{Axis, Frame, Unit};
-pub use obj_lines::{Corner, Face};
-pub use obj_source::ObjSource;
+pub use obj_source::{Corner, Face, ObjSource};
 pub use remesh::Density;
 pub use rest::RestShape;
+pub(crate) use topology::Dijkstra;
 pub use topology::{NONE, Topology};
 
 /// An indexed triangle mesh with optional named groups of triangles.
@@ -57,7 +45,7 @@ pub struct TriMesh {
     pub positions: Vec<DVec3>,
     /// Vertex indices of each triangle, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Names of the groups (`hem`, `neckline`, ...); empty where there are none.
+    /// Names of the groups (`hem`, `neckline`, ...); empty without groups.
     pub groups: Vec<String>,
     /// Index into [`groups`](Self::groups) of each triangle; empty exactly where `groups` is.
     pub triangle_group: Vec<u32>,
@@ -108,7 +96,7 @@ impl TriMesh {
         areas
     }
 
-    /// Unit vertex normals, weighted by area; zero where every triangle at the vertex is degenerate or there is none.
+    /// Unit vertex normals, weighted by area; zero at a vertex without a triangle of positive area.
     #[must_use]
     pub fn vertex_normals(&self) -> Vec<DVec3> {
         let mut normals = vec![DVec3::ZERO; self.positions.len()];
@@ -124,7 +112,7 @@ impl TriMesh {
     /// Smallest and largest coordinate along each axis, m; `None` for a mesh without vertices.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        bounds(&self.positions)
+        (!self.positions.is_empty()).then(|| box_about(self.positions.iter().copied()))
     }
 
     /// The same triangles and groups at other positions.
@@ -135,45 +123,40 @@ impl TriMesh {
     }
 }
 
-/// Smallest and largest coordinate of some points along each axis; `None` for no points.
-fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    let first = *points.first()?;
-    Some(points.iter().fold((first, first), |(low, high), &p| (low.min(p), high.max(p))))
-}
-
 /// Lengths of the sides of a triangle, m: opposite the first corner, the second, the third.
 pub(crate) fn sides([a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [b.distance(c), c.distance(a), a.distance(b)]
 }
 
-/// The greatest of them, m.
+/// Length of the longest side of a triangle, m.
 pub(crate) fn longest_side(corners: [DVec3; 3]) -> f64 {
     sides(corners).into_iter().fold(0.0, f64::max)
 }
 
-/// Lower and upper corner of the box about some points, m; infinite and inside out for none.
+/// Lower and upper corner of the box around some points, m; for none, infinite with lower above upper.
 pub(crate) fn box_about(points: impl IntoIterator<Item = DVec3>) -> (DVec3, DVec3) {
     let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     points.into_iter().fold(none, |(low, high), p| (low.min(p), high.max(p)))
 }
 
-/// The connected pieces of what is alike among `count` things with these neighbours, by their first; each from there on, depth first.
+/// The connected components of `count` items, where neighbours are connected if `alike`. Components are in the order of their first
+/// item, and each lists its items depth first from there.
 pub(crate) fn pieces<'a>(
     count: usize,
     neighbours: impl Fn(usize) -> &'a [u32],
     alike: impl Fn(usize, usize) -> bool,
 ) -> Vec<Vec<u32>> {
-    let mut met = vec![false; count];
+    let mut visited = vec![false; count];
     let mut all = Vec::new();
     for seed in 0..count {
-        if std::mem::replace(&mut met[seed], true) {
+        if std::mem::replace(&mut visited[seed], true) {
             continue;
         }
         let (mut piece, mut open) = (Vec::new(), vec![seed as u32]);
         while let Some(one) = open.pop() {
             piece.push(one);
             let beside = neighbours(one as usize).iter().filter(|&&other| alike(seed, other as usize));
-            open.extend(beside.filter(|&&other| !std::mem::replace(&mut met[other as usize], true)));
+            open.extend(beside.filter(|&&other| !std::mem::replace(&mut visited[other as usize], true)));
         }
         all.push(piece);
     }
@@ -185,7 +168,7 @@ pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// Each of these once, ascending.
+/// The items without duplicates, ascending.
 pub(crate) fn each_once<T: Ord>(all: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut all: Vec<T> = all.into_iter().collect();
     all.sort_unstable();
@@ -193,14 +176,54 @@ pub(crate) fn each_once<T: Ord>(all: impl IntoIterator<Item = T>) -> Vec<T> {
     all
 }
 
-/// The new number of each of so many things when those that are not kept go; [`NONE`] for these.
+/// The new index of each of `count` items after those that are not kept are removed; [`NONE`] for these.
 pub(crate) fn renumbered(count: usize, keep: impl Fn(usize) -> bool) -> Vec<u32> {
     let mut next = 0..;
     (0..count).map(|i| if keep(i) { next.next().unwrap_or(NONE) } else { NONE }).collect()
 }
 
-/// Keeps the elements of a list whose places `keep` names.
+/// Keeps the elements of a list at the indices that `keep` accepts.
 pub(crate) fn retain<T>(list: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
     let mut place = 0..;
     list.retain(|_| place.next().is_some_and(&keep));
+}
+
+/// Meshes for tests.
+#[cfg(test)]
+pub(crate) mod samples {
+    use std::f64::consts::TAU;
+
+    use super::{DVec3, TriMesh};
+
+    /// A closed box, wound outward; triangles 2 and 3 are its top.
+    pub(crate) fn cuboid(low: DVec3, high: DVec3) -> TriMesh {
+        let corner = |i: usize| {
+            let of = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
+            DVec3::new(of(0, low.x, high.x), of(1, low.y, high.y), of(2, low.z, high.z))
+        };
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        TriMesh::new((0..8).map(corner).collect(), triangles)
+    }
+
+    /// A grid of squares, two triangles each. Vertices are numbered row by row; `at` places them by column and row.
+    pub(crate) fn sheet(columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+        squares(columns + 1, columns, rows, at)
+    }
+
+    /// A [`sheet`] whose sides are joined, open at both ends. `at` places vertices by angle and row; the outside is outward where
+    /// rows go up.
+    pub(crate) fn tube(around: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+        squares(around, around, rows, |i, j| at(TAU * i / f64::from(around), j))
+    }
+
+    fn squares(row: u32, columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {
+        let corners = (0..=rows).flat_map(|j| (0..row).map(move |i| (f64::from(i), f64::from(j))));
+        let square = |i: u32, j: u32| {
+            let [[a, b], [c, d]] = [j, j + 1].map(|j| [i, i + 1].map(|i| j * row + i % row));
+            [[a, b, d], [a, d, c]]
+        };
+        let triangles = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| square(i, j))).collect();
+        TriMesh::new(corners.map(|(i, j)| at(i, j)).collect(), triangles)
+    }
 }

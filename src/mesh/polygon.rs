@@ -2,7 +2,7 @@
 //!
 //! A quad is cut along the inner diagonal with the larger smallest angle. Larger polygons are cut by ear clipping, the best
 //! shaped ear first, in the plane of their Newell normal (Sutherland, Sproull, Schumacker: "A characterization of ten
-//! hidden-surface algorithms", 1974, section on planes). This is correct for concave polygons and takes up to O(n³) for n
+//! hidden-surface algorithms", 1974, section on planes). Ear clipping handles concave polygons and takes up to O(n³) for n
 //! corners, so polygons of more than [`MAX_EAR_CORNERS`] get a constrained Delaunay triangulation, O(n log n).
 //!
 //! The Delaunay triangulation chooses the same diagonals for the quads of the test bodies, but lists the triangles and

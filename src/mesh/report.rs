@@ -1,4 +1,4 @@
-//! What was found in a mesh file and what was repaired, for people and for machines.
+//! The report of an import: counts, repairs and remarks, as text and as JSON.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::frame::Frame;
 
-/// Something changed on the way in.
+/// A change made by the import.
 #[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 #[allow(missing_docs, reason = "the message says what each field is")]
@@ -14,7 +14,7 @@ pub enum Repair {
     /// Faces with more than three corners were cut.
     #[error("cut {quads} quads and {larger} larger polygons into triangles")]
     PolygonsCut { quads: usize, larger: usize },
-    /// Vertices at the same place were joined, as asked.
+    /// Vertices at the same place were welded on request.
     #[error("joined {vertices} vertices to another at the same place, as asked")]
     Welded { vertices: usize },
     /// Triangles that name a vertex twice were dropped.
@@ -26,11 +26,12 @@ pub enum Repair {
     /// Triangles of the same three vertices as an earlier one were dropped.
     #[error("dropped {triangles} triangles that were there already")]
     DuplicatesDropped { triangles: usize },
-    /// Connected parts that lie exactly on another were left out.
+    /// Connected parts that coincide with another were left out.
     #[error(
         "left out {parts} connected parts, {triangles} triangles, that lie exactly on another, as if they were there twice; an export moves them with it"
     )]
-    TwinsDropped { parts: usize, triangles: usize },
+    #[serde(rename = "twins_dropped")]
+    DuplicatePartsDropped { parts: usize, triangles: usize },
     /// Vertices that no face uses were dropped.
     #[error("dropped {vertices} vertices that no face uses")]
     UnusedDropped { vertices: usize },
@@ -55,12 +56,12 @@ pub enum Repair {
         1e2 * .farthest_m
     )]
     SeamsDrawnShut { longest_m: f64, steps: usize, farthest_m: f64 },
-    /// A group was chosen and the rest left out.
+    /// Faces outside the chosen group were left out.
     #[error("took group \"{name}\" and left {left_out} faces out")]
     GroupChosen { name: String, left_out: usize },
 }
 
-/// Something worth knowing that was left as it is.
+/// An irregularity that the import left unchanged.
 #[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 #[allow(missing_docs, reason = "the message says what each field is")]
@@ -89,7 +90,7 @@ pub enum Remark {
          were that high"
     )]
     Slivers { triangles: usize },
-    /// Triangles of another size at rest than as worn; `first` is the file's face, from 1, of the one that is farthest off.
+    /// Triangles of another size at rest than as worn; `first` is the file's face, from 1, of the one with the largest ratio.
     #[error(
         "{triangles} triangles are of another size at rest than as worn, the farthest off in face {first}: {rest_m:.3} m \
          long at rest, {worn_m:.3} m as worn; is the pattern torn there?"
@@ -109,12 +110,12 @@ pub enum Remark {
     UnknownLines { count: usize, line: usize, text: String },
 }
 
-/// What a mesh file holds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "named as they are; what is not plain is said")]
+/// The report of an imported mesh.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the names are the documentation")]
 pub struct MeshReport {
     pub file: String,
-    /// How its numbers were read.
+    /// Unit and axes of the file.
     pub frame: Frame,
     pub vertices: usize,
     pub triangles: usize,
@@ -126,9 +127,9 @@ pub struct MeshReport {
     pub boundary_edges: usize,
     /// Loops they form.
     pub boundary_loops: usize,
-    /// What was changed.
+    /// Changes made.
     pub repairs: Vec<Repair>,
-    /// What was left as it is.
+    /// Irregularities left unchanged.
     pub remarks: Vec<Remark>,
 }
 

@@ -1,4 +1,4 @@
-//! The rest shape of a garment: each triangle as it was cut from the cloth.
+//! The rest shape of a garment: the shape of each triangle when it was cut from the cloth.
 //!
 //! Strain is measured against it (design: own edges, a second mesh, or the pattern in the texture coordinates). Each
 //! triangle is kept by itself, in the plane of its cloth, since a garment as a whole does not lie flat: x runs along
@@ -20,14 +20,14 @@ use super::TriMesh;
 /// A triangle whose height is less than this share of its longest edge has no usable shape: with f64 corners its
 /// strain would be rounding noise.
 const FLAT: f64 = 1e-6;
-/// A triangle whose height is less than this share of its longest side is a sliver, and bears loads as if it were that high: under
-/// half a millimetre in meshes of 2 cm.
+/// A triangle whose height is less than this share of its longest side is a sliver, and bears loads as if it were that high: less
+/// than half a millimetre in a mesh of 2 cm.
 pub(crate) const SLIVER: f64 = 0.02;
 /// Texture coordinates are taken as metric if they hold between a quarter of and four times the area in space: cloth
 /// placed undraped is off by tens of percent, a 0-to-1 atlas by orders of magnitude.
 const METRIC_AREA_RATIO: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 
-/// Why a rest shape cannot be had.
+/// Errors of a rest shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum RestError {
@@ -67,7 +67,7 @@ pub enum RestError {
 pub struct RestShape {
     /// Corners of each triangle, in the order of the mesh's triangles and of their corners, m.
     pub corners: Vec<[DVec2; 3]>,
-    /// Which of the garment's fabrics each triangle is cut from, by number; empty where all are cut from the first.
+    /// Index of the fabric that each triangle is cut from; empty if all are cut from the first.
     pub cut_from: Vec<u16>,
 }
 
@@ -78,7 +78,7 @@ impl RestShape {
         Self { corners, cut_from: Vec::new() }
     }
 
-    /// The number of the fabric that a triangle is cut from.
+    /// Index of the fabric that a triangle is cut from.
     #[must_use]
     pub fn fabric_of(&self, triangle: usize) -> usize {
         self.cut_from.get(triangle).map_or(0, |&fabric| fabric.into())
@@ -89,7 +89,7 @@ impl RestShape {
         Self::edges_of(mesh).checked()
     }
 
-    /// [`from_edges`](Self::from_edges), triangles without area and all.
+    /// [`from_edges`](Self::from_edges) without the check for area.
     pub(crate) fn edges_of(mesh: &TriMesh) -> Self {
         Self::new((0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect())
     }
@@ -102,8 +102,7 @@ impl RestShape {
         if rest.vertex_count() != mesh.vertex_count() {
             return Err(RestError::Vertices { found: rest.vertex_count(), expected: mesh.vertex_count() });
         }
-        let pairs = mesh.triangles.iter().zip(&rest.triangles);
-        let same = pairs.take_while(|(a, b)| a == b).count();
+        let same = mesh.triangles.iter().zip(&rest.triangles).take_while(|(a, b)| a == b).count();
         if same < mesh.triangles.len().max(rest.triangles.len()) {
             return Err(RestError::Triangles { first: same });
         }
@@ -114,8 +113,8 @@ impl RestShape {
     /// `None` for a triangle without. `metres_per_unit` is the length of one unit of them, m.
     ///
     /// # Errors
-    /// [`RestError::NoTexture`], [`RestError::NoArea`], [`RestError::NotMetric`] where the pattern's area is nothing
-    /// like the garment's.
+    /// [`RestError::NoTexture`], [`RestError::NoArea`], [`RestError::NotMetric`] where the pattern's area is far
+    /// from the garment's.
     pub fn from_texture(
         mesh: &TriMesh,
         texture: &[Option<[DVec2; 3]>],
@@ -124,7 +123,7 @@ impl RestShape {
         Self::texture_of(mesh, texture, metres_per_unit)?.checked()
     }
 
-    /// [`from_texture`](Self::from_texture), triangles without area and all.
+    /// [`from_texture`](Self::from_texture) without the check for area.
     pub(crate) fn texture_of(
         mesh: &TriMesh,
         texture: &[Option<[DVec2; 3]>],
@@ -154,7 +153,7 @@ impl RestShape {
         self.corners.iter().map(|[a, b, c]| 0.5 * (b - a).perp_dot(c - a)).collect()
     }
 
-    /// Which triangles have no area.
+    /// Whether each triangle is without area.
     pub(crate) fn without_area(&self) -> Vec<bool> {
         let flat = |&[a, b, c]: &[DVec2; 3]| {
             let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
@@ -164,7 +163,7 @@ impl RestShape {
         self.corners.iter().map(flat).collect()
     }
 
-    /// How many triangles are slivers.
+    /// Number of slivers.
     pub(crate) fn slivers(&self) -> usize {
         self.corners.iter().filter(|corners| raised(**corners).0).count()
     }
@@ -178,7 +177,8 @@ impl RestShape {
     }
 }
 
-/// Whether a flat triangle is a sliver, and its corners: those of a sliver with its longest side along the weft, a fiftieth of it high.
+/// Whether a triangle is a sliver, and its corners; those of a sliver are raised to a fiftieth of its longest side, which lies along
+/// the weft.
 pub(crate) fn raised(rest: [DVec2; 3]) -> (bool, [DVec2; 3]) {
     let sides = [0, 1, 2].map(|i| rest[(i + 1) % 3].distance(rest[i]));
     let i = (0..3).fold(0, |longest, i| if sides[i] > sides[longest] { i } else { longest });

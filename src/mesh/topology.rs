@@ -1,12 +1,18 @@
-//! Edges, neighbours and boundary loops of a triangle mesh, in a deterministic order.
+//! Edges, neighbours, boundary loops and edge distances of a triangle mesh, in a deterministic order.
 //!
 //! Edges are sorted by (smaller vertex, larger vertex); neighbours are sorted by index; so everything that iterates over
 //! them sums in the same order on any number of threads.
 
-use super::csr::Lists;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use glam::DVec3;
+use ordered_float::OrderedFloat;
+
+use super::csr::Csr;
 use super::{TriMesh, pieces};
 
-/// None there: no triangle on that side of an edge, no further vertex in a list of fixed length, no parent in a tree.
+/// No index: no triangle on that side of an edge, no further vertex in a list of fixed length, no parent in a tree.
 pub const NONE: u32 = u32::MAX;
 
 /// The connectivity of a [`TriMesh`].
@@ -18,7 +24,7 @@ pub struct Topology {
     pub edge_triangles: Vec<[u32; 2]>,
     /// How many triangles share each edge: 1 boundary, 2 inside, more is non-manifold.
     pub edge_valence: Vec<u32>,
-    neighbours: Lists<u32>,
+    neighbours: Csr<u32>,
 }
 
 impl Topology {
@@ -28,7 +34,7 @@ impl Topology {
         Self::of(&mesh.triangles, mesh.vertex_count())
     }
 
-    /// The same of triangles over so many vertices.
+    /// The connectivity of triangles over a number of vertices.
     pub(crate) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
         let mut halves: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * triangles.len());
         for (t, &[a, b, c]) in triangles.iter().enumerate() {
@@ -54,7 +60,7 @@ impl Topology {
         // Edges come sorted by (a, b): first the smaller neighbours of each vertex, then the larger, each ascending.
         let edges = &topology.edges;
         let smaller = || edges.iter().map(|&[a, b]| (b, a));
-        topology.neighbours = Lists::gathered(vertices, || smaller().chain(edges.iter().map(|&[a, b]| (a, b))));
+        topology.neighbours = Csr::gathered(vertices, || smaller().chain(edges.iter().map(|&[a, b]| (a, b))));
         topology
     }
 
@@ -99,13 +105,13 @@ impl Topology {
     /// (more than two boundary edges) is walked through at its lowest unused edge.
     #[must_use]
     pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
-        let mut links: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();
+        let mut links: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for [a, b] in self.boundary_edges() {
             links.entry(a).or_default().push(b);
             links.entry(b).or_default().push(a);
         }
         let mut loops = Vec::new();
-        // Everything before the last start is used up: looked through once, not once a loop.
+        // All edges before the last start are used.
         let mut from = 0;
         while let Some(start) = links.range(from..).find(|(_, ends)| !ends.is_empty()).map(|(&start, _)| start) {
             from = start;
@@ -130,10 +136,61 @@ impl Topology {
     }
 }
 
+/// Dijkstra's algorithm along the edges of a mesh, its memory kept from run to run.
+pub(crate) struct Dijkstra<'a> {
+    pub(crate) topology: &'a Topology,
+    /// Positions of the vertices, m.
+    pub(crate) positions: &'a [DVec3],
+    /// Distance of each vertex from the nearest source, m; infinite if not reached.
+    pub(crate) distance: Vec<f64>,
+    /// The nearest source of each.
+    pub(crate) source: Vec<u32>,
+    /// The vertices reached, sources first.
+    pub(crate) reached: Vec<u32>,
+    heap: BinaryHeap<Reverse<(OrderedFloat<f64>, u32)>>,
+}
+
+impl<'a> Dijkstra<'a> {
+    pub(crate) fn new(topology: &'a Topology, positions: &'a [DVec3]) -> Self {
+        let n = positions.len();
+        let (distance, source) = (vec![f64::INFINITY; n], vec![0; n]);
+        Self { topology, positions, distance, source, reached: Vec::new(), heap: BinaryHeap::new() }
+    }
+
+    /// Computes the distances from `sources` over `allowed` vertices, below `limit`, m.
+    pub(crate) fn run(&mut self, sources: &[u32], limit: f64, allowed: impl Fn(u32) -> bool) {
+        for v in self.reached.drain(..) {
+            self.distance[v as usize] = f64::INFINITY;
+        }
+        for &v in sources {
+            self.distance[v as usize] = 0.0;
+            self.source[v as usize] = v;
+            self.reached.push(v);
+            self.heap.push(Reverse((OrderedFloat(0.0), v)));
+        }
+        while let Some(Reverse((OrderedFloat(d), v))) = self.heap.pop() {
+            if d > self.distance[v as usize] {
+                continue;
+            }
+            for &w in self.topology.neighbours(v) {
+                let there = d + self.positions[v as usize].distance(self.positions[w as usize]);
+                let before = self.distance[w as usize];
+                if there < limit && there < before && allowed(w) {
+                    if before == f64::INFINITY {
+                        self.reached.push(w);
+                    }
+                    self.distance[w as usize] = there;
+                    self.source[w as usize] = self.source[v as usize];
+                    self.heap.push(Reverse((OrderedFloat(there), w)));
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
 
     fn square() -> TriMesh {
         TriMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y], vec![[0, 1, 2], [0, 2, 3]])

@@ -1,8 +1,8 @@
-//! Which way round the triangles of a mesh run.
+//! The winding of triangles: agreement of neighbours and the outside of closed surfaces.
 //!
 //! Two neighbours agree if they run along their common edge in opposite directions. Each patch (triangles joined by edges
-//! of exactly two) is walked from its first triangle, every neighbour turned to agree; then the whole patch is turned
-//! back where that disturbs fewer triangles. A closed surface faces outward if its signed volume
+//! of exactly two) is traversed from its first triangle, every neighbour turned to agree; the whole patch is turned back if
+//! that turns fewer triangles. A closed surface faces outward if its signed volume
 //! V = ⅙ Σ a · (b × c) is positive.
 //!
 //! Limits: a one-sided patch (a Möbius strip) has no consistent winding: it is left as found and counted.
@@ -10,17 +10,8 @@
 use super::topology::{NONE, Topology};
 use super::{DVec3, TriMesh};
 
-/// What was turned.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Turned {
-    /// Triangles turned to agree with their neighbours.
-    pub to_agree: usize,
-    /// Patches that cannot agree.
-    pub one_sided: usize,
-}
-
-/// Which triangles must be turned so that neighbours agree, the fewest in each patch.
-pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Turned) {
+/// The triangles to turn so that neighbours agree, the fewest in each patch, and the number of one-sided patches.
+pub(super) fn agree(mesh: &TriMesh) -> (Vec<usize>, usize) {
     let topology = Topology::new(mesh);
     let n = mesh.triangles.len();
     let mut across = vec![[NONE; 3]; n];
@@ -35,10 +26,10 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Turned) {
         }
     }
     let mut turn = vec![false; n];
-    let mut met = vec![false; n];
-    let mut turned = Turned::default();
+    let mut visited = vec![false; n];
+    let mut one_sided = 0;
     for seed in 0..n {
-        if std::mem::replace(&mut met[seed], true) {
+        if std::mem::replace(&mut visited[seed], true) {
             continue;
         }
         let mut members = vec![seed];
@@ -53,7 +44,7 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Turned) {
                 let (a, b) = (mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
                 let same_direction = runs_along(mesh.triangles[other], a, b);
                 let wanted = turn[t] ^ same_direction;
-                if !std::mem::replace(&mut met[other], true) {
+                if !std::mem::replace(&mut visited[other], true) {
                     turn[other] = wanted;
                     members.push(other);
                 } else if turn[other] != wanted {
@@ -63,16 +54,13 @@ pub(super) fn agree(mesh: &TriMesh) -> (Vec<bool>, Turned) {
         }
         let count = members.iter().filter(|&&t| turn[t]).count();
         if !consistent {
-            turned.one_sided += 1;
+            one_sided += 1;
             members.iter().for_each(|&t| turn[t] = false);
         } else if 2 * count > members.len() {
-            turned.to_agree += members.len() - count;
             members.iter().for_each(|&t| turn[t] = !turn[t]);
-        } else {
-            turned.to_agree += count;
         }
     }
-    (turn, turned)
+    ((0..n).filter(|&t| turn[t]).collect(), one_sided)
 }
 
 /// Number of edges along which two triangles run in the same direction.
@@ -90,7 +78,7 @@ pub(super) fn disagreeing_edges(mesh: &TriMesh, topology: &Topology) -> usize {
 }
 
 /// Signed volume of each vertex-connected component about its own middle, m³; positive where it faces outward. For an
-/// open component, the volume of the cone from its middle, whose sign still tells the outside of a bowl.
+/// open component, the volume of the cone from its middle, whose sign still finds the outside of a bowl.
 pub(crate) fn signed_volumes(mesh: &TriMesh, component: &[u32], count: usize) -> Vec<f64> {
     let mut middle = vec![(DVec3::ZERO, 0.0); count];
     for (p, &c) in mesh.positions.iter().zip(component) {
@@ -126,14 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn the_odd_one_is_turned_and_volume_tells_the_outside() {
+    fn a_disagreeing_triangle_is_turned_and_the_volume_is_positive() {
         let mut mesh = tetrahedron();
         assert!((signed_volumes(&mesh, &[0; 4], 1)[0] - 1.0 / 6.0).abs() < 1e-15);
         mesh.triangles[2].reverse();
         assert_eq!(disagreeing_edges(&mesh, &Topology::new(&mesh)), 3);
-        let (turn, turned) = agree(&mesh);
-        assert_eq!(turn, [false, false, true, false]);
-        assert_eq!(turned, Turned { to_agree: 1, one_sided: 0 });
+        assert_eq!(agree(&mesh), (vec![2], 0));
     }
 
     #[test]
@@ -141,8 +127,6 @@ mod tests {
         // Five triangles around a ring, the last joined with a half turn (the five-vertex Möbius strip).
         let triangles: Vec<[u32; 3]> = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
         let positions = (0..5).map(|i| DVec3::new(f64::from(i), f64::from(i * i), f64::from(i * i * i))).collect();
-        let (turn, turned) = agree(&TriMesh::new(positions, triangles));
-        assert_eq!(turned, Turned { to_agree: 0, one_sided: 1 });
-        assert_eq!(turn, [false; 5]);
+        assert_eq!(agree(&TriMesh::new(positions, triangles)), (vec![], 1));
     }
 }

@@ -11,7 +11,7 @@
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::Lists;
+use crate::mesh::Csr;
 
 /// Rows of one parallel task. A heuristic.
 const CHUNK: usize = 512;
@@ -20,7 +20,7 @@ const CHUNK: usize = 512;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BlockRows {
     /// Columns of the blocks of each row.
-    pub(super) columns: Lists<u32>,
+    pub(super) columns: Csr<u32>,
     /// Index of each row's diagonal block.
     pub diagonal: Vec<u32>,
     /// The blocks.
@@ -35,7 +35,7 @@ impl BlockRows {
         all.extend(pairs.flat_map(|(i, j)| [u64::from(i) << 32 | u64::from(j), u64::from(j) << 32 | u64::from(i)]));
         all.par_sort_unstable();
         all.dedup();
-        let columns = Lists::gathered(rows, || all.iter().map(|&pair| ((pair >> 32) as u32, pair as u32)));
+        let columns = Csr::gathered(rows, || all.iter().map(|&pair| ((pair >> 32) as u32, pair as u32)));
         let mut matrix = Self { columns, diagonal: Vec::new(), blocks: vec![Mat3A::ZERO; all.len()] };
         matrix.diagonal = (0..rows as u32).filter_map(|i| matrix.at(i, i)).collect();
         matrix

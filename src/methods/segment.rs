@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use glam::{DMat3, DVec3};
 use ordered_float::OrderedFloat;
 
-use crate::mesh::{Flow, Lists, NONE, Topology, TriMesh, outer, pieces};
+use crate::mesh::{Csr, Dijkstra, NONE, Topology, TriMesh, outer, pieces};
 
 /// Bands from the highest vertex to the farthest. More bands resolve shorter limbs, and leave fewer triangles a ring. A heuristic.
 const BANDS: f64 = 56.0;
@@ -88,13 +88,13 @@ fn geodesics(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
     let mut distance = vec![f64::INFINITY; mesh.vertex_count()];
     let mut by_height: Vec<u32> = (0..mesh.vertex_count() as u32).collect();
     by_height.sort_by_key(|&v| (Reverse(OrderedFloat(mesh.positions[v as usize].z)), v));
-    let mut flow = Flow::new(topology, &mesh.positions);
+    let mut dijkstra = Dijkstra::new(topology, &mesh.positions);
     for start in by_height {
         if distance[start as usize].is_finite() || topology.neighbours(start).is_empty() {
             continue;
         }
-        flow.run(&[start], f64::INFINITY, |_| true);
-        flow.reached.iter().for_each(|&v| distance[v as usize] = flow.distance[v as usize]);
+        dijkstra.run(&[start], f64::INFINITY, |_| true);
+        dijkstra.reached.iter().for_each(|&v| distance[v as usize] = dijkstra.distance[v as usize]);
     }
     distance
 }
@@ -106,7 +106,7 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
         let inner = topology.edge_triangles.iter().zip(&topology.edge_valence);
         inner.filter(|(pair, valence)| **valence > 1 && pair[1] != NONE).map(|(pair, _)| *pair)
     };
-    let beside = Lists::gathered(n, || joined().flat_map(|[s, t]| [(s, t), (t, s)]));
+    let beside = Csr::gathered(n, || joined().flat_map(|[s, t]| [(s, t), (t, s)]));
     let areas = mesh.triangle_areas();
     let mut band = band.to_vec();
     // Noise takes the band of its neighbour; the next round makes it part of that ring.
@@ -145,7 +145,7 @@ fn rings(mesh: &TriMesh, topology: &Topology, band: &[usize]) -> (Vec<usize>, Ve
 }
 
 /// Connected pieces of bands.
-fn flood(beside: &Lists<u32>, band: &[usize], areas: &[f64]) -> (Vec<usize>, Vec<Ring>) {
+fn flood(beside: &Csr<u32>, band: &[usize], areas: &[f64]) -> (Vec<usize>, Vec<Ring>) {
     let mut ring_of = vec![0; band.len()];
     let mut rings: Vec<Ring> = Vec::new();
     for piece in pieces(band.len(), |t| beside.of(t), |t, s| band[t] == band[s]) {

@@ -23,13 +23,13 @@ use std::collections::BinaryHeap;
 
 use ordered_float::OrderedFloat;
 
-use crate::mesh::{Lists, RestShape, Topology, TriMesh};
+use crate::mesh::{Csr, RestShape, Topology, TriMesh};
 
 /// Squared lengths of every garment edge along weft and warp.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grain {
     /// l_u², l_v² from each vertex to its neighbours, in the order of [`Topology::neighbours`], m².
-    squares: Lists<[f64; 2]>,
+    squares: Csr<[f64; 2]>,
 }
 
 impl Grain {
@@ -37,7 +37,7 @@ impl Grain {
     #[must_use]
     pub fn new(mesh: &TriMesh, topology: &Topology, rest: &RestShape) -> Self {
         let of_edge: Vec<[f64; 2]> = (0..topology.edges.len()).map(|e| squares(mesh, topology, rest, e)).collect();
-        let mut squares = Lists::default();
+        let mut squares = Csr::default();
         for v in 0..mesh.vertex_count() as u32 {
             let edges = topology.neighbours(v).iter().filter_map(|&w| topology.edge_between(v, w));
             squares.push(edges.map(|e| of_edge[e]));
@@ -118,7 +118,7 @@ pub(crate) fn spread_seeds(
     mut enough: impl FnMut(f64, usize, &[u32]) -> bool,
 ) {
     // The edges inside the piece, by index in its list: neighbour and length, m.
-    let mut graph = Lists::default();
+    let mut graph = Csr::default();
     for &v in vertices {
         graph.push(ruler.neighbours(v).filter_map(|(w, length)| Some((local(w)?, length))));
     }
@@ -149,7 +149,7 @@ struct NearestSeed {
 
 impl NearestSeed {
     /// Puts a seed on a vertex; Dijkstra's algorithm over the vertices that are nearer to it than to any seed before.
-    fn add(&mut self, seed: usize, at: usize, graph: &Lists<(usize, f64)>) {
+    fn add(&mut self, seed: usize, at: usize, graph: &Csr<(usize, f64)>) {
         self.distance[at] = 0.0;
         self.seed_of_vertex[at] = seed as u32;
         self.parent[at] = usize::MAX;

@@ -374,7 +374,7 @@ impl SceneSpec {
     /// A garment mesh from a file.
     fn load_garment(&self, body: &Body, imported_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
         let beside = match (imported_body, body.mesh().bounds()) {
-            (Some(body), _) => Beside::File(body.frame()),
+            (Some(body), _) => Beside::File(&body.report.frame),
             (None, Some((low, high))) => Beside::Bounds(low, high),
             (None, None) => return Err(DistanceError::Empty.into()),
         };
@@ -415,7 +415,7 @@ impl SceneSpec {
             (how @ (REST_AUTO | "own"), _) => imported.own_rest(how == REST_AUTO),
             ("texture", _) => of_texture(1.0)?,
             (file, _) => {
-                let frame = imported.frame();
+                let frame = &imported.report.frame;
                 let options = ImportOptions {
                     unit: Some(frame.unit),
                     up: Some(frame.up),

@@ -144,7 +144,7 @@ fn a_closed_body_faces_outward_and_an_open_one_is_refused_unless_allowed() {
     let body = import_body(&path, &upright).unwrap();
     assert!(body.report.is_closed());
     assert!(body.report.repairs.contains(&Repair::TurnedOutward { components: 1 }));
-    assert_eq!(body.frame().unit, Unit::Dm);
+    assert_eq!(body.report.frame.unit, Unit::Dm);
     let (lo, hi) = body.mesh.bounds().unwrap();
     assert!((hi - lo - DVec3::new(0.4, 0.3, 1.7)).length() < 1e-12);
     let distance = partwise::body::distance::Body::new(&body.mesh).unwrap();
@@ -265,7 +265,7 @@ proptest! {
         sound.dedup();
         match import_garment(&path, &METRES, &Beside::File(&beside)) {
             Ok(imported) => {
-                let number = imported.source.file_vertices();
+                let number = imported.file_vertices();
                 for (p, &v) in imported.mesh.positions.iter().zip(&number) {
                     prop_assert_eq!(*p, positions[v as usize]);
                 }

@@ -24,7 +24,7 @@ fn degenerate_double_and_unused_parts_are_dropped_and_said() {
         assert!(imported.report.repairs.contains(&repair), "{repair:?} in {:?}", imported.report.repairs);
     }
     assert!(imported.report.remarks.contains(&Remark::SmallFaces { count: 1 }));
-    assert_eq!(imported.source.file_vertices(), [1, 2, 3, 4]);
+    assert_eq!(imported.file_vertices(), [1, 2, 3, 4]);
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn a_part_that_is_there_twice_is_taken_once_and_exported_as_one() {
     let text = format!("{SQUARE}f 1 2 3 4\nv 9 9 9\n{SQUARE}f -1 -2 -3 -4\n");
     let imported = read(&text);
     assert_eq!((imported.mesh.vertex_count(), imported.mesh.triangles.len(), imported.report.components), (4, 2, 1));
-    assert!(imported.report.repairs.contains(&Repair::TwinsDropped { parts: 1, triangles: 2 }));
+    assert!(imported.report.repairs.contains(&Repair::DuplicatePartsDropped { parts: 1, triangles: 2 }));
     assert!(imported.report.remarks.is_empty(), "{:?}", imported.report.remarks);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.obj");
@@ -67,7 +67,7 @@ fn nothing_is_welded_unless_asked() {
     let joined = read_with(&text, &ImportOptions { weld: true, ..METRES }).unwrap();
     assert_eq!((joined.report.components, joined.mesh.vertex_count()), (1, 4));
     assert!(joined.report.repairs.contains(&Repair::Welded { vertices: 2 }));
-    assert_eq!(joined.source.file_vertices(), [0, 1, 2, 3]);
+    assert_eq!(joined.file_vertices(), [0, 1, 2, 3]);
 }
 
 #[test]

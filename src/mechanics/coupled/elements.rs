@@ -7,7 +7,7 @@
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
 use crate::mechanics::energy::sparsity::Pattern;
-use crate::mesh::Lists;
+use crate::mesh::Csr;
 
 use super::motions::Motions;
 use super::weights::Weights;
@@ -25,11 +25,11 @@ pub(super) struct Elements {
     /// Which of all they are, and how many each stands for.
     pub(super) sampled: Vec<(u32, f64)>,
     /// PARTs of each, ascending.
-    pub(super) parts: Lists<u32>,
+    pub(super) parts: Csr<u32>,
     /// Their weights at its vertices, PART after PART.
-    pub(super) weights: Lists<f64>,
+    pub(super) weights: Csr<f64>,
     /// The pairs of its PARTs.
-    pub(super) pairs: Lists<Pair>,
+    pub(super) pairs: Csr<Pair>,
 }
 
 /// Two PARTs of an element, by their places in its list: rows of the later, columns of the earlier.
@@ -52,7 +52,7 @@ pub(super) struct Place {
 
 impl Elements {
     /// Of all elements, whose PARTs are given, those that are sampled; `vertices` are an element's.
-    fn sampled<'a>(weights: &Weights, count: usize, parts: &Lists<u32>, vertices: impl Fn(usize) -> &'a [u32]) -> Self {
+    fn sampled<'a>(weights: &Weights, count: usize, parts: &Csr<u32>, vertices: impl Fn(usize) -> &'a [u32]) -> Self {
         let mut e = Self { sampled: sample(count, parts), ..Self::default() };
         let weight = |p: u32, v: u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
         for &(i, _) in &e.sampled {
@@ -91,8 +91,8 @@ impl Elements {
 }
 
 /// PARTs of each element, ascending, from the vertices of each.
-fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Lists<u32> {
-    let (mut parts, mut own) = (Lists::default(), Vec::new());
+fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Csr<u32> {
+    let (mut parts, mut own) = (Csr::default(), Vec::new());
     for vertices in all {
         own.extend(vertices.iter().flat_map(|&v| weights.of(v as usize)).map(|w| w.0));
         own.sort_unstable();
@@ -103,7 +103,7 @@ fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> List
 }
 
 /// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each PART.
-fn sample(count: usize, parts: &Lists<u32>) -> Vec<(u32, f64)> {
+fn sample(count: usize, parts: &Csr<u32>) -> Vec<(u32, f64)> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut size = vec![0.0; count];
     for i in 0..parts.len() {
@@ -194,7 +194,7 @@ impl Layout {
 }
 
 /// Pairs of PARTs that share an element.
-fn pairs_of(parts: &Lists<u32>) -> Vec<[u32; 2]> {
+fn pairs_of(parts: &Csr<u32>) -> Vec<[u32; 2]> {
     let mut pairs: Vec<[u32; 2]> = Vec::new();
     let mut last: &[u32] = &[];
     for i in 0..parts.len() {

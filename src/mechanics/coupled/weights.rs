@@ -18,7 +18,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::mesh::{Flow, Lists, Topology};
+use crate::mesh::{Csr, Dijkstra, Topology};
 use crate::parts::{Parts, UNASSIGNED};
 
 /// Weights under this share are left out: they cost as much as any and move nothing.
@@ -26,7 +26,7 @@ const MIN_WEIGHT: f64 = 0.03;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Weights(Lists<(u32, f64)>);
+pub struct Weights(Csr<(u32, f64)>);
 
 impl Weights {
     /// Weights of every vertex; one of a piece of garment without any PART has none.
@@ -40,7 +40,10 @@ impl Weights {
         let bands: Vec<Vec<(u32, f64)>> = members
             .par_iter()
             .enumerate()
-            .map_init(|| Flow::new(topology, placed), |flow, (p, members)| band(flow, &owner, p as u32, members))
+            .map_init(
+                || Dijkstra::new(topology, placed),
+                |dijkstra, (p, members)| band(dijkstra, &owner, p as u32, members),
+            )
             .collect();
         let mut rows: Vec<Vec<(u32, f64)>> =
             owner.iter().map(|&p| if p == UNASSIGNED { Vec::new() } else { vec![(p, 1.0)] }).collect();
@@ -82,18 +85,18 @@ fn owners(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Vec<u32> {
     let mut owner = parts.part_of_vertex.clone();
     if parts.unassigned > 0 {
         let sources: Vec<u32> = (0..owner.len() as u32).filter(|&v| owner[v as usize] != UNASSIGNED).collect();
-        let mut flow = Flow::new(topology, placed);
-        flow.run(&sources, f64::INFINITY, |_| true);
-        for &v in &flow.reached {
-            owner[v as usize] = parts.part_of_vertex[flow.source[v as usize] as usize];
+        let mut dijkstra = Dijkstra::new(topology, placed);
+        dijkstra.run(&sources, f64::INFINITY, |_| true);
+        for &v in &dijkstra.reached {
+            owner[v as usize] = parts.part_of_vertex[dijkstra.source[v as usize] as usize];
         }
     }
     owner
 }
 
 /// Vertices outside PART p within its reach, and κ there.
-fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32, f64)> {
-    let (placed, topology) = (flow.placed, flow.topology);
+fn band(dijkstra: &mut Dijkstra<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32, f64)> {
+    let (placed, topology) = (dijkstra.positions, dijkstra.topology);
     let inside = |v: u32| owner[v as usize] == p;
     let across = |v: u32| topology.neighbours(v).iter().copied().filter(|&w| !inside(w));
     let seam: Vec<u32> = members.iter().copied().filter(|&v| across(v).next().is_some()).collect();
@@ -105,12 +108,12 @@ fn band(flow: &mut Flow<'_>, owner: &[u32], p: u32, members: &[u32]) -> Vec<(u32
     }
     // The seam runs half an edge beyond the PART's own vertices.
     let half = 0.5 * sum / count;
-    flow.run(&seam, f64::INFINITY, inside);
-    let reach = half + flow.reached.iter().map(|&v| flow.distance[v as usize]).fold(0.0, f64::max);
-    flow.run(&seam, reach + half, |v| !inside(v));
+    dijkstra.run(&seam, f64::INFINITY, inside);
+    let reach = half + dijkstra.reached.iter().map(|&v| dijkstra.distance[v as usize]).fold(0.0, f64::max);
+    dijkstra.run(&seam, reach + half, |v| !inside(v));
     let kernel = |v: u32| {
-        let t = (flow.distance[v as usize] - half).max(0.0) / reach;
+        let t = (dijkstra.distance[v as usize] - half).max(0.0) / reach;
         (!inside(v) && t < 1.0).then_some((v, (1.0 - t) * (1.0 - t)))
     };
-    flow.reached.iter().filter_map(|&v| kernel(v)).collect()
+    dijkstra.reached.iter().filter_map(|&v| kernel(v)).collect()
 }

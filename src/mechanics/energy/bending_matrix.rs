@@ -18,12 +18,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::base::simd::{Four, Lanes, Pack};
-use crate::mesh::Lists;
+use crate::mesh::Csr;
 
 /// The entries Q_ij with j < i, by row, two at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BendingMatrix {
-    rows: Lists<EntryPair>,
+    rows: Csr<EntryPair>,
     /// Q_ii, N/m: minus the sum of the other entries of the row.
     diagonal: Vec<f64>,
 }
@@ -43,7 +43,7 @@ fn gather<'a>(
     i: u32,
     elements: impl Iterator<Item = (&'a (&'a [u32], &'a [DVec3], DVec3), usize)>,
     row: &mut Vec<(u32, f64)>,
-    rows: &mut Lists<EntryPair>,
+    rows: &mut Csr<EntryPair>,
 ) {
     row.clear();
     for ((vertices, weights, stiffness), at) in elements {
@@ -71,14 +71,14 @@ impl BendingMatrix {
     /// Sums elements, each given by its vertices, weights and stiffness.
     pub(super) fn new(vertices: usize, elements: &[(&[u32], &[DVec3], DVec3)]) -> Self {
         // Elements of each vertex in their order, and the position of the vertex in them.
-        let of = Lists::gathered(vertices, || {
+        let of = Csr::gathered(vertices, || {
             let numbered = (0u32..).zip(elements);
             numbered.flat_map(|(e, element)| (0u32..).zip(element.0).map(move |(k, &v)| (v, (e, k))))
         });
         let numbers: Vec<usize> = (0..vertices).collect();
-        let chunks: Vec<Lists<EntryPair>> = (numbers.par_chunks(CHUNK))
+        let chunks: Vec<Csr<EntryPair>> = (numbers.par_chunks(CHUNK))
             .map(|chunk| {
-                let (mut rows, mut row) = (Lists::default(), Vec::new());
+                let (mut rows, mut row) = (Csr::default(), Vec::new());
                 for &i in chunk {
                     let own = of.of(i).iter().map(|&(e, k)| (&elements[e as usize], k as usize));
                     gather(i as u32, own, &mut row, &mut rows);

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 
-use crate::mesh::{Lists, box_about};
+use crate::mesh::{Csr, box_about};
 
 /// Largest set that is not dissected, in vertices: a separator of fewer costs as much as it saves.
 const MAX_LEAF: usize = 24;
@@ -24,15 +24,15 @@ const MIN_PARALLEL: usize = 1000;
 
 /// The neighbours of each vertex.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Adjacency(Lists<u32>);
+pub(crate) struct Adjacency(Csr<u32>);
 
 impl Adjacency {
     /// The adjacency of `count` vertices by these pairs, in any order, repeated or not; pairs of a vertex with itself are ignored.
     #[must_use]
     pub(crate) fn new<P: Iterator<Item = [u32; 2]>>(count: usize, pairs: impl Fn() -> P) -> Self {
         let both_ways = || pairs().filter(|[a, b]| a != b).flat_map(|[a, b]| [(a, b), (b, a)]);
-        let mut all = Lists::gathered(count, both_ways);
-        let mut kept = Lists::default();
+        let mut all = Csr::gathered(count, both_ways);
+        let mut kept = Csr::default();
         for v in 0..count {
             let list = all.of_mut(v);
             list.sort_unstable();

@@ -11,7 +11,7 @@
 //! The tree is cut into subtrees of about as much work each, and the top above them.
 
 use crate::mechanics::energy::sparsity::Pattern;
-use crate::mesh::{Lists, NONE, renumbered};
+use crate::mesh::{Csr, NONE, renumbered};
 
 /// Up to so many columns may be put together with that share of zeros.
 const MAX_ZEROS: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
@@ -37,13 +37,13 @@ pub(super) struct Supernode {
 }
 
 /// A pattern's upper half by rows: the columns before i that meet row i, and their blocks.
-pub(super) type Upper = Lists<(u32, u32)>;
+pub(super) type Upper = Csr<(u32, u32)>;
 
 /// Of a pattern; columns ascend.
 pub(super) fn upper(pattern: &Pattern) -> Upper {
     // The diagonal is no part of it.
     let below = |j: usize| pattern.column(j).skip(1).map(move |block| (pattern.rows[block], (j as u32, block as u32)));
-    Lists::gathered(pattern.unknowns(), || (0..pattern.unknowns()).flat_map(below))
+    Csr::gathered(pattern.unknowns(), || (0..pattern.unknowns()).flat_map(below))
 }
 
 /// Parent of each column, and how many rows its factor has below the diagonal.

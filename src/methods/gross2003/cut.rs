@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use super::pieces::{Piece, unfit};
 use crate::garment::sewing::laid_flat;
-use crate::mesh::{Lists, RestShape, Topology, TriMesh, each_once, pieces};
+use crate::mesh::{Csr, RestShape, Topology, TriMesh, each_once, pieces};
 use crate::methods::method::{MethodError, MethodInput};
 
 /// Smallest share of the garment's triangles in a piece; a smaller one joins its neighbour. A heuristic.
@@ -108,7 +108,7 @@ fn edge_pairs(topology: &Topology) -> impl Iterator<Item = [u32; 2]> + '_ {
 /// Connected sets of triangles of one label, ordered by their first triangle.
 fn components(label: &[usize], topology: &Topology) -> Vec<Vec<u32>> {
     let across = || edge_pairs(topology).flat_map(|[s, t]| [(s, t), (t, s)]);
-    let neighbours = Lists::gathered(label.len(), across);
+    let neighbours = Csr::gathered(label.len(), across);
     let mut all = pieces(label.len(), |t| neighbours.of(t), |s, t| label[s] == label[t]);
     all.iter_mut().for_each(|piece| piece.sort_unstable());
     all

@@ -33,7 +33,7 @@ use rayon::prelude::*;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::bending::bending_stiffness;
 use crate::mechanics::energy::membrane::Stiffness;
-use crate::mesh::Lists;
+use crate::mesh::Csr;
 use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::Operator;
 
@@ -68,10 +68,10 @@ pub struct Elements {
     constants: Constants,
     areas: Vec<f32>,
     /// The control vertices of each element.
-    vertices: Lists<(u32, Weights)>,
+    vertices: Csr<(u32, Weights)>,
     frames: Vec<Frame>,
     /// The elements of each vertex.
-    elements: Lists<(u32, Weights)>,
+    elements: Csr<(u32, Weights)>,
     strains: Vec<[f32; 3]>,
     forces: Vec<ElementForce>,
 }
@@ -93,9 +93,9 @@ impl Elements {
             shear: membrane.shear as f32,
             bending: bending_stiffness(fabric).to_array().map(|b| b as f32),
         };
-        let mut vertices = Lists::default();
+        let mut vertices = Csr::default();
         list.iter().for_each(|m| vertices.push(m.vertices.iter().copied()));
-        let elements = Lists::gathered(vertex_count, || {
+        let elements = Csr::gathered(vertex_count, || {
             let numbered = (0u32..).zip(list);
             numbered.flat_map(|(e, m)| m.vertices.iter().map(move |&(v, weights)| (v, (e, weights))))
         });

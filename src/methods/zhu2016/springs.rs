@@ -14,7 +14,7 @@
 use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::Lists;
+use crate::mesh::Csr;
 use crate::methods::implicit_euler::Elastic;
 use crate::methods::linear::{BlockRows, Operator};
 use crate::methods::method::MethodInput;
@@ -47,7 +47,7 @@ struct Limit {
 #[derive(Debug, Clone)]
 pub(crate) struct Springs {
     /// The springs of each vertex.
-    springs: Lists<HalfSpring>,
+    springs: Csr<HalfSpring>,
     limits: Vec<Limit>,
     matrix: BlockRows,
 }
@@ -81,7 +81,7 @@ impl Springs {
             let block = matrix.at(own, other).map_or(0, |k| k - row.start as u32);
             (own, HalfSpring { other, block, rest: rest as f32, stiffness: stiffness as f32 })
         };
-        let springs = Lists::gathered(cloth.vertex_count(), || springs.iter().flat_map(ends).map(half));
+        let springs = Csr::gathered(cloth.vertex_count(), || springs.iter().flat_map(ends).map(half));
         Self { springs, limits, matrix }
     }
 }

@@ -1,7 +1,7 @@
 //! Collision filter: rejects or cuts steps that would make the cloth intersect itself.
 //!
 //! At the end of a step from x to x', and at up to three points on the way of a long one, all intersecting pairs of triangles are found
-//! exactly (`mesh::triangle_crossing`). If a pair did not intersect at x, a long step is rejected, and the caller tries half of it. A short
+//! exactly (`mesh::self_intersection`). If a pair did not intersect at x, a long step is rejected, and the caller tries half of it. A short
 //! step is cut: the corners of intersecting triangles go back towards x, half the way each time, and after a few times all
 //! the way, together with their neighbours. Since x has no intersection, this terminates.
 //!
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::surface::Surface;
 use super::verlet_list::VerletList;
 use crate::mesh::each_once;
-use crate::mesh::triangle_crossing::cross;
+use crate::mesh::self_intersection::cross;
 
 /// Longest move of a step that is cut, in mean edges; a longer step is rejected, because cutting it would tear the cloth. Heuristic.
 const MAX_CUT_MOVE: f64 = 1.0;
