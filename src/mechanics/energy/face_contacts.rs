@@ -92,17 +92,17 @@ fn place_offset(thickness: &[f64], triangle: &Triangle) -> f64 {
 }
 
 /// A point inside a triangle that touches the body.
-pub(in crate::mechanics) struct TouchingPlace {
-    pub(in crate::mechanics) corners: [u32; 3],
+pub(crate) struct TouchingPlace {
+    pub(crate) corners: [u32; 3],
     /// Barycentric coordinates.
-    pub(in crate::mechanics) shares: [f64; 3],
+    pub(crate) shares: [f64; 3],
     /// Outward normal of the body.
-    pub(in crate::mechanics) normal: DVec3,
+    pub(crate) normal: DVec3,
 }
 
 /// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. The distance to the body is Lipschitz
 /// with constant one, so the distances of the corners exclude most points without a query.
-pub(in crate::mechanics) fn touching_places(
+pub(crate) fn touching_places(
     triangles: &[Triangle],
     thickness: &[f64],
     body: &Body,

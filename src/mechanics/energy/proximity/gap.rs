@@ -11,18 +11,18 @@ const VANISHED_SHARE: f64 = 1e-3;
 
 /// Identifies a gap across refreshes: the features it connects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::mechanics::energy) struct Key {
-    pub(in crate::mechanics::energy) kind: Kind,
+pub(crate) struct Key {
+    pub(crate) kind: Kind,
     /// The vertex and the corners of the opposite feature, the ends of both edges, or the ends of an edge and the corners of a triangle;
     /// [`NONE`] where there are fewer.
-    pub(in crate::mechanics::energy) vertices: [u32; 5],
+    pub(crate) vertices: [u32; 5],
     /// Number of the contact place within a triangle; [`NONE`] for a gap of the cloth with itself.
-    pub(in crate::mechanics::energy) place: u32,
+    pub(crate) place: u32,
 }
 
 /// The two features of a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::mechanics::energy) enum Kind {
+pub(crate) enum Kind {
     /// A vertex and a triangle, or an edge or a corner of one.
     Vertex,
     /// Two edges.
@@ -36,17 +36,17 @@ pub(in crate::mechanics::energy) enum Kind {
 /// A gap as of the last refresh; its places and its plane are constant until the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gap {
-    pub(in crate::mechanics::energy) key: Key,
+    pub(crate) key: Key,
     /// w of each vertex: they sum to zero.
     pub(super) weights: [f64; 5],
     /// The point of the body, m; zero for a gap of the cloth with itself.
-    pub(in crate::mechanics::energy) body: DVec3,
+    pub(crate) body: DVec3,
     /// n, from the second place to the first.
-    pub(in crate::mechanics) normal: DVec3,
+    pub(crate) normal: DVec3,
     /// h: distance along n that the two places keep, m.
     pub(super) goal: f64,
     /// κ A, N/m.
-    pub(in crate::mechanics) stiffness: f64,
+    pub(crate) stiffness: f64,
     /// Initial κ A, N/m.
     pub(super) first: f64,
     /// Whether the gap no longer exists and its stiffness falls to zero.
@@ -61,7 +61,7 @@ pub(crate) struct Gap {
 
 impl Gap {
     /// A gap without history; its plane is set by the caller.
-    pub(in crate::mechanics::energy) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
+    pub(crate) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
         let [body, normal, from, slip] = [DVec3::ZERO; 4];
         Self { key, weights, body, normal, goal, stiffness, first: stiffness, vanishing: false, from, slip, limit: 0.0 }
     }

@@ -5,7 +5,7 @@ use crate::mesh::{NONE, Topology};
 
 /// Topology and rest areas of a cloth.
 #[derive(Debug, Clone)]
-pub(in crate::mechanics::energy) struct Surface {
+pub(crate) struct Surface {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) topology: Topology,
     /// The corners opposite an edge in its first two triangles; [`NONE`] at the boundary.
@@ -27,7 +27,7 @@ pub(in crate::mechanics::energy) struct Surface {
 }
 
 impl Surface {
-    pub(in crate::mechanics::energy) fn new(triangles: &[Triangle], vertices: usize) -> Self {
+    pub(crate) fn new(triangles: &[Triangle], vertices: usize) -> Self {
         let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices).collect();
         let topology = Topology::of(&corners, vertices);
         let mut surface = Self {
