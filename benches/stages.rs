@@ -1,8 +1,8 @@
 //! Each stage of a drape by size: `cargo bench --no-default-features`. Compare two builds on one idle machine, as ratios.
 //!
-//! What is loaded and laid out beforehand is not timed. The garment is the built-in flared skirt in knit.
+//! Loading and placing are not timed. The garment is the built-in flared skirt in knit.
 
-#![allow(clippy::unwrap_used, reason = "a bench that fails has nothing to say")]
+#![allow(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
 
 use divan::{Bencher, black_box};
 use glam::DVec3;
@@ -35,14 +35,14 @@ fn cloth_of(job: &Job, Loaded { scene, .. }: &Loaded) -> Cloth {
     Cloth::new(&scene.garment, &scene.topology, &scene.rest, &job.settings.fabric, &scene.held).unwrap()
 }
 
-/// Stage one's first half: the body's nearest point to each vertex.
+/// First half of stage one: the closest point of the body to each vertex.
 #[divan::bench(args = SIZES)]
 fn closest_points(bencher: Bencher<'_, '_>, vertices: usize) {
     let (_, loaded) = job(vertices, Refine::Steps(0));
     bencher.bench(|| loaded.scene.body.nearest_all(black_box(&loaded.scene.garment.positions)));
 }
 
-/// The same by parry3d's own search, to compare.
+/// The same by parry3d's own search, for comparison.
 #[divan::bench(args = SIZES)]
 fn closest_points_by_parry(bencher: Bencher<'_, '_>, vertices: usize) {
     let (_, loaded) = job(vertices, Refine::Steps(0));
@@ -54,7 +54,7 @@ fn closest_points_by_parry(bencher: Bencher<'_, '_>, vertices: usize) {
     });
 }
 
-/// Its second half: levels to connected PARTs.
+/// Second half of stage one: levels to connected PARTs.
 #[divan::bench(args = SIZES)]
 fn stage_one(bencher: Bencher<'_, '_>, vertices: usize) {
     let (_, loaded) = job(vertices, Refine::Steps(0));
@@ -64,7 +64,7 @@ fn stage_one(bencher: Bencher<'_, '_>, vertices: usize) {
     bencher.bench(|| partwise::parts::segment(&loaded.scene.topology, black_box(&distance), &table));
 }
 
-/// What does not change while a garment settles, and the plan of its elimination.
+/// The constant part of the energy, and the symbolic factorisation.
 #[divan::bench(args = SIZES)]
 fn setting_up(bencher: Bencher<'_, '_>, vertices: usize) {
     let (job, loaded) = job(vertices, Refine::Steps(0));
@@ -74,14 +74,14 @@ fn setting_up(bencher: Bencher<'_, '_>, vertices: usize) {
     });
 }
 
-/// All of a preview by the PARTs of Table 3: distances, PARTs, their motion, the figures.
+/// A whole preview by the PARTs of Table 3.
 #[divan::bench(args = SIZES)]
 fn stage_two(bencher: Bencher<'_, '_>, vertices: usize) {
     let (job, loaded) = job(vertices, Refine::Steps(0));
     bencher.bench(|| job.drape(&loaded.scene, &mut unobserved).unwrap());
 }
 
-/// A Newton step's dear part: gradient, Hessian, factor, solution.
+/// The costly part of a Newton step: gradient, Hessian, factor, solution.
 #[divan::bench(args = SIZES)]
 fn newton_step(bencher: Bencher<'_, '_>, vertices: usize) {
     let (job, loaded) = job(vertices, Refine::Steps(0));
@@ -100,7 +100,7 @@ fn newton_step(bencher: Bencher<'_, '_>, vertices: usize) {
     });
 }
 
-/// All of a drape to rest.
+/// A whole drape to rest.
 #[divan::bench(args = [1000, 4000], sample_count = 5, sample_size = 1)]
 fn converged(bencher: Bencher<'_, '_>, vertices: usize) {
     let (job, loaded) = job(vertices, Refine::Converged);

@@ -1,7 +1,7 @@
 //! Drapes an OBJ garment over an OBJ body and writes it back with its own faces, groups and texture coordinates:
 //! `cargo run --release --no-default-features --example drape_obj -- me.obj shirt.obj draped.obj`
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example talks")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 
 use std::error::Error;
 

@@ -1,7 +1,7 @@
-//! Logs a drape into a Rerun stream of one's own, beside whatever else one logs there:
+//! Logs a drape into a Rerun stream of the application:
 //! `cargo run --release --example record_stream -- out.rrd`
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example talks")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 
 use std::error::Error;
 
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     recording.log("world/garment", &shape(&input.scene.garment))?;
     let draped = drape::drape(&input.scene, &Settings::default(), &mut |step| {
         recording.set_time_sequence("iteration", i64::try_from(step.iteration).unwrap_or(i64::MAX));
-        // A recording that cannot be written is told by the last line; a drape goes on without it.
+        // `flush_blocking` reports a failed recording; the drape goes on without it.
         let _ = recording.log("solver/residual_over_weight", &rerun::Scalars::single(step.residual_over_weight));
         std::ops::ControlFlow::Continue(())
     })?;
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A mesh of ours as one of Rerun's.
+/// Converts a mesh to Rerun's.
 fn shape(mesh: &TriMesh) -> Mesh3D {
     let single = |points: &[DVec3]| points.iter().map(|p| p.as_vec3().to_array()).collect::<Vec<_>>();
     Mesh3D::new(single(&mesh.positions))

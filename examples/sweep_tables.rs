@@ -1,7 +1,7 @@
-//! Drapes one garment by several range tables and tells what each costs and how far it is from the canonical drape:
+//! Drapes one garment by several range tables and prints the time and the error of each against the canonical drape:
 //! `cargo run --release --no-default-features --example sweep_tables`
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example talks")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 
 use std::error::Error;
 

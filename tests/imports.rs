@@ -89,7 +89,7 @@ fn words_after<'a>(code: &'a str, prefix: &str) -> Vec<&'a str> {
     words
 }
 
-/// What a source of `module` imports that comes after it, or that nobody listed.
+/// The imports in a source of `module` of later modules, or of unlisted ones.
 fn offences<'a>(order: &[String], module: &str, code: &'a str) -> Vec<&'a str> {
     let place = |name: &str| order.iter().position(|known| known == name);
     let own = place(module).unwrap_or_else(|| panic!("ARCHITECTURE.md does not list the module {module}"));
@@ -322,7 +322,7 @@ fn resolve(all: &BTreeMap<Vec<String>, Module>, at: &[String], path: &[String], 
     }
     let module = all.get(&current)?;
     let Some(item) = rest.first().filter(|_| depth < 8) else { return Some(module.file.clone()) };
-    for import in module.imports.iter().filter(|import| import.name == *item) {
+    if let Some(import) = module.imports.iter().find(|import| import.name == *item) {
         return resolve(all, &current, &import.path, depth + 1);
     }
     let defined = |code: &str| {

@@ -32,7 +32,6 @@ pub(crate) fn write(path: &Path, tag: &Tag, value: &impl Serialize) -> std::io::
 }
 
 /// The hash of `value`, used as a file name or key.
-#[must_use]
 pub(crate) fn hash(tag: &Tag, value: &impl Serialize) -> blake3::Hash {
     // Plain data of known length is serialised to memory, which cannot fail.
     let bytes = postcard::to_extend(value, tag.to_vec()).unwrap_or_else(|e| unreachable!("{e}"));
@@ -40,7 +39,6 @@ pub(crate) fn hash(tag: &Tag, value: &impl Serialize) -> blake3::Hash {
 }
 
 /// The value, if tag and hash match.
-#[must_use]
 pub(crate) fn decode<T: DeserializeOwned>(tag: &Tag, bytes: &[u8]) -> Option<T> {
     let (content, hash) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>()?;
     let value = content.strip_prefix(tag).filter(|_| blake3::hash(content).as_bytes() == hash)?;
@@ -48,7 +46,6 @@ pub(crate) fn decode<T: DeserializeOwned>(tag: &Tag, bytes: &[u8]) -> Option<T> 
 }
 
 /// The first field of a value, read from the first bytes alone; the hash is not verified.
-#[must_use]
 pub(crate) fn first_field<T: DeserializeOwned>(tag: &Tag, head: &[u8]) -> Option<T> {
     Some(postcard::take_from_bytes(head.strip_prefix(tag)?).ok()?.0)
 }

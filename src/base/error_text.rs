@@ -27,7 +27,6 @@ pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
 }
 
 /// A text with control characters escaped and, above [`KEPT_BYTES`], its middle left out.
-#[must_use]
 pub(crate) fn short(text: &str) -> String {
     without_control(&shortened(text, KEPT_BYTES)).into_owned()
 }
@@ -42,7 +41,6 @@ pub(crate) fn shortened(text: &str, [start, end]: [usize; 2]) -> Cow<'_, str> {
 }
 
 /// A text with its control characters escaped, except newlines and tabs.
-#[must_use]
 pub(crate) fn without_control(text: &str) -> Cow<'_, str> {
     let harmful = |c: char| c.is_control() && c != '\n' && c != '\t';
     if !text.contains(harmful) {

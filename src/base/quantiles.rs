@@ -5,14 +5,12 @@
 use serde::Serialize;
 
 /// The smallest value such that at least `share` of all values do not exceed it (nearest rank); 0 for an empty list.
-#[must_use]
 pub(crate) fn nearest_rank(values: &[f64], share: f64) -> f64 {
     let rank = (share * values.len() as f64).ceil() as usize;
     sorted(values).get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 /// The quantile at `share` by linear interpolation; 0 for an empty list.
-#[must_use]
 pub(crate) fn interpolated(values: &[f64], share: f64) -> f64 {
     let sorted = sorted(values);
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
@@ -48,7 +46,6 @@ pub struct Percentiles {
 
 impl Percentiles {
     /// The percentiles of `values`; zeros for an empty list.
-    #[must_use]
     pub(crate) fn of(values: &[f64]) -> Self {
         let sorted = sorted(values);
         let last = sorted.len().saturating_sub(1);
@@ -57,7 +54,6 @@ impl Percentiles {
     }
 
     /// A phrase for a report, each value times `scale` with `digits` decimals.
-    #[must_use]
     pub(crate) fn text(&self, scale: f64, digits: usize) -> String {
         let [min, p01, p05, p50, p95, max] =
             [self.min, self.p01, self.p05, self.p50, self.p95, self.max].map(|v| format!("{:.digits$}", v * scale));

@@ -4,7 +4,6 @@ use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 
 /// The variant of this name.
-#[must_use]
 pub(crate) fn parse<'a, T: Deserialize<'a>>(name: &'a str) -> Option<T> {
     T::deserialize(StrDeserializer::<Error>::new(name)).ok()
 }

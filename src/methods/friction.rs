@@ -3,7 +3,7 @@
 //! A touching vertex sticks or slips. One that sticks has an anchor a, where its contact began, and a spring to it:
 //! f = −μ_f N u/ε, u = (I − n nᵀ)(x − a), until |u| > ε. One that slips is braked against its displacement d in the step:
 //! f = −μ_f N d/|d|. The denominator is the length of the step before, so that the step stays linear; the force never pulls the vertex
-//! back, whatever the step. Below [`STICK_DISPLACEMENT`] it sticks again, with the anchor where the spring's force equals the
+//! back, in steps of any length. Below [`STICK_DISPLACEMENT`] it sticks again, with the anchor where the spring's force equals the
 //! braking force.
 //!
 //! The friction of this project's statics ([`energy::friction`](crate::mechanics::energy::friction)) pulls a slipping vertex with
@@ -58,7 +58,6 @@ pub(crate) struct Friction {
 
 impl Friction {
     /// Friction with this coefficient and no contact yet.
-    #[must_use]
     pub(crate) fn new(coefficient: f64) -> Self {
         Self { coefficient, vertices: Vec::new() }
     }

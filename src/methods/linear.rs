@@ -29,7 +29,6 @@ pub(crate) struct BlockRows {
 
 impl BlockRows {
     /// A zero matrix with blocks at `pairs` (in any order, repetitions allowed), their transposes and the diagonal.
-    #[must_use]
     pub(crate) fn new(rows: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let mut all: Vec<u64> = (0..rows as u64).map(|i| i << 32 | i).collect();
         all.extend(pairs.flat_map(|(i, j)| [u64::from(i) << 32 | u64::from(j), u64::from(j) << 32 | u64::from(i)]));
@@ -42,7 +41,6 @@ impl BlockRows {
     }
 
     /// Index of the block in row `i`, column `j`.
-    #[must_use]
     pub(crate) fn at(&self, i: u32, j: u32) -> Option<u32> {
         let found = self.columns.of(i as usize).binary_search(&j).ok();
         found.map(|k| (self.columns.range(i as usize).start + k) as u32)

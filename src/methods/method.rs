@@ -95,7 +95,7 @@ pub enum MethodError {
     Unfit {
         /// The method.
         method: &'static str,
-        /// What is missing.
+        /// The missing property.
         reason: String,
     },
     /// The cloth cannot be set up.
@@ -117,7 +117,7 @@ impl MethodError {
     }
 }
 
-/// A result, or why there is none.
+/// A result or an error.
 pub(crate) type MethodOutcome = Result<MethodDrape, MethodError>;
 
 /// A method that drapes a garment from its placed start to rest.

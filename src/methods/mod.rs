@@ -11,13 +11,13 @@
 //! our reading. Quantities that belong to no method are shared: the cloth's masses, areas and offset from the body, and the law of
 //! the contact forces. A method that cannot run on a scene returns a [`MethodError`]; none falls back to another.
 
-pub mod friction;
+mod friction;
 pub mod gross2003;
 pub mod implicit_euler;
 pub mod linear;
 mod method;
-pub mod segment;
-pub mod spring_list;
+mod segment;
+mod spring_list;
 pub mod thomaszewski2006;
 pub mod zhu2016;
 
@@ -29,7 +29,6 @@ pub(crate) const METHODS: [&str; 3] = [zhu2016::NAME, gross2003::NAME, thomaszew
 
 /// The method of this name with its defaults. `exhibit` requests its intermediate results; `sewn` holds the panels of a garment made
 /// from a sewing pattern.
-#[must_use]
 pub(crate) fn by_name(name: &str, exhibit: bool, sewn: Option<&SewnGarment>) -> Option<Box<dyn ReferenceMethod>> {
     match name {
         gross2003::NAME => Some(Box::new(gross2003::Gross2003 { exhibit, sewn: sewn.cloned(), ..Default::default() })),

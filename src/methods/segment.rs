@@ -52,7 +52,6 @@ impl Segments {
     }
 
     /// The units of any body; each component has its own.
-    #[must_use]
     pub(crate) fn new(mesh: &TriMesh, topology: &Topology) -> Self {
         let distance = geodesics(mesh, topology);
         let farthest = distance.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);

@@ -50,7 +50,6 @@ struct Edge {
 }
 
 /// Structural springs, one for each edge in the topology's order, and bending springs.
-#[must_use]
 pub(crate) fn springs(
     triangles: &[[u32; 3]],
     topology: &Topology,

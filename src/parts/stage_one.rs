@@ -23,7 +23,7 @@
 //!
 //! Source: Luo, Jiang, Cong, section 2.1; joining and cutting are ours. Limits: connectivity is by garment edges alone, so two layers
 //! that touch without sharing vertices stay apart; a table as fine as the distance noise yields many single-vertex PARTs, which are
-//! counted; a small PART that is a garment component of its own has no neighbour and stays. A path along edges is up to 15 % longer
+//! counted; a small PART that is a whole component of the garment has no neighbour and stays. A path along edges is up to 15 % longer
 //! than the geodesic on a regular triangulation, so pieces come out that much smaller than the extent, never larger. A non-positive
 //! extent makes every vertex a PART; an infinite one or NaN cuts nothing.
 

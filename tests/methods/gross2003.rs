@@ -1,4 +1,4 @@
-//! Pieces on developable surfaces: what bounds bounds, what is laid keeps its lengths, what is sewn comes to rest.
+//! Pieces on developable surfaces: surfaces bound the body, laid pieces keep their lengths, sewn garments come to rest.
 
 use std::path::Path;
 

@@ -158,15 +158,28 @@ fn whoever_is_ended_at_once_leaves_nothing_half_written() {
     }
 }
 
+/// Environment variable with the port of [`serve_as_a_viewer`].
+const VIEWER_PORT: &str = "PARTWISE_TEST_VIEWER_PORT";
+
+/// A process that accepts recordings as the viewer does, by Rerun's message proxy, until it is killed.
+#[test]
+#[ignore = "started by another test"]
+fn serve_as_a_viewer() {
+    let Ok(port) = std::env::var(VIEWER_PORT) else { return };
+    let builder = rerun::RecordingStreamBuilder::new("viewer");
+    let _server = builder.serve_grpc_opts("127.0.0.1", port.parse().unwrap(), rerun::ServerOptions::default()).unwrap();
+    loop {
+        std::thread::park();
+    }
+}
+
 #[test]
 fn a_session_is_shown_to_a_viewer_that_comes_late_and_to_one_that_comes_back() {
     let bench = Bench::new();
-    bench.drape(&["--save", "any.rrd"]).with(0, &[]);
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
-    // What serves a recording takes one as well.
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let viewer = || {
-        let mut command = bench.command();
-        command.args(["view", "any.rrd", "--port", "0", "--grpc-port", &port]);
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "waiting::serve_as_a_viewer", "--ignored"]).env(VIEWER_PORT, port.to_string());
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     };
     let mut command = bench.command();
@@ -186,19 +199,19 @@ fn a_session_is_shown_to_a_viewer_that_comes_late_and_to_one_that_comes_back() {
     };
     let heard = (|| {
         until("a viewer that is there later sees it")?;
-        let mut there = viewer();
+        let mut first = viewer();
         let came = until("a viewer is there");
-        there.kill().unwrap();
-        there.wait().unwrap();
+        first.kill().unwrap();
+        first.wait().unwrap();
         came?;
-        // Nothing is edited: that nobody is there any more is found out all the same.
+        // The loss is noticed without an edit.
         until("a viewer that is there later sees it")?;
-        let mut again = viewer();
+        let mut second = viewer();
         let came = until("a viewer is there");
         let _ = Command::new("kill").args(["-INT", &session.id().to_string()]).status().unwrap();
         let kept = until("recording: kept.rrd");
-        again.kill().unwrap();
-        again.wait().unwrap();
+        second.kill().unwrap();
+        second.wait().unwrap();
         came.and(kept)
     })();
     let _ = session.kill();

@@ -1,5 +1,5 @@
-//! Whole runs of the program on mutated files and command lines: whatever it is given, it ends, in bounded time and memory, with an
-//! exit code that says whose fault it is and words that say what to do.
+//! Whole runs of the program on mutated files and command lines: every run ends in bounded time and memory, with a documented
+//! exit code and, if it fails, an error message.
 //!
 //! `PARTWISE_FUZZ_RUNS` sets how many runs there are; without it a minute's worth. What shows something wrong is kept with its
 //! files and command line under `target/whole-runs/`.
@@ -188,7 +188,7 @@ fn whatever_it_is_given_it_ends_well() {
             let _ = fs::remove_dir_all(seeds.folder.path().join(worker.to_string()));
             fs::create_dir_all(&folder).unwrap();
             let ended = judge(&case, &folder);
-            // A run asked for alone is kept whatever comes of it, to be looked at.
+            // A single run is always kept, for inspection.
             if let (Err(reason), _) | (Ok(reason), 1) = (ended.as_deref().map_err(String::as_str), runs) {
                 keep(&case, number, reason);
             }

@@ -72,7 +72,6 @@ impl Developable {
     }
 
     /// The surface with this taper (1/m) that bounds points given in the frame (m).
-    #[must_use]
     pub(crate) fn with_taper(
         local: &[DVec3],
         taper: f64,
@@ -141,7 +140,6 @@ impl Developable {
     }
 
     /// Ω at the radial projection of a point of the world.
-    #[must_use]
     pub(super) fn arc_at(&self, x: DVec3) -> f64 {
         let p = self.local(x).truncate();
         let (i, b) = self.facet_at(if p.length_squared() > 0.0 { p } else { DVec2::X });
@@ -150,7 +148,6 @@ impl Developable {
 
     /// The radial projection of `x` on the surface unrolled from Ω = `origin` to both sides, m: to the right as
     /// seen from outside, and up the axis.
-    #[must_use]
     pub(crate) fn unrolled(&self, x: DVec3, origin: f64) -> DVec2 {
         let p = self.local(x);
         let whole = self.arcs[self.base.len()];
@@ -167,7 +164,6 @@ impl Developable {
     }
 
     /// The point of the world to which a flat point (m) is rolled.
-    #[must_use]
     pub(crate) fn rolled(&self, flat: DVec2, origin: f64) -> DVec3 {
         let n = self.base.len();
         let height = if self.taper == 0.0 { 0.0 } else { 1.0 / self.taper };
@@ -189,7 +185,6 @@ impl Developable {
     }
 
     /// The polygon at five heights and rulings of the surface as lines, m.
-    #[must_use]
     pub(crate) fn outline(&self) -> Vec<Vec<DVec3>> {
         let back = self.turn.transpose();
         let at = |b: DVec2, z: f64| self.origin + back * (b * (1.0 - self.taper * z)).extend(z);

@@ -33,7 +33,7 @@ const BOUNDED_SHARE: f64 = 0.1;
 pub struct Piece {
     /// Its name.
     pub name: String,
-    /// The garment's vertex of each of its own vertices.
+    /// The garment's vertex of each of the piece's vertices.
     pub vertices: Vec<u32>,
     /// Their flat positions, m.
     pub flat: Vec<DVec2>,
@@ -156,7 +156,7 @@ pub fn parts(input: &MethodInput<'_>, pieces: &[Piece]) -> Result<Vec<BodyPart>,
     let mut all = Vec::new();
     for (limb, of) in of_part.into_iter().enumerate().filter(|(_, of)| !of.is_empty()) {
         let own = shares(&mut of.iter().flat_map(|&p| pieces[p].vertices.iter().copied()));
-        // The trunk's surface does not bound a limb with pieces of its own.
+        // The trunk's surface does not bound a limb that has pieces.
         let bounded = |u: usize| u == limb || (own[u] > BOUNDED_SHARE && !(segments.is_limb[u] && taken[u]));
         let mut inside = vec![false; body.vertex_count()];
         for (triangle, &u) in body.triangles.iter().zip(&segments.of_triangle) {

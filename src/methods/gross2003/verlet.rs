@@ -55,7 +55,6 @@ pub(crate) struct Sheet<'b> {
 
 impl<'b> Sheet<'b> {
     /// Cloth at rest at `x` (m), with [`inverse_masses`] and structural and bending springs.
-    #[must_use]
     pub(crate) fn new(
         x: Vec<DVec3>,
         weights: Vec<f64>,
@@ -154,7 +153,6 @@ impl<'b> Sheet<'b> {
     }
 
     /// RMS speed of the free vertices, m/s.
-    #[must_use]
     pub(crate) fn rms_speed(&self) -> f64 {
         rms_speed(self.v.iter().zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(v, _)| v))
     }

@@ -117,7 +117,6 @@ impl Elements {
     }
 
     /// Number of elements.
-    #[must_use]
     pub(crate) fn count(&self) -> usize {
         self.areas.len()
     }

@@ -1,6 +1,6 @@
 //! The control vertices of a triangle of the limit surface and the weights of their derivatives at its centre.
 //!
-//! One step of Loop's subdivision around a triangle makes its middle child regular, whatever the valences of its
+//! One step of Loop's subdivision around a triangle makes its middle child regular for any valences of its
 //! corners: the child's corners are edge points. At the centre, the one quadrature point, Stam's evaluation therefore
 //! needs a single subdivision step and no eigenvectors: the twelve control vertices of the middle child as combinations
 //! of the garment's vertices, times the box spline's functions. On a regular patch the result equals that of
@@ -12,7 +12,7 @@
 //! + d).
 //!
 //! The twelve functions of a regular patch are quartic box splines. With the barycentric coordinates p, q, r of a triangle, twelve
-//! times the functions of its own corner p, of the vertex across the edge pq, and of the vertex beside p next to that one are the
+//! times the functions of the corner p, of the vertex across the edge pq, and of the vertex beside p next to that one are the
 //! polynomials [`CORNER`], [`ACROSS`] and [`BESIDE`]; the others follow by symmetry (Stam: "Evaluation of Loop subdivision surfaces",
 //! SIGGRAPH 1998 course notes; Loop: "Smooth subdivision surfaces based on triangles", 1987).
 

@@ -1,6 +1,6 @@
 //! The rest shape of a patch: a triangle and its neighbours, flattened around it.
 //!
-//! Each triangle of the garment has its rest shape in a frame of its own. Around each corner the triangles are flattened
+//! Each triangle of the garment has its rest shape in its own frame. Around each corner the triangles are flattened
 //! next to one another in both directions, starting from the middle triangle. Where the two directions meet, the two positions of a
 //! vertex (equal on developable cloth) are blended by the number of triangles on each side.
 //!

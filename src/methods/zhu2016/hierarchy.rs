@@ -120,13 +120,11 @@ impl Hierarchy {
     }
 
     /// Number of quadrics.
-    #[must_use]
     pub(super) fn slices(&self) -> usize {
         self.units.iter().flat_map(|u| &u.slices).flatten().count()
     }
 
     /// The quadrics as closed lines, m, each with the index of its unit.
-    #[must_use]
     pub(super) fn outlines(&self) -> Vec<(usize, Vec<DVec3>)> {
         let of = |(i, unit): (usize, &BodyUnit)| unit.outlines().into_iter().map(move |line| (i, line));
         self.units.iter().enumerate().flat_map(of).collect()

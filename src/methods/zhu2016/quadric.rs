@@ -35,7 +35,6 @@ pub(crate) struct Quadric {
 impl Quadric {
     /// ρ², which is 1 on the quadric.
     #[inline]
-    #[must_use]
     pub(crate) fn level(&self, p: DVec2) -> f64 {
         let q = p - self.centre;
         let (x, y) = (q.dot(self.axis) / self.half.x, self.axis.perp_dot(q) / self.half.y);
@@ -43,7 +42,6 @@ impl Quadric {
     }
 
     /// Fits points with weights; `round` for a cylinder. `None` for fewer than three points.
-    #[must_use]
     pub(crate) fn fit(points: &[(DVec2, f64)], round: bool) -> Option<Self> {
         let weight: f64 = points.iter().map(|p| p.1).sum();
         if points.len() < 3 || weight <= 0.0 {

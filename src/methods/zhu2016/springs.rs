@@ -54,7 +54,6 @@ pub(crate) struct Springs {
 
 impl Springs {
     /// Springs of the garment by its rest shape.
-    #[must_use]
     pub(crate) fn new(input: &MethodInput<'_>, strain_limit: f64) -> Self {
         let MethodInput { scene, fabric, cloth } = input;
         let [structural, bending] = springs(&scene.garment.triangles, &scene.topology, &scene.rest, fabric);

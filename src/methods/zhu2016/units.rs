@@ -51,7 +51,6 @@ pub(crate) struct BodyUnit {
 
 impl BodyUnit {
     /// The unit of these triangles of `mesh`, for cloth that touches within `offset` (m); `None` without triangles.
-    #[must_use]
     pub(crate) fn new(mesh: &TriMesh, triangles: &[u32], is_limb: bool, offset: f64) -> Option<Self> {
         let corners = |t: u32| mesh.corners(t as usize);
         let weighted: Vec<(DVec3, f64)> = triangles
@@ -125,21 +124,18 @@ impl BodyUnit {
 
     /// A point of the world in the unit's frame, m.
     #[inline]
-    #[must_use]
     pub(crate) fn local(&self, x: DVec3) -> DVec3 {
         self.turn * (x - self.origin)
     }
 
     /// The slice at this height of the unit's frame: |z| < h/2 in the frame of the slice.
     #[inline]
-    #[must_use]
     pub(crate) fn slice(&self, z: f64) -> Option<&Slice> {
         let k = (z - self.low) / self.height;
         if k >= 0.0 { self.slices.get(k as usize)?.as_ref() } else { None }
     }
 
     /// Each slice's quadric at both its ends, as closed lines in the world, m.
-    #[must_use]
     pub(crate) fn outlines(&self) -> Vec<Vec<DVec3>> {
         let back = self.turn.transpose();
         let mut lines = Vec::new();
@@ -158,7 +154,6 @@ impl BodyUnit {
 impl Slice {
     /// The range of the unit's leaves to test for a point of the slice's plane.
     #[inline]
-    #[must_use]
     pub(crate) fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
         let q = p - self.quadric.centre;
         let turns = q.y.atan2(q.x) / std::f64::consts::TAU;

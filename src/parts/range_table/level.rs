@@ -21,8 +21,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// A level without an extent of its own.
-    #[must_use]
+    /// A level without an extent.
     pub(crate) fn new(lower_cm: f64, upper_cm: f64) -> Self {
         Self { lower_cm, upper_cm, extent: None }
     }
@@ -69,13 +68,11 @@ impl Extent {
     }
 
     /// Whether a level with this extent is cut.
-    #[must_use]
     pub(crate) fn cuts(&self) -> bool {
         *self != Self::UNCUT
     }
 
     /// Factors for lengths along weft and warp after which the extent is the same along both, and that extent, m.
-    #[must_use]
     pub(crate) fn evened(&self) -> ([f64; 2], f64) {
         let Self { width_cm, height_cm } = *self;
         if width_cm == height_cm {
@@ -88,19 +85,16 @@ impl Extent {
     }
 
     /// The smaller width and the smaller height of two extents.
-    #[must_use]
     pub(super) fn min(self, other: Self) -> Self {
         Self { width_cm: self.width_cm.min(other.width_cm), height_cm: self.height_cm.min(other.height_cm) }
     }
 
     /// The extent as a row of a table lists it: one number where width and height are equal.
-    #[must_use]
     pub(super) fn numbers_cm(&self) -> Vec<f64> {
         if self.width_cm == self.height_cm { vec![self.width_cm] } else { vec![self.width_cm, self.height_cm] }
     }
 
     /// The extent in a column of a table: `12`, `6x24`, `inf`.
-    #[must_use]
     pub(crate) fn in_a_column(&self) -> String {
         self.numbers_cm().iter().map(f64::to_string).collect::<Vec<_>>().join("x")
     }

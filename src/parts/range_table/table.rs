@@ -62,14 +62,13 @@ impl RangeTable {
         Ok(self)
     }
 
-    /// Whether any level has an extent of its own.
+    /// Whether any level has an extent.
     #[must_use]
     pub fn has_extents(&self) -> bool {
         self.levels.iter().any(|l| l.extent.is_some())
     }
 
     /// The same table with its source.
-    #[must_use]
     pub(crate) fn with_source(mut self, source: impl Into<String>) -> Self {
         self.source = source.into();
         self
@@ -84,13 +83,11 @@ impl RangeTable {
     }
 
     /// The holes between rows, cm.
-    #[must_use]
     pub(crate) fn holes_cm(&self) -> Vec<[f64; 2]> {
         self.levels.windows(2).map(|w| [w[0].upper_cm, w[1].lower_cm]).filter(|[from, to]| from < to).collect()
     }
 
     /// The levels after the gap rule, ascending, without holes; PARTs number their level by this list.
-    #[must_use]
     pub(crate) fn effective_levels(&self) -> Vec<Level> {
         let mut out: Vec<Level> = Vec::with_capacity(self.levels.len() + 1);
         for level in &self.levels {
@@ -265,7 +262,6 @@ impl TableRule {
     }
 
     /// The same rule under another name.
-    #[must_use]
     pub(crate) fn named(mut self, new: impl Into<String>) -> Self {
         match &mut self {
             Self::Rows(RangeTable { name, .. }) | Self::Quantile { name, .. } => *name = new.into(),
