@@ -112,7 +112,7 @@ fn chains(mut points: Vec<DVec2>) -> [Vec<DVec2>; 2] {
 
 /// One curve in which a plane cuts a mesh, by the edges it crosses.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// The crossed edges in order, each with its end above the plane first, and the position of the crossing from there as a share
     /// of the edge.
     pub(crate) crossings: Vec<([u32; 2], f64)>,
