@@ -143,7 +143,13 @@ impl Session {
 
     /// Adds a result of state number `of`, if that is still the newest; drops it otherwise.
     pub(super) fn publish(&self, of: u64, add: impl FnOnce(&mut SessionState)) {
-        let done = self.change(|state| if state.snapshot.state == of { Ok(add(state)) } else { Err(()) });
+        let done = self.change(|state| {
+            if state.snapshot.state != of {
+                return Err(());
+            }
+            add(state);
+            Ok(())
+        });
         done.unwrap_or_default();
     }
 
