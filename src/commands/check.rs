@@ -1,15 +1,17 @@
-//! `partwise check`: the health of a body and a garment, and how they lie about each other, without draping; on request whether the
-//! garment, a draped one, is at rest.
+//! `partwise check`: mesh defects of a body and a garment and the fit of one on the other, without draping; optionally the
+//! certificate of a draped garment.
 
 use crate::mesh::health::{Health, health};
 use crate::scene::Placement;
 use crate::study::certificate::{Certificate, CertifyError, certify};
 use crate::{Scene, SceneSpec};
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 
-use super::run::Format;
-use super::{FabricArgs, InputArgs, UserError, certified, console};
+use super::console::{self, Format};
+use super::inputs::{FabricArgs, InputArgs};
+use super::runtime::UserError;
+use super::summary::{print_certificate, require_pass};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -22,55 +24,40 @@ pub(crate) struct CheckArgs {
     garment_file: Option<String>,
     #[command(flatten)]
     input: InputArgs,
-    /// Certify that this file, the garment after it was draped and exported, is at rest: forces, curvature, contact and strain, from
-    /// its positions alone, with rest shape and held edges of the garment as it was given; exit code 1 where a line fails
+    /// Certify that this file, an export of the draped garment, is in equilibrium: forces, curvature, contact and strain are computed
+    /// from its positions, with the rest shape and the held edges of the undraped garment; exit code 1 if a criterion fails
     #[arg(long, value_name = "DRAPED.obj", help_heading = "Certificate")]
     certificate: Option<String>,
     #[command(flatten, next_help_heading = "Certificate")]
-    cloth: FabricArgs,
-    /// What to print on stdout
+    fabric: FabricArgs,
+    /// Format of the result on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
 }
 
-#[derive(Serialize)]
-struct Report {
-    body: Health,
-    garment: Health,
-    fit: Placement,
-    notes: Vec<String>,
-    verdict: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    certificate: Option<Certificate>,
-}
-
-/// What of it all is in the way of a drape.
+/// The defects that affect a drape, in one sentence.
 fn verdict(body: &Health, garment: &Health, fit: &Placement) -> String {
-    let found = [
-        (usize::from(!body.closed), "an open body, whose inside goes by its normals alone"),
-        (body.self_intersecting_pairs, "pairs of body triangles that cross"),
-        (garment.non_manifold_edges, "garment edges of three triangles or more"),
+    let defects = [
+        (usize::from(!body.closed), "open body, whose normals alone separate inside from outside"),
+        (body.self_intersecting_pairs, "pairs of body triangles that intersect"),
+        (garment.non_manifold_edges, "garment edges with three triangles or more"),
         (garment.no_area, "garment triangles without area"),
         (
             garment.self_intersecting_pairs,
-            "pairs of garment triangles that cross, which a drape takes apart as far as it can",
+            "pairs of garment triangles that intersect; a drape separates them if it can",
         ),
-        (fit.penetrating_vertices, "garment vertices inside the body, which a drape pushes out first"),
-        (fit.crossing_pairs, "pairs of a garment and a body triangle that cross"),
+        (fit.penetrating_vertices, "garment vertices inside the body; a drape moves them out first"),
+        (fit.crossing_pairs, "pairs of a garment triangle and a body triangle that intersect"),
     ];
-    let found: Vec<String> =
-        found.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
-    if found.is_empty() {
-        "nothing is in the way of a drape".to_owned()
-    } else {
-        format!("look at {}", found.join("; "))
-    }
+    let found = defects.iter().filter(|(count, _)| *count > 0).map(|(count, defect)| format!("{count} {defect}"));
+    let found: Vec<String> = found.collect();
+    if found.is_empty() { "no defect affects a drape".to_owned() } else { format!("found {}", found.join("; ")) }
 }
 
-/// Connected parts that are listed, at most.
-const LISTED: usize = 12;
+/// Connected parts listed at most.
+const MAX_LISTED: usize = 12;
 
-/// The connected parts of a garment that has several, by the names that `--hold` takes.
+/// The connected parts of a garment that has several, by the names that `--hold` accepts.
 fn connected_parts(scene: &Scene) -> Vec<(String, String)> {
     let (part_of, count) = scene.topology.components();
     if count < 2 {
@@ -85,44 +72,45 @@ fn connected_parts(scene: &Scene) -> Vec<(String, String)> {
     let row = |(part, (vertices, low, high))| {
         (format!("  part {part} (--hold top:{part})"), format!("{vertices} vertices, {low:.2} to {high:.2} m high"))
     };
-    (1..).zip(parts).take(LISTED).map(row).collect()
+    (1..).zip(parts).take(MAX_LISTED).map(row).collect()
 }
 
 impl CheckArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
-        // As they came: what push-out would mend is a finding here.
-        let mut spec = SceneSpec { push_out: false, ..self.cloth.give(self.input.spec()?)? };
+        // Without push-out, which would hide penetrating vertices.
+        let mut spec = SceneSpec { push_out: false, ..self.fabric.assign(self.input.spec()?)? };
         spec.body = self.body_file.clone().unwrap_or(spec.body);
         spec.garment = self.garment_file.clone().unwrap_or(spec.garment);
         let loaded = self.input.load(&spec)?;
-        self.cloth.check_used(&loaded)?;
+        self.fabric.check_used(&loaded)?;
         let scene = &loaded.scene;
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
         let verdict = verdict(&body, &garment, &fit);
         let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, scene, draped)).transpose()?;
-        let report = Report { body, garment, fit, notes: loaded.notes(), verdict, certificate };
+        let (certificate, notes) = (certificate.as_ref(), loaded.notes());
         if self.format == Format::Json {
-            console::result(&crate::base::error_text::json(&report)?);
-            return certified::verified(report.certificate.as_ref());
+            let mut report =
+                json!({ "body": body, "garment": garment, "fit": fit, "notes": notes, "verdict": verdict });
+            if let Some(certificate) = certificate {
+                report["certificate"] = json!(certificate);
+            }
+            console::json(&report)?;
+            return require_pass(certificate);
         }
-        console::notes(&report.notes);
-        let mut table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], []);
-        for ((name, body), (_, garment)) in report.body.rows().into_iter().zip(report.garment.rows()) {
-            table.add_row([name.to_owned(), body, garment]);
-        }
-        for (name, value) in connected_parts(scene) {
-            table.add_row([name, String::new(), value]);
-        }
-        for (name, value) in report.fit.rows() {
-            table.add_row([name.to_owned(), String::new(), value]);
-        }
-        console::result(&format!("{table}\nverdict: {}", report.verdict));
-        certified::print(report.certificate.as_ref());
-        certified::verified(report.certificate.as_ref())
+        let meshes = body.rows().into_iter().zip(garment.rows());
+        let meshes = meshes.map(|((name, body), (_, garment))| [name.to_owned(), body, garment]);
+        let fit = fit.rows().into_iter().map(|(name, value)| (name.to_owned(), value));
+        let of_garment = connected_parts(scene).into_iter().chain(fit);
+        let rows = meshes.chain(of_garment.map(|(name, value)| [name, String::new(), value]));
+        let table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], [], rows);
+        console::result(&format!("{table}\nverdict: {verdict}"));
+        print_certificate(certificate);
+        console::notes(&notes);
+        require_pass(certificate)
     }
 
-    /// The certificate of a file whose vertices are those of the garment, in their order.
+    /// The certificate of a file with the vertices of the garment in the same order.
     fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
         let spec = SceneSpec {
             garment: draped.to_owned(),
@@ -134,8 +122,10 @@ impl CheckArgs {
             ..spec.clone()
         };
         let positions = self.input.load(&spec)?.scene.garment.positions;
-        certify(scene, &self.cloth.first()?, &positions).map_err(|error| match error {
-            CertifyError::Count { .. } | CertifyError::NotFinite { .. } => UserError::new(format!("{draped}: {error}")),
+        certify(scene, &self.fabric.first()?, &positions).map_err(|error| match error {
+            CertifyError::Count { .. } | CertifyError::NotFinite { .. } => {
+                UserError(format!("{draped}: {error}")).into()
+            }
             other => other.into(),
         })
     }

@@ -1,4 +1,4 @@
-//! What people read: results on stdout, everything else on stderr. The one place that prints.
+//! Terminal output: results on stdout, everything else on stderr. No other file prints.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -6,37 +6,48 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::base::error_text::{with_causes, without_control};
-use comfy_table::{CellAlignment, ContentArrangement, Row, Table};
+use crate::base::error_text::{self, with_causes, without_control};
+use clap::ValueEnum;
+use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Row, Table, Width};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Whether a result could not be printed.
+/// The format of a result on stdout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// Tables for people
+    Text,
+    /// One JSON object
+    Json,
+}
+
+/// The format of a result that consists of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RowFormat {
+    /// Tables for people
+    Text,
+    /// One JSON object
+    Json,
+    /// The rows as CSV
+    Csv,
+}
+
+/// Set when a result could not be printed.
 static UNPRINTED: AtomicBool = AtomicBool::new(false);
 
-/// A result, on stdout. A closed pipe (`| head`) is no error; any other failure is said, and ends the program with 1.
+/// Prints a result on stdout. A closed pipe (`| head`) is not an error; any other failure is reported, and the program exits with 1.
 pub(crate) fn result(text: &str) {
     let mut stdout = std::io::stdout().lock();
-    // Flushed here, as nobody hears of what fails when the program ends.
+    // Flushed here, because a failure of the flush at program exit is not reported.
     let printed = writeln!(stdout, "{}", without_control(text.trim_end_matches('\n'))).and_then(|()| stdout.flush());
     if let Err(error) = printed.or_else(|e| if e.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(e) }) {
         UNPRINTED.store(true, Ordering::SeqCst);
-        say(&paint("error: ", "31;1"), &format!("standard output: the result cannot be printed: {error}"));
+        report("error: ", "31;1", &format!("standard output: the result cannot be printed: {error}"));
     }
 }
 
-/// The looks of tables: with lines between the columns, or around all alone.
-pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
-
-/// A table that is no wider than the terminal: what does not fit goes on below. In a file its lines are as long as they are. Columns of
-/// numbers, ascending, are set to the right.
-pub(crate) fn table(look: &str, header: impl Into<Row>, numbers: impl IntoIterator<Item = usize>) -> Table {
-    let mut table = Table::new();
-    table.load_preset(look).set_content_arrangement(ContentArrangement::Dynamic).set_header(header);
-    for column in numbers {
-        let Some(column) = table.column_mut(column) else { break };
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+/// Prints a result as one line of JSON.
+pub(crate) fn json(value: &impl serde::Serialize) -> serde_json::Result<()> {
+    error_text::json(value).map(|text| result(&text))
 }
 
 /// Whether every result could be printed.
@@ -44,57 +55,83 @@ pub(crate) fn all_printed() -> bool {
     !UNPRINTED.load(Ordering::SeqCst)
 }
 
-/// Something worth knowing, on stderr.
-pub(crate) fn note(text: &str) {
-    say("", text);
+/// Styles of tables: a border alone, or lines between the columns as well.
+pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
+
+/// A table that fits the terminal where its longest words do: long cells are wrapped between words. In a file or a pipe the lines
+/// have their full length. The columns listed in `numbers`, ascending, are aligned right.
+pub(crate) fn table<R: Into<Row>>(
+    style: &str,
+    header: impl IntoIterator<Item: Into<Cell>>,
+    numbers: impl IntoIterator<Item = usize>,
+    rows: impl IntoIterator<Item = R>,
+) -> Table {
+    let mut table = Table::new();
+    table.load_preset(style).set_content_arrangement(ContentArrangement::Dynamic).set_header(header).add_rows(rows);
+    for column in numbers {
+        let Some(column) = table.column_mut(column) else { break };
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let mut longest_word = vec![0_u16; table.column_count()];
+    for row in table.header().into_iter().chain(table.row_iter()) {
+        for (longest, cell) in longest_word.iter_mut().zip(row.cell_iter()) {
+            let content = cell.content();
+            let words = content.split_whitespace().map(|word| word.chars().count() as u16);
+            *longest = words.fold(*longest, u16::max);
+        }
+    }
+    let narrow = table.width().is_some_and(|width| longest_word.iter().map(|n| n + 3).sum::<u16>() >= width);
+    for (column, longest) in table.column_iter_mut().zip(longest_word) {
+        let padding = if narrow { (0, 1) } else { (1, 1) };
+        let least = Width::Fixed(longest + padding.0 + padding.1);
+        column.set_padding(padding).set_constraint(ColumnConstraint::LowerBoundary(least));
+    }
+    table
 }
 
-/// Things worth knowing.
+/// Prints information on stderr.
+pub(crate) fn note(text: &str) {
+    report("", "", text);
+}
+
+/// Prints several notes.
 pub(crate) fn notes(texts: &[String]) {
     texts.iter().for_each(|text| note(text));
 }
 
-/// Writes to stderr; `mark` may hold colours, `text` may come from a file and may not.
-fn say(mark: &str, text: &str) {
-    // Where stderr is closed there is nobody left to tell.
-    let _ = writeln!(std::io::stderr().lock(), "{mark}{}", without_control(text));
-}
-
-/// Something to act upon, on stderr.
+/// Prints a warning on stderr: a problem that the user should act on.
 pub(crate) fn warning(text: &str) {
-    say(&paint("warning: ", "33;1"), text);
+    report("warning: ", "33;1", text);
 }
 
-/// Things to act upon.
+/// Prints several warnings.
 pub(crate) fn warnings(texts: &[String]) {
     texts.iter().for_each(|text| warning(text));
 }
 
-/// An error with its causes, on stderr.
+/// Prints an error with its causes on stderr.
 pub(crate) fn error(error: &anyhow::Error) {
-    say(&paint("error: ", "31;1"), &with_causes(error.as_ref(), "\n  because: "));
+    report("error: ", "31;1", &with_causes(error.as_ref(), "\n  because: "));
 }
 
-fn paint(text: &str, code: &str) -> String {
-    if std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
-        format!("\u{1b}[{code}m{text}\u{1b}[0m")
-    } else {
-        text.to_owned()
-    }
+/// Writes to stderr. The mark is coloured on a terminal; control characters in `text`, which may quote a file, are escaped.
+fn report(mark: &str, colour: &str, text: &str) {
+    let mut stderr = std::io::stderr().lock();
+    let coloured = !colour.is_empty() && stderr.is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let mark = if coloured { format!("\u{1b}[{colour}m{mark}\u{1b}[0m") } else { mark.to_owned() };
+    // A closed stderr leaves no channel to report on.
+    let _ = writeln!(stderr, "{mark}{}", without_control(text));
 }
 
-/// A progress bar that appears once the work has taken a while, on terminals only.
-pub(crate) fn progress(length: Option<u64>, what: &str) -> ProgressBar {
-    let bar = match length {
-        Some(n) => ProgressBar::new(n).with_style(style("{msg} {wide_bar} {pos}/{len}  {eta} left")),
-        None => ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}")),
+/// A progress bar, shown on terminals only; without `length` a spinner.
+pub(crate) fn progress(length: Option<u64>, title: &str) -> ProgressBar {
+    let (bar, template) = match length {
+        Some(n) => (ProgressBar::new(n), "{msg} {wide_bar} {pos}/{len}  {eta} left"),
+        None => (ProgressBar::new_spinner(), "{spinner} {msg}  {elapsed}"),
     };
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
-    bar.set_message(without_control(what).into_owned());
+    bar.set_message(without_control(title).into_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
-}
-
-fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

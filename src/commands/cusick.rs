@@ -1,4 +1,4 @@
-//! `partwise cusick`: the drape test of the fabrics, beside the published bands.
+//! `partwise cusick`: the simulated Cusick drape test of fabrics, compared with published ranges.
 
 use std::path::PathBuf;
 
@@ -9,19 +9,19 @@ use clap::Args;
 use super::console;
 use super::runtime::{check, write};
 
-/// Rows of a mesh beyond which a drape takes hours: 30,000 vertices.
-const MOST_ROWS: u64 = 100;
+/// Bound on the rows of the mesh; 100 rows are 30,000 vertices, and more take hours.
+const MAX_ROWS: u64 = 100;
 
 /// Arguments of `cusick`.
 #[derive(Debug, Args)]
 pub(crate) struct CusickArgs {
-    /// Fabrics to test: built-in names or TOML files [default: all that are built in]
+    /// Fabrics to test: built-in names or TOML files [default: all built-in fabrics]
     #[arg(value_name = "NAME|FILE")]
     fabrics: Vec<String>,
-    /// Rows of the mesh from the plates' edge to the rim, 4 to 100: 12 is half a centimetre
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(4..=MOST_ROWS))]
+    /// Rows of the mesh from the edge of the plate to the rim, 4 to 100; 12 rows have edges of half a centimetre
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(4..=MAX_ROWS))]
     rows: u64,
-    /// Write the results to this file as well, as CSV
+    /// Also write the results to this CSV file
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
 }
@@ -35,9 +35,8 @@ impl CusickArgs {
             [] => BUILT_IN.to_vec(),
             some => some.iter().map(String::as_str).collect(),
         };
-        // Before any of them is draped.
+        // Every name is checked before the first drape.
         names.iter().try_for_each(|name| Fabric::by_name(name).map(|_| ()))?;
-        // Seconds a fabric, and nothing is written before the last.
         let bar = console::progress(Some(names.len() as u64), "drape test");
         let mut csv = String::new();
         for name in names {
@@ -54,10 +53,9 @@ impl CusickArgs {
             write(path, &csv, "--csv")?;
         }
         let mut reader = csv::Reader::from_reader(csv.as_bytes());
-        let mut table = console::table(console::RULED, reader.headers()?.iter(), []);
-        for row in reader.records() {
-            table.add_row(row?.iter());
-        }
+        let header = reader.headers()?.clone();
+        let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>()?;
+        let table = console::table(console::RULED, &header, [], rows.iter().map(csv::StringRecord::iter));
         console::result(&table.to_string());
         Ok(())
     }

@@ -1,13 +1,18 @@
-//! Body and garment: the arguments shared by every command that needs them.
+//! Arguments for body, measurements, garment and fabric, shared by the commands that need a scene.
+
+use std::path::{Path, PathBuf};
 
 use crate::SceneSpec;
-use crate::base::files::has_ending;
+use crate::base::files::{has_ending, read_text};
+use crate::body::BodySpec;
 use crate::garment::MeshCache;
+use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
 use crate::mesh::{Axis, Unit};
-use crate::scene::{DistanceTo, Loaded, SceneError};
+use crate::scene::{CutError, DistanceTo, Loaded, SceneError};
+use anyhow::Context as _;
 use clap::Args;
 
-use super::MeasurementArgs;
+use super::runtime::refuse;
 
 /// Body and garment.
 #[derive(Debug, Clone, Args)]
@@ -16,27 +21,27 @@ pub(crate) struct InputArgs {
     /// Body: `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
-    /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress, long-sleeved-dress, any of them @VERTICES, a TOML
-    /// spec, an OBJ file, or a sewing pattern (JSON). Given several times, garments are worn over each other, inner to outer
+    /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress or long-sleeved-dress, each optionally with @VERTICES; a TOML
+    /// specification, an OBJ file, or a sewing pattern (JSON). Several garments are layered in the given order, innermost first
     #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
     garment: Vec<String>,
-    /// What distances count to where garments are worn over each other: the `body`, or what lies `below`, whichever is nearer
+    /// Distances of layered garments: to the `body`, or to the nearest surface `below`, body or garment
     #[arg(long, value_name = "body|below", default_value_t = SceneSpec::default().distance_to)]
     distance_to: DistanceTo,
-    /// Sew this pattern (JSON as GarmentCode writes it) and put it on the body, in place of --garment
+    /// Sewing pattern (JSON in the GarmentCode format) to sew around the body, in place of --garment
     #[arg(long, value_name = "FILE.json", conflicts_with = "garment", value_parser = pattern_file)]
     pattern: Option<String>,
-    /// TOML file that names the fabrics of a garment's panels, or groups: `default = "interlock"`, and under `[panels]` lines such as
-    /// `left_cuff = "denim"` or `"sleeve*" = "rib.toml"` (a file beside it) [default: NAME.fabrics.toml beside NAME.json or NAME.obj]
+    /// TOML file with a fabric for each panel or group: `default = "interlock"`, then under `[panels]` lines such as
+    /// `left_cuff = "denim"` or `"sleeve*" = "rib.toml"` (relative to this file) [default: NAME.fabrics.toml beside NAME.json or NAME.obj]
     #[arg(long, value_name = "FILE.toml")]
     fabrics: Option<String>,
-    /// Length of the edges that a pattern is meshed with
+    /// Edge length of the mesh of a sewing pattern
     #[arg(long, value_name = "CM", default_value_t = SceneSpec::default().edge_cm)]
     edge_length: f64,
-    /// Take one group or object of the body's file
+    /// Use only this group or object of the body's file
     #[arg(long, value_name = "GROUP")]
     body_group: Option<String>,
-    /// Take one group or object of the garment's file
+    /// Use only this group or object of the garment's file
     #[arg(long, value_name = "GROUP")]
     garment_group: Option<String>,
     /// Unit of the files: m, dm, cm, mm, in, ft [default: guessed from the body's height]
@@ -45,24 +50,24 @@ pub(crate) struct InputArgs {
     /// Up axis of the files: x, y, z [default: guessed from the body]
     #[arg(long, value_name = "AXIS")]
     up: Option<Axis>,
-    /// Accept a body that is not closed, and tell inside from outside by its normals
+    /// Accept a body mesh that is not closed; its normals then separate inside from outside
     #[arg(long)]
     open_body: bool,
-    /// Join garment and body vertices that lie at exactly the same place
+    /// Merge vertices of a mesh that have exactly the same position
     #[arg(long)]
     weld: bool,
-    /// Rest shape of the garment: `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`: the
-    /// texture coordinates where they are the flat pattern it was cut by, in whatever unit, else its own edges
+    /// Rest shape of the garment: its `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`:
+    /// the texture coordinates if they are the flat sewing pattern, in any unit, otherwise the garment's own edges
     #[arg(long, value_name = "auto|own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
     rest: String,
-    /// Hold edges of the garment where they are: `top` (its highest edge, a waistband, say), `top:2` (the highest of its second connected
-    /// part) or those that a group of its file lies on; several with commas [default: the waistband of a built-in skirt; of a file nothing]
+    /// Edges of the garment that stay fixed: `top` (its highest edge, such as a waistband), `top:2` (the highest edge of its second
+    /// connected part) or the edges of a group; several with commas [default: the waistband of a built-in skirt, otherwise nothing]
     #[arg(long, value_name = "top|top:N|GROUP")]
     hold: Option<String>,
-    /// Leave garment vertices that start inside the body where they are
+    /// Do not move garment vertices that start inside the body out of it
     #[arg(long)]
     no_push_out: bool,
-    /// Make the built-in form and garment anew instead of reading those made before from the user's cache folder
+    /// Generate the built-in form and garments instead of reading them from the user's cache folder
     #[arg(long)]
     no_cache: bool,
     #[command(flatten)]
@@ -70,7 +75,7 @@ pub(crate) struct InputArgs {
 }
 
 impl InputArgs {
-    /// What the flags ask for.
+    /// The scene that the arguments specify.
     pub(crate) fn spec(&self) -> anyhow::Result<SceneSpec> {
         Ok(SceneSpec {
             body: self.body.clone(),
@@ -93,24 +98,137 @@ impl InputArgs {
         })
     }
 
-    /// Where built-in meshes are kept.
+    /// The cache of built-in meshes.
     pub(crate) fn meshes(&self) -> MeshCache {
         if self.no_cache { MeshCache::default() } else { MeshCache::in_user_cache() }
     }
 
-    /// Loads a scene of these flags, saying where measurements that make no body were given.
+    /// Loads a scene. An error about measurements names the flags and the file that they came from.
     pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
         spec.load_with(&self.meshes()).map_err(|error| match error {
-            SceneError::Measurements(source) => anyhow::Error::new(source).context(self.measurements.place()),
+            SceneError::Measurements(source) => {
+                let flags = "--bust, --waist, --measure and similar flags";
+                let file = self.measurements.measurements.as_deref();
+                let place = file.map_or(flags.to_owned(), |file| format!("{}, or {flags}", file.display()));
+                anyhow::Error::new(source).context(place)
+            }
             other => other.into(),
         })
     }
 }
 
-/// By its ending a garment's file is known for what it is.
 fn pattern_file(name: &str) -> Result<String, String> {
     if has_ending(name.as_ref(), "json") {
         return Ok(name.to_owned());
     }
-    Err(format!("found `{name}`, expected a file that ends in `.json`; a mesh or a description is a --garment"))
+    Err(format!("found `{name}`, expected a file that ends in `.json`; use --garment for a mesh or a description"))
+}
+
+/// Measurements of the built-in dress form, in centimetres. The defaults are European size 38.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Dress form (centimetres; defaults are European size 38)")]
+pub(crate) struct MeasurementArgs {
+    /// TOML file of measurements; the flags below take precedence
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) measurements: Option<PathBuf>,
+    /// Height of the crown
+    #[arg(long, value_name = "CM")]
+    stature: Option<f64>,
+    /// Girth of the bust
+    #[arg(long, value_name = "CM")]
+    bust: Option<f64>,
+    /// Girth right below the bust
+    #[arg(long, value_name = "CM")]
+    underbust: Option<f64>,
+    /// Girth of the waist
+    #[arg(long, value_name = "CM")]
+    waist: Option<f64>,
+    /// Girth of the hip
+    #[arg(long, value_name = "CM")]
+    hip: Option<f64>,
+    /// Any other measurement by its name in the file, e.g. `--measure neck=33`
+    #[arg(long = "measure", value_name = "NAME=CM", value_parser = measurement)]
+    others: Vec<(String, f64)>,
+}
+
+fn measurement(text: &str) -> Result<(String, f64), String> {
+    let (name, cm) = text.split_once('=').ok_or("expected NAME=CM, e.g. neck=33")?;
+    let cm = cm.trim().parse().map_err(|_| format!("found `{cm}`, expected a number of centimetres"))?;
+    Ok((name.trim().to_owned(), cm))
+}
+
+impl MeasurementArgs {
+    /// The measurements of the file, overridden by the flags.
+    pub(crate) fn spec(&self) -> anyhow::Result<BodySpec> {
+        let mut spec = match &self.measurements {
+            None => BodySpec::default(),
+            Some(file) => BodySpec::from_toml(&read_text(file)?).with_context(|| format!("{}", file.display()))?,
+        };
+        let flags = [
+            ("stature", self.stature),
+            ("bust", self.bust),
+            ("underbust", self.underbust),
+            ("waist", self.waist),
+            ("hip", self.hip),
+        ];
+        let given = flags.into_iter().filter_map(|(name, cm)| Some((name, cm?)));
+        for (name, cm) in given.chain(self.others.iter().map(|(name, cm)| (name.as_str(), *cm))) {
+            spec = spec.with(name, cm)?;
+        }
+        Ok(spec)
+    }
+}
+
+/// The fabrics.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct FabricArgs {
+    /// Fabric: a built-in name or a TOML file. For layered garments one for all, or one for each --garment in the same order; use
+    /// --fabrics for the fabrics of single panels [default: interlock]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) fabric: Vec<String>,
+}
+
+impl FabricArgs {
+    /// The fabric of every panel that has no other.
+    pub(crate) fn first(&self) -> anyhow::Result<Fabric> {
+        Ok(Fabric::by_name(self.fabric.first().map_or(DEFAULT_FABRIC, String::as_str))?)
+    }
+
+    /// Refuses more than one fabric, for commands that use one.
+    pub(crate) fn check_single(&self, command: &str) -> anyhow::Result<()> {
+        match self.fabric.len() {
+            0 | 1 => Ok(()),
+            found => refuse!("{command}: found {found} times --fabric, expected one for all"),
+        }
+    }
+
+    /// Assigns the garments of `spec` their fabrics, if several were given.
+    pub(crate) fn assign(&self, spec: SceneSpec) -> anyhow::Result<SceneSpec> {
+        if self.fabric.len() < 2 {
+            return Ok(spec);
+        }
+        let spec = SceneSpec { fabrics: self.fabric.clone(), ..spec };
+        spec.check_names()?;
+        Ok(spec)
+    }
+
+    /// Refuses a fabric that no panel uses.
+    pub(crate) fn check_used(&self, loaded: &Loaded) -> anyhow::Result<()> {
+        let [fabric] = &self.fabric[..] else { return Ok(()) };
+        if loaded.scene.takes_the_settings_fabric() {
+            return Ok(());
+        }
+        let mut by: Vec<&str> = loaded.swatches.iter().filter_map(|swatch| swatch.by.as_deref()).collect();
+        by.dedup();
+        Err(SceneError::from(CutError::Unfit(format!(
+            "--fabric {fabric}: found nothing to cut from it, every panel has its own ({}); take --fabric away, or `default` there",
+            by.join(", ")
+        )))
+        .into())
+    }
+
+    /// The arguments that name files.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.fabric.iter().filter(|name| crate::base::files::names_a_file(name)).map(Path::new)
+    }
 }

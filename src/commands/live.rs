@@ -11,19 +11,16 @@ use crate::scene::FileRole;
 use crate::session::{Session, Worker};
 use clap::Args;
 
-use super::runtime::use_threads;
-use super::session_recorder::GLANCE;
-use super::sinks::SeenFrom;
-use super::{InputArgs, SinkArgs, StageArgs, browser, console, interrupt, session_recorder};
+use super::console;
+use super::inputs::InputArgs;
+use super::runtime::{interrupted, keep_results, use_threads};
+use super::sinks::{SeenFrom, SinkArgs};
+use super::solved::{POLL, record_session, show_session};
+use super::stages::StageArgs;
+use super::view::open_browser;
 
-/// Port of the page unless another is given, if it is free: an open page then finds the program when it is run again.
+/// Default port of the page, if it is free, so that an open page reconnects when the program is started again.
 const PORT: u16 = 7279;
-
-pub(crate) const LONG_ABOUT: &str = "\
-Serves a page: the Rerun viewer in the middle, the range table beside it. Drag a bound, change the fabric, a measurement or \
-the garment, and PARTs, forces and drape follow; let go, and the drape comes to rest.
-
-The same by HTTP, for scripts and editors.";
 
 pub(crate) const HTTP: &str = include_str!("../../assets/live/http.md");
 
@@ -34,31 +31,31 @@ pub(crate) struct LiveArgs {
     input: InputArgs,
     #[command(flatten)]
     stages: StageArgs,
-    /// Port of the page; 0 takes any free one [default: 7279, or any where that is taken]
+    /// Port of the page; 0 picks a free one [default: 7279, or a free one if it is in use]
     #[arg(long, visible_alias = "web-port", value_name = "PORT", help_heading = "Page")]
     port: Option<u16>,
-    /// Address to listen on; others than loopback ones need a token, which is made and printed
+    /// Address to listen on; an address other than a loopback address requires a token, which is generated and printed
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Page")]
     bind: IpAddr,
-    /// A name of this machine that browsers may use besides its addresses
+    /// Name of this machine that browsers may use besides its addresses
     #[arg(long, value_name = "NAME", help_heading = "Page")]
     host: Option<String>,
-    /// Token for control, 16 characters at least [default: a random one where --bind needs it]
+    /// Token for editing, at least 16 characters [default: a random one if --bind requires it]
     #[arg(long, value_name = "TOKEN", env = "PARTWISE_TOKEN", hide_env_values = true, help_heading = "Page")]
     token: Option<String>,
     /// Open the page in your browser
     #[arg(long, help_heading = "Page")]
     open: bool,
-    /// Begin every drape at the undraped garment, as `run` does: slower, and the same bits
+    /// Start every drape from the undraped garment: slower, but bit-identical to `run`
     #[arg(long, help_heading = "Stages")]
     cold: bool,
-    /// Keep the session as a timeline of its edits, for `partwise view`
+    /// Record the session as a timeline of its edits, for `partwise view`
     #[arg(long, value_name = "FILE.rrd", help_heading = "Recording")]
     record: Option<PathBuf>,
-    /// Send the same to a viewer elsewhere, which may come and go, e.g. rerun+http://127.0.0.1:9876/proxy
+    /// Also stream the session to a remote viewer, which may disconnect and reconnect, e.g. rerun+http://127.0.0.1:9876/proxy
     #[arg(long, value_name = "URL", help_heading = "Recording")]
     connect: Option<String>,
-    /// Where the views look from
+    /// Direction of the views
     #[arg(long, value_enum, default_value_t = SeenFrom::Front, help_heading = "Page")]
     seen_from: SeenFrom,
     /// Worker threads; results do not depend on it [default: one per core]
@@ -70,12 +67,13 @@ impl LiveArgs {
     /// Serves until Ctrl-C.
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        interrupt::keep();
-        self.stages.dials.cloth.only("live")?;
+        keep_results();
+        let fabric = &self.stages.model.fabric;
+        fabric.check_single("live")?;
         let job = Job { scene: self.input.spec()?, settings: self.stages.settings()?, ..Job::default() };
         job.scene.check_names()?;
         if job.scene.names_of_fabrics().is_some() {
-            self.stages.dials.cloth.check_used(&self.input.load(&job.scene)?)?;
+            fabric.check_used(&self.input.load(&job.scene)?)?;
         }
         let session = Session::new(job.clone(), !self.cold);
         let options = self.options(&job)?;
@@ -85,24 +83,23 @@ impl LiveArgs {
             let (session, mut worker) = (session.clone(), Worker::new(self.input.meshes()));
             std::thread::spawn(move || worker.run(&session))
         };
-        let (recorder, shower) = (self.keep(&session), self.show(&session));
-        let mut shown = None;
-        while !interrupt::requested() && !worker.is_finished() {
-            std::thread::sleep(GLANCE);
-            // HTTP clients do not get the reason, which may quote the file.
-            let refused =
-                session.snapshot().refused.filter(|refused| refused.file.is_some() && shown != Some(refused.state));
+        let (recorder, remote) = (self.record(&session), self.stream(&session));
+        let mut reported = None;
+        while !interrupted() && !worker.is_finished() {
+            std::thread::sleep(POLL);
+            // The reason may quote the file, so it is printed here and withheld from HTTP clients.
+            let refused = session.snapshot().refused.filter(|r| r.file.is_some() && reported != Some(r.state));
             if let Some(refused) = refused {
                 console::error(&anyhow::Error::msg(refused.sentence.clone()));
-                shown = Some(refused.state);
+                reported = Some(refused.state);
             }
         }
         session.close();
         drop(server);
         let worked = worker.join();
-        let (recorded, shown) = (recorder.map(JoinHandle::join), shower.map(JoinHandle::join));
-        if worked.is_err() || matches!(recorded, Some(Err(_))) || matches!(shown, Some(Err(_))) {
-            anyhow::bail!("the session broke off; this is a mistake of the program");
+        let (recorded, streamed) = (recorder.map(JoinHandle::join), remote.map(JoinHandle::join));
+        if worked.is_err() || matches!(recorded, Some(Err(_))) || matches!(streamed, Some(Err(_))) {
+            anyhow::bail!("the session ended unexpectedly; this is a defect of the program");
         }
         if let Some(Ok(summary)) = recorded {
             console::notes(summary?.file_line().as_slice());
@@ -121,17 +118,16 @@ impl LiveArgs {
     }
 
     fn options(&self, job: &Job) -> anyhow::Result<LiveOptions> {
-        let far = !self.bind.is_loopback();
         let control = match &self.token {
             Some(token) => Some(token.clone()),
-            None if far => Some(random_token()?),
+            None if !self.bind.is_loopback() => Some(random_token()?),
             None => None,
         };
         let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
         let mut files: Vec<_> =
             job.scene.file_names().into_iter().map(|(role, name)| (role, name.to_owned())).collect();
         files.push((FileRole::Table, self.stages.table.clone()));
-        files.extend(self.stages.dials.cloth.fabric.iter().map(|name| (FileRole::Fabric, name.clone())));
+        files.extend(self.stages.model.fabric.fabric.iter().map(|name| (FileRole::Fabric, name.clone())));
         Ok(LiveOptions {
             address: SocketAddr::new(self.bind, self.port.unwrap_or(PORT)),
             host: self.host.clone(),
@@ -155,35 +151,35 @@ impl LiveArgs {
         };
         console::result(&page);
         if let (Some(_), Some(onlooker)) = (&options.control, &options.onlooker) {
-            console::note(&format!("to look on only: {}", with_token(&name, onlooker)));
+            console::note(&format!("read-only access: {}", with_token(&name, onlooker)));
         }
         console::note("open this address in a browser, or see `partwise live --help` for curl; Ctrl-C ends");
         if address.ip().is_unspecified() {
-            console::note("0.0.0.0 is every address of this machine: others need one of these instead");
+            console::note("0.0.0.0 stands for every address of this machine: from another machine, open one of those");
         }
         if self.open {
-            browser::open(&page);
+            open_browser(&page);
         }
     }
 
-    /// Records each finished state in a file, on a thread of its own; a slow disk makes it skip states.
-    fn keep(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
+    /// Records each finished state in a file, on a separate thread; with a slow disk, states are skipped.
+    fn record(&self, session: &Session) -> Option<JoinHandle<anyhow::Result<RecordSummary>>> {
         let file = self.record.clone()?;
         let sinks = SinkArgs { save: Some(file), seen_from: self.seen_from, ..SinkArgs::default() };
         let session = session.clone();
-        Some(std::thread::spawn(move || session_recorder::keep(&session, &sinks)))
+        Some(std::thread::spawn(move || record_session(&session, &sinks)))
     }
 
-    /// Sends each finished state to a remote viewer, on a thread of its own, so that a slow or lost viewer delays nothing.
-    fn show(&self, session: &Session) -> Option<JoinHandle<()>> {
+    /// Streams each finished state to a remote viewer, on a separate thread, so that a slow or lost viewer delays nothing.
+    fn stream(&self, session: &Session) -> Option<JoinHandle<()>> {
         let connect = Some(self.connect.clone()?);
         let sinks = SinkArgs { no_save: true, connect, seen_from: self.seen_from, ..SinkArgs::default() };
         let session = session.clone();
-        Some(std::thread::spawn(move || session_recorder::show(&session, &sinks)))
+        Some(std::thread::spawn(move || show_session(&session, &sinks)))
     }
 }
 
-/// The address of the page with a token, which may hold characters that mean something else in an address.
+/// The address of the page with a token, percent-encoded.
 fn with_token(host: &str, token: &str) -> String {
     let token: String = form_urlencoded::byte_serialize(token.as_bytes()).collect();
     format!("http://{host}/?token={token}")

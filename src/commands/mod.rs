@@ -1,25 +1,16 @@
-//! The command line: one file per subcommand, its arguments beside its code.
+//! The command line: one module per subcommand, its arguments beside its code.
 
 mod assets;
 mod bench;
-mod browser;
-mod certified;
 mod check;
 mod compare;
 mod console;
 mod cusick;
-mod fabrics;
-mod failure;
 mod inputs;
-mod interrupt;
 mod live;
-mod measurements;
-mod merge;
 mod pattern;
-mod readings;
 mod run;
 mod runtime;
-mod session_recorder;
 mod sinks;
 mod solved;
 mod stages;
@@ -27,7 +18,6 @@ mod summary;
 mod sweep;
 mod tune;
 mod view;
-mod watch;
 
 use std::process::ExitCode;
 use std::time::SystemTime;
@@ -35,52 +25,36 @@ use std::time::SystemTime;
 use crate::base::{atomic_file, files};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-// What most commands take and say goes by one name in all of them.
-use fabrics::FabricArgs;
-use failure::UserError;
-use inputs::InputArgs;
-use measurements::MeasurementArgs;
-use sinks::SinkArgs;
-use stages::StageArgs;
-
-const LONG_ABOUT: &str = "\
-Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun \
-viewer.
-
-Stage one cuts the garment into PARTs: connected areas whose distance to the body falls in one row of a range table. \
-Stage two balances gravity, the body's reaction and the pull of neighbouring PARTs, and gives every PART a displacement. \
-Fewer PARTs are faster, more are truer: the range table is the dial.
-
-Without a subcommand, `partwise` is `partwise run`.";
-
 const EXAMPLES: &str = "\
 Examples:
-  partwise                                        drape the low-cut dress, leave recordings/low-cut-dress.rrd
-  partwise view recordings/low-cut-dress.rrd      look at it in a browser
-  partwise --garment flared-skirt@3613 --spawn    another garment and size, straight into the native viewer
-  partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and said
-  partwise live                                   a page: drag the bounds, the garment follows
-  partwise --pattern shirt.json --body me.obj     sew a pattern, put it on, drape it
+  partwise                                        drape the low-cut dress, write recordings/low-cut-dress.rrd
+  partwise view recordings/low-cut-dress.rrd      show it in a browser
+  partwise --garment flared-skirt@3613 --spawn    another garment and size, in the native viewer
+  partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and reported
+  partwise live                                   a page: drag the bounds of the range table, the garment follows
+  partwise --pattern shirt.json --body me.obj     sew a pattern around a body and drape it
   partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
   partwise --format json --threads 1              one JSON object on stdout, for scripts
 
-Exit codes: 0 done, 2 something you gave cannot be used or written, 1 anything else, 130 interrupted (what was done is kept).";
+Exit codes: 0 done, 2 an input cannot be used or an output cannot be written, 1 any other failure, 130 interrupted (results so far are kept).";
 
+/// Drape a garment over a body by the two-stage PART model, every stage in Rerun
+///
+/// Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun viewer.
+///
+/// Stage one cuts the garment into PARTs: connected areas whose distance to the body falls in one row of a range table. Stage two
+/// balances gravity, the body's reaction and the pull of neighbouring PARTs, and gives every PART a displacement. Fewer PARTs are
+/// faster, more PARTs are more accurate: the range table sets the trade-off.
+///
+/// Without a subcommand, `partwise` is `partwise run`.
 #[derive(Debug, Parser)]
-#[command(
-    name = "partwise",
-    version,
-    about = "Drape a garment over a body by the two-stage PART model, every stage in Rerun",
-    long_about = LONG_ABOUT,
-    after_help = EXAMPLES,
-    args_conflicts_with_subcommands = true
-)]
+#[command(name = "partwise", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     run: run::RunArgs,
-    /// Let an output replace an input of the same run, and `assets` replace files that were edited
+    /// Allow an output to replace an input of the same run, and `assets` to replace edited files
     #[arg(long, global = true, help_heading = "Output")]
     force: bool,
 }
@@ -89,45 +63,73 @@ struct Cli {
 enum Command {
     /// Drape one garment and record every stage (the default)
     Run(Box<run::RunArgs>),
-    /// Serve a page to turn the dial on, and the same by HTTP
-    #[command(long_about = live::LONG_ABOUT, after_long_help = live::HTTP)]
+    /// Serve a page and an HTTP interface to edit the range table while the garment follows
+    ///
+    /// The page has the Rerun viewer in the middle and the range table beside it. Drag a bound, or change the fabric, a measurement or
+    /// the garment, and PARTs, forces and drape follow; after the edit, the drape is refined until it converges.
+    ///
+    /// Scripts and editors use the same session by HTTP.
+    #[command(after_long_help = live::HTTP)]
     Live(Box<live::LiveArgs>),
-    /// Report the health of a body and a garment, and how they lie about each other, without draping
+    /// Report mesh defects of a body and a garment and how the garment fits, without draping
     Check(Box<check::CheckArgs>),
-    /// Simulate the Cusick drape test of the fabrics and set it beside the published bands
+    /// Simulate the Cusick drape test of fabrics and compare it with the published ranges
     Cusick(cusick::CusickArgs),
-    /// Run every point of a sweep file: tables, garments, fabrics; a row on disk after each, and a recording of all
-    #[command(long_about = sweep::LONG_ABOUT)]
+    /// Run every point of a sweep file (tables, garments, fabrics); write a row after each, and a recording of all
+    ///
+    /// The points are range tables, and any other setting, over garments, sizes and fabrics.
+    ///
+    /// A row is written after every point (rows.jsonl; rows.csv is derived from it at the end). Ctrl-C, a crash or a full disk lose at
+    /// most the current point; --resume continues from there. A point that fails is a row with its error, and the sweep continues. At
+    /// the end, one recording per garment shows each table as a step, the best few side by side, and time against error.
     Sweep(Box<sweep::SweepArgs>),
-    /// Set range tables side by side: PARTs of each level, what is split and merged, time, error
-    #[command(long_about = compare::LONG_ABOUT)]
+    /// Compare range tables: PARTs of each level, which are split and merged, time, error
+    ///
+    /// Drapes a garment once for each of two to six range tables and compares them: PARTs of each level, which PARTs of the first
+    /// table are kept, split or merged, the time of the two stages, and the distance of each drape from its equilibrium.
+    ///
+    /// Without --refine this evaluates the two-stage scheme alone, where the tables differ; refined to convergence, all end in a
+    /// drape in equilibrium.
     Compare(Box<compare::CompareArgs>),
     /// Search range tables for the least error at every number of PARTs
-    #[command(long_about = tune::LONG_ABOUT)]
+    ///
+    /// The paper adjusts its table by iteration with a computer and leaves the best one open. The search minimises the distance from
+    /// the reference drape that remains when each PART moves by its nearest affine map, the motion of the coupled model. This needs no
+    /// mechanics, so one exact dynamic program gives the best tables for every number of PARTs. Tables near the optimum are then
+    /// ranked with the maps blended over the seams, as in the model; the best of those are draped by the model, and the one nearest to
+    /// the reference is written. The first search has levels alone, over every bound that makes a difference; the second also cuts
+    /// the PARTs of each level to an extent along the cloth.
+    ///
+    /// With --motion translation each PART moves by one displacement, as in the paper, and the optimum of that search is written
+    /// without ranking by the model.
     Tune(Box<tune::TuneArgs>),
-    /// Run the paper's Table 4 again: every way to drape on the same garments, time and error together
+    /// Repeat the paper's Table 4: every method on the same garments, with time and error
     #[command(subcommand)]
     Bench(bench::BenchCommand),
-    /// Join the shards of a sweep into what one run would have written
-    Merge(Box<merge::MergeArgs>),
-    /// Sum up a sewing pattern, and draw it flat
-    #[command(long_about = pattern::LONG_ABOUT)]
+    /// Join the shards of a sweep into the output of a single run
+    Merge(Box<sweep::MergeArgs>),
+    /// Summarise a sewing pattern, and draw it flat
+    ///
+    /// Reads a sewing pattern (JSON in the GarmentCode format: *_specification.json), checks it, sews it and lists the panels with
+    /// their areas and the seams with the lengths of both sides.
+    ///
+    /// `partwise --pattern FILE` drapes it, on the dress form or on --body.
     Pattern(pattern::PatternArgs),
-    /// Write everything built in as files: body and garments as OBJ, tables, fabrics, measurements as TOML
+    /// Write the built-in inputs as files: body and garments as OBJ, tables, fabrics and measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
     View(view::ViewArgs),
 }
 
-/// Parses the arguments, runs the command, prints what went wrong.
+/// Parses the arguments, runs the command and reports its error.
 pub fn main() -> ExitCode {
-    let cli = Cli::from_arg_matches(&with_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
-    interrupt::listen();
-    interrupt::outlive_file_limits();
+    let cli = Cli::from_arg_matches(&allow_negatives(Cli::command()).get_matches()).unwrap_or_else(|e| e.exit());
+    runtime::handle_interrupts();
+    runtime::ignore_file_size_signal();
     if !cli.force {
         files::protect_inputs();
     }
-    let outcome = clock_is_set(SystemTime::now()).and_then(|()| match cli.command {
+    let outcome = check_clock(SystemTime::now()).and_then(|()| match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Live(args)) => args.execute(),
@@ -136,38 +138,38 @@ pub fn main() -> ExitCode {
         Some(Command::Sweep(args)) => args.execute(),
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),
-        Some(Command::Bench(command)) => command.execute(),
+        Some(Command::Bench(bench::BenchCommand::TableFour(args))) => args.execute(),
         Some(Command::Merge(args)) => args.execute(),
         Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(cli.force),
         Some(Command::View(args)) => args.execute(),
     });
-    // A thread that still writes dies with the program.
+    // Threads that still write end with the process; their incomplete files are removed.
     atomic_file::abandon_all();
     match outcome {
-        Ok(()) if interrupt::requested() => ExitCode::from(130),
+        Ok(()) if runtime::interrupted() => ExitCode::from(130),
         Ok(()) if !console::all_printed() => ExitCode::FAILURE,
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             console::error(&error);
-            failure::exit_code(&error)
+            runtime::exit_code(&error)
         }
     }
 }
 
-/// Refuses a clock that stands before 1970: recordings carry the time since then, and Rerun panics without one.
-fn clock_is_set(now: SystemTime) -> anyhow::Result<()> {
-    if now >= SystemTime::UNIX_EPOCH {
-        return Ok(());
+/// Refuses a clock before 1970: recordings contain the time since then, and Rerun panics on an earlier one.
+fn check_clock(now: SystemTime) -> anyhow::Result<()> {
+    if now < SystemTime::UNIX_EPOCH {
+        runtime::refuse!(
+            "found the clock of this machine before 1970, expected today's date: recordings contain it; set the clock"
+        );
     }
-    Err(UserError::new(
-        "found the clock of this machine before 1970, expected today's date: recordings carry it; set the clock",
-    ))
+    Ok(())
 }
 
-/// `--edge-length -1` is a number that will not do, not a flag that nobody knows.
-fn with_negatives(command: clap::Command) -> clap::Command {
-    command.allow_negative_numbers(true).mut_subcommands(with_negatives)
+/// Parses `--edge-length -1` as a value that is out of range and not as an unknown flag.
+fn allow_negatives(command: clap::Command) -> clap::Command {
+    command.allow_negative_numbers(true).mut_subcommands(allow_negatives)
 }
 
 #[cfg(test)]
@@ -178,8 +180,8 @@ mod tests {
 
     #[test]
     fn a_clock_before_1970_is_refused() {
-        clock_is_set(SystemTime::UNIX_EPOCH).unwrap();
-        let said = clock_is_set(SystemTime::UNIX_EPOCH - Duration::from_secs(1)).unwrap_err().to_string();
-        assert!(said.contains("before 1970") && said.contains("set the clock"), "{said}");
+        check_clock(SystemTime::UNIX_EPOCH).unwrap();
+        let error = check_clock(SystemTime::UNIX_EPOCH - Duration::from_secs(1)).unwrap_err().to_string();
+        assert!(error.contains("before 1970") && error.contains("set the clock"), "{error}");
     }
 }

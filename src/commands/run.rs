@@ -1,37 +1,31 @@
-//! `partwise run`: one garment through every stage, recorded, summed up, and on request watched.
+//! `partwise run`: drapes a garment, records every stage and prints a summary; with `--watch`, again after each change of a file.
 
-mod by_method;
-mod coloured_export;
-mod watching;
+mod method;
+mod watch;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::Job;
+use crate::base::files::has_ending;
 use crate::drape::{self, LetGo};
-use crate::record::Recorder;
+use crate::mechanics::refine::{Observer, Step};
+use crate::mesh::glb::write_glb;
+use crate::record::{Overlay, Recorder, by_parts};
 use crate::study::certificate::certify;
 use crate::study::evaluate::EvaluateError;
 use crate::study::job::Against;
+use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
-use clap::{Args, ValueEnum};
 
-use super::runtime::{cache, refining, use_threads};
-use super::sinks::mesh_file;
-use super::solved::{Snapshot, Solved};
-use super::summary::Summary;
-use super::{InputArgs, SinkArgs, StageArgs, certified, console, interrupt};
-use coloured_export::ExportColours;
-
-/// What stdout is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    /// Tables for people
-    Text,
-    /// One JSON object
-    Json,
-}
+use super::console::{self, Format};
+use super::inputs::InputArgs;
+use super::runtime::{interrupted, reference_cache, refuse, use_threads, wait_for_interrupt, with_progress};
+use super::sinks::{SinkArgs, mesh_file};
+use super::solved::{Iteration, Solved};
+use super::stages::StageArgs;
+use super::summary::{Summary, print_certificate, require_pass};
 
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
@@ -42,37 +36,38 @@ pub(crate) struct RunArgs {
     stages: StageArgs,
     #[command(flatten)]
     sinks: SinkArgs,
-    /// Solve again and stream the next step whenever the table, fabric, body or garment file changes
+    /// Drape again and stream another step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
-    /// Leave the solver's steps out of the recording, for a small file
+    /// Omit the iterations of the solver from the recording, for a smaller file
     #[arg(long, help_heading = "Recording")]
     no_iterations: bool,
-    /// Drape by one of the paper's reference methods instead, to its stopping rule: `zhu2016` [19], `gross2003` [20],
+    /// Drape by one of the paper's reference methods instead, up to its stopping criterion: `zhu2016` [19], `gross2003` [20],
     /// `thomaszewski2006` [21]
-    #[arg(long, value_name = "METHOD", default_value = by_method::TWO_STAGE, value_parser = by_method::method, help_heading = "Stages")]
+    #[arg(long, value_name = "METHOD", default_value = method::TWO_STAGE, value_parser = method::method, help_heading = "Stages")]
     method: &'static str,
-    /// Measure the drape against its own continuation and the canonical drape; references are cached between runs
+    /// Measure the errors of the drape against its own continuation and the canonical drape; both references are cached
     #[arg(long, help_heading = "Stages")]
     accuracy: bool,
-    /// Under --accuracy: canonical drapes from this many perturbed starts, for the spread between equilibria
+    /// With --accuracy: canonical drapes from this many perturbed starts, for the spread between equilibria
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Stages")]
     spread: u64,
-    /// Under --accuracy: where references are kept [default: the user's cache folder]
+    /// With --accuracy: folder of the reference drapes [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Stages")]
     cache: Option<PathBuf>,
-    /// Certify the drape: whether it is at rest, would stay so, and nothing goes through anything, by forces taken anew from its
-    /// positions; exit code 1 where a line fails
+    /// Certify that the drape is a stable equilibrium without intersections, from forces recomputed from its positions; exit code 1 if
+    /// a criterion fails
     #[arg(long, help_heading = "Stages", conflicts_with = "watch")]
     certify: bool,
-    /// Write the displaced garment: as OBJ with its original faces, groups and texture coordinates (of a pattern the panels and
-    /// where they lay flat), or as glTF in metres, y up
+    /// Export the draped garment: as OBJ with its original faces, groups and texture coordinates (of a sewing pattern: panels and flat
+    /// positions), or as glTF in metres, y up
     #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
     export: Option<PathBuf>,
-    /// Colour the vertices of a `.glb` as the views of the recording do
-    #[arg(long, value_enum, value_name = "WHAT", requires = "export", help_heading = "Output")]
-    export_colours: Option<ExportColours>,
-    /// What to print on stdout
+    /// Colour the vertices of a `.glb` as in the recording, by `parts` (the hue shows the level), largest `strain` (%), `pressure` on
+    /// the body (kPa), or `folds` (excess length of the cloth, %)
+    #[arg(long, value_parser = ["parts", "strain", "pressure", "folds"], value_name = "WHAT", requires = "export", help_heading = "Output")]
+    export_colours: Option<String>,
+    /// Format of the result on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
     /// Worker threads; results do not depend on it [default: one per core]
@@ -80,26 +75,34 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
-/// Says where a recording is served, and ends it once the user has seen enough.
-fn show(recorder: Recorder) -> anyhow::Result<()> {
+/// Prints the address of a served recording, and ends the recording after Ctrl-C.
+fn serve(recorder: Recorder) -> anyhow::Result<()> {
     if let Some(url) = recorder.web_url() {
-        console::note(&format!("look at it: {url}"));
+        console::note(&format!("view it in a browser: {url}"));
     }
-    interrupt::wait();
+    wait_for_interrupt();
     console::notes(recorder.finish()?.file_line().as_slice());
     Ok(())
 }
 
-/// The recording gets the mesh at every so many steps: enough to see it settle, a few megabytes at most.
-const MESH_EVERY: usize = 8;
+/// Interval, in solver iterations, at which the mesh is recorded. A smaller interval gives a smoother animation and a larger file; this
+/// one, a heuristic, keeps a recording at a few megabytes.
+const MESH_INTERVAL: usize = 8;
 
 impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.check_outputs(&[("--export", self.export.as_deref())])?;
-        coloured_export::refuse(self.export.as_deref(), self.export_colours)?;
-        if self.method != by_method::TWO_STAGE {
-            return self.run_by_method();
+        if let Some(path) =
+            self.export.as_deref().filter(|path| self.export_colours.is_some() && !has_ending(path, "glb"))
+        {
+            refuse!(
+                "{}: found --export-colours for an OBJ, which has no colours, expected a name that ends in `.glb`",
+                path.display()
+            );
+        }
+        if self.method != method::TWO_STAGE {
+            return self.run_method();
         }
         if self.watch {
             return self.keep_watching();
@@ -108,33 +111,52 @@ impl RunArgs {
         let job = self.job()?;
         self.sinks.refuse_unwritable(&job.scene.garment_name())?;
         let mut solved = self.solve(job, start)?;
-        let mut recorder = Recorder::open(solved.record_options(&self.sinks, !self.no_iterations, false))?;
+        let mut recorder = solved.open(&self.sinks, !self.no_iterations, false)?;
         solved.record(&mut recorder, 0, !self.no_iterations)?;
         self.export(&mut solved)?;
         if self.sinks.serve {
             self.print(&solved)?;
-            show(recorder)?;
+            serve(recorder)?;
         } else {
             let finished = Instant::now();
             solved.summary.outputs.extend(recorder.finish()?.file_line());
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
         }
-        certified::verified(solved.summary.certificate.as_ref())
+        require_pass(solved.summary.certificate.as_ref())
     }
 
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
         if let Some(path) = &self.export {
-            coloured_export::write(solved, path, self.export_colours)?;
-            solved.summary.outputs.push(format!("displaced garment: {}", path.display()));
+            self.write_export(solved, path)?;
+            solved.summary.outputs.push(format!("draped garment: {}", path.display()));
         }
         Ok(())
     }
 
-    /// The job that the flags ask for, its small files read.
+    fn write_export(&self, solved: &Solved, path: &Path) -> anyhow::Result<()> {
+        let (scene, drape) = (&solved.loaded.scene, &solved.drape);
+        let Some(quantity) = &self.export_colours else { return Ok(solved.loaded.write(path, &drape.positions)?) };
+        let colours = if quantity == "parts" {
+            let levels = solved.summary.panel().levels;
+            Some(by_parts(&scene.garment, &drape.parts.part_of_vertex, drape.parts.len(), &levels))
+        } else {
+            solved.overlays().iter().find(|overlay| overlay.name == *quantity).map(Overlay::vertex_colours)
+        };
+        let Some(colours) = colours else {
+            refuse!(
+                "{}: found no {quantity} to colour it by, because this model does not compute it; expected --export-colours \
+                 parts, or --model coupled",
+                path.display()
+            )
+        };
+        Ok(write_glb(path, &scene.garment.with_positions(drape.positions.clone()), Some(&colours))?)
+    }
+
+    /// The job that the arguments specify, its tables and fabrics read.
     fn job(&self) -> anyhow::Result<Job> {
         let settings = self.stages.settings()?;
-        let scene = self.stages.dials.cloth.give(self.input.spec()?)?;
+        let scene = self.stages.model.fabric.assign(self.input.spec()?)?;
         let accuracy = if self.accuracy { Against::Own } else { Against::None };
         Ok(Job { scene, settings, seed: 0, accuracy, spread_starts: self.spread })
     }
@@ -142,32 +164,32 @@ impl RunArgs {
     /// Runs every stage of a job.
     fn solve(&self, mut job: Job, start: Instant) -> anyhow::Result<Solved> {
         let loaded = self.input.load(&job.scene)?;
-        self.stages.dials.cloth.check_used(&loaded)?;
+        self.stages.model.fabric.check_used(&loaded)?;
         let load = start.elapsed();
         let name = &loaded.garment_name;
-        let mut snapshots = BTreeMap::new();
-        let drape = refining(name, |progress| {
+        let mut iterations = BTreeMap::new();
+        let drape = with_progress(name, |progress| {
             job.drape(&loaded.scene, &mut |step| {
                 if step.at_rest {
-                    // Told before, as the step that it is.
+                    // The same state was reported before, as an iteration.
                     return progress(step);
                 }
-                let positions = (step.iteration.is_multiple_of(MESH_EVERY)).then(|| step.positions.to_vec());
-                let snapshot =
-                    Snapshot { energy: step.energy, residual_over_weight: step.residual_over_weight, positions };
-                // Coarser garments that it rests on first, and trials that were taken back, count as the step that follows.
-                snapshots.insert(step.iteration, snapshot);
+                let positions = (step.iteration.is_multiple_of(MESH_INTERVAL)).then(|| step.positions.to_vec());
+                let Step { energy, residual_over_weight, .. } = *step;
+                // Solves on coarser garments and rejected trials are replaced by the iteration that follows.
+                iterations.insert(step.iteration, Iteration { energy, residual_over_weight, positions });
                 progress(step)
             })
         })?;
-        let cache = cache(self.cache.as_ref());
-        if interrupt::requested() {
+        let cache = reference_cache(self.cache.as_ref());
+        if interrupted() {
             job.accuracy = Against::None;
         }
-        let what = format!("{name}: references");
+        let title = format!("{name}: references");
         let draped = Instant::now();
-        let measured = match refining(&what, |progress| job.measure(&loaded.scene, &drape, cache.as_ref(), progress)) {
-            // The drape is there all the same, and is not lost for what it was to be compared with.
+        let measure = |progress: Observer<'_>| job.measure(&loaded.scene, &drape, cache.as_ref(), progress);
+        let measured = match with_progress(&title, measure) {
+            // A drape without its references is still a result.
             Err(error @ (EvaluateError::Fallen | EvaluateError::Interrupted)) => {
                 console::warning(&format!("{error}; the drape is kept without its error"));
                 job.accuracy = Against::None;
@@ -191,19 +213,19 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        Ok(Solved { loaded, drape, measured, snapshots, summary })
+        Ok(Solved { loaded, drape, measured, iterations, summary })
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
-        console::warnings(&solved.summary.warnings);
-        console::notes(&solved.loaded.notes());
         match self.format {
             Format::Text => {
                 console::result(&solved.summary.text());
-                certified::print(solved.summary.certificate.as_ref());
+                print_certificate(solved.summary.certificate.as_ref());
             }
-            Format::Json => console::result(&solved.summary.json()?),
+            Format::Json => console::json(&solved.summary)?,
         }
+        console::notes(&solved.loaded.notes());
+        console::warnings(&solved.summary.warnings);
         Ok(())
     }
 }

@@ -1,61 +1,176 @@
-//! What every command that computes needs: threads, references, progress that Ctrl-C is heard beside.
+//! Shared by the commands: exit codes, Ctrl-C, threads, output files, progress of the solver.
 
+use std::error::Error;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-use crate::base::atomic_file::WholeFile;
+use crate::base::atomic_file::{self, WholeFile};
+use crate::drape::DrapeError;
+use crate::live::LiveError;
 use crate::mechanics::refine::Observer;
+use crate::record::RecordError;
 use crate::study::accuracy::ReferenceCache;
+use crate::study::evaluate::EvaluateError;
 
-use super::{UserError, console, interrupt};
+use super::console;
 
-/// The folder of references: the one given, else the user's.
-pub(crate) fn cache(given: Option<&PathBuf>) -> Option<ReferenceCache> {
-    given.cloned().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
+/// A mistake in the user's input that no library error describes.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct UserError(pub(crate) String);
+
+/// Returns a [`UserError`] with a formatted message from the enclosing function.
+macro_rules! refuse {
+    ($($message:tt)*) => {
+        return Err($crate::commands::runtime::UserError(format!($($message)*)).into())
+    };
+}
+pub(crate) use refuse;
+
+/// The exit code of an error: 2 where the user can remedy it, by another input or more disk space, and 1 otherwise.
+pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.chain().any(is_users) { ExitCode::from(2) } else { ExitCode::FAILURE }
 }
 
-/// More threads than any machine has cores: the system runs out of them before they do any good.
-pub(crate) const MOST_THREADS: usize = 1024;
+fn is_users(cause: &(dyn Error + 'static)) -> bool {
+    cause.downcast_ref().is_some_and(RecordError::is_users)
+        // A garment without a free vertex is the user's; a failure of the solver is not.
+        || cause.downcast_ref().is_some_and(|error| !matches!(error, DrapeError::Solve(_)))
+        || cause.downcast_ref().is_some_and(|error| !matches!(error, LiveError::Server(_)))
+        || matches!(cause.downcast_ref(), Some(EvaluateError::Fallen | EvaluateError::Layers { .. }))
+        || cause.is::<UserError>()
+        || cause.is::<crate::base::files::Unreadable>()
+        || cause.is::<crate::body::ShapeError>()
+        || cause.is::<crate::garment::fabric::FabricError>()
+        || cause.is::<crate::garment::pattern::PatternError>()
+        || cause.is::<crate::mechanics::energy::EnergyError>()
+        || cause.is::<crate::mechanics::paper::PaperError>()
+        || cause.is::<crate::mesh::MeshError>()
+        || cause.is::<crate::parts::range_table::TableError>()
+        || cause.is::<crate::scene::SceneError>()
+        || cause.is::<crate::session::EditError>()
+        || cause.is::<crate::study::sweep::MergeError>()
+        || cause.is::<crate::study::sweep::PlanError>()
+        || cause.is::<crate::study::sweep::StoreError>()
+        || cause.is::<crate::study::table_search::SearchError>()
+}
+
+/// Signals within this time count as one: `timeout` and similar programs signal the process and then its group.
+const SAME_INTERRUPT: Duration = Duration::from_millis(300);
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static HAS_RESULTS: AtomicBool = AtomicBool::new(false);
+static FIRST_INTERRUPT: OnceLock<Instant> = OnceLock::new();
+
+/// Handles Ctrl-C from now on. Before [`keep_results`] is called, and at the second interrupt, the program exits at once and removes
+/// its incomplete files. Where no handler can be installed, the default action remains.
+pub(crate) fn handle_interrupts() {
+    let _ = ctrlc::set_handler(|| {
+        let since = FIRST_INTERRUPT.get_or_init(Instant::now).elapsed();
+        let again = INTERRUPTED.swap(true, Ordering::SeqCst);
+        if !HAS_RESULTS.load(Ordering::SeqCst) || (again && since > SAME_INTERRUPT) {
+            atomic_file::abandon_all();
+            std::process::exit(130);
+        }
+        if !again {
+            console::note("interrupted: the results so far are kept; press Ctrl-C again to quit at once");
+        }
+    });
+}
+
+/// Makes a write beyond `ulimit -f` an error, as on a full disk. By default its signal ends the program and leaves incomplete files.
+pub(crate) fn ignore_file_size_signal() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        /// The number of the signal on Linux (except MIPS), macOS and the BSDs.
+        const SIGXFSZ: i32 = 25;
+        // Tokio's handler remains installed after its listener is dropped.
+        if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_io().build() {
+            let _ = runtime.block_on(async { signal(SignalKind::from_raw(SIGXFSZ)) });
+        }
+    }
+}
+
+/// From now on, the first Ctrl-C sets [`interrupted`] instead of ending the program.
+pub(crate) fn keep_results() {
+    HAS_RESULTS.store(true, Ordering::SeqCst);
+}
+
+/// Whether Ctrl-C was pressed.
+pub(crate) fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::SeqCst)
+}
+
+/// [`interrupted`] for iterative work.
+pub(crate) fn control_flow() -> ControlFlow<()> {
+    if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+/// [`interrupted`] for worker threads.
+pub(crate) fn interrupt_flag() -> &'static AtomicBool {
+    &INTERRUPTED
+}
+
+/// Blocks until Ctrl-C.
+pub(crate) fn wait_for_interrupt() {
+    while !interrupted() {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// The cache of reference drapes: `folder`, or else the user's cache folder.
+pub(crate) fn reference_cache(folder: Option<&PathBuf>) -> Option<ReferenceCache> {
+    folder.cloned().map(ReferenceCache::new).or_else(ReferenceCache::in_user_cache)
+}
+
+/// Bound on the number of threads; a heuristic, above the core count of any machine and below the limits of operating systems.
+pub(crate) const MAX_THREADS: usize = 1024;
 
 /// Sets the size of the thread pool.
 pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
     match threads {
         None => Ok(()),
-        Some(0) => Err(UserError::new("--threads 0: found 0, expected at least 1; leave it out for one per core")),
-        Some(n) if n > MOST_THREADS => Err(UserError::new(format!(
-            "--threads {n}: found {n}, expected 1 to {MOST_THREADS}; leave it out for one per core"
-        ))),
+        Some(0) => refuse!("--threads 0: found 0, expected at least 1; leave it out for one per core"),
+        Some(n) if n > MAX_THREADS => {
+            refuse!("--threads {n}: found {n}, expected 1 to {MAX_THREADS}; leave it out for one per core")
+        }
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?),
     }
 }
 
-/// Refuses an output that cannot be written, or is an input, before anything is computed.
+/// Refuses an output that cannot be written or is an input, before anything is computed.
 pub(crate) fn check(path: &Path, flag: &str) -> anyhow::Result<()> {
     WholeFile::check(path).map_err(unwritable(path, flag))
 }
 
-/// Writes an output that the user asked for by `flag`.
+/// Writes the output of `flag`.
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>, flag: &str) -> anyhow::Result<()> {
     WholeFile::write(path, text).map_err(unwritable(path, flag))
 }
 
-/// The error of an output that cannot be written; the user can choose another place with `flag`.
+/// The error of an output that cannot be written; `flag` selects another place.
 pub(crate) fn unwritable<'a>(path: &'a Path, flag: &'a str) -> impl FnOnce(io::Error) -> anyhow::Error + 'a {
-    move |e| UserError::new(format!("{}: cannot be written: {e}; choose another place with {flag}", path.display()))
+    move |e| UserError(format!("{}: cannot be written: {e}; choose another place with {flag}", path.display())).into()
 }
 
-/// Makes a folder that was asked for.
-pub(crate) fn make_folder(path: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(path).map_err(|e| UserError::new(format!("{}: cannot be made: {e}", path.display())))
+/// Creates a folder for outputs.
+pub(crate) fn create_folder(path: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(path).map_err(|e| UserError(format!("{}: cannot be created: {e}", path.display())).into())
 }
 
-/// Runs `work` with the solver's progress shown and Ctrl-C heard.
-pub(crate) fn refining<T>(what: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
-    interrupt::keep();
-    let bar = console::progress(None, what);
+/// Runs `work` with a progress display of the solver's steps; Ctrl-C interrupts it.
+pub(crate) fn with_progress<T>(title: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
+    keep_results();
+    let bar = console::progress(None, title);
     let out = work(&mut |step| {
-        bar.set_message(format!("{what}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
-        interrupt::go_on()
+        bar.set_message(format!("{title}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
+        control_flow()
     });
     bar.finish_and_clear();
     out

@@ -1,4 +1,4 @@
-//! Where the recording goes: arguments shared by every command that records.
+//! Arguments for the destinations of a recording, shared by the commands that record.
 
 use std::path::{Path, PathBuf};
 
@@ -8,23 +8,22 @@ use crate::record::Sink;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
-use super::UserError;
-use super::runtime::check;
+use super::runtime::{check, refuse};
 
-/// Where the views of a recording look from when it opens.
+/// Direction from which the views of a recording show the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum SeenFrom {
-    /// The wearer looks at you
+    /// From the front
     #[default]
     Front,
-    /// The wearer's left
+    /// From the wearer's left
     Side,
-    /// Behind the wearer
+    /// From behind
     Back,
 }
 
 impl SeenFrom {
-    /// The direction towards the eye; our own bodies, and most of other people's, look along −y.
+    /// The direction from the body towards the eye. The built-in form faces −y, as most body meshes do.
     pub(crate) fn direction(self) -> DVec3 {
         match self {
             Self::Front => DVec3::NEG_Y,
@@ -34,7 +33,7 @@ impl SeenFrom {
     }
 }
 
-/// Where a displaced garment goes: no other formats are written, whatever the name says.
+/// Parses the name of an exported garment; only OBJ and glTF can be written.
 pub(crate) fn mesh_file(path: PathBuf) -> Result<PathBuf, String> {
     match path.extension() {
         Some(ending) if !["obj", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)) => Err(format!(
@@ -45,19 +44,16 @@ pub(crate) fn mesh_file(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
-/// Refuses a recording's name that another program's file may have: `--save notes.txt` would replace the notes.
+/// Refuses a recording without the ending `.rrd`: `--save notes.txt` would replace a file of another program.
 fn recording_file(path: &Path) -> anyhow::Result<()> {
     let device = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
     if device || has_ending(path, "rrd") {
         return Ok(());
     }
-    Err(UserError::new(format!(
-        "{}: found a recording without the ending `.rrd`, expected one; add it",
-        path.display()
-    )))
+    refuse!("{}: found a recording without the ending `.rrd`, expected one; add it", path.display())
 }
 
-/// The sinks of a recording; several at once are fine.
+/// The sinks of a recording; several can be combined.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Recording")]
 pub(crate) struct SinkArgs {
@@ -76,32 +72,32 @@ pub(crate) struct SinkArgs {
     /// Serve the bundled web viewer on 127.0.0.1 and print its address
     #[arg(long)]
     pub(crate) serve: bool,
-    /// Where the views look from when the recording opens
+    /// Direction of the views when the recording opens
     #[arg(long, value_enum, default_value_t = SeenFrom::Front)]
     pub(crate) seen_from: SeenFrom,
-    /// Port of the served page; 0 takes any free one [default: 7278, or any where that is taken]
+    /// Port of the served page; 0 picks a free one [default: 7278, or a free one if it is in use]
     #[arg(long, visible_alias = "port", value_name = "PORT")]
     pub(crate) web_port: Option<u16>,
-    /// A further port on which viewers read the recording, as they do on the page's own
+    /// Additional port on which viewers can read the recording
     #[arg(long, value_name = "PORT")]
     pub(crate) grpc_port: Option<u16>,
-    /// Megabytes of steps kept for pages that open later; beyond it the oldest go first
+    /// Megabytes of steps kept in memory for pages that open later; the oldest steps are dropped first
     #[arg(long, value_name = "MB", default_value_t = 256)]
     pub(crate) history: u64,
 }
 
 impl SinkArgs {
-    /// Refuses outputs that cannot be written, that are two in one file, or one with an input, before anything is read or computed.
-    /// `outputs` are those of the command beside `--save`, by their flags.
+    /// Refuses outputs that cannot be written, that share a file, or that would replace an input, before anything is read or computed.
+    /// `outputs` are the command's outputs other than `--save`, by flag.
     pub(crate) fn check_outputs(&self, outputs: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
         let all = std::iter::once(("--save", self.save.as_deref())).chain(outputs.iter().copied());
         let given: Vec<(&str, &Path)> = all.filter_map(|(flag, path)| Some((flag, path?))).collect();
         for (i, (flag, path)) in given.iter().enumerate() {
             if let Some((other, _)) = given[..i].iter().find(|(_, before)| same_place(before, path)) {
                 let path = path.display();
-                return Err(UserError::new(format!(
-                    "{path}: found both {other} and {flag} writing here, expected two files; give one of them another name"
-                )));
+                refuse!(
+                    "{path}: found both {other} and {flag} writing here, expected two files; give one another name"
+                );
             }
         }
         if let Some(path) = &self.save {
@@ -111,17 +107,17 @@ impl SinkArgs {
         outputs.iter().filter_map(|(flag, path)| Some((flag, (*path)?))).try_for_each(|(flag, path)| check(path, flag))
     }
 
-    /// Refuses a recording that could not be written, before anything is computed.
+    /// Refuses a recording that cannot be written, before anything is computed.
     pub(crate) fn refuse_unwritable(&self, name: &str) -> anyhow::Result<()> {
         Ok(self.sinks(name).iter().try_for_each(Sink::check)?)
     }
 
-    /// The sinks asked for; `name` names the file where the user did not.
+    /// The sinks; `name` is the default name of the file, in `recordings/`.
     pub(crate) fn sinks(&self, name: &str) -> Vec<Sink> {
         self.sinks_in(Path::new("recordings"), name)
     }
 
-    /// The same with the file in another folder.
+    /// The sinks, with the default file in `folder`.
     pub(crate) fn sinks_in(&self, folder: &Path, name: &str) -> Vec<Sink> {
         let mut sinks = Vec::new();
         if !self.no_save {

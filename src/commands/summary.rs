@@ -1,4 +1,5 @@
-//! What a run did, once, for three readers: a person at the terminal, a script, the recording's text panel.
+//! The summary of a run, in three forms: text for the terminal, JSON for scripts, the text panel of the recording; and the
+//! certificate of a drape.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -30,10 +31,10 @@ pub(crate) struct Summary {
     model: &'static str,
     motion: &'static str,
     fabric: String,
-    /// Which garment or panel is cut from which, where that was said.
+    /// The panels of each fabric, if fabrics were assigned.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cut: Vec<Swatch>,
-    /// Constants of all of them, for people.
+    /// The constants of all fabrics, for the panel.
     #[serde(skip)]
     fabrics: Vec<Fabric>,
     table: String,
@@ -46,25 +47,25 @@ pub(crate) struct Summary {
     levels: Vec<LevelCount>,
     /// Garment and body at bust, waist and hip.
     ease: Vec<GirthEase>,
-    /// What has changed since the save before, under `--watch`.
+    /// The change since the previous save, under `--watch`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) since_last: Option<String>,
-    /// What came of letting go what was held until it rested.
+    /// The result of releasing held edges.
     let_go: Option<String>,
-    /// Every figure against the own continuation, under `--accuracy`.
+    /// The errors against the drape's own continuation, under `--accuracy`.
     accuracy: Option<Value>,
     /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, and `total`.
     timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
-    /// What was certified, where that was asked.
+    /// The certificate, under `--certify`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) certificate: Option<Certificate>,
-    /// Where the recording went.
+    /// The files written.
     pub(crate) outputs: Vec<String>,
 }
 
 impl Summary {
-    /// Reads the figures off a result.
+    /// The summary of a result.
     pub(crate) fn new(
         loaded: &Loaded,
         settings: &Settings,
@@ -119,52 +120,43 @@ impl Summary {
         }
     }
 
-    pub(crate) fn json(&self) -> anyhow::Result<String> {
-        Ok(crate::base::error_text::json(self)?)
-    }
-
-    /// For the terminal.
+    /// Text for the terminal.
     pub(crate) fn text(&self) -> String {
-        let metrics = &self.metrics;
-        let (vertices, triangles) = (metrics.vertices, metrics.triangles);
-        let mut out = format!("{} on {}: {vertices} vertices, {triangles} triangles\n", self.garment, self.body);
-        let (table, parts, levels, singletons) =
-            (&self.table, metrics.parts_text(), metrics.levels, metrics.singletons);
-        let stage_one = format!("table {table}: {parts} in {levels} levels, {singletons} of them single vertices");
-        let _ = writeln!(out, "{:<20}{stage_one}", "stage one");
-        let _ = writeln!(
-            out,
-            "{:<20}model {}, motion {}, fabric {}: {} PARTs touch the body, displacement {:.1} mm RMS",
-            "stage two", self.model, self.motion, self.fabric, metrics.contact_parts, metrics.displacement_rms_mm
-        );
-        if let Some(let_go) = &self.let_go {
-            let _ = writeln!(out, "{:<20}{let_go}", "let go");
-        }
-        let since = self.since_last.iter().map(|since| ("since the last save", since.clone()));
-        for (name, value) in metrics.findings().into_iter().chain(since) {
-            let _ = writeln!(out, "{name:<20}{value}");
-        }
+        let Self { metrics, table, model, motion, fabric, .. } = self;
+        let (levels, singletons) = (metrics.levels, metrics.singletons);
+        let parts = format!("table {table}: {} in {levels} levels, {singletons} single vertices", metrics.parts_text());
+        let (contact, moved) = (metrics.contact_parts, metrics.displacement_rms_mm);
+        let moved = format!("{contact} PARTs touch the body, displacement {moved:.1} mm RMS");
+        let two = format!("model {model}, motion {motion}, fabric {fabric}: {moved}");
+        let stages = [("stage one", parts), ("stage two", two)].into_iter();
+        let released = self.let_go.iter().map(|released| ("released edges", released.clone()));
+        let lines = stages.chain(released).chain(metrics.findings()).chain(self.since_last());
+        let mut out = heading(&self.garment, &self.body, (metrics.vertices, metrics.triangles), lines);
         let _ = writeln!(out, "\n{}", self.levels_table());
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        out + &ended(self.times(), &self.outputs)
+        out + &ending(self.times(), &self.outputs)
     }
 
-    /// For the recording's text panel.
+    fn since_last(&self) -> impl Iterator<Item = (&'static str, String)> {
+        self.since_last.iter().map(|since| ("since the last save", since.clone()))
+    }
+
+    /// The text panel of the recording.
     pub(crate) fn panel(&self) -> Panel {
         let of_model = [("model", self.model.to_owned()), ("motion", self.motion.to_owned())];
         let ease: Vec<String> = self.covered().map(|(e, _, cm)| format!("{} {cm:+.1} cm", e.at)).collect();
         let ease = (!ease.is_empty()).then(|| ("ease", ease.join(", ")));
         let facts = of_model.into_iter().chain(self.metrics.facts()).chain(ease);
-        let facts = facts.chain(self.since_last.iter().map(|since| ("since the last save", since.clone())));
+        let facts = facts.chain(self.since_last());
         Panel {
             title: format!("{} on {}", self.garment, self.body),
             table: self.table.clone(),
             levels: self.levels.clone(),
             facts: facts.map(|(name, value)| (name.to_owned(), value)).collect(),
             fabric: self.fabrics.iter().flat_map(fabric_facts).chain(self.cut.iter().map(swatch_fact)).collect(),
-            // How long the recording takes is not known while it is made.
+            // The time of the recording is unknown while it is written.
             timings_ms: self
                 .times()
                 .filter(|(stage, _)| *stage != "record")
@@ -175,51 +167,59 @@ impl Summary {
         }
     }
 
-    /// Milliseconds of the stages there were, in their order.
+    /// Milliseconds of the stages that ran, in their order.
     fn times(&self) -> impl Iterator<Item = (&'static str, f64)> {
         ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"]
             .into_iter()
             .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
     }
 
-    /// Where the garment goes round the body: its girth and its ease, cm.
+    /// The girths at which the garment surrounds the body: garment girth and ease, cm.
     fn covered(&self) -> impl Iterator<Item = (&GirthEase, f64, f64)> {
         self.ease.iter().filter_map(|ease| Some((ease, ease.garment_cm?, ease.ease_cm?)))
     }
 
     fn ease_table(&self) -> Table {
         let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
-        let mut table = console::table(console::RULED, header, 1..);
-        for (ease, garment_cm, ease_cm) in self.covered() {
+        let rows = self.covered().map(|(ease, garment_cm, ease_cm)| {
             let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
             if let Some(under) = ease.garment_height_cm.filter(|cm| cm + 0.5 < ease.height_cm) {
                 garment = format!("{garment}, under the sleeves at {under:.1}");
             }
-            let lengths = [height, body, garment];
-            table.add_row([ease.at.to_owned()].into_iter().chain(lengths).chain([format!("{ease_cm:+.1}")]));
-        }
-        table
+            [ease.at.to_owned(), height, body, garment, format!("{ease_cm:+.1}")]
+        });
+        console::table(console::RULED, header, 1.., rows)
     }
 
     fn levels_table(&self) -> Table {
-        let mut table = console::table(console::RULED, ["level", "from cm", "to cm", "PARTs", "vertices"], 0..);
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
-        for l in self.levels.iter().filter(|l| l.vertices > 0) {
-            let cells = [l.level.to_string(), bound(l.lower_cm), bound(l.upper_cm)];
-            table.add_row(cells.into_iter().chain([l.parts.to_string(), l.vertices.to_string()]));
-        }
-        table
+        let rows = self.levels.iter().filter(|l| l.vertices > 0).map(|l| {
+            let [lower, upper] = [l.lower_cm, l.upper_cm].map(bound);
+            [l.level.to_string(), lower, upper, l.parts.to_string(), l.vertices.to_string()]
+        });
+        console::table(console::RULED, ["level", "from cm", "to cm", "PARTs", "vertices"], 0.., rows)
     }
 }
 
-/// How a run for the terminal ends: its times, and what was written.
-pub(crate) fn ended(times_ms: impl Iterator<Item = (&'static str, f64)>, outputs: &[String]) -> String {
+/// The first lines of a run's text: garment, body, (vertices, triangles), then a line for each name and value.
+pub(crate) fn heading(
+    garment: &str,
+    body: &str,
+    (vertices, triangles): (usize, usize),
+    lines: impl Iterator<Item = (&'static str, String)>,
+) -> String {
+    let first = format!("{garment} on {body}: {vertices} vertices, {triangles} triangles\n");
+    lines.fold(first, |text, (name, value)| text + &format!("{name:<20}{value}\n"))
+}
+
+/// The last lines of a run's text: its times and the files written.
+pub(crate) fn ending(times_ms: impl Iterator<Item = (&'static str, f64)>, outputs: &[String]) -> String {
     let times: Vec<String> = times_ms.map(|(stage, ms)| format!("{stage} {ms:.1}")).collect();
     let times = format!("milliseconds: {}\n", times.join(", "));
     outputs.iter().fold(times, |text, output| text + output + "\n")
 }
 
-/// An accuracy's JSON without the state of the drape, which the figures tell: one key, one meaning.
+/// The JSON of an accuracy without the state of the drape, which the metrics contain under the same keys.
 fn without_state(accuracy: &Accuracy) -> serde_json::Result<Value> {
     let mut all: Map<String, Value> = serde_json::from_value(serde_json::to_value(accuracy)?)?;
     let state: Map<String, Value> = serde_json::from_value(serde_json::to_value(accuracy.state)?)?;
@@ -227,9 +227,9 @@ fn without_state(accuracy: &Accuracy) -> serde_json::Result<Value> {
     Ok(Value::Object(all))
 }
 
-/// The command line as typed, the program by its bare name.
+/// The command line, the program by its bare name.
 pub(crate) fn command_line() -> String {
-    // Names of files need not be Unicode.
+    // File names need not be Unicode.
     let typed = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
     let arguments = typed.map(|a| if a.contains(' ') { format!("'{a}'") } else { a });
     std::iter::once("partwise".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
@@ -253,4 +253,26 @@ pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
         fact("thickness", format!("{:.2} mm", 1e3 * fabric.thickness_m)),
         fact("friction", fabric.friction.to_string()),
     ]
+}
+
+/// Prints a certificate as a table.
+pub(crate) fn print_certificate(certificate: Option<&Certificate>) {
+    let Some(certificate) = certificate else { return };
+    let number =
+        |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };
+    let rows = certificate.findings.iter().map(|f| {
+        let passes = if f.passes { "passes" } else { "FAILS" };
+        let text = [f.name, passes, &number(f.value), &number(f.limit), f.unit, &f.remark];
+        text.map(str::to_owned)
+    });
+    let table = console::table(console::RULED, ["criterion", "", "value", "limit", "unit", "remark"], 2..4, rows);
+    let verdict = if certificate.passes { "certified: the drape is in equilibrium" } else { "not certified" };
+    console::result(&format!("{table}\n{verdict}"));
+}
+
+/// Fails if a criterion of the certificate fails, so that the program exits with 1.
+pub(crate) fn require_pass(certificate: Option<&Certificate>) -> anyhow::Result<()> {
+    let failed = certificate.map_or(0, |c| c.findings.iter().filter(|f| !f.passes).count());
+    anyhow::ensure!(failed == 0, "not certified: {failed} criteria fail");
+    Ok(())
 }

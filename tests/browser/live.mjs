@@ -284,7 +284,7 @@ try {
 
   // Who looks on sees all and changes nothing.
   const shared = await serve("--garment", "flared-skirt@900", "--token", TOKEN);
-  const link = await until_said(shared, /to look on only: (\S+)/);
+  const link = await until_said(shared, /read-only access: (\S+)/);
   const looker = await open({ width: 1280, height: 800 }, "light", { at: link });
   await idle(looker);
   await looker.waitForTimeout(800);

@@ -55,10 +55,10 @@ fn a_check_ends_in_a_verdict_and_tables_that_cannot_be_compared_in_their_reasons
         (String::from_utf8(done.stdout).unwrap(), done.status.code())
     };
     let (said, code) = told(&["check", "form", "flared-skirt@400"]);
-    assert!(said.contains("verdict: nothing is in the way of a drape") && code == Some(0), "{said}");
+    assert!(said.contains("verdict: no defect affects a drape") && code == Some(0), "{said}");
     bench.write("low.obj", &super::GARMENT.replace("v 0 0 1.65", "v 0 0 1.55"));
     let (said, _) = told(&["check", "body.obj", "low.obj"]);
-    assert!(said.contains("verdict: look at 1 garment vertices inside the body"), "{said}");
+    assert!(said.contains("verdict: found 1 garment vertices inside the body"), "{said}");
     // A ring that nothing is under: no table's fault, told in each one's row.
     let ring: String = (0..2)
         .flat_map(|j| (0..12).map(move |i| (f64::from(i) * std::f64::consts::TAU / 12.0, j)))

@@ -127,7 +127,7 @@ fn ctrl_c_while_a_mesh_is_made_ends_the_run_at_once() {
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     assert_eq!(status.code(), Some(130), "{said}");
-    assert!(!said.contains("keeping what is done"), "{said}");
+    assert!(!said.contains("the results so far are kept"), "{said}");
 }
 
 #[test]
@@ -198,16 +198,16 @@ fn a_session_is_shown_to_a_viewer_that_comes_late_and_to_one_that_comes_back() {
         Ok(())
     };
     let heard = (|| {
-        until("a viewer that is there later sees it")?;
+        until("a viewer that connects later shows it")?;
         let mut first = viewer();
-        let came = until("a viewer is there");
+        let came = until("a viewer is connected");
         first.kill().unwrap();
         first.wait().unwrap();
         came?;
         // The loss is noticed without an edit.
-        until("a viewer that is there later sees it")?;
+        until("a viewer that connects later shows it")?;
         let mut second = viewer();
-        let came = until("a viewer is there");
+        let came = until("a viewer is connected");
         let _ = Command::new("kill").args(["-INT", &session.id().to_string()]).status().unwrap();
         let kept = until("recording: kept.rrd");
         second.kill().unwrap();

@@ -1,10 +1,8 @@
-//! `partwise sweep`: every point of a sweep file, a row on disk after each, and a recording of them all.
+//! `partwise sweep`: computes every point of a sweep file, writes a row after each, and records all. `partwise merge`: joins the shards
+//! of a sweep.
 
-pub(crate) mod chosen;
-pub(crate) mod points;
 pub(crate) mod recording;
 pub(crate) mod report;
-mod single;
 pub(crate) mod store;
 
 use std::collections::BTreeSet;
@@ -14,29 +12,22 @@ use std::time::Instant;
 use crate::Job;
 use crate::record::{RecordSummary, Tab};
 use crate::study::job::Against;
-use crate::study::sweep::{Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress, sweep};
+use crate::study::sweep::{self, Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress};
 use clap::Args;
 
-use self::points::KeepingBench;
-use self::report::{Format, Report};
-use self::store::PointStore;
-use super::failure::UserError;
-use super::runtime::{MOST_THREADS, cache, use_threads};
+use self::report::Report;
+use self::store::{PointStore, StoringBench};
+use super::console::{self, RowFormat};
+use super::runtime::{
+    MAX_THREADS, interrupt_flag, interrupted, keep_results, reference_cache, refuse, unwritable, use_threads,
+};
 use super::sinks::SinkArgs;
-use super::{console, interrupt};
-
-pub(super) const LONG_ABOUT: &str = "\
-Runs every point of a sweep file: range tables, and any other setting, over garments, sizes and fabrics.
-
-A row is on disk after every point (rows.jsonl; rows.csv is made of it at the end), so that Ctrl-C, a crash or a full disk lose at \
-most the point in hand; --resume goes on from there. A point that fails is a row with its error, and the sweep goes on. At the end \
-one recording per garment shows each table as a step, the few best side by side, and speed against error.";
 
 const EXAMPLES: &str = "\
 Examples:
-  partwise sweep assets/sweeps/table-3-variations.toml                the paper's table and its variations
-  partwise sweep mine.toml --resume                                   go on after Ctrl-C, a crash, a full disk
-  partwise sweep mine.toml --shard 2/8 --out part-2                   one share of eight, for a job array
+  partwise sweep assets/sweeps/table-3-variations.toml                the paper's table and variations of it
+  partwise sweep mine.toml --resume                                   continue after Ctrl-C, a crash or a full disk
+  partwise sweep mine.toml --shard 2/8 --out part-2                   one shard of eight, for a job array
   parallel partwise sweep mine.toml --shard {}/3 --out part-{} ::: 1 2 3 && partwise merge part-* --out whole
 
 A sweep file:
@@ -51,35 +42,35 @@ A sweep file:
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct SweepArgs {
-    /// The sweep file, TOML
+    /// Sweep file, TOML
     file: PathBuf,
-    /// Folder of the rows [default: recordings/sweeps/FILE, and /shard-I-of-N in it]
+    /// Folder of the rows [default: recordings/sweeps/FILE, for shards /shard-I-of-N in it]
     #[arg(long, value_name = "DIR", help_heading = "Rows")]
     out: Option<PathBuf>,
-    /// Go on: skip what has a row, try again what failed
+    /// Continue: skip points that have a row, and repeat those that failed
     #[arg(long, help_heading = "Rows")]
     resume: bool,
-    /// With the sweep file changed since: keep the rows of points it still has
+    /// With a sweep file changed since: keep the rows of points that it still contains
     #[arg(long, requires = "resume", help_heading = "Rows")]
     adopt: bool,
-    /// Run one share of the points, e.g. 2/8; `partwise merge` joins them
+    /// Run one shard of the points, e.g. 2/8; `partwise merge` joins the shards
     #[arg(long, value_name = "I/N", help_heading = "Rows")]
     shard: Option<Shard>,
-    /// Points at a time; more than one makes the timings of all of them worse
+    /// Points computed in parallel; more than one distorts the measured times
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Rows")]
     jobs: usize,
-    /// What points that do not say it are measured against: `none`, `canonical` (the drape of garment, body and
-    /// fabric), or `own` continuation too, a converged drape for every point, seconds each
+    /// Reference of points that specify none: `none`, `canonical` (the canonical drape of garment, body and fabric), or `own` (also the
+    /// point's own continuation to convergence, seconds per point)
     #[arg(long, value_name = "none|canonical|own", default_value_t = Against::Own, help_heading = "Rows")]
     accuracy: Against,
-    /// Where references are kept [default: the user's cache folder]
+    /// Folder of the reference drapes [default: the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Rows")]
     cache: Option<PathBuf>,
     #[command(flatten)]
     sinks: SinkArgs,
-    /// What to print on stdout
-    #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
-    format: Format,
+    /// Format of the result on stdout
+    #[arg(long, value_enum, default_value_t = RowFormat::Text, help_heading = "Output")]
+    format: RowFormat,
     /// Worker threads; results do not depend on it [default: one per core]
     #[arg(long, value_name = "N", help_heading = "Output")]
     threads: Option<usize>,
@@ -88,21 +79,19 @@ pub(crate) struct SweepArgs {
 impl SweepArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        if !(1..=MOST_THREADS).contains(&self.jobs) {
+        if !(1..=MAX_THREADS).contains(&self.jobs) {
             let found = self.jobs;
-            return Err(UserError::new(format!(
-                "--jobs {found}: found {found}, expected 1 to {MOST_THREADS} points at a time"
-            )));
+            refuse!("--jobs {found}: found {found}, expected 1 to {MAX_THREADS} points in parallel");
         }
-        interrupt::keep();
+        keep_results();
         self.sinks.check_outputs(&[])?;
         let plan = self.plan()?;
         let folder = self.folder();
         let store = PointStore::in_folder(&folder);
-        // Before hours of points, not after them.
+        // Checked before the points are computed, which may take hours.
         let scenes: BTreeSet<String> = plan.points.iter().map(Point::scene_id).collect();
-        one_recording(scenes.len(), &folder, &self.sinks)?;
-        let bench = KeepingBench::new(&store, cache(self.cache.as_ref()));
+        check_single_recording(scenes.len(), &folder, &self.sinks)?;
+        let bench = StoringBench::new(&store, reference_cache(self.cache.as_ref()));
         let existing = match self.resume {
             true => Existing::Resume { retry_failed: true, adopt: self.adopt },
             false => Existing::Refuse,
@@ -113,39 +102,39 @@ impl SweepArgs {
             bar.set_length(p.total as u64);
             bar.set_position(p.done as u64);
             if p.row.is_none() {
-                // The rows found there took no time: what is left is guessed from the others.
+                // Rows of an earlier run took no time and would distort the estimate.
                 bar.reset_eta();
             }
             if p.failed > 0 {
                 bar.set_message(format!("{} ({} failed)", plan.name, p.failed));
             }
         };
-        let run = Run { jobs: self.jobs, stop: interrupt::flag(), progress: &progress };
+        let run = Run { jobs: self.jobs, stop: interrupt_flag(), progress: &progress };
         let row = |point: &Point| bench.row(point, (plan.warm_up, plan.repeats));
-        let outcome = sweep(&plan, self.shard, &folder, existing, &run, &row);
+        let outcome = sweep::sweep(&plan, self.shard, &folder, existing, &run, &row);
         bar.finish_and_clear();
-        if let Some(error) = bench.take_broken() {
-            let advice = "the rows before are intact: make room and go on with --resume";
-            return Err(UserError::new(format!("{}: cannot keep a point: {error}; {advice}", folder.display())));
+        if let Some(error) = bench.take_error() {
+            let remedy = "the earlier rows are intact: free disk space and continue with --resume";
+            refuse!("{}: cannot store a point: {error}; {remedy}", folder.display());
         }
         let outcome = outcome?;
-        self.mend(&plan, &outcome.rows, &store, &bench);
+        self.restore(&plan, &outcome.rows, &store, &bench);
         let seconds = started.elapsed().as_secs_f64();
-        console::warnings(&bench.bench.warnings());
         let recordings = record_all(&outcome.rows, &store, &plan.name, &folder, &self.sinks, Tab::Stages)?;
         let report = Report {
             name: &plan.name,
             folder: &folder,
             outcome: &outcome,
             seconds,
-            keeping_ms: bench.keeping_ms(),
+            storing_ms: bench.storing_ms(),
             recordings: &recordings,
         };
-        console::result(&report.text(self.format)?);
-        if outcome.failed > 0 && !interrupt::requested() {
+        report.print(self.format)?;
+        console::warnings(&bench.bench.warnings());
+        if outcome.failed > 0 && !interrupted() {
             let (Outcome { failed, total, .. }, folder) = (outcome, folder.display());
             anyhow::bail!(
-                "{failed} of {total} points failed: the column `error` of {folder}/rows.csv says why; --resume tries them again"
+                "{failed} of {total} points failed: the column `error` of {folder}/rows.csv contains the reasons; --resume repeats them"
             );
         }
         Ok(())
@@ -160,14 +149,14 @@ impl SweepArgs {
     fn folder(&self) -> PathBuf {
         let stem = self.file.file_stem().map_or_else(|| "sweep".into(), std::ffi::OsStr::to_string_lossy);
         let whole = || Path::new("recordings").join("sweeps").join(stem.as_ref());
-        let share = |shard: Shard| whole().join(format!("shard-{}", shard.to_string().replace('/', "-of-")));
-        self.out.clone().unwrap_or_else(|| self.shard.map_or_else(whole, share))
+        let of_shard = |shard: Shard| whole().join(format!("shard-{}", shard.to_string().replace('/', "-of-")));
+        self.out.clone().unwrap_or_else(|| self.shard.map_or_else(whole, of_shard))
     }
 
-    /// Computes again what is kept of points whose file is gone or damaged.
-    fn mend(&self, plan: &Plan, rows: &[Row], store: &PointStore, bench: &KeepingBench<'_>) {
+    /// Computes points again whose stored file is missing or damaged.
+    fn restore(&self, plan: &Plan, rows: &[Row], store: &PointStore, bench: &StoringBench<'_>) {
         for row in rows.iter().filter(|row| row.status == Status::Ok) {
-            if interrupt::requested() {
+            if interrupted() {
                 return;
             }
             if store.point(&row.point).is_some_and(|point| store.scene(&point.scene).is_some()) {
@@ -181,19 +170,19 @@ impl SweepArgs {
     }
 }
 
-/// Refuses a sink that takes one recording where there are several.
-fn one_recording(recordings: usize, folder: &Path, sinks: &SinkArgs) -> anyhow::Result<()> {
+/// Refuses sinks for a single recording if there are several.
+fn check_single_recording(recordings: usize, folder: &Path, sinks: &SinkArgs) -> anyhow::Result<()> {
     if recordings > 1 && (sinks.save.is_some() || sinks.serve) {
-        return Err(UserError::new(format!(
-            "--save and --serve take one recording, and this sweep makes {recordings}, one a garment; leave them out, and look at \
-             one of {}/*.rrd with `partwise view`",
+        refuse!(
+            "--save and --serve accept one recording, but this sweep has {recordings}, one per garment; omit them, and open one \
+             of {}/*.rrd with `partwise view`",
             folder.display()
-        )));
+        );
     }
     Ok(())
 }
 
-/// Makes the recordings of a sweep, in its folder unless a file was given.
+/// Writes the recordings of a sweep, to its folder unless a file was given.
 pub(crate) fn record_all(
     rows: &[Row],
     store: &PointStore,
@@ -205,10 +194,10 @@ pub(crate) fn record_all(
     let (groups, missing) = recording::groups(rows, store);
     if missing > 0 {
         console::warning(&format!(
-            "{missing} points have a row but no drape on disk and are missing from the recording"
+            "{missing} points have a row but no stored drape and are missing from the recording"
         ));
     }
-    one_recording(groups.len(), folder, sinks)?;
+    check_single_recording(groups.len(), folder, sinks)?;
     let mut done = Vec::new();
     for group in &groups {
         let sinks = sinks.sinks_in(folder, &group.name);
@@ -217,4 +206,48 @@ pub(crate) fn record_all(
         }
     }
     Ok(done)
+}
+
+/// Arguments of `merge`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct MergeArgs {
+    /// Folders written by `partwise sweep --shard I/N`; overlapping shards must agree
+    #[arg(required = true, value_name = "DIR")]
+    shards: Vec<PathBuf>,
+    /// Folder of the joined sweep
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    sinks: SinkArgs,
+    /// Format of the result on stdout
+    #[arg(long, value_enum, default_value_t = RowFormat::Text, help_heading = "Output")]
+    format: RowFormat,
+}
+
+impl MergeArgs {
+    pub(crate) fn execute(&self) -> anyhow::Result<()> {
+        let started = Instant::now();
+        self.sinks.check_outputs(&[])?;
+        let rows = sweep::merge(&self.shards, &self.out)?;
+        let (manifest, _) = sweep::store::read(&self.out)?;
+        let store = PointStore::in_folder(&self.out);
+        let sources: Vec<PointStore> = self.shards.iter().map(|folder| PointStore::in_folder(folder)).collect();
+        for row in rows.iter().filter(|row| row.status == Status::Ok) {
+            for source in &sources {
+                if store.adopt(source, &row.point).map_err(unwritable(&self.out, "--out"))? {
+                    break;
+                }
+            }
+        }
+        let recordings = record_all(&rows, &store, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
+        let report = Report {
+            name: &manifest.name,
+            folder: &self.out,
+            outcome: &Outcome::found(rows),
+            seconds: started.elapsed().as_secs_f64(),
+            storing_ms: 0.0,
+            recordings: &recordings,
+        };
+        report.print(self.format)
+    }
 }

@@ -1,56 +1,43 @@
-//! A sweep on the terminal and for scripts: its rows as a table, JSON or CSV, and what the recordings cost.
+//! The report of a sweep as text, JSON or CSV: its rows, and the size and time of its recordings.
 
 use std::path::Path;
 
 use crate::record::RecordSummary;
 use crate::study::sweep::{Outcome, Row, Status, csv_text};
-use clap::ValueEnum;
-use comfy_table::Table;
 use serde_json::json;
 
-use super::chosen::{labels, total_ms};
-use crate::commands::console;
+use super::recording::{labels, total_ms};
+use crate::commands::console::{self, RowFormat};
 
-/// What stdout is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    /// Tables for people
-    Text,
-    /// One JSON object
-    Json,
-    /// The rows as CSV
-    Csv,
-}
-
-/// What became of a sweep.
+/// The result of a sweep.
 pub(crate) struct Report<'a> {
     pub(crate) name: &'a str,
     pub(crate) folder: &'a Path,
     pub(crate) outcome: &'a Outcome,
     /// Wall time of the points, s.
     pub(crate) seconds: f64,
-    /// Time spent on keeping points for the recording, ms.
-    pub(crate) keeping_ms: f64,
+    /// Time spent storing points for the recording, ms.
+    pub(crate) storing_ms: f64,
     pub(crate) recordings: &'a [RecordSummary],
 }
 
 impl Report<'_> {
-    /// In the format asked for.
-    pub(crate) fn text(&self, format: Format) -> anyhow::Result<String> {
+    pub(crate) fn print(&self, format: RowFormat) -> anyhow::Result<()> {
         match format {
-            Format::Text => Ok(self.table()),
-            Format::Json => Ok(crate::base::error_text::json(&self.json())?),
-            Format::Csv => Ok(String::from_utf8(csv_text(&self.outcome.rows))?),
+            RowFormat::Text => console::result(&self.text()),
+            RowFormat::Json => console::json(&self.json())?,
+            RowFormat::Csv => console::result(&String::from_utf8(csv_text(&self.outcome.rows))?),
         }
+        Ok(())
     }
 
-    /// Time to keep points and to write the recordings, ms.
+    /// Time spent storing points and writing the recordings, ms.
     fn logging_ms(&self) -> f64 {
-        self.keeping_ms + self.recordings.iter().map(|r| r.log_ms).sum::<f64>()
+        self.storing_ms + self.recordings.iter().map(|r| r.log_ms).sum::<f64>()
     }
 
     fn json(&self) -> serde_json::Value {
-        // JSON is Unicode; names of files need not be.
+        // JSON is Unicode; file names need not be.
         let name = |r: &RecordSummary| r.path.as_ref().map(|path| path.display().to_string());
         let recordings: Vec<_> = self
             .recordings
@@ -70,65 +57,53 @@ impl Report<'_> {
         })
     }
 
-    fn table(&self) -> String {
+    fn text(&self) -> String {
         let Outcome { total, skipped, failed, rows, .. } = self.outcome;
-        let mut out = format!("{}\n{}", rows_table(rows), explained(rows));
         let (done, seconds, folder) = (rows.len(), self.seconds, self.folder.display());
-        out.push_str(&format!(
-            "{done} of {total} points done, {failed} failed; {skipped} found there, the others took {seconds:.1} s\nrows: {folder}/rows.csv\n"
-        ));
-        for recording in self.recordings {
-            out.push_str(&line(recording));
-        }
+        let points = format!(
+            "{done} of {total} points done, {failed} failed; {skipped} from an earlier run, the others in {seconds:.1} s"
+        );
+        let recordings: String = self.recordings.iter().map(recording_line).collect();
+        let mut out = format!("{}{points}\nrows: {folder}/rows.csv\n{recordings}", rows_text(rows));
         if !self.recordings.is_empty() {
-            out.push_str(&format!("keeping and recording the points took {:.1} s\n", self.logging_ms() / 1e3));
+            out += &format!("storing and recording the points took {:.1} s\n", self.logging_ms() / 1e3);
         }
         out
     }
 }
 
-/// A recording, its size and its cost in a line.
-pub(crate) fn line(recording: &RecordSummary) -> String {
-    let Some(said) = recording.file_line() else { return String::new() };
+/// A recording, its size and its time in a line.
+pub(crate) fn recording_line(recording: &RecordSummary) -> String {
+    let Some(path) = recording.file_line() else { return String::new() };
     let [bytes, raw] = [recording.bytes, recording.raw_bytes.max(1)].map(|bytes| bytes as f64);
     let (mb, share, seconds) = (bytes / 1e6, bytes / raw, recording.log_ms / 1e3);
-    format!("{said} ({mb:.1} MB, {share:.2} of the bytes that changed, {seconds:.1} s)\n")
+    format!("{path} ({mb:.1} MB, {share:.2} of the uncompressed size, {seconds:.1} s)\n")
 }
 
-/// What the columns of [`rows_table`] are, where an error was measured.
-pub(crate) fn explained(rows: &[Row]) -> &'static str {
-    let measured = |row: &Row| row.metrics.as_ref().is_some_and(|metrics| metrics.canonical_rms_mm.is_some());
-    if !rows.iter().any(measured) {
-        return "";
-    }
-    "RMS over the vertices, mm. own: to where this drape would settle; canonical: to the drape of the garment as placed, the same for \
-     all tables;\naffine, translation: what one affine map, one displacement, a PART leaves of the canonical drape at best\n"
-}
-
-/// The rows for people: what tells them apart, how many PARTs, how fast, how far off.
-pub(crate) fn rows_table(rows: &[Row]) -> Table {
-    let header = ["", "garment", "setting", "PARTs", "ms", "own mm", "canonical mm", "affine mm", "translation mm"];
-    let mut table = console::table(console::OPEN, header, [0].into_iter().chain(3..));
+/// The rows as text: a table of settings, PARTs, times and errors, and the definitions of the errors.
+pub(crate) fn rows_text(rows: &[Row]) -> String {
+    let mm = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"));
     let refs: Vec<&Row> = rows.iter().collect();
-    let mm = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
-    for (row, label) in rows.iter().zip(labels(&refs)) {
+    let cells = rows.iter().zip(labels(&refs)).filter_map(|(row, label)| {
         let (index, garment) = (row.index.to_string(), row.garment.clone());
         if row.status == Status::Error {
-            table.add_row([index, garment, format!("{label}: {}", row.error)]);
-            continue;
+            return Some(vec![index, garment, format!("{label}: {}", row.error)]);
         }
-        let Some(metrics) = &row.metrics else { continue };
-        table.add_row([
-            index,
-            garment,
-            label,
-            metrics.part_count.to_string(),
-            mm(total_ms(row)),
-            mm(metrics.rms_mm),
-            mm(metrics.canonical_rms_mm),
-            mm(metrics.representable_affine_rms_mm),
-            mm(metrics.representable_rms_mm),
-        ]);
-    }
-    table
+        let m = row.metrics.as_ref()?;
+        let errors = [m.rms_mm, m.canonical_rms_mm, m.representable_affine_rms_mm, m.representable_rms_mm];
+        let (parts, time) = (m.part_count.to_string(), mm(total_ms(row)));
+        Some([index, garment, label, parts, time].into_iter().chain(errors.map(mm)).collect())
+    });
+    let errors = ["own error mm", "canonical error mm", "affine bound mm", "translation bound mm"];
+    let header = ["", "garment", "setting", "PARTs", "ms"].into_iter().chain(errors);
+    let table = console::table(console::OPEN, header, [0].into_iter().chain(3..), cells);
+    let measured = rows.iter().filter_map(|row| row.metrics.as_ref()).any(|metrics| metrics.canonical_rms_mm.is_some());
+    format!("{table}\n{}", if measured { ERRORS } else { "" })
 }
+
+/// Definitions of the errors in [`rows_text`].
+const ERRORS: &str = "\
+Errors are RMS over the vertices. own error: to the equilibrium that this drape converges to. canonical
+error: to the canonical drape of the garment, the same for all tables. affine and translation bound: to
+the canonical drape, if each PART moved by its best affine map, or by its best displacement.
+";

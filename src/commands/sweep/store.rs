@@ -1,37 +1,41 @@
-//! What a sweep keeps of every point beside its row, so that its recording can be put together at the end, after any
-//! interruption, and from shards: the drape, the PARTs and their forces, in single precision as a recording holds them.
+//! The stored points of a sweep: drape, PARTs and forces, in the single precision of a recording. The recording of a sweep is made
+//! from them at the end, also after an interruption and from shards.
 //!
-//! | file in the sweep's folder | what |
+//! | file in the sweep's folder | contents |
 //! |---|---|
 //! | `points/ID.point` | one point, by its content hash |
 //! | `scenes/ID.scene` | body, garment and distances that points share |
 //!
-//! A point's file is written before its row; one that is missing or damaged is computed again.
+//! The file of a point is written before its row. A point with a missing or damaged file is computed again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use crate::base::checksum::{self, Tag, write};
 use crate::base::files::{self, read_own};
 use crate::drape::Drape;
+use crate::garment::MeshCache;
 use crate::mesh::TriMesh;
 use crate::parts::UNASSIGNED;
 use crate::scene::Scene;
+use crate::study::accuracy::ReferenceCache;
 use crate::study::metrics::LevelCount;
-use crate::study::sweep::is_id;
+use crate::study::sweep::{Bench, Point, PointError, Row, is_id};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::single;
+use crate::commands::runtime::interrupt_flag;
 
 const POINT: &Tag = b"PWPOINT5";
 const SCENE: &Tag = b"PWSCENE3";
 
-/// Body and garment as a recording shows them.
+/// Body and garment of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct KeptScene {
+pub(crate) struct StoredScene {
     /// The body, m.
     #[serde(with = "single::mesh")]
     pub(crate) body: TriMesh,
@@ -43,41 +47,41 @@ pub(crate) struct KeptScene {
     pub(crate) distance_m: Vec<f64>,
 }
 
-/// One point as a recording shows it.
+/// A point of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct KeptPoint {
-    /// Id of its scene; the first field, so that it can be told from the head of a file.
+pub(crate) struct StoredPoint {
+    /// Id of the scene; the first field, so that it can be read from the first bytes of a file.
     pub(crate) scene: String,
-    /// The levels of its table.
+    /// The levels of the table.
     pub(crate) levels: Vec<LevelCount>,
     /// Resultant force on each PART, N.
     #[serde(with = "single::points")]
     pub(crate) force_n: Vec<DVec3>,
     /// PART of each vertex.
     pub(crate) part_of_vertex: Vec<u32>,
-    /// The displaced garment, m.
+    /// The draped garment, m.
     #[serde(with = "single::points")]
     pub(crate) positions: Vec<DVec3>,
-    /// Distance of each vertex to the reference drape, mm; empty where nobody asked.
+    /// Distance of each vertex to the reference drape, mm; empty if not measured.
     #[serde(with = "single::numbers")]
     pub(crate) error_mm: Vec<f64>,
 }
 
-impl KeptScene {
+impl StoredScene {
     fn of(scene: &Scene) -> io::Result<Self> {
         let (body, garment) = (scene.body.mesh().clone(), scene.garment.clone());
         Ok(Self { body, garment, distance_m: scene.distances_m().map_err(io::Error::other)? })
     }
 
-    /// Whether every index points at something: a file may be somebody else's.
-    fn is_sound(&self) -> bool {
+    /// Whether every index is in range; a file may come from another program.
+    fn is_valid(&self) -> bool {
         let whole = |mesh: &TriMesh| mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.vertex_count());
         whole(&self.body) && whole(&self.garment) && self.distance_m.len() == self.garment.vertex_count()
     }
 }
 
-impl KeptPoint {
-    /// What is kept of a drape in the scene of this id.
+impl StoredPoint {
+    /// The point of a drape in the scene with id `scene`.
     pub(crate) fn of(scene: String, drape: &Drape, error_mm: &[f64]) -> Self {
         Self {
             scene,
@@ -95,8 +99,8 @@ impl KeptPoint {
         self.part_of_vertex.iter().map(of).collect()
     }
 
-    /// Whether every index points at something, levels and PARTs add up, and the scene's id is one.
-    fn is_sound(&self) -> bool {
+    /// Whether every index is in range, the levels contain all PARTs, and the scene has a valid id.
+    fn is_valid(&self) -> bool {
         let parts = self.force_n.len();
         let counted = self.levels.iter().try_fold(0_usize, |sum, level| sum.checked_add(level.parts));
         is_id(&self.scene)
@@ -108,19 +112,19 @@ impl KeptPoint {
     }
 }
 
-/// Where points and scenes are kept.
+/// The storage of points and scenes.
 #[derive(Debug)]
 pub(crate) enum PointStore {
-    /// In a sweep's folder; who writes a scene, which several jobs may want at once, takes the lock.
+    /// The folder of a sweep. The lock is held while a scene is written, because several jobs may share one.
     Folder(PathBuf, Mutex<()>),
-    /// In memory, for a handful of points.
-    Memory(Mutex<Kept>),
+    /// Memory, for a few points.
+    Memory(Mutex<Stored>),
 }
 
-type Kept = (BTreeMap<String, KeptScene>, BTreeMap<String, KeptPoint>);
+type Stored = (BTreeMap<String, StoredScene>, BTreeMap<String, StoredPoint>);
 
-fn open(kept: &Mutex<Kept>) -> MutexGuard<'_, Kept> {
-    kept.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn point_path(folder: &Path, id: &str) -> PathBuf {
@@ -136,29 +140,34 @@ impl PointStore {
         Self::Memory(Mutex::default())
     }
 
-    /// A store in a sweep's folder; it is made with the first point.
+    /// The store in a sweep's folder, which is created with the first point.
     pub(crate) fn in_folder(folder: &Path) -> Self {
         Self::Folder(folder.to_owned(), Mutex::default())
     }
 
-    /// Keeps a point and its scene.
-    pub(crate) fn put(&self, id: &str, point: KeptPoint, scene: &Scene) -> io::Result<()> {
-        self.put_both(id, point, || KeptScene::of(scene))
+    /// Stores a point and its scene.
+    pub(crate) fn put(&self, id: &str, point: StoredPoint, scene: &Scene) -> io::Result<()> {
+        self.put_both(id, point, || StoredScene::of(scene))
     }
 
-    fn put_both(&self, id: &str, point: KeptPoint, scene: impl FnOnce() -> io::Result<KeptScene>) -> io::Result<()> {
+    fn put_both(
+        &self,
+        id: &str,
+        point: StoredPoint,
+        scene: impl FnOnce() -> io::Result<StoredScene>,
+    ) -> io::Result<()> {
         match self {
-            Self::Folder(folder, lock) => {
-                let writing = lock.lock().unwrap_or_else(PoisonError::into_inner);
-                // One that is there and damaged is written again: for ever in the way of --resume otherwise.
+            Self::Folder(folder, writing) => {
+                let writing = lock(writing);
+                // A damaged scene is written again; otherwise --resume would never succeed.
                 if self.scene(&point.scene).is_none() {
                     write(&scene_path(folder, &point.scene), SCENE, &scene()?)?;
                 }
                 drop(writing);
                 write(&point_path(folder, id), POINT, &point)
             }
-            Self::Memory(kept) => {
-                let (scenes, points) = &mut *open(kept);
+            Self::Memory(stored) => {
+                let (scenes, points) = &mut *lock(stored);
                 if !scenes.contains_key(&point.scene) {
                     scenes.insert(point.scene.clone(), scene()?);
                 }
@@ -168,17 +177,17 @@ impl PointStore {
         }
     }
 
-    /// A point, if it is there and whole.
-    pub(crate) fn point(&self, id: &str) -> Option<KeptPoint> {
+    /// A point, if its file exists and is intact.
+    pub(crate) fn point(&self, id: &str) -> Option<StoredPoint> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::decode(POINT, &read_own(&point_path(folder, id)).ok()?).filter(KeptPoint::is_sound)
+                checksum::decode(POINT, &read_own(&point_path(folder, id)).ok()?).filter(StoredPoint::is_valid)
             }
-            Self::Memory(kept) => open(kept).1.get(id).cloned(),
+            Self::Memory(stored) => lock(stored).1.get(id).cloned(),
         }
     }
 
-    /// The scene of a point, by id, without reading the whole of it.
+    /// The id of a point's scene, from the first bytes of the point's file.
     pub(crate) fn scene_of(&self, id: &str) -> Option<String> {
         match self {
             Self::Folder(folder, _) => {
@@ -186,25 +195,122 @@ impl PointStore {
                 files::open(&point_path(folder, id)).ok()?.take(256).read_to_end(&mut head).ok()?;
                 checksum::first_field(POINT, &head).filter(|scene: &String| is_id(scene))
             }
-            Self::Memory(kept) => Some(open(kept).1.get(id)?.scene.clone()),
+            Self::Memory(stored) => Some(lock(stored).1.get(id)?.scene.clone()),
         }
     }
 
-    /// A scene, if it is there and whole.
-    pub(crate) fn scene(&self, id: &str) -> Option<KeptScene> {
+    /// A scene, if its file exists and is intact.
+    pub(crate) fn scene(&self, id: &str) -> Option<StoredScene> {
         match self {
             Self::Folder(folder, _) => {
-                checksum::decode(SCENE, &read_own(&scene_path(folder, id)).ok()?).filter(KeptScene::is_sound)
+                checksum::decode(SCENE, &read_own(&scene_path(folder, id)).ok()?).filter(StoredScene::is_valid)
             }
-            Self::Memory(kept) => open(kept).0.get(id).cloned(),
+            Self::Memory(stored) => lock(stored).0.get(id).cloned(),
         }
     }
 
-    /// Takes over what another sweep's folder holds of a point; false where it has nothing whole.
+    /// Copies a point from another store; false if it is missing or damaged there.
     pub(crate) fn adopt(&self, from: &Self, id: &str) -> io::Result<bool> {
         let Some(point) = from.point(id) else { return Ok(false) };
         let Some(scene) = from.scene(&point.scene) else { return Ok(false) };
         self.put_both(id, point, || Ok(scene)).map(|()| true)
+    }
+}
+
+/// Computes points and stores them.
+pub(crate) struct StoringBench<'a> {
+    pub(crate) bench: Bench<'static>,
+    store: &'a PointStore,
+    failed: Mutex<Option<io::Error>>,
+    storing_us: AtomicU64,
+}
+
+impl<'a> StoringBench<'a> {
+    /// A bench with its points in `store` and its reference drapes in `cache`.
+    pub(crate) fn new(store: &'a PointStore, cache: Option<ReferenceCache>) -> Self {
+        let bench = Bench::new(cache, interrupt_flag()).with_meshes(MeshCache::in_user_cache());
+        Self { bench, store, failed: Mutex::default(), storing_us: AtomicU64::new(0) }
+    }
+
+    /// The error of a store that failed, such as a full disk.
+    pub(crate) fn take_error(&self) -> Option<io::Error> {
+        lock(&self.failed).take()
+    }
+
+    /// Time spent storing points, ms.
+    pub(crate) fn storing_ms(&self) -> f64 {
+        self.storing_us.load(Ordering::Relaxed) as f64 / 1e3
+    }
+
+    /// The row of a point, which is stored first; `passes` are the untimed and the timed ones.
+    pub(crate) fn row(&self, point: &Point, passes: (usize, usize)) -> Option<Row> {
+        if lock(&self.failed).is_some() {
+            return None;
+        }
+        self.bench.row(point, passes, |loaded, drape, measured| {
+            let started = Instant::now();
+            let stored = StoredPoint::of(point.scene_id(), drape, &measured.error_mm);
+            let put = self.store.put(&point.id, stored, &loaded.scene);
+            self.storing_us.fetch_add(started.elapsed().as_micros() as u64, Ordering::Relaxed);
+            put.map_err(|error| {
+                // A point that is not stored gets no row. Most likely the disk is full, and further points would fail as well.
+                *lock(&self.failed) = Some(error);
+                PointError::Interrupted
+            })
+        })
+    }
+}
+
+/// Meshes and numbers in single precision: `#[serde(with = "single::points")]`.
+mod single {
+    use crate::mesh::TriMesh;
+    use glam::{DVec3, Vec3};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    fn rounded(points: &[DVec3]) -> Vec<Vec3> {
+        points.iter().map(DVec3::as_vec3).collect()
+    }
+
+    fn widened(points: Vec<Vec3>) -> Vec<DVec3> {
+        points.iter().map(Vec3::as_dvec3).collect()
+    }
+
+    pub(super) mod points {
+        use super::*;
+
+        pub(crate) fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
+            rounded(points).serialize(to)
+        }
+
+        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
+            Deserialize::deserialize(from).map(widened)
+        }
+    }
+
+    pub(super) mod numbers {
+        use super::*;
+
+        pub(crate) fn serialize<S: Serializer>(numbers: &[f64], to: S) -> Result<S::Ok, S::Error> {
+            to.collect_seq(numbers.iter().map(|&x| x as f32))
+        }
+
+        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+            Ok(Vec::<f32>::deserialize(from)?.into_iter().map(f64::from).collect())
+        }
+    }
+
+    /// Positions and triangles; a recording has no groups.
+    pub(super) mod mesh {
+        use super::*;
+
+        pub(crate) fn serialize<S: Serializer>(mesh: &TriMesh, to: S) -> Result<S::Ok, S::Error> {
+            (rounded(&mesh.positions), &mesh.triangles).serialize(to)
+        }
+
+        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<TriMesh, D::Error> {
+            let (positions, triangles) = Deserialize::deserialize(from)?;
+            Ok(TriMesh::new(widened(positions), triangles))
+        }
     }
 }
 
@@ -216,14 +322,14 @@ mod tests {
 
     const SCENE_ID: &str = "0123456789abcdef0123456789abcdef";
 
-    fn scene() -> KeptScene {
+    fn scene() -> StoredScene {
         let mesh = TriMesh::new(vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.25], vec![[0, 1, 2]]);
-        KeptScene { body: mesh.clone(), garment: mesh, distance_m: vec![0.5, 0.25, 0.125] }
+        StoredScene { body: mesh.clone(), garment: mesh, distance_m: vec![0.5, 0.25, 0.125] }
     }
 
-    fn point() -> KeptPoint {
+    fn point() -> StoredPoint {
         let (lower_cm, upper_cm) = (0.0, f64::INFINITY);
-        KeptPoint {
+        StoredPoint {
             scene: SCENE_ID.to_owned(),
             levels: vec![LevelCount { level: 1, lower_cm, upper_cm, extent: None, vertices: 2, parts: 1 }],
             force_n: vec![DVec3::Z * -0.5],
@@ -234,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_reads_back_and_a_truncated_scene_is_written_again() {
+    fn a_stored_point_reads_back_and_a_truncated_scene_is_written_again() {
         let folder = tempfile::tempdir().unwrap();
         let store = PointStore::in_folder(folder.path());
         store.put_both("a", point(), || Ok(scene())).unwrap();
@@ -245,14 +351,14 @@ mod tests {
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         assert_eq!(store.scene(SCENE_ID), None);
         store.put_both("a", point(), || Ok(scene())).unwrap();
-        assert_eq!(store.scene(SCENE_ID), Some(scene()), "--resume would fail for ever");
+        assert_eq!(store.scene(SCENE_ID), Some(scene()), "--resume would never succeed");
     }
 
     #[test]
-    fn indices_that_point_nowhere_and_ids_that_are_paths_read_as_nothing() {
+    fn indices_out_of_range_and_ids_that_are_paths_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let store = PointStore::in_folder(folder.path());
-        let spoil: [fn(&mut KeptPoint); 6] = [
+        let spoil: [fn(&mut StoredPoint); 6] = [
             |p| p.scene = "outside".to_owned(),
             |p| p.levels[0].level = 7,
             |p| p.levels[0].parts = 2,
@@ -266,7 +372,7 @@ mod tests {
             write(&point_path(folder.path(), "b"), POINT, &spoilt).unwrap();
             assert_eq!(store.point("b"), None, "{i}");
         }
-        let outside = KeptPoint { scene: "../../outside".to_owned(), ..point() };
+        let outside = StoredPoint { scene: "../../outside".to_owned(), ..point() };
         write(&point_path(folder.path(), "b"), POINT, &outside).unwrap();
         assert_eq!((store.scene_of("b"), store.point("b")), (None, None));
         let mut far = scene();

@@ -1,4 +1,4 @@
-//! A garment to tune a table on, or to try one on: its distances, its reference drape, and what a table can hold of it.
+//! A garment of the search: its distances, its reference drape, and the errors of a range table on it.
 
 use crate::drape::{Drape, DrapeError, Refine, Settings, drape, unobserved};
 use crate::garment::fabric::Fabric;
@@ -12,35 +12,36 @@ use crate::study::table_search::Sample;
 use crate::{Scene, SceneSpec};
 use glam::DVec3;
 
-use crate::commands::runtime::refining;
-use crate::commands::{FabricArgs, UserError, console};
+use crate::commands::console;
+use crate::commands::inputs::FabricArgs;
+use crate::commands::runtime::{refuse, with_progress};
 
-/// PARTs of a table on a garment, and the error that guides the search.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// PARTs of a table on a garment, and the error that the search minimises.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TableFit {
     pub(crate) parts: usize,
-    /// What a motion of each PART's own leaves, mm.
+    /// RMS distance from the reference if each PART moves by its own best motion, mm.
     pub(crate) rms_mm: f64,
 }
 
-/// What a table is worth on a garment: two bounds, which more freedom makes smaller whatever the table, and what comes of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Errors of a table on a garment: two bounds, and the errors of the coupled model. More PARTs always reduce the bounds.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TableQuality {
-    /// What a translation of each PART leaves, mm: the paper's bound.
+    /// RMS distance from the reference with the best translation of each PART, mm: the bound of the paper's model.
     pub(crate) translation_mm: f64,
-    /// What affine maps, blended over the seams, leave, mm: the coupled model's bound.
+    /// RMS distance from the reference with the best affine maps, blended over the seams, mm: the bound of the coupled model.
     pub(crate) affine_mm: f64,
-    /// What the coupled model leaves of the canonical drape after both stages, mm. A garment has several rests, millimetres to
-    /// centimetres apart, and where the model ends near another one this cannot be small.
+    /// RMS distance of the coupled model's drape, without refinement, from the canonical drape, mm. A garment has several equilibria,
+    /// millimetres to centimetres apart, and a drape near another equilibrium has a large error.
     pub(crate) model_mm: f64,
-    /// How far the model's result is from where it would settle itself, mm. What lies on the floor is near its rest, too, so it
-    /// never stands alone. `None` where the user stopped it.
+    /// RMS distance of the coupled model's drape from the equilibrium it converges to, mm. A garment that fell off has a small one, so
+    /// it is reported beside the other errors. `None` if the continuation was interrupted or fell off.
     pub(crate) own_mm: Option<f64>,
 }
 
 /// A garment with its reference drape.
 pub(crate) struct Garment {
-    /// As on the command line.
+    /// The name on the command line.
     pub(crate) name: String,
     /// The garment on its body.
     pub(crate) scene: Scene,
@@ -48,41 +49,42 @@ pub(crate) struct Garment {
     pub(crate) distances_m: Vec<f64>,
     /// The canonical drape, m.
     pub(crate) reference: Vec<DVec3>,
-    /// From undraped to the canonical drape, m.
+    /// Displacement from the undraped garment to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
     fabric: Fabric,
     options: EvaluateOptions,
-    /// How PARTs move in the search.
+    /// Motion of PARTs in the search.
     pub(crate) motion: Motion,
-    /// Its grain, which pieces narrow and tall follow.
+    /// The grain, along which PARTs are cut to an extent.
     grain: Grain,
-    /// What Table 3 makes of it.
+    /// PARTs and error of Table 3.
     pub(crate) table_3: TableFit,
-    /// What Table 3 is worth on it.
-    pub(crate) table_3_worth: TableQuality,
+    /// Errors of Table 3.
+    pub(crate) table_3_quality: TableQuality,
 }
 
 impl Garment {
-    /// Makes or reads a garment and finds or computes its reference; `None` where the user stopped it.
+    /// Loads a garment and loads or computes its reference; `None` if interrupted.
     pub(crate) fn load(
         name: &str,
         body: &str,
-        cloth: &FabricArgs,
+        fabric: &FabricArgs,
         motion: Motion,
         options: &EvaluateOptions,
     ) -> anyhow::Result<Option<Self>> {
-        let (loaded, fabric) = (SceneSpec::new(body, name).load()?, cloth.first()?);
-        cloth.check_used(&loaded)?;
-        let found = refining(&format!("{name}: reference drape"), |observer| {
+        let loaded = SceneSpec::new(body, name).load()?;
+        fabric.check_used(&loaded)?;
+        let fabric = fabric.first()?;
+        let found = with_progress(&format!("{name}: reference drape"), |observer| {
             canonical(&loaded.scene, &fabric, options, observer)
         });
         let (reference, warnings) = match found {
             Ok(found) => found,
             Err(EvaluateError::Interrupted) => return Ok(None),
             Err(EvaluateError::Fallen) => {
-                return Err(UserError::new(format!(
-                    "{name}: it falls off the body, so there is no drape to find tables for; give one that stays on by itself"
-                )));
+                refuse!(
+                    "{name}: it falls off the body, so it has no reference drape; use a garment that stays on by itself"
+                );
             }
             Err(other) => return Err(other.into()),
         };
@@ -102,21 +104,21 @@ impl Garment {
             fabric,
             options: options.clone(),
             motion,
-            table_3: TableFit { parts: 0, rms_mm: 0.0 },
-            table_3_worth: TableQuality { translation_mm: 0.0, affine_mm: 0.0, model_mm: 0.0, own_mm: None },
+            table_3: TableFit::default(),
+            table_3_quality: TableQuality::default(),
         };
         let table_3 = RangeTable::table_3();
-        garment.table_3 = garment.holds(&table_3);
-        garment.table_3_worth = garment.worth(&table_3)?;
+        garment.table_3 = garment.fit(&table_3);
+        garment.table_3_quality = garment.quality(&table_3)?;
         Ok(Some(garment))
     }
 
-    /// How much its squared error counts: relative to Table 3's, so that a wide skirt does not outweigh a pullover.
+    /// Weight of the squared error in the search: errors are relative to Table 3's, so that a wide skirt does not outweigh a pullover.
     pub(crate) fn weight(&self) -> f64 {
         1.0 / self.table_3.rms_mm.max(1e-3).powi(2)
     }
 
-    /// As the search sees it, with the most PARTs it may have.
+    /// The input of the search, with a bound on the number of PARTs.
     pub(crate) fn sample(&self, max_parts: usize) -> Sample<'_> {
         Sample {
             mesh: &self.scene.garment,
@@ -129,15 +131,15 @@ impl Garment {
         }
     }
 
-    /// The PARTs of a table, levels with an extent cut to it.
+    /// The PARTs of a table, cut to the extents of its levels.
     pub(crate) fn parts(&self, table: &RangeTable) -> Parts {
         let scene = &self.scene;
         let parts = segment(&scene.topology, &self.distances_m, table);
         parts.cut_to_table(&scene.garment, &scene.topology, &scene.rest, table)
     }
 
-    /// What a table holds of the reference.
-    pub(crate) fn holds(&self, table: &RangeTable) -> TableFit {
+    /// PARTs and search error of a table.
+    pub(crate) fn fit(&self, table: &RangeTable) -> TableFit {
         let parts = self.parts(table);
         TableFit { parts: parts.len(), rms_mm: self.unblended_mm(&parts, self.motion) }
     }
@@ -147,12 +149,12 @@ impl Garment {
         1e3 * representable::unblended_rms_m(parts, start, &self.displacement, motion)
     }
 
-    /// The displacement nearest to the reference's that these PARTs can hold, blended over the seams, m.
+    /// The displacement of these PARTs, blended over the seams, that is nearest to the reference's, m.
     pub(crate) fn nearest(&self, parts: &Parts, motion: Motion) -> Result<Vec<DVec3>, SolveError> {
         let Scene { garment, topology, held, .. } = &self.scene;
-        let mut still = vec![false; garment.vertex_count()];
-        held.iter().for_each(|&v| still[v as usize] = true);
-        representable::blended(topology, parts, &still, &garment.positions, &self.displacement, motion)
+        let mut fixed = vec![false; garment.vertex_count()];
+        held.iter().for_each(|&v| fixed[v as usize] = true);
+        representable::blended(topology, parts, &fixed, &garment.positions, &self.displacement, motion)
     }
 
     /// The bound of the coupled model, mm.
@@ -160,15 +162,15 @@ impl Garment {
         Ok(accuracy::rms_mm(&self.nearest(parts, Motion::Affine)?, &self.displacement))
     }
 
-    /// What a table is worth: takes a preview, and a drape from there until it has settled.
-    pub(crate) fn worth(&self, table: &RangeTable) -> anyhow::Result<TableQuality> {
+    /// The errors of a table; computes a preview and its continuation to convergence.
+    pub(crate) fn quality(&self, table: &RangeTable) -> anyhow::Result<TableQuality> {
         let (settings, draped) = self.preview(table)?;
-        let own = refining(&format!("{}: the rest of a preview", self.name), |observer| {
+        let own = with_progress(&format!("{}: continuation of a preview", self.name), |observer| {
             evaluate(&self.scene, &settings, &draped, &self.options, observer)
         });
         let own_mm = match own {
             Ok(own) => Some(own.accuracy.vertices.rms_mm),
-            // One table's preview may slide off where others stay: that is no end to the search.
+            // The preview of one table may slide off while others stay on; the search continues.
             Err(EvaluateError::Interrupted | EvaluateError::Fallen) => None,
             Err(other) => return Err(other.into()),
         };
@@ -180,12 +182,12 @@ impl Garment {
         })
     }
 
-    /// What the coupled model leaves of the reference, mm.
+    /// RMS distance of the coupled model's drape from the reference, mm.
     pub(crate) fn model_mm(&self, table: &RangeTable) -> Result<f64, DrapeError> {
         Ok(accuracy::rms_mm(&self.preview(table)?.1.positions, &self.reference))
     }
 
-    /// Both stages, and no step at full resolution.
+    /// The drape of both stages without refinement.
     fn preview(&self, table: &RangeTable) -> Result<(Settings, Drape), DrapeError> {
         let (fabric, table) = (self.fabric.clone(), table.clone().into());
         let settings = Settings { fabric, table, refine: Refine::Steps(0), ..Settings::default() };
