@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What each range table of dial.toml is worth: its error beside the least its PARTs could have, its time beside the converged drape's.
+"""Evaluates the range tables of dial.toml: error against the bound of their PARTs, time against the converged drape.
 
 usage: dial.py ROWS.csv [PICTURE.png]
 
-ROWS.csv is what `partwise sweep assets/sweeps/dial.toml --accuracy own` leaves in its folder. Needs pandas, and matplotlib for the picture.
-A row is good where its error is at most one and a half times the bound (blended affine maps, of where it settles) plus 3 mm.
+ROWS.csv is written by `partwise sweep assets/sweeps/dial.toml --accuracy own`. Needs pandas, and matplotlib for the picture.
+A row is good if its error is at most 1.5 times the bound (blended affine maps, against its own equilibrium) plus 3 mm.
 """
 
 import sys

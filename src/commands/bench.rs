@@ -20,17 +20,6 @@ use super::runtime::{
     UserError, check, control_flow, create_folder, keep_results, refuse, unwritable, use_threads, write,
 };
 
-const EXAMPLES: &str = "\
-Examples:
-  partwise bench table-4                                       the ten rows; about ten minutes on two cores
-  partwise bench table-4 --quick                               two small garments, one round, as a smoke test
-  partwise bench table-4 --growth flared-skirt                 1,000 to 64,000 vertices: growth of the time, with fitted exponents
-  partwise bench table-4 --rows pullover-1@4710 --rounds 1     one row, one round
-  partwise bench table-4 --recordings table-4                  a recording per row: the drapes side by side
-  partwise bench table-4 --csv table-4.csv --format json       for scripts
-
-Each finished row is written to --rows-file; the same command continues from there after Ctrl-C.";
-
 /// Sizes of `--growth`.
 const GROWTH: [usize; 4] = [1_000, 4_000, 16_000, 64_000];
 
@@ -49,7 +38,7 @@ pub(crate) enum BenchCommand {
     ///
     /// Hem height and girths complete the error of each method. A method that cannot run on a garment has no figures, and the table
     /// gives the reason.
-    #[command(name = "table-4", after_help = EXAMPLES)]
+    #[command(name = "table-4", after_help = include_str!("../../assets/help/bench-table-4.txt"))]
     TableFour(TableFourArgs),
 }
 

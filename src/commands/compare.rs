@@ -24,15 +24,9 @@ use super::sweep::recording::MAX_SIDE_BY_SIDE;
 use super::sweep::report::{recording_line, rows_text};
 use super::sweep::store::{PointStore, StoringBench};
 
-const EXAMPLES: &str = "\
-Examples:
-  partwise compare table-3 mine.toml                                  one garment, a recording in recordings/compare/
-  partwise compare table-3 a.toml b.toml --garment pullover-1 --garment flared-skirt@3613 --csv levels.csv
-  partwise compare table-3 mine.toml --max-extent 12 --refine 10      other settings, the same for all";
-
 /// Arguments of `compare`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = include_str!("../../assets/help/compare.txt"))]
 pub(crate) struct CompareArgs {
     /// Range tables: `table-3` (the paper's) or TOML files; the first is the reference of the comparison
     #[arg(required = true, value_name = "NAME|FILE")]

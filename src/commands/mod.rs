@@ -25,19 +25,6 @@ use std::time::SystemTime;
 use crate::base::{atomic_file, files};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-const EXAMPLES: &str = "\
-Examples:
-  partwise                                        drape the low-cut dress, write recordings/low-cut-dress.rrd
-  partwise view recordings/low-cut-dress.rrd      show it in a browser
-  partwise --garment flared-skirt@3613 --spawn    another garment and size, in the native viewer
-  partwise --body me.obj --garment shirt.obj      your own meshes; unit and up axis are guessed and reported
-  partwise live                                   a page: drag the bounds of the range table, the garment follows
-  partwise --pattern shirt.json --body me.obj     sew a pattern around a body and drape it
-  partwise --table mine.toml --serve --watch      edit the table, see the PARTs change in the browser
-  partwise --format json --threads 1              one JSON object on stdout, for scripts
-
-Exit codes: 0 done, 2 an input cannot be used or an output cannot be written, 1 any other failure, 130 interrupted (results so far are kept).";
-
 /// Drape a garment over a body by the two-stage PART model, every stage in Rerun
 ///
 /// Drapes a garment over a body by the two-stage PART model of Luo, Jiang and Cong and streams every stage to the Rerun viewer.
@@ -48,7 +35,7 @@ Exit codes: 0 done, 2 an input cannot be used or an output cannot be written, 1 
 ///
 /// Without a subcommand, `partwise` is `partwise run`.
 #[derive(Debug, Parser)]
-#[command(name = "partwise", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
+#[command(name = "partwise", version, after_help = include_str!("../../assets/help/run.txt"), args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -1,4 +1,4 @@
-//! The pieces of a recording that viewers read, encoded once for all of them on a thread of its own while there are any.
+//! The pieces of a recording that viewers read, encoded once for all viewers on a separate thread while any viewer is connected.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,4 @@
-//! What stands beside a run: the paper's table, the certificate of a drape, sewing patterns.
+//! Commands beside `run`: the paper's Table 4, the certificate of a drape, sewing patterns.
 
 use std::fs;
 use std::process::Output;

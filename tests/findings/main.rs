@@ -1,4 +1,4 @@
-//! What a drape says of itself where its numbers alone would reassure: what slid, what fell, where skin shows, what slivers do.
+//! Warnings of a drape whose figures alone look good: a garment that slid or fell, visible skin, slivers.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -66,7 +66,7 @@ fn draped_by(scene: &Scene, job: &Job) -> (Metrics, Vec<String>, Vec<DVec3>) {
 }
 
 #[test]
-fn a_garment_that_slides_down_is_told_with_what_to_hold() {
+fn a_garment_that_slides_down_is_reported_with_the_edge_to_hold() {
     let mut tube = turned(&[(0.3, 0.95), (0.3, 0.9), (0.3, 0.85), (0.3, 0.8), (0.3, 0.75), (0.3, 0.7)], 40, None);
     tube.groups = vec!["waist".to_owned()];
     tube.triangle_group = vec![0; tube.triangles.len()];
@@ -76,7 +76,7 @@ fn a_garment_that_slides_down_is_told_with_what_to_hold() {
     assert!(sank > 0.2 && (metrics.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
     let said = warnings.join("\n");
     assert!(said.contains("slid down") && said.contains("--hold top") && said.contains("waist"), "{said}");
-    // Held, it stays, and nothing is said.
+    // A held garment stays, without a warning.
     scene.held = scene.edge("top").unwrap();
     let (metrics, warnings, _) = draped(&scene);
     assert_eq!(metrics.top_sank_mm, 0.0);
@@ -92,7 +92,7 @@ fn beside(mut mesh: TriMesh, other: &TriMesh) -> TriMesh {
 }
 
 #[test]
-fn the_connected_part_that_slides_or_falls_is_told_by_its_number() {
+fn the_connected_part_that_slides_or_falls_is_reported_by_its_number() {
     let tube = |radius: f64, top: f64| {
         turned(&(0..6).map(|k| (radius, top - 0.05 * f64::from(k))).collect::<Vec<_>>(), 40, None)
     };
@@ -107,7 +107,7 @@ fn the_connected_part_that_slides_or_falls_is_told_by_its_number() {
     let said =
         format!("connected part 2 of the garment's 2 has slid down: its highest edge sank by {:.0} cm", 1e2 * sank[1]);
     assert!(warnings.iter().any(|w| w.contains(&said) && w.contains("(--hold top:2)")), "{warnings:?}");
-    // Another part held is no help; held itself, it stays, and nothing is said.
+    // Holding another part does not help. Once this part is held, it stays, without a warning.
     scene.held = scene.edge("top:1").unwrap();
     assert!(draped(&scene).1.iter().any(|w| w.contains(&said[..50])), "{warnings:?}");
     scene.held = scene.edge("top:2").unwrap();
@@ -147,7 +147,7 @@ fn two_ponchos_laid_flat_over_each_other_stay_on() {
 }
 
 #[test]
-fn skin_between_vertices_that_are_outside_is_told() {
+fn skin_between_vertices_outside_the_body_is_reported() {
     // Triangles of 15 cm on a sphere of 30 cm: their middles sag a centimetre under their corners.
     let cape = |around, rings: u32| {
         let ring = |k: u32| {
@@ -172,7 +172,7 @@ fn skin_between_vertices_that_are_outside_is_told() {
 }
 
 #[test]
-fn cloth_that_ends_in_cloth_is_told() {
+fn intersecting_cloth_is_reported() {
     let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
     let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
     let moved = |by: DVec3| cape.with_positions(cape.positions.iter().map(|p| *p + by).collect());
@@ -183,7 +183,7 @@ fn cloth_that_ends_in_cloth_is_told() {
     let (metrics, warnings, _) = draped_by(&scene, &bare);
     let said = format!("cloth goes through cloth: {} pairs", metrics.self_intersecting_pairs);
     assert!(metrics.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&said)), "{warnings:?}");
-    // Over each other and kept so, nothing is told.
+    // Layers that stay apart give no warning.
     let (metrics, warnings, _) = draped(&over(DVec3::Z * 0.008));
     assert_eq!((metrics.self_intersecting_pairs, warnings.len()), (0, 0), "{warnings:?}");
 }
@@ -239,7 +239,7 @@ fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
 }
 
 #[test]
-fn what_is_stretched_beyond_what_fabrics_bear_and_what_presses_is_told() {
+fn excessive_strain_and_pressure_are_reported() {
     let ring = |k: u32| (0.05 + 0.04 * f64::from(k), 1.34 - 0.025 * f64::from(k));
     let cape = turned(&(0..10).map(ring).collect::<Vec<_>>(), 40, None);
     let mut scene = Scene::of_meshes(&sphere(), cape).unwrap();
@@ -253,7 +253,7 @@ fn what_is_stretched_beyond_what_fabrics_bear_and_what_presses_is_told() {
     scene.held = (0..40).chain(360..400).collect();
     let (metrics, warnings, _) = draped(&scene);
     assert!(metrics.strain_max.unwrap() > 0.5, "{:?}", metrics.strain_max);
-    let told = warnings.iter().find(|w| w.contains("more than fabrics bear")).unwrap();
-    // Both its openings are held as long as they were before it was cut anew.
-    assert!(told.contains("its opening at a height of"), "{told}");
+    let warning = warnings.iter().find(|w| w.contains("more than fabrics bear")).unwrap();
+    // Both openings are held at their length before the rest shape changed.
+    assert!(warning.contains("its opening at a height of"), "{warning}");
 }

@@ -1,4 +1,4 @@
-//! `--open`: a stand-in for the browser writes down what it is asked to open.
+//! `--open`: a stand-in for the browser writes its arguments to a file.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -29,7 +29,7 @@ fn serving(mut command: Command) -> (String, Child) {
     (address.trim().to_owned(), child)
 }
 
-/// What it said until it was ended.
+/// The stderr of a child, which is killed first.
 fn said(mut child: Child) -> String {
     child.kill().unwrap();
     let mut said = String::new();

@@ -1,4 +1,4 @@
-//! What it is given: numbers beyond measure, mistakes, escape codes, odd names, damaged recordings.
+//! Inputs: numbers out of range, mistakes, escape codes, odd names, damaged recordings.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -34,7 +34,7 @@ fn what_the_user_can_mend_ends_with_two() {
     bench.run(&held).with(2, &["no vertex is free"]);
     let tables = ["compare", "table-3", "table-3", "--body", "body.obj", "--garment", "nowhere.obj", "--no-save"];
     bench.run(&tables).with(2, &["nowhere.obj"]);
-    // A garment from another program is told as what it is, whatever the body.
+    // A garment file of another program is named as such, for every body.
     bench.write("shirt.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
     bench.run(&["--body", "body.obj", "--garment", "shirt.ply", "--no-save"]).with(2, &["shirt.ply", "PLY", "OBJ"]);
     bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
@@ -136,7 +136,7 @@ fn pipes_and_devices_are_refused_wherever_a_file_is_read() {
     ] {
         run(line).with(2, &["it is a pipe or a device, expected a regular file"]);
     }
-    // Entries of caches that are none are made anew.
+    // Invalid cache entries are written again.
     let cached =
         |folder: &str| fs::read_dir(bench.path(folder)).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
     run("--no-save --garment flared-skirt@400 --accuracy --cache kept").with(0, &[]);

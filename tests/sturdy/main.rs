@@ -1,4 +1,4 @@
-//! What foreign input, full disks, silent peers and odd names do to the program: it says so and ends.
+//! Foreign input, full disks, silent peers and odd names: the program reports them and exits.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]

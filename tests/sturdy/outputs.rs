@@ -1,4 +1,4 @@
-//! Where it writes: devices, links, full disks, one place for two.
+//! Outputs: devices, links, full disks, two outputs in one file.
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, symlink};
@@ -28,7 +28,7 @@ fn devices_stay_devices_and_a_full_one_is_said() {
 fn an_output_that_cannot_be_is_refused_before_anything_is_read_or_solved() {
     let bench = Bench::new();
     let [rrd, obj] = ["missing/x.rrd", "missing/x.obj"].map(|name| bench.path(name).to_str().unwrap().to_owned());
-    // Solved first, the garment that is not there would be told.
+    // If the inputs were read first, the missing garment would be reported.
     for output in [["--save", &rrd], ["--export", &obj]] {
         let mut arguments = vec!["--body", "body.obj", "--garment", "nowhere.obj"];
         arguments.extend(output);
@@ -116,7 +116,7 @@ fn an_input_is_not_overwritten_by_any_command_unless_forced() {
     assert_ne!(fs::read_to_string(bench.path("garment.obj")).unwrap(), super::GARMENT);
     bench.run(&["pattern", "p.json", "--svg", "p.json", "--force"]).with(0, &[]);
     assert!(fs::read_to_string(bench.path("p.json")).unwrap().starts_with("<svg"));
-    // What no program of ours wrote is no recording.
+    // A file of another program is not a recording.
     bench.write("notes.txt", "mine");
     bench.drape(&["--save", "notes.txt"]).with(2, &["notes.txt", ".rrd"]);
     bench.drape(&["--save", "notes.txt", "--force"]).with(2, &["notes.txt", ".rrd"]);

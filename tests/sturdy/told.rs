@@ -1,4 +1,4 @@
-//! What it is asked, told before any time is spent on it; and what is kept when it is broken off.
+//! Invalid options are refused before any computation; an interrupted run keeps its results.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -48,7 +48,7 @@ fn a_search_takes_no_more_parts_than_there_are_vertices() {
 }
 
 #[test]
-fn a_check_ends_in_a_verdict_and_tables_that_cannot_be_compared_in_their_reasons() {
+fn check_prints_a_verdict_and_compare_the_reasons_of_failed_tables() {
     let bench = Bench::new();
     let told = |arguments: &[&str]| {
         let done = bench.command().args(arguments).output().unwrap();
@@ -78,7 +78,7 @@ fn numbered(text: &str) -> Vec<u32> {
 }
 
 #[test]
-fn levels_have_the_same_numbers_wherever_they_are_told() {
+fn levels_have_the_same_numbers_in_run_and_compare() {
     let bench = Bench::new();
     let told = |arguments: &[&str]| {
         let mut command = bench.command();
@@ -118,7 +118,7 @@ fn ctrl_c_while_the_error_is_measured_keeps_the_drape() {
     let bench = Bench::new();
     let line =
         ["--garment", "flared-skirt@400", "--accuracy", "--spread", "2000", "--save", "x.rrd", "--export", "x.obj"];
-    // On a machine so slow that nothing is draped by then, it says so and is asked later again.
+    // On a slow machine nothing may be draped by then; the run is repeated with a later interrupt.
     for patience in [4, 30, 120] {
         let mut command = bench.command();
         let mut child = command.args(line).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();

@@ -1,4 +1,4 @@
-//! What is run: command lines, the files they read, and how both are spoilt.
+//! The cases: command lines, their input files, and the mutations of both.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -131,7 +131,7 @@ pub(super) const KINDS: [Kind; 13] = [
     },
 ];
 
-/// Flags that wait for somebody, or are asked of the window system.
+/// Flags that wait for input, or need a window system.
 const NOT_HERE: [&str; 10] = [
     "--serve",
     "--watch",
@@ -287,7 +287,7 @@ impl Case {
     fn change_line(arguments: &mut Vec<String>, seeds: &Seeds, random: &mut Random) {
         let odd = |random: &mut Random| {
             let change = (0, 0, random.next() as u32);
-            // What replaces a lone word is one of the odd values.
+            // A word without a flag is replaced by one of the odd values.
             mutate::mutate("word", &["word".to_owned()], change)
         };
         let at = random.below(arguments.len());

@@ -165,7 +165,7 @@ fn keep(case: &Case, number: u32, reason: &str) {
 }
 
 #[test]
-fn whatever_it_is_given_it_ends_well() {
+fn every_mutated_run_ends_with_a_known_outcome() {
     let runs = std::env::var("PARTWISE_FUZZ_RUNS").map_or(120, |text| text.parse::<u32>().unwrap());
     let first = std::env::var("PARTWISE_FUZZ_FIRST").map_or(0, |text| text.parse::<u32>().unwrap());
     let seeds = Seeds::new();

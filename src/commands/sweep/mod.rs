@@ -23,24 +23,9 @@ use super::runtime::{
 };
 use super::sinks::SinkArgs;
 
-const EXAMPLES: &str = "\
-Examples:
-  partwise sweep assets/sweeps/table-3-variations.toml                the paper's table and variations of it
-  partwise sweep mine.toml --resume                                   continue after Ctrl-C, a crash or a full disk
-  partwise sweep mine.toml --shard 2/8 --out part-2                   one shard of eight, for a job array
-  parallel partwise sweep mine.toml --shard {}/3 --out part-{} ::: 1 2 3 && partwise merge part-* --out whole
-
-A sweep file:
-  name = \"extents of a skirt\"
-  [base]
-  garment = \"flared-skirt@3920\"
-  [grid]
-  tables = [\"table-3\", { quantile = [10, 20] }, { scale = [0.5, 2] }, \"mine.toml\"]
-  extents_cm = [12, 8, 5]";
-
 /// Arguments of `sweep`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = include_str!("../../../assets/help/sweep.txt"))]
 pub(crate) struct SweepArgs {
     /// Sweep file, TOML
     file: PathBuf,

@@ -27,17 +27,9 @@ use super::runtime::{self, create_folder, interrupted, keep_results, reference_c
 use super::sinks::SinkArgs;
 use super::sweep::report::recording_line;
 
-const EXAMPLES: &str = "\
-Examples:
-  partwise tune --garment flared-skirt                        a table for one garment, in recordings/tune/
-  partwise tune                                               a table for each of the five garments
-  partwise tune --together --garment pullover-1 --garment flared-skirt --hold-out low-cut-dress
-                                                              one table for two garments, evaluated on a third
-  partwise compare table-3 recordings/tune/flared-skirt-levels.toml --garment flared-skirt";
-
 /// Arguments of `tune`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = include_str!("../../../assets/help/tune.txt"))]
 pub(crate) struct TuneArgs {
     /// Garment to tune on, as in `partwise run`; each garment gets separate tables [default: the five built-in ones]
     #[arg(long, value_name = "NAME[@VERTICES]|FILE")]

@@ -5,7 +5,7 @@ import { ask } from "./session.js";
 
 const message = document.getElementById("message");
 const CHANNEL = "session";
-// Frames drawn before the canvas is shown: until the layout arrives, the viewer makes one of its own.
+// Frames drawn before the canvas is shown: until the layout arrives, the viewer shows its default layout.
 const COVERED = 3;
 
 // The viewer reads a piece in slices and yields between them: a small piece would overtake the large one it builds on, and be drawn

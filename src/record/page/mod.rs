@@ -29,7 +29,7 @@ pub(super) use recording::Recording;
 pub use server::Limits;
 pub(crate) use server::{Connection, Server};
 
-/// What a browser may do on a page with the viewer. WebAssembly is compiled code, which needs a separate permission; the
+/// Permissions of a browser on a page with the viewer. WebAssembly is compiled code, which needs a separate permission; the
 /// viewer sets styles and draws pictures it made.
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; \
     style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; \
