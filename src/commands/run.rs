@@ -12,6 +12,7 @@ use crate::base::files::has_ending;
 use crate::drape::{self, LetGo};
 use crate::mechanics::refine::{Observer, Step};
 use crate::mesh::glb::write_glb;
+use crate::methods::METHODS;
 use crate::record::{Overlay, Recorder, by_parts};
 use crate::study::certificate::certify;
 use crate::study::evaluate::EvaluateError;
@@ -26,6 +27,15 @@ use super::sinks::{SinkArgs, mesh_file};
 use super::solved::{Iteration, Solved};
 use super::stages::StageArgs;
 use super::summary::{Summary, print_certificate, require_pass};
+
+/// The method of this program: PARTs, and refinement at full resolution.
+const TWO_STAGE: &str = "two-stage";
+
+fn method_name(name: &str) -> Result<&'static str, String> {
+    let methods = std::iter::once(TWO_STAGE).chain(METHODS);
+    let expected = || format!("found `{name}`, expected one of {}", methods.clone().collect::<Vec<_>>().join(", "));
+    methods.clone().find(|method| *method == name).ok_or_else(expected)
+}
 
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
@@ -44,7 +54,7 @@ pub(crate) struct RunArgs {
     no_iterations: bool,
     /// Drape by one of the paper's reference methods instead, up to its stopping criterion: `zhu2016` [19], `gross2003` [20],
     /// `thomaszewski2006` [21]
-    #[arg(long, value_name = "METHOD", default_value = method::TWO_STAGE, value_parser = method::method, help_heading = "Stages")]
+    #[arg(long, value_name = "METHOD", default_value = TWO_STAGE, value_parser = method_name, help_heading = "Stages")]
     method: &'static str,
     /// Measure the errors of the drape against its own continuation and the canonical drape; both references are cached
     #[arg(long, help_heading = "Stages")]
@@ -101,7 +111,7 @@ impl RunArgs {
                 path.display()
             );
         }
-        if self.method != method::TWO_STAGE {
+        if self.method != TWO_STAGE {
             return self.run_method();
         }
         if self.watch {

@@ -6,7 +6,7 @@ use crate::DVec3;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
-use crate::methods::{self, METHODS, MethodDrape, MethodInput, RestRule};
+use crate::methods::{self, MethodDrape, MethodInput, RestRule};
 use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
 use crate::scene::Loaded;
 use crate::study::certificate::{Certificate, certify};
@@ -15,19 +15,10 @@ use anyhow::Context as _;
 use indexmap::IndexMap;
 use serde::Serialize;
 
-use super::{RunArgs, serve};
+use super::{RunArgs, TWO_STAGE, serve};
 use crate::commands::console::{self, Format};
 use crate::commands::runtime::{UserError, control_flow, keep_results, refuse};
 use crate::commands::summary::{command_line, ending, fabric_facts, heading, print_certificate, require_pass};
-
-/// The method of this program: PARTs, and refinement at full resolution.
-pub(super) const TWO_STAGE: &str = "two-stage";
-
-pub(super) fn method(name: &str) -> Result<&'static str, String> {
-    let methods = std::iter::once(TWO_STAGE).chain(METHODS);
-    let expected = || format!("found `{name}`, expected one of {}", methods.clone().collect::<Vec<_>>().join(", "));
-    methods.clone().find(|method| *method == name).ok_or_else(expected)
-}
 
 /// Interval, in s of simulated time, at which the mesh is recorded. A smaller interval gives a smoother animation and a larger file;
 /// this one, a heuristic, keeps a recording at a few megabytes.

@@ -25,8 +25,8 @@ use crate::scene::Scene;
 use crate::study::accuracy::ReferenceCache;
 use crate::study::metrics::LevelCount;
 use crate::study::sweep::{Bench, Point, PointError, Row, is_id};
-use glam::DVec3;
-use serde::{Deserialize, Serialize};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::commands::runtime::interrupt_flag;
 
@@ -37,13 +37,13 @@ const SCENE: &Tag = b"PWSCENE3";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StoredScene {
     /// The body, m.
-    #[serde(with = "single::mesh")]
+    #[serde(serialize_with = "write_mesh", deserialize_with = "read_mesh")]
     pub(crate) body: TriMesh,
     /// The garment, undraped, m.
-    #[serde(with = "single::mesh")]
+    #[serde(serialize_with = "write_mesh", deserialize_with = "read_mesh")]
     pub(crate) garment: TriMesh,
     /// Unsigned distance of each garment vertex to the body, m.
-    #[serde(with = "single::numbers")]
+    #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
     pub(crate) distance_m: Vec<f64>,
 }
 
@@ -55,15 +55,15 @@ pub(crate) struct StoredPoint {
     /// The levels of the table.
     pub(crate) levels: Vec<LevelCount>,
     /// Resultant force on each PART, N.
-    #[serde(with = "single::points")]
+    #[serde(serialize_with = "write_points", deserialize_with = "read_points")]
     pub(crate) force_n: Vec<DVec3>,
     /// PART of each vertex.
     pub(crate) part_of_vertex: Vec<u32>,
     /// The draped garment, m.
-    #[serde(with = "single::points")]
+    #[serde(serialize_with = "write_points", deserialize_with = "read_points")]
     pub(crate) positions: Vec<DVec3>,
     /// Distance of each vertex to the reference drape, mm; empty if not measured.
-    #[serde(with = "single::numbers")]
+    #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
     pub(crate) error_mm: Vec<f64>,
 }
 
@@ -261,57 +261,40 @@ impl<'a> StoringBench<'a> {
     }
 }
 
-/// Meshes and numbers in single precision: `#[serde(with = "single::points")]`.
-mod single {
-    use crate::mesh::TriMesh;
-    use glam::{DVec3, Vec3};
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+// Meshes and numbers are stored in single precision.
 
-    fn rounded(points: &[DVec3]) -> Vec<Vec3> {
-        points.iter().map(DVec3::as_vec3).collect()
-    }
+fn narrow(points: &[DVec3]) -> Vec<Vec3> {
+    points.iter().map(DVec3::as_vec3).collect()
+}
 
-    fn widened(points: Vec<Vec3>) -> Vec<DVec3> {
-        points.iter().map(Vec3::as_dvec3).collect()
-    }
+fn widen(points: Vec<Vec3>) -> Vec<DVec3> {
+    points.iter().map(Vec3::as_dvec3).collect()
+}
 
-    pub(super) mod points {
-        use super::*;
+fn write_points<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
+    narrow(points).serialize(to)
+}
 
-        pub(crate) fn serialize<S: Serializer>(points: &[DVec3], to: S) -> Result<S::Ok, S::Error> {
-            rounded(points).serialize(to)
-        }
+fn read_points<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
+    Deserialize::deserialize(from).map(widen)
+}
 
-        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DVec3>, D::Error> {
-            Deserialize::deserialize(from).map(widened)
-        }
-    }
+fn write_numbers<S: Serializer>(numbers: &[f64], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(numbers.iter().map(|&x| x as f32))
+}
 
-    pub(super) mod numbers {
-        use super::*;
+fn read_numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    Ok(Vec::<f32>::deserialize(from)?.into_iter().map(f64::from).collect())
+}
 
-        pub(crate) fn serialize<S: Serializer>(numbers: &[f64], to: S) -> Result<S::Ok, S::Error> {
-            to.collect_seq(numbers.iter().map(|&x| x as f32))
-        }
+/// Writes positions and triangles; a recording has no groups.
+fn write_mesh<S: Serializer>(mesh: &TriMesh, to: S) -> Result<S::Ok, S::Error> {
+    (narrow(&mesh.positions), &mesh.triangles).serialize(to)
+}
 
-        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-            Ok(Vec::<f32>::deserialize(from)?.into_iter().map(f64::from).collect())
-        }
-    }
-
-    /// Positions and triangles; a recording has no groups.
-    pub(super) mod mesh {
-        use super::*;
-
-        pub(crate) fn serialize<S: Serializer>(mesh: &TriMesh, to: S) -> Result<S::Ok, S::Error> {
-            (rounded(&mesh.positions), &mesh.triangles).serialize(to)
-        }
-
-        pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<TriMesh, D::Error> {
-            let (positions, triangles) = Deserialize::deserialize(from)?;
-            Ok(TriMesh::new(widened(positions), triangles))
-        }
-    }
+fn read_mesh<'de, D: Deserializer<'de>>(from: D) -> Result<TriMesh, D::Error> {
+    let (positions, triangles) = Deserialize::deserialize(from)?;
+    Ok(TriMesh::new(widen(positions), triangles))
 }
 
 #[cfg(test)]

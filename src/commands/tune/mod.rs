@@ -6,6 +6,7 @@ mod search;
 
 use std::path::PathBuf;
 
+use crate::SceneSpec;
 use crate::base::files::stem;
 use crate::garment::BUILT_IN;
 use crate::mechanics::coupled::Motion;
@@ -112,6 +113,9 @@ impl TuneArgs {
         } else {
             self.garment.clone()
         };
+        for name in names.iter().chain(&self.hold_out) {
+            SceneSpec::new(&self.body, name).check_names()?;
+        }
         create_folder(&self.out)?;
         let stems: Vec<String> = names.iter().map(|name| stem(name)).collect();
         let stems = if self.together { vec![stems.join("+")] } else { stems };
