@@ -5,7 +5,7 @@
 
 use std::error::Error;
 
-use partwise::{SceneSpec, Settings, drape};
+use partwise::{SceneSpec, Settings};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let input = SceneSpec::new(body, garment).load()?;
     input.notes().iter().chain(&input.warnings()).for_each(|line| eprintln!("{line}"));
-    let draped = drape::drape(&input.scene, &Settings::default(), &mut drape::unobserved)?;
+    let draped = input.scene.drape(&Settings::default())?;
     draped.warnings.iter().for_each(|line| eprintln!("{line}"));
     println!("{} PARTs, {} vertices inside the body", draped.parts.len(), draped.penetrating_vertices);
     input.write(out, &draped.positions)?;

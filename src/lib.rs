@@ -6,35 +6,34 @@
 //! centimetres, as in the paper. A name that carries another unit says so (`_mm`, `_cm`, `_kpa`, `_ms`).
 //!
 //! # Draping a mesh
-//! A [`SceneSpec`] names body and garment: built in, as here, or OBJ files (`SceneSpec::new("me.obj", "shirt.obj")`),
-//! whose unit and up axis are guessed, and said in the notes.
+//! A [`SceneSpec`] names a body and a garment: built-in ones, as here, or OBJ files (`SceneSpec::new("me.obj",
+//! "shirt.obj")`), whose unit and up axis are guessed and reported in the notes.
 //!
 //! ```
-//! use partwise::{SceneSpec, Settings, drape};
+//! use partwise::{SceneSpec, Settings, drape::Refine};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("draped.obj");
 //! let input = SceneSpec::new("form", "flared-skirt@600").load()?;
-//! input.notes().iter().chain(&input.warnings()).for_each(|line| eprintln!("{line}"));
-//! let settings = Settings { refine: drape::Refine::Steps(2), ..Settings::default() };
-//! let draped = drape::drape(&input.scene, &settings, &mut drape::unobserved)?;
+//! let settings = Settings { refine: Refine::Steps(2), ..Settings::default() };
+//! let draped = input.scene.drape(&settings)?;
 //! println!("{} PARTs in {:?}", draped.parts.len(), draped.times.total);
 //! input.write(path, &draped.positions)?;
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! `Settings::default()` without the third line goes on until the drape rests. A [`Job`] is the same as plain data,
-//! with what is to be measured; `examples/` drapes an OBJ, sweeps tables, and records into a Rerun stream of one's own.
+//! `Settings::default()` continues until the garment is at rest. [`drape::drape`] takes an observer as well, which is
+//! called after each step and can stop the run; `rayon::ThreadPool::install` chooses the threads. A [`Job`] holds the
+//! same as plain data, with the metrics to compute. `examples/` drapes an OBJ file, sweeps tables, and records into an
+//! existing Rerun stream.
 //!
-//! # Module map
-//! Data flows one way:
-//! [`mesh`] → [`distance`] → [`scene`] → [`parts`] → [`mechanics`] → [`drape()`](drape::drape) → [`job`] → `record` →
-//! the command line. [`shapes`] makes the built-in body and garments, [`pattern`] reads sewing patterns and [`sewing`] puts
-//! them on, [`range_table`] and [`fabric`] hold the two inputs a user tunes, [`accuracy`] measures a result against a
-//! reference, [`figures`] are what everybody reads of it, [`sweep`] runs jobs by the hundred, [`session`]
-//! keeps one that is edited while it is draped. Only `record` knows Rerun; only the binary knows clap.
+//! # Modules
+//! Data flows one way: [`mesh`] → [`body`] → [`garment`] → [`scene`] → [`parts`] → [`mechanics`] →
+//! [`drape`](mod@drape) → [`study`] → `record`. [`parts::range_table`] and [`garment::fabric`] hold the two inputs to
+//! tune, [`methods`] the paper's reference methods, [`study`] metrics, accuracy, sweeps and the table search,
+//! [`session`] a scene that is edited while it is draped. Only `record` imports Rerun.
 
 #![cfg_attr(
     not(feature = "cli"),

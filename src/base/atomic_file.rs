@@ -1,11 +1,11 @@
 //! A file that is there whole or not at all: the one place that writes and renames.
 //!
-//! Where inputs are protected ([`files::protect_inputs`]), a file that the process has read as an input is not replaced.
+//! Where inputs are protected (`protect_inputs`), a file that the process has read as an input is not replaced.
 //!
 //! What is written grows beside its place under a random name that nobody can have planted (created with `O_EXCL`), and
 //! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What
 //! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was. Whoever ends the
-//! program while files are in the making calls [`abandon_all`] first.
+//! program while files are in the making calls `abandon_all` first.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};

@@ -132,7 +132,7 @@ fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The dress form of these measurements, closed, about [`DEFAULT_TRIANGLES`] triangles.
+/// The dress form of these measurements, closed, about `DEFAULT_TRIANGLES` triangles.
 pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
     DressForm::new(spec)?.mesh(DEFAULT_TRIANGLES)
 }
@@ -140,7 +140,7 @@ pub fn dress_form(spec: &BodySpec) -> Result<TriMesh, ShapeError> {
 /// A girth of the body: its plane and its requested length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GirthMark {
-    /// The measurement's name, as in [`BodySpec`](super::BodySpec) without `_cm`.
+    /// The measurement's name, as in [`BodySpec`] without `_cm`.
     pub name: &'static str,
     /// Its plane; the origin is the section's centre.
     pub plane: Plane,

@@ -39,6 +39,16 @@ pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Resu
     rayon::scope(|_| run(scene, settings, observer))
 }
 
+impl Scene {
+    /// Runs both stages and the refinement that the settings ask for; [`drape`] with an observer that does nothing.
+    ///
+    /// # Errors
+    /// [`DrapeError`] where a constant of the fabric or an option cannot be used.
+    pub fn drape(&self, settings: &Settings) -> Result<Drape, DrapeError> {
+        drape(self, settings, &mut unobserved)
+    }
+}
+
 /// An observer that does nothing.
 pub fn unobserved(_: &Step<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())

@@ -101,7 +101,7 @@ pub enum FabricError {
 pub(crate) const DEFAULT_FABRIC: &str = BUILT_IN[0];
 
 impl Default for Fabric {
-    /// [`DEFAULT_FABRIC`], a knit.
+    /// `DEFAULT_FABRIC`, a knit.
     fn default() -> Self {
         // A test parses the built-in text.
         Self::parse(FILES[0], DEFAULT_FABRIC).unwrap_or_else(|e| unreachable!("{e}"))

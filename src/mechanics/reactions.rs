@@ -16,7 +16,7 @@
 //! | μ_f | friction coefficient | – |
 //!
 //! Source: the projection on a second-order cone in closed form (Parikh and Boyd: "Proximal algorithms", 2014, section 6.3.2). Limits:
-//! a vertex touches within [`TOUCH_MARGIN_M`] of its offset, which depends on the mesh and changes with its strain.
+//! a vertex touches within `TOUCH_MARGIN_M` of its offset, which depends on the mesh and changes with its strain.
 
 use glam::DVec3;
 

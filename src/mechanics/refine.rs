@@ -90,7 +90,7 @@ const MIN_UNDER_RELAXATION: f64 = 1.0 / 64.0;
 /// When to stop, and how carefully to go.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RefineOptions {
-    /// At most this many steps; `None` for as many as it takes (see [`STEP_LIMIT`]).
+    /// At most this many steps; `None` for as many as it takes (see `STEP_LIMIT`).
     pub max_steps: Option<usize>,
     /// Residual over weight that counts as converged.
     pub tolerance: f64,
@@ -100,7 +100,7 @@ pub struct RefineOptions {
     pub longest_move_m: f64,
     /// Strain under its own hanging weight that stiff cloth may have to begin with; 0 for its true stiffness throughout.
     pub soft_strain: f64,
-    /// Whether cloth keeps off cloth: see [`proximity`](super::energy::proximity).
+    /// Whether cloth keeps off cloth: see `proximity`.
     pub self_contact: bool,
     /// Whether a rest must last: hardly anything moves by the next step, and no way leads out on which the energy falls.
     pub lasting: bool,

@@ -5,7 +5,7 @@
 //!
 //! (M (1/h² + c/h) + K) d = f(x) + M v/h,  x ← x + d,  v ← d/h.
 //!
-//! The body pushes with κ A (h_o − q) along its normal, as everywhere in this project, and holds by Coulomb's [`Friction`]. A
+//! The body pushes with κ A (h_o − q) along its normal, as everywhere in this project, and holds by Coulomb's `Friction`. A
 //! touching vertex has no velocity off the body after the step: cloth does not bounce.
 //!
 //! | symbol | meaning | unit |

@@ -3,7 +3,7 @@
 //! The *own continuation* is refined to convergence from the result itself (`accuracy.rms_mm`). The *canonical drape* is
 //! refined from the undraped garment (`accuracy.canonical_rms_mm`). Its *spread* is the RMS distance between it and drapes
 //! from perturbed starts (`accuracy.canonical_spread_mm`, [`perturbed`]). A garment has several equilibria, so an error below
-//! the spread does not rank results. References are cached on disk; see [`reference`](crate::study::accuracy::reference).
+//! the spread does not rank results. References are cached on disk; see `reference`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! Signed distance to the body, and the two repairs of a garment's placement that follow it outward.
 //!
-//! [`signed_distance`] has the definition, its equations and its limits; `tree` finds the nearest triangle; [`push_out`]
+//! `signed_distance` has the definition, its equations and its limits; `tree` finds the nearest triangle; `push_out`
 //! moves garment vertices out of the body before a drape.
 
 pub(crate) mod push_out;

@@ -1,7 +1,7 @@
 //! A sewing pattern put on a body: its panels are placed around this body, and their seams are closed.
 //!
-//! [`put_on`] sews the pattern in a few edge lengths, long ones first: on some hundred vertices the seams close in a tenth of a
-//! second, and each finer garment starts from the one before, interpolated in the flat panels. [`draw_shut`] closes the open
+//! `put_on` sews the pattern in a few edge lengths, long ones first: on some hundred vertices the seams close in a tenth of a
+//! second, and each finer garment starts from the one before, interpolated in the flat panels. `draw_shut` closes the open
 //! seams of a garment mesh from a file.
 
 mod arap;

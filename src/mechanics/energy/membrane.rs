@@ -26,7 +26,7 @@
 //! | ν | Poisson's ratio, the geometric mean of both directions | – |
 //! | b_i | gradient of the shape function of corner i | 1/m |
 //!
-//! There are two Hessians ([`HessianKind`]). The projected one drops the negative stiffness that compression and shear have out of the plane
+//! There are two Hessians (`HessianKind`). The projected one drops the negative stiffness that compression and shear have out of the plane
 //! (Teran and others: "Robust quasistatic finite elements and flesh simulation", SCA 2005, for the principle); in tension it is exact
 //! up to terms of strain times stiffness within the plane. The true one is exact up to buckling: it cuts the compressive stress
 //! out of the plane at the buckling stress of a triangle. Folds as narrow as a triangle, of half wave √(2A), buckle at B π²/2A. As

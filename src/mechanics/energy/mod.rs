@@ -8,9 +8,9 @@
 //! |---|---|---|
 //! | gravity | [`Cloth`] | Σ m g z |
 //! | membrane | [`membrane`] | Σ A ψ(F), orthotropic |
-//! | bending | [`bending`] | Σ ½ A (B_u \|x_uu\|² + H \|x_uv\|² + B_v \|x_vv\|²) |
+//! | bending | `bending` | Σ ½ A (B_u \|x_uu\|² + H \|x_uv\|² + B_v \|x_vv\|²) |
 //! | contact | `contact`, `face_contacts` | Σ ½ κ A (h − q)² |
-//! | friction | [`friction`] | Σ μ N φ(\|u\|) |
+//! | friction | `friction` | Σ μ N φ(\|u\|) |
 //! | self-contact | `proximity` | Σ ½ κ A (h − n·Σ w x)², and friction |
 
 pub(crate) mod bending;

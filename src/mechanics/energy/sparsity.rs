@@ -1,7 +1,7 @@
 //! The unknowns of a cloth in elimination order, and the sparse symmetric pattern of its Hessian in 3×3 blocks.
 //!
 //! Two free vertices share a block if a triangle or a bending element contains both. Unknowns are numbered in elimination order
-//! ([`ordering`](super::ordering)). A pattern stores the lower half by columns, rows ascending: block (i, j) with i ≥ j.
+//! (`ordering`). A pattern stores the lower half by columns, rows ascending: block (i, j) with i ≥ j.
 
 use glam::{DMat3, DVec3};
 
@@ -111,7 +111,7 @@ impl Pattern {
 pub struct HessianLayout {
     /// Vertex of each unknown, in elimination order.
     pub order: Vec<u32>,
-    /// Unknown of each vertex; [`HELD`] where it is held.
+    /// Unknown of each vertex; `HELD` where it is held.
     pub unknown: Vec<u32>,
     /// The blocks of the Hessian.
     pub pattern: Pattern,

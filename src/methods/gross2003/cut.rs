@@ -2,7 +2,7 @@
 //!
 //! The built-in garments have no seams. They are cut along mesh edges where sleeve and bodice meet (by the mesh's
 //! groups) and where front and back meet, at the sides, on the shoulders and along the arms. Each piece is flattened from its rest
-//! shape as isometrically as possible ([`laid_flat`]); a bodice with a bust has no exact plane pattern, and the remaining strain is
+//! shape as isometrically as possible (`laid_flat`); a bodice with a bust has no exact plane pattern, and the remaining strain is
 //! reported ([`distortion`](super::pieces::distortion)).
 //!
 //! Source: ours; Groß, Fuhrmann, Luckas 2003 start from pattern pieces.

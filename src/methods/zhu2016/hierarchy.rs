@@ -10,7 +10,7 @@
 //! and a vertex that cannot touch yet by its last q (q has slope at most one) is skipped. The cache is ours; the source mentions
 //! none.
 //!
-//! Limits: deeper than [`REACH`] inside the body the nearest triangle may be in another sector, and the
+//! Limits: deeper than `REACH` inside the body the nearest triangle may be in another sector, and the
 //! depth is then overestimated.
 
 use glam::DVec3;

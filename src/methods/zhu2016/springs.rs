@@ -1,5 +1,5 @@
 //! The garment as masses and springs, with structural and bending springs by
-//! [`spring_list`](crate::methods::spring_list).
+//! `spring_list`.
 //!
 //! Provot's limiting (Provot: "Deformation constraints in a mass-spring model to describe rigid cloth behaviour",
 //! Graphics Interface 1995): after a step, a structural spring longer than (1 + τ) L is shortened to that length by

@@ -1,7 +1,7 @@
 //! A unit of the body: its frame, its slices with their quadrics, and the leaf triangles of each slice by sectors.
 //!
 //! The frame's z runs along the unit: for a limb the principal axis of its triangles; for trunk and hip, which
-//! may be wider than high, the vertical. Slices are 4 cm high. A slice lists every triangle of the unit within [`REACH`], so that a
+//! may be wider than high, the vertical. Slices are 4 cm high. A slice lists every triangle of the unit within `REACH`, so that a
 //! point up to that deep inside the body still finds the nearest one; a sector of a slice lists those of them within the same reach
 //! of the sector.
 

@@ -1,11 +1,11 @@
 //! Accuracy of a drape: its distance to a reference, and metrics of its own state.
 //!
 //! A garment has several equilibria of nearly the same energy, so the distance to a single reference misleads. A result is
-//! compared with its *own continuation*, refined to convergence from the result itself ([`Accuracy::vertices`], `rms_mm`), and with
+//! compared with its *own continuation*, refined to convergence from the result itself (`vertices`, `rms_mm`), and with
 //! the *canonical drape*, refined from the undraped start (`canonical_rms_mm`). Both are reported with the spread of canonical drapes
 //! from perturbed starts (`canonical_spread_mm`). The vertex error e_i = |x_i − x'_i| is split by zone: contact, where the
-//! reference is within [`CONTACT_ZONE`] of the body, and free. [`mod@shape`] compares shapes, [`state`] measures residual and
-//! strain, [`representable`] the best drape that the PARTs can represent; [`mod@reference`] caches references on disk.
+//! reference is within `CONTACT_ZONE` of the body, and free. `shape` compares shapes, `state` measures residual and
+//! strain, `representable` the best drape that the PARTs can represent; `reference` caches references on disk.
 //!
 //! Limits: the reference is a drape of the model, not of real cloth; drape tests compare the model with real cloth.
 

@@ -16,7 +16,7 @@
 //! | inside the body | vertices, by the exact distance | none |
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
-//! | largest strain | principal strain of a triangle, % | [`TORN_PERCENT`]: more than fabrics bear |
+//! | largest strain | principal strain of a triangle, % | `TORN_PERCENT`: more than fabrics bear |
 //!
 //! Limits: an admissible reaction need not be the one that the history left; the curvature keeps the contacts fixed.
 

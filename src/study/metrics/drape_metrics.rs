@@ -77,7 +77,7 @@ pub struct Metrics {
     /// coupled model's PARTs can reach.
     pub representable_affine_rms_mm: Option<f64>,
     /// ‖∇E‖ over the weight of the drape as a state without history, less the forces that friction can balance: see
-    /// [`state`](crate::study::accuracy::state).
+    /// `state`.
     pub residual_at_rest_over_weight: Option<f64>,
     /// Representable error of the own continuation with blended affine maps, mm: a lower bound of `rms_mm` before relaxation.
     pub own_affine_rms_mm: Option<f64>,

@@ -1,12 +1,12 @@
 //! Sweeps: a file of range tables and other parameters run point by point, a row on disk after each.
 //!
 //! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row
-//! yet by a function from point to row (usually a [`Bench`]), and writes the rows to a [`Store`]; [`merge`] joins
+//! yet by a function from point to row (usually a [`Bench`]), and writes the rows to a [`Store`]; `merge` joins
 //! the stores of shards. Equal plans give equal rows, timings excepted, independent of interruptions, jobs and
 //! shards.
 //!
-//! [`tables`] documents how a file names range tables, [`mod@file`] all its keys, [`plan`] the order of points,
-//! [`point`] their ids, [`store`] the files; [`sweep_file`] writes one of jobs.
+//! `tables` documents how a file names range tables, `file` all its keys, `plan` the order of points,
+//! `point` their ids, `store` the files; `sweep_file` writes one of jobs.
 
 mod axes;
 mod bench;
