@@ -58,8 +58,8 @@ pub(crate) fn all_printed() -> bool {
 /// Styles of tables: a border alone, or lines between the columns as well.
 pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
 
-/// A table that fits the terminal where its longest words do: long cells are wrapped between words. In a file or a pipe the lines
-/// have their full length. The columns listed in `numbers`, ascending, are aligned right.
+/// A table that fits the terminal: long cells are wrapped between words. If even the longest words do not fit side by side, the longest of
+/// all are broken, such as paths. In a file or a pipe the lines have their full length. The columns listed in `numbers`, ascending, are aligned right.
 pub(crate) fn table<R: Into<Row>>(
     style: &str,
     header: impl IntoIterator<Item: Into<Cell>>,
@@ -72,21 +72,36 @@ pub(crate) fn table<R: Into<Row>>(
         let Some(column) = table.column_mut(column) else { break };
         column.set_cell_alignment(CellAlignment::Right);
     }
+    let width = table.width().unwrap_or(u16::MAX);
+    fit(&mut table, width);
+    table
+}
+
+/// Sets padding and column widths for a terminal of this width, in characters.
+fn fit(table: &mut Table, width: u16) {
     let mut longest_word = vec![0_u16; table.column_count()];
     for row in table.header().into_iter().chain(table.row_iter()) {
         for (longest, cell) in longest_word.iter_mut().zip(row.cell_iter()) {
             let content = cell.content();
-            let words = content.split_whitespace().map(|word| word.chars().count() as u16);
+            let words = content.split_whitespace().map(|word| u16::try_from(word.chars().count()).unwrap_or(u16::MAX));
             *longest = words.fold(*longest, u16::max);
         }
     }
-    let narrow = table.width().is_some_and(|width| longest_word.iter().map(|n| n + 3).sum::<u16>() >= width);
+    // Each column takes its padding and a separator.
+    let total = |words: &[u16], padding: (u16, u16)| {
+        words.iter().map(|n| n.saturating_add(padding.0 + padding.1 + 1)).fold(1, u16::saturating_add)
+    };
+    let fits = |padding: &(u16, u16)| total(&longest_word, *padding) <= width;
+    let padding = [(1, 1), (0, 1)].into_iter().find(fits).unwrap_or((0, 0));
+    while total(&longest_word, padding) > width
+        && let Some(longest) = longest_word.iter_mut().max().filter(|longest| **longest > 1)
+    {
+        *longest -= 1;
+    }
     for (column, longest) in table.column_iter_mut().zip(longest_word) {
-        let padding = if narrow { (0, 1) } else { (1, 1) };
-        let least = Width::Fixed(longest + padding.0 + padding.1);
+        let least = Width::Fixed(longest.saturating_add(padding.0 + padding.1));
         column.set_padding(padding).set_constraint(ColumnConstraint::LowerBoundary(least));
     }
-    table
 }
 
 /// Prints information on stderr.
@@ -134,4 +149,31 @@ pub(crate) fn progress(length: Option<u64>, title: &str) -> ProgressBar {
     bar.set_message(without_control(title).into_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(width: u16, setting: &str) -> Vec<String> {
+        let header = ["garment", "setting", "canonical error mm", "translation bound mm"];
+        let mut table = table(OPEN, header, 2.., [["flared-skirt@3920", setting, "45.8", "76.9"]]);
+        table.set_width(width);
+        fit(&mut table, width);
+        table.lines().collect()
+    }
+
+    #[test]
+    fn a_narrow_table_breaks_between_words_and_within_the_longest_word_alone() {
+        let narrow = lines(52, "table-3");
+        assert!(narrow.iter().all(|line| line.chars().count() <= 52), "{narrow:#?}");
+        for word in ["flared-skirt@3920", "table-3", "canonical", "translation"] {
+            assert!(narrow.iter().any(|line| line.contains(word)), "{word}: {narrow:#?}");
+        }
+        let broken = lines(60, &"path/".repeat(20));
+        assert!(broken.iter().all(|line| line.chars().count() <= 60), "{broken:#?}");
+        for word in ["canonical", "translation"] {
+            assert!(broken.iter().any(|line| line.contains(word)), "{word}: {broken:#?}");
+        }
+    }
 }

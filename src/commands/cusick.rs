@@ -53,7 +53,7 @@ impl CusickArgs {
             write(path, &csv, "--csv")?;
         }
         let mut reader = csv::Reader::from_reader(csv.as_bytes());
-        let header = reader.headers()?.clone();
+        let header: Vec<String> = reader.headers()?.iter().map(|name| name.replace('_', " ")).collect();
         let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>()?;
         let table = console::table(console::RULED, &header, [], rows.iter().map(csv::StringRecord::iter));
         console::result(&table.to_string());

@@ -227,7 +227,7 @@ fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
     assert_eq!(scene.edges("top:2, top:1").unwrap(), [ring(0), ring(first)].concat());
     assert_eq!(scene.edge("upper").unwrap(), [ring(0), ring(48)].concat());
     for (what, expected) in
-        [("top:3", "`top:1` to `top:2`"), ("top:x", "2 connected parts"), ("inside", "no edge"), ("hem", "upper")]
+        [("top:3", "`top:1` to `top:2`"), ("top:x", "2 connected parts"), ("inside", "no open edge"), ("hem", "upper")]
     {
         let said = scene.edges(what).unwrap_err().to_string();
         assert!(said.contains("--hold") && said.contains(expected), "{said}");

@@ -103,7 +103,8 @@ pub(crate) fn rows_text(rows: &[Row]) -> String {
 
 /// Definitions of the errors in [`rows_text`].
 const ERRORS: &str = "\
-Errors are RMS over the vertices. own error: to the equilibrium that this drape converges to. canonical
-error: to the canonical drape of the garment, the same for all tables. affine and translation bound: to
-the canonical drape, if each PART moved by its best affine map, or by its best displacement.
+Errors are RMS over the vertices. Own error: to the equilibrium that this drape
+converges to. Canonical error: to the canonical drape of the garment, the same
+for all tables. Affine and translation bound: to the canonical drape, if each
+PART moved by its best affine map, or by its best displacement.
 ";
