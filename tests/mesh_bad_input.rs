@@ -1,11 +1,12 @@
 //! What bad mesh input gets: one message with file, line, found, expected, what to do.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
 
 use partwise::mesh::export::write_mesh;
-use partwise::mesh::import::{Beside, ImportOptions, import_body, import_garment};
+use partwise::mesh::import::{Beside, ImportOptions, MAX_BODY_FAN, MAX_GARMENT_FAN, import_body, import_garment};
 use partwise::mesh::{Axis, Frame, MeshError, TriMesh, Unit};
 
 fn refusal(name: &str, bytes: &[u8]) -> String {
@@ -53,6 +54,42 @@ fn indices_out_of_range_name_their_line_and_the_range() {
         let expected = format!("found {index}, expected 1 to 1, the texture coordinates");
         says(&format!("{textured}f 1/1 2/{index} 3/1\n"), &["line 5", &expected]);
     }
+}
+
+/// The OBJ text of `n` triangles about vertex 1, a closed fan.
+fn fan(n: usize) -> String {
+    let rim = (0..n).map(|i| (TAU * i as f64 / n as f64).sin_cos());
+    let vertices: String = rim.map(|(y, x)| format!("v {x} {y} 0\n")).collect();
+    let faces: String = (0..n).map(|i| format!("f 1 {} {}\n", i + 2, (i + 1) % n + 2)).collect();
+    format!("v 0 0 1.5\n{vertices}{faces}")
+}
+
+#[test]
+fn a_fan_is_refused_above_the_number_of_triangles_that_a_drape_can_bear() {
+    for n in [MAX_GARMENT_FAN + 1, 20_000] {
+        let found = format!("found {n} triangles about vertex 1, at (0.0000, 0.0000, 1.5000)");
+        says(&fan(n), &[&found, &format!("expected {MAX_GARMENT_FAN} at most"), "remesh"]);
+    }
+    // An edge of as many triangles.
+    let rim: String = (0..20_000).map(|i| format!("v {i} 1 0\n")).collect();
+    let pages: String = (0..20_000).map(|i| format!("f 1 2 {}\n", i + 3)).collect();
+    says(&format!("v 0 0 0\nv 1 0 0\n{rim}{pages}"), &["found 20000 triangles about vertex 1", "remesh"]);
+    // Loose triangles that share one vertex.
+    let loose: String = (0..20_000).map(|i| format!("f 1 {} {}\n", i % 10_000 + 2, i + 10_002)).collect();
+    let corners: String = (0..30_000).map(|i| format!("v {i} 1 {}\n", i % 7)).collect();
+    says(&format!("v 0 0 0\n{corners}{loose}"), &["found 20000 triangles about vertex 1"]);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cap.obj");
+    let frame = Frame::given(Unit::M, Axis::Z);
+    fs::write(&path, fan(MAX_GARMENT_FAN)).unwrap();
+    import_garment(&path, &ImportOptions::default(), &Beside::File(&frame)).unwrap();
+    // A body may have more: it is not bent.
+    fs::write(&path, fan(MAX_BODY_FAN)).unwrap();
+    let open = ImportOptions { open_body: true, ..ImportOptions::default() };
+    import_body(&path, &open).unwrap();
+    fs::write(&path, fan(MAX_BODY_FAN + 1)).unwrap();
+    assert!(import_body(&path, &open).unwrap_err().to_string().contains("found 4001 triangles"));
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use crate::base::files::{Unreadable, listed};
 
 /// Errors of reading or writing a mesh file.
@@ -25,6 +27,14 @@ pub enum MeshError {
          triangle of three different vertices; expected at least one"
     )]
     Empty { file: PathBuf, vertices: usize, faces: usize },
+    /// Too many triangles about one vertex.
+    #[error(
+        "{file}: found {triangles} triangles about vertex {vertex}, at ({:.4}, {:.4}, {:.4}) of the file, expected {max_fan} at most, \
+         because the time of a drape grows with the cube of that number; remesh the file there, so that the triangles are about \
+         as long as wide",
+        .at.x, .at.y, .at.z
+    )]
+    Fan { file: PathBuf, vertex: usize, at: DVec3, triangles: usize, max_fan: usize },
     /// No group of that name.
     #[error("{file}: no group \"{asked}\"; {there_are}", there_are = there_are(available))]
     UnknownGroup { file: PathBuf, asked: String, available: Vec<String> },
