@@ -53,6 +53,12 @@ pub enum SceneError {
          the same unit, up axis and place (--unit, --up)?"
     )]
     NotNear { nearest: f64, limit: f64 },
+    /// A garment worn over itself.
+    #[error(
+        "{coincident} of its {vertices} vertices lie exactly on a garment below it, expected a garment around that one; is it given \
+         twice? Give it once, with a fabric of twice the mass if its cloth is double, or export the outer one some millimetres wider"
+    )]
+    Coincident { coincident: usize, vertices: usize },
     /// Fabrics that cannot be assigned.
     #[error(transparent)]
     Cut(Box<CutError>),

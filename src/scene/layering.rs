@@ -12,6 +12,8 @@
 //!
 //! Limits: a garment is over or under another as a whole.
 
+use std::collections::HashSet;
+
 use glam::DVec3;
 use parry3d_f64::query::{Ray, RayCast};
 use parry3d_f64::shape::{FeatureId, TriMesh as ParryMesh};
@@ -119,6 +121,13 @@ fn last_sheet(c: DVec3, outward: DVec3, inner: &TriMesh, below: &ParryMesh, body
         }
     }
     last
+}
+
+/// Number of vertices of `outer` that lie exactly on one of `inner`.
+pub(super) fn coincident(inner: &TriMesh, outer: &TriMesh) -> usize {
+    let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
+    let taken: HashSet<[u64; 3]> = inner.positions.iter().map(bits).collect();
+    outer.positions.iter().filter(|p| taken.contains(&bits(p))).count()
 }
 
 /// Appends `more` to `mesh`, with its groups; returns the number of vertices there were before.

@@ -273,8 +273,9 @@ impl Scene {
     /// # Errors
     /// As [`edge`](Self::edge).
     pub fn edges(&self, names: &str) -> Result<Vec<u32>, SceneError> {
-        let edges = self.edge_names(names).into_iter().map(|name| self.edge(name)).collect::<Result<Vec<_>, _>>()?;
-        Ok(each_once(edges.into_iter().flatten()))
+        let edges = Edges::new(self);
+        let held = self.edge_names(names).into_iter().map(|name| edges.named(name)).collect::<Result<Vec<_>, _>>()?;
+        Ok(each_once(held.into_iter().flatten()))
     }
 
     /// The names of several edges, one by one.
@@ -303,23 +304,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] where there is no such part or group, or no edge.
     pub fn edge(&self, name: &str) -> Result<Vec<u32>, SceneError> {
-        let Self { garment: mesh, topology, .. } = self;
-        if let Some(group) = mesh.groups.iter().position(|g| g == name) {
-            let on_edge = topology.boundary_vertices();
-            let of_group = mesh.triangles.iter().zip(&mesh.triangle_group).filter(|&(_, &g)| g as usize == group);
-            let held = each_once(of_group.flat_map(|(triangle, _)| *triangle).filter(|&v| on_edge[v as usize]));
-            return if held.is_empty() { Err(SceneError::NoEdge { what: name.to_owned() }) } else { Ok(held) };
-        }
-        let (part_of, parts) = topology.components();
-        let part = match name.strip_prefix("top:").map(str::parse::<usize>) {
-            _ if name == "top" => None,
-            Some(Ok(part)) if (1..=parts).contains(&part) => Some(part as u32 - 1),
-            Some(_) => return Err(SceneError::UnknownPart { found: name.to_owned(), parts }),
-            None => return Err(SceneError::UnknownGroup { found: name.to_owned(), known: mesh.groups.clone() }),
-        };
-        let edges = topology.boundary_loops().into_iter();
-        let of_part = edges.filter(|edge| part.is_none_or(|part| part_of[edge[0] as usize] == part));
-        self.highest(of_part.collect()).ok_or_else(|| SceneError::NoEdge { what: name.to_owned() })
+        Edges::new(self).named(name)
     }
 
     /// The highest of some edges, by mean height as placed. Of several that are equally high, the shortest: the neckline of
@@ -415,5 +400,43 @@ impl Scene {
             some => format!(", or one of its groups: {}", first_of(some, MAX_NAMED)),
         };
         format!("hold its edge (--hold {names}{or_group})")
+    }
+}
+
+/// The edges of a scene's garment by name, for names by the thousand.
+struct Edges<'a> {
+    scene: &'a Scene,
+    /// The highest edge of each connected part.
+    tops: Vec<Option<Vec<u32>>>,
+    /// Vertices of the boundary edges of each group.
+    of_group: Vec<Vec<u32>>,
+}
+
+impl<'a> Edges<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let Scene { garment: mesh, topology, .. } = scene;
+        let on_edge = topology.boundary_vertices();
+        let mut of_group = vec![Vec::new(); mesh.groups.len()];
+        for (triangle, &group) in mesh.triangles.iter().zip(&mesh.triangle_group) {
+            of_group[group as usize].extend(triangle.iter().filter(|&&v| on_edge[v as usize]));
+        }
+        Self { scene, tops: scene.tops(), of_group }
+    }
+
+    /// As [`Scene::edge`].
+    fn named(&self, name: &str) -> Result<Vec<u32>, SceneError> {
+        let no_edge = || SceneError::NoEdge { what: name.to_owned() };
+        let groups = &self.scene.garment.groups;
+        if let Some(group) = groups.iter().position(|g| g == name) {
+            let held = each_once(self.of_group[group].iter().copied());
+            return if held.is_empty() { Err(no_edge()) } else { Ok(held) };
+        }
+        let parts = self.tops.len();
+        match name.strip_prefix("top:").map(str::parse::<usize>) {
+            _ if name == "top" => self.scene.highest(self.scene.topology.boundary_loops()).ok_or_else(no_edge),
+            Some(Ok(part)) if (1..=parts).contains(&part) => self.tops[part - 1].clone().ok_or_else(no_edge),
+            Some(_) => Err(SceneError::UnknownPart { found: name.to_owned(), parts }),
+            None => Err(SceneError::UnknownGroup { found: name.to_owned(), known: groups.clone() }),
+        }
     }
 }

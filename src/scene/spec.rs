@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::layering::coincident;
 use super::loaded::{Loaded, Tailored, Unplaced};
 use super::materials::{BESIDE, Cut, CutError, files_named_in};
 use super::placement::facing_body;
@@ -292,6 +293,11 @@ impl SceneSpec {
         let mut layers = vec![unplaced.layer(self.layer_name(), (0, 0))];
         for spec in self.layers().skip(1) {
             let outer = spec.unplaced(&body, imported_body.as_ref(), spec.make_garment(meshes))?;
+            let (coincident, vertices) = (coincident(&unplaced.mesh, &outer.mesh), outer.mesh.vertex_count());
+            // Contact cannot tell which of the two is outside, and the drape goes on for minutes.
+            if 2 * coincident > vertices {
+                return Err(SceneError::about(&spec.garment)(SceneError::Coincident { coincident, vertices }));
+            }
             let before = (unplaced.mesh.vertex_count(), unplaced.mesh.triangles.len());
             unplaced.add_outer(outer);
             layers.push(unplaced.layer(spec.layer_name(), before));

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod meshes;
+mod placed;
 
 use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
