@@ -1,25 +1,42 @@
-//! Responses that go on while their client reads: events of the state, and pieces for the viewer. At most 30 a second, of which
-//! each carries only the newest.
+//! Streamed responses: events of the state, and pieces for the viewer. A client gets at most 30 a second, each with the newest
+//! data only.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use tokio::sync::{OwnedSemaphorePermit, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
+use super::access::Access;
+use super::pieces::Pieces;
 use super::report;
-use super::routes::Site;
+use crate::scene::FileRole;
+use crate::session::Session;
 
-/// Between two events of one client.
-const PACE: Duration = Duration::from_millis(33);
-/// The longest pause between two events, so that a lost client is noticed.
-const PULSE: Duration = Duration::from_secs(10);
-/// How long a client may take for one event.
-const PATIENCE: Duration = Duration::from_secs(30);
-/// Clients that read events or pieces at a time.
-pub(super) const MOST_FLOWS: usize = 64;
+/// Shortest interval between two events of one client.
+const EVENT_INTERVAL: Duration = Duration::from_millis(33);
+/// Longest interval between two events; a keep-alive message is sent then, so that a lost client is noticed.
+const KEEP_ALIVE: Duration = Duration::from_secs(10);
+/// Time in which a client must accept one event.
+const SEND_TIMEOUT: Duration = Duration::from_secs(30);
+/// Largest number of clients that read events or pieces at the same time.
+pub(super) const MAX_READERS: usize = 64;
+
+/// A session and its clients.
+pub(super) struct Site {
+    pub(super) session: Session,
+    pub(super) access: Access,
+    /// Files that requests may name.
+    pub(super) files: Vec<(FileRole, String)>,
+    pub(super) pieces: Arc<Pieces>,
+    pub(super) news: watch::Receiver<u64>,
+    /// One permit for each reader of events or the stream.
+    pub(super) readers: Arc<Semaphore>,
+    /// A name by which a page recognises this server.
+    pub(super) run: String,
+}
 
 /// The state now and after each change, as server-sent events.
 pub(super) fn events(site: &Arc<Site>, permit: OwnedSemaphorePermit) -> Receiver<Bytes> {
@@ -65,7 +82,7 @@ fn flow(
                     return;
                 }
             }
-            sleep_until(began + PACE).await;
+            sleep_until(began + EVENT_INTERVAL).await;
             if !changed(&mut news, &sender, alive).await {
                 return;
             }
@@ -77,7 +94,7 @@ fn flow(
 /// Waits for news and sends `alive` meanwhile; false once the session or the client is gone.
 async fn changed(news: &mut watch::Receiver<u64>, sender: &Sender<Bytes>, alive: &'static [u8]) -> bool {
     loop {
-        match timeout(PULSE, news.changed()).await {
+        match timeout(KEEP_ALIVE, news.changed()).await {
             Ok(changed) => return changed.is_ok(),
             Err(_) if !sent(sender, Bytes::from_static(alive)).await => return false,
             Err(_) => {}
@@ -87,5 +104,5 @@ async fn changed(news: &mut watch::Receiver<u64>, sender: &Sender<Bytes>, alive:
 
 /// Whether the client took the bytes in time.
 async fn sent(sender: &Sender<Bytes>, bytes: Bytes) -> bool {
-    matches!(timeout(PATIENCE, sender.send(bytes)).await, Ok(Ok(())))
+    matches!(timeout(SEND_TIMEOUT, sender.send(bytes)).await, Ok(Ok(())))
 }

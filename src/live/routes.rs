@@ -12,14 +12,13 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post};
 use axum::{Extension, Router};
 use serde_json::{Value, json};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::Receiver;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::access::{Access, Right, check_site, may};
-use super::events::{MOST_FLOWS, events, stream};
-use super::pieces::Pieces;
+use super::access::{Right, check_site, may};
+use super::events::{MAX_READERS, Site, events, stream};
 use super::{garment, report};
 use crate::base::error_text;
 use crate::parts::range_table::RangeTable;
@@ -29,11 +28,11 @@ use crate::session::{Edit, EditError, Session, TableEdit};
 use crate::study::job::Job;
 use crate::study::sweep::sweep_file;
 
-/// Bytes of the longest request body.
-const LONGEST: usize = 1 << 20;
+/// Largest request body, bytes.
+const MAX_BODY: usize = 1 << 20;
 
-/// How long a request body may take to arrive.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Time in which a request body must arrive.
+const BODY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The page's own files.
 const FILES: [(&str, &str, &str); 7] = [
@@ -45,19 +44,6 @@ const FILES: [(&str, &str, &str); 7] = [
     ("/numbers.js", "text/javascript; charset=utf-8", include_str!("page/numbers.js")),
     ("/viewer.js", "text/javascript; charset=utf-8", include_str!("page/viewer.js")),
 ];
-
-/// A session and its clients.
-pub(super) struct Site {
-    pub(super) session: Session,
-    pub(super) access: Access,
-    pub(super) files: Vec<(FileRole, String)>,
-    pub(super) pieces: Arc<Pieces>,
-    pub(super) news: watch::Receiver<u64>,
-    /// One permit for each reader of events or the stream.
-    pub(super) flows: Arc<Semaphore>,
-    /// A name by which a page recognises this server.
-    pub(super) run: String,
-}
 
 /// A refused request: status and sentence, sent as `{"error": sentence}`.
 struct Refusal(StatusCode, String);
@@ -102,7 +88,7 @@ pub(super) fn router(site: Arc<Site>) -> Router {
     router
         .method_not_allowed_fallback(wrong_method)
         .fallback(async |request: Request| file(&request).map_err(Refusal::from))
-        .layer(DefaultBodyLimit::max(LONGEST))
+        .layer(DefaultBodyLimit::max(MAX_BODY))
         .layer(from_fn_with_state(Arc::clone(&site), check_host))
         .with_state(site)
 }
@@ -150,10 +136,10 @@ async fn pieces(State(site): State<Arc<Site>>) -> Answer {
     }
 }
 
-/// A response that goes on while its client reads.
+/// A streamed response.
 fn flow(site: &Arc<Site>, kind: &'static str, open: fn(&Arc<Site>, OwnedSemaphorePermit) -> Receiver<Bytes>) -> Answer {
-    let Ok(permit) = Arc::clone(&site.flows).try_acquire_owned() else {
-        let full = format!("found {MOST_FLOWS} readers already; close a page");
+    let Ok(permit) = Arc::clone(&site.readers).try_acquire_owned() else {
+        let full = format!("found {MAX_READERS} readers already; close a page");
         return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, full));
     };
     let pieces = ReceiverStream::new(open(site, permit)).map(Ok::<_, std::convert::Infallible>);
@@ -284,18 +270,18 @@ async fn unpin(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
     Err(Refusal(StatusCode::NOT_FOUND, format!("found pin {id}, expected the number of a pin of `GET /api/state`")))
 }
 
-/// The body of a request, up to [`LONGEST`] bytes.
+/// The body of a request, up to [`MAX_BODY`] bytes.
 async fn body(request: Request) -> Result<Bytes, Refusal> {
-    let long = || Refusal(StatusCode::PAYLOAD_TOO_LARGE, format!("found more than {LONGEST} bytes, expected an edit"));
-    if request.body().size_hint().lower() > LONGEST as u64 {
+    let long = || Refusal(StatusCode::PAYLOAD_TOO_LARGE, format!("found more than {MAX_BODY} bytes, expected an edit"));
+    if request.body().size_hint().lower() > MAX_BODY as u64 {
         return Err(long());
     }
-    match tokio::time::timeout(PATIENCE, Bytes::from_request(request, &())).await {
+    match tokio::time::timeout(BODY_TIMEOUT, Bytes::from_request(request, &())).await {
         Ok(Ok(bytes)) => Ok(bytes),
         Ok(Err(error)) if error.status() == StatusCode::PAYLOAD_TOO_LARGE => Err(long()),
         Ok(Err(error)) => Err(malformed(&format!("the request broke off: {error}"))),
         Err(_) => {
-            let late = format!("the body did not arrive in {} s", PATIENCE.as_secs());
+            let late = format!("the body did not arrive in {} s", BODY_TIMEOUT.as_secs());
             Err(Refusal(StatusCode::REQUEST_TIMEOUT, late))
         }
     }

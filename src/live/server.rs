@@ -7,9 +7,9 @@ use std::thread::JoinHandle;
 use tokio::sync::{Semaphore, watch};
 
 use super::access::Access;
-use super::events::MOST_FLOWS;
+use super::events::{MAX_READERS, Site};
 use super::pieces::Pieces;
-use super::routes::{Site, router};
+use super::routes::router;
 use super::{LiveError, LiveOptions};
 use crate::record::{Server, name_of_run};
 use crate::session::Session;
@@ -45,7 +45,7 @@ impl LiveServer {
             files: options.files.clone(),
             pieces: Arc::clone(&pieces),
             news,
-            flows: Arc::new(Semaphore::new(MOST_FLOWS)),
+            readers: Arc::new(Semaphore::new(MAX_READERS)),
             run: name_of_run(),
         });
         let failed = |error: std::io::Error| LiveError::Server(error.to_string());

@@ -29,13 +29,7 @@ use crate::mesh::rest::RestError;
 use crate::mesh::{RestShape, Topology};
 
 pub(crate) use shadow::shadow_area;
-pub(crate) use specimen::specimen;
-
-/// Radius of the specimen, m.
-pub(crate) const SPECIMEN_RADIUS: f64 = 0.15;
-
-/// Radius of the plates, m.
-pub(crate) const PLATE_RADIUS: f64 = 0.09;
+pub(crate) use specimen::{PLATE_RADIUS, SPECIMEN_RADIUS, specimen};
 
 /// Published bands, by fabric.
 const TARGETS: &str = include_str!("../../../assets/cusick/targets.csv");

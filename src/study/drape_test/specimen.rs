@@ -5,8 +5,13 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{PLATE_RADIUS, SPECIMEN_RADIUS};
 use crate::mesh::TriMesh;
+
+/// Radius of the specimen, m.
+pub(crate) const SPECIMEN_RADIUS: f64 = 0.15;
+
+/// Radius of the plates, m.
+pub(crate) const PLATE_RADIUS: f64 = 0.09;
 
 /// The flat specimen.
 #[derive(Debug, Clone)]

@@ -6,9 +6,10 @@
 use toml::Value;
 
 use super::bodies::body;
-use super::file::{At, Grid, Single, Source, number};
+use super::file::{At, Axis, Grid, Single, Source, number};
 use super::garments::garments;
 use super::inputs::Inputs;
+use super::point::{Edit, one};
 use super::tables::tables;
 use super::{PlanError, Point};
 use crate::base::files::names_a_file;
@@ -20,9 +21,6 @@ use crate::study::job::Job;
 /// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and
 /// its points take 200 MB of memory).
 const LIMIT: usize = 100_000;
-
-/// The change of a point by a value of an axis.
-pub(super) type Edit = Box<dyn Fn(&mut Point)>;
 
 /// The values of every axis, in the order in which a grid is nested.
 pub(super) struct Axes(Vec<Vec<Edit>>);
@@ -100,43 +98,6 @@ impl Axes {
             points.push(point.named());
         }
         Ok(())
-    }
-}
-
-/// An axis value that is one edit.
-pub(super) fn one(edit: impl Fn(&mut Point) + 'static) -> Vec<Edit> {
-    vec![Box::new(edit)]
-}
-
-/// Reads one axis after the other.
-#[derive(Clone, Copy)]
-pub(super) struct Axis<'a> {
-    pub(super) source: Source<'a>,
-    pub(super) base: &'a Single,
-    pub(super) grid: &'a Grid,
-}
-
-impl Axis<'_> {
-    /// The edits of an axis, by its key in `[base]` and in `[grid]`; where neither has it, one that changes nothing.
-    fn edits(
-        self,
-        keys: [&'static str; 2],
-        mut read: impl FnMut(&At) -> Result<Vec<Edit>, PlanError>,
-    ) -> Result<Vec<Edit>, PlanError> {
-        let Some(values) = self.values(keys)? else { return Ok(one(|_| ())) };
-        let edits: Vec<Vec<Edit>> = values.iter().map(|v| read(v)).collect::<Result<_, _>>()?;
-        Ok(edits.into_iter().flatten().collect())
-    }
-
-    /// The values of an axis: of the grid's list, or the base's one.
-    pub(super) fn values(self, [single, plural]: [&'static str; 2]) -> Result<Option<Vec<At>>, PlanError> {
-        let Some(list) = self.grid.get(plural) else { return Ok(self.base.get(single).map(|v| vec![v.clone()])) };
-        if list.get_ref().is_empty() {
-            let (place, found) = (self.source.line(list.span().start), "an empty list".to_owned());
-            let expected = "at least one value; leave the key out for the value of [base]".to_owned();
-            return Err(PlanError::Value { place, key: plural, found, expected });
-        }
-        Ok(Some(list.get_ref().clone()))
     }
 }
 

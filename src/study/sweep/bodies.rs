@@ -2,10 +2,10 @@
 
 use toml::Value;
 
-use super::axes::{Edit, one};
 use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::{Input, Inputs};
+use super::point::{Edit, one};
 use crate::base::files::{has_ending, names_a_file};
 use crate::body::BodySpec;
 use crate::scene::DRESS_FORM;

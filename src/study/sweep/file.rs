@@ -38,6 +38,7 @@ use serde::Deserialize;
 use toml::{Spanned, Value};
 
 use super::error::PlanError;
+use super::point::{Edit, one};
 use crate::base::files::line_of;
 
 /// A value and where it stands.
@@ -148,6 +149,38 @@ impl Source<'_> {
     ) -> Result<T, PlanError> {
         let number = value.get_ref().as_integer().and_then(|n| T::try_from(n).ok()).filter(|n| *n >= least);
         number.ok_or_else(|| self.wrong(value, key, expected))
+    }
+}
+
+/// Reads the values of one axis after the other.
+#[derive(Clone, Copy)]
+pub(super) struct Axis<'a> {
+    pub(super) source: Source<'a>,
+    pub(super) base: &'a Single,
+    pub(super) grid: &'a Grid,
+}
+
+impl Axis<'_> {
+    /// The edits of an axis, by its keys in `[base]` and in `[grid]`. An axis that the file leaves out has one edit without effect.
+    pub(super) fn edits(
+        self,
+        keys: [&'static str; 2],
+        mut read: impl FnMut(&At) -> Result<Vec<Edit>, PlanError>,
+    ) -> Result<Vec<Edit>, PlanError> {
+        let Some(values) = self.values(keys)? else { return Ok(one(|_| ())) };
+        let edits: Vec<Vec<Edit>> = values.iter().map(|v| read(v)).collect::<Result<_, _>>()?;
+        Ok(edits.into_iter().flatten().collect())
+    }
+
+    /// The values of an axis: the list in `[grid]`, or else the value in `[base]`.
+    pub(super) fn values(self, [single, plural]: [&'static str; 2]) -> Result<Option<Vec<At>>, PlanError> {
+        let Some(list) = self.grid.get(plural) else { return Ok(self.base.get(single).map(|v| vec![v.clone()])) };
+        if list.get_ref().is_empty() {
+            let (place, found) = (self.source.line(list.span().start), "an empty list".to_owned());
+            let expected = "at least one value; leave the key out for the value of [base]".to_owned();
+            return Err(PlanError::Value { place, key: plural, found, expected });
+        }
+        Ok(Some(list.get_ref().clone()))
     }
 }
 

@@ -1,9 +1,9 @@
 //! The garments of a sweep, at their sizes.
 
-use super::axes::{Axis, Edit, one};
 use super::error::PlanError;
-use super::file::At;
+use super::file::{At, Axis};
 use super::inputs::{Input, Inputs};
+use super::point::{Edit, one};
 use crate::base::files::names_a_file;
 use crate::garment::builtin::TABLE_4_SIZES;
 use crate::garment::{BUILT_IN, GarmentRequest, GarmentSpec};

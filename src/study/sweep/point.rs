@@ -106,6 +106,14 @@ impl Point {
     }
 }
 
+/// The change of a point by a value of an axis.
+pub(super) type Edit = Box<dyn Fn(&mut Point)>;
+
+/// An axis value that is one edit.
+pub(super) fn one(edit: impl Fn(&mut Point) + 'static) -> Vec<Edit> {
+    vec![Box::new(edit)]
+}
+
 /// Hash of a value's JSON, 128 bits in hexadecimal: enough that no two points of any sweep meet, and short in a CSV.
 pub(super) fn content_id(value: &impl Serialize) -> String {
     // Structs keep their order of fields whatever features serde_json is built with; a map might not. Writing plain

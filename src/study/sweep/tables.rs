@@ -16,10 +16,10 @@
 use serde::Deserialize;
 use toml::Value;
 
-use super::axes::Edit;
 use super::error::PlanError;
 use super::file::{At, Source, number};
 use super::inputs::Inputs;
+use super::point::Edit;
 use crate::base::files::names_a_file;
 use crate::parts::range_table::{MAX_LEVELS, RangeTable, TABLE_3, TableError, TableRule};
 

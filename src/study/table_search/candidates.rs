@@ -1,9 +1,10 @@
-//! Candidate bounds: places between two neighbouring distances, as ranks in the sorted distances of all garments.
+//! Candidate bounds of levels, as ranks in the sorted distances of all garments.
 //!
-//! Only the rank of a bound matters to which vertices fall on which side, so candidates of equal rank are one. The bound itself is
+//! The rank of a bound alone decides which vertices lie below it, so bounds of equal rank are one candidate. The bound itself is
 //! halfway between its two neighbouring distances.
 
-use super::{Sample, SearchOptions};
+use super::options::SearchOptions;
+use super::sample::Sample;
 use crate::parts::range_table::METRES_PER_CM;
 
 /// Bounds between which levels may begin and end.
@@ -13,15 +14,15 @@ pub(super) struct Candidates {
     sorted: Vec<f64>,
     /// Ranks in `sorted`, ascending, distinct, each from 1 to its length − 1.
     ranks: Vec<usize>,
-    /// Whether these are all ranks there are: no other bound makes a difference then.
+    /// Whether `ranks` holds all ranks; no other bound changes a table then.
     pub(super) every: bool,
-    /// How far apart candidates are, in ranks.
+    /// Spacing of the first candidates, in ranks.
     spacing: usize,
 }
 
 impl Candidates {
-    /// Evenly spaced ranks, and those of the tables to include; every rank there is of one garment where they
-    /// are few enough.
+    /// Evenly spaced ranks and those of the tables to include; for a single garment with at most `exact_up_to` distances, every
+    /// rank.
     pub(super) fn quantiles(samples: &[Sample<'_>], options: &SearchOptions) -> Self {
         let mut sorted: Vec<f64> = samples.iter().flat_map(|s| s.distances_m).map(|d| d.abs()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -42,7 +43,7 @@ impl Candidates {
     }
 
     fn of(sorted: Vec<f64>, mut ranks: Vec<usize>, spacing: usize) -> Self {
-        // Distances that differ in their last bits may have no bound in centimetres between them.
+        // Between distances that differ in their last bits, rounding to centimetres may leave no bound.
         let parts = |r: usize| {
             let bound_m = bound_cm(&sorted, r) * METRES_PER_CM;
             sorted[r - 1] < bound_m && bound_m <= sorted[r]
@@ -53,13 +54,13 @@ impl Candidates {
         Self { sorted, ranks, every: false, spacing }
     }
 
-    /// The given bounds, about `count` ranks near them, near and far, and as many quantiles as a third of these, other ones each
+    /// The given bounds and `count` more ranks: two thirds around the bounds, one third quantiles, which differ from round to
     /// round.
     pub(super) fn around(&self, bounds_cm: &[f64], count: usize, round: usize) -> Self {
         let near = 2 * count / 3;
         let each = (near / (2 * bounds_cm.len().max(1))).max(1);
-        // Distances halve from as far as the first candidates were apart to one rank; where there is no room for all, rounds
-        // take turns.
+        // Offsets from a bound halve from the spacing of the first candidates to one rank. If `count` does not allow them all,
+        // rounds take turns.
         let steps: Vec<usize> = (0..).map(|i| self.spacing >> i).take_while(|&step| step > 0).collect();
         let mut ranks = Vec::new();
         for &bound_cm in bounds_cm {
@@ -71,18 +72,18 @@ impl Candidates {
             }
         }
         let others = (count - near).max(1);
-        // Multiples of the golden ratio never come back to the same place.
+        // Multiples of the golden ratio modulo 1 do not repeat.
         let shift = (round as f64 * 0.618_033_988_749_895).fract();
         ranks.extend((0..others).map(|i| ((i as f64 + shift) * self.sorted.len() as f64 / others as f64) as usize));
         Self::of(self.sorted.clone(), ranks, self.spacing)
     }
 
-    /// Number of smallest levels, between neighbouring candidates.
+    /// Number of smallest levels: those between neighbouring candidates.
     pub(super) fn bins(&self) -> usize {
         self.ranks.len() + 1
     }
 
-    /// How many levels that start at a smallest one, the thinnest first, are thinner than this. The last is open.
+    /// Number of levels from `lower` on that are thinner than `cm`. The last level is unbounded and not thin.
     pub(super) fn too_thin(&self, lower: usize, cm: f64) -> usize {
         let at = |bin: usize| bin.checked_sub(1).map_or(0.0, |i| bound_cm(&self.sorted, self.ranks[i]));
         (lower + 1..self.bins()).take_while(|&upper| at(upper) - at(lower) < cm).count()
@@ -97,7 +98,7 @@ impl Candidates {
     pub(super) fn members(&self, distances_m: &[f64]) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.bins()];
         for (&d, v) in distances_m.iter().zip(0u32..) {
-            // A distance of rank r, itself the r-th of `sorted`, lies above all candidates up to r.
+            // A distance of rank r lies above all candidates up to r.
             let rank = self.sorted.partition_point(|&s| s < d.abs());
             members[self.ranks.partition_point(|&c| c <= rank)].push(v);
         }
@@ -110,7 +111,7 @@ fn bound_cm(sorted: &[f64], rank: usize) -> f64 {
     0.5 * (sorted[rank - 1] + sorted[rank]) / METRES_PER_CM
 }
 
-/// How many distances lie below a bound.
+/// Number of distances below a bound.
 fn rank(sorted: &[f64], bound_cm: f64) -> usize {
     sorted.partition_point(|&s| s < bound_cm * METRES_PER_CM)
 }

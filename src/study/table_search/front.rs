@@ -1,6 +1,6 @@
 //! The Pareto front of PART count and representable error.
 
-use super::extent_grid::Ladder;
+use super::extent_grid::ExtentGrid;
 use super::program::Path;
 use crate::parts::range_table::{Extent, RangeTable, TableError};
 
@@ -19,15 +19,15 @@ pub(crate) struct FrontPoint {
 
 impl FrontPoint {
     /// The table of a path with the given number of PARTs.
-    pub(super) fn on(path: &Path, parts: usize, inner_cm: &[f64], ladder: &Ladder) -> Self {
+    pub(super) fn on(path: &Path, parts: usize, inner_cm: &[f64], extents: &ExtentGrid) -> Self {
         // The first level starts at 0.
         let bounds = path.levels.iter().filter_map(|level| inner_cm.get(level.lower.checked_sub(1)?).copied());
-        let steps = if ladder.cuts() { &path.levels[..] } else { &[] };
+        let cut = if extents.cuts() { &path.levels[..] } else { &[] };
         Self {
             parts,
             rms_m: path.squared.max(0.0).sqrt(),
             inner_bounds_cm: bounds.collect(),
-            extents: steps.iter().map(|level| ladder.extent(level.step)).collect(),
+            extents: cut.iter().map(|level| extents.extent(level.extent)).collect(),
         }
     }
 

@@ -1,11 +1,12 @@
 //! PARTs and squared error of every level [a, b) between candidate bounds, uncut and cut to each extent.
 //!
-//! For each lower bound the upper one grows step by step: vertices come in, a union-find keeps the connected pieces and the sums
-//! of their errors ([`Moments`]). A changed piece is cut as in stage one. The seeds do not depend on the extent, so one sequence of
-//! seeds serves all extents, and a new seed updates the sums of the reassigned vertices only.
+//! For each lower bound, the upper bound advances candidate by candidate and adds vertices. A union-find keeps the connected pieces,
+//! and [`Moments`] their errors. A changed piece is cut as in stage one. The seeds do not depend on the extent, so one sequence of
+//! seeds serves all extents, and a new seed updates the moments of the reassigned vertices only.
 
-use super::Sample;
-use super::extent_grid::Ladder;
+use super::extent_grid::ExtentGrid;
+use super::options::SearchOptions;
+use super::sample::Sample;
 use crate::mechanics::coupled::Motion;
 use crate::parts::{Ruler, spread_seeds};
 use crate::study::accuracy::moments::Moments;
@@ -21,31 +22,43 @@ pub(super) struct Cost {
 /// More PARTs than any table may have.
 pub(super) const TOO_MANY: Cost = Cost { parts: u32::MAX, error: 0.0 };
 
+/// Excludes levels from all tables: the first `too_thin` levels, and uncut levels if the options require a cut.
+pub(super) fn forbid(row: &mut [Cost], too_thin: usize, extents: &ExtentGrid, options: &SearchOptions) {
+    for (i, level) in row.chunks_mut(extents.len()).enumerate() {
+        if i < too_thin {
+            level.fill(TOO_MANY);
+        } else if !options.uncut && extents.cuts() {
+            level[0] = TOO_MANY;
+        }
+    }
+}
+
 impl Cost {
     fn plus(self, other: Self) -> Self {
         Self { parts: self.parts.saturating_add(other.parts), error: self.error + other.error }
     }
 }
 
-/// Data of a garment for all rows.
+/// Evaluates the levels of a garment, a row for each lower bound.
 pub(super) struct Intervals<'a> {
     sample: &'a Sample<'a>,
-    /// Sums of each vertex by itself.
+    /// Moments of each single vertex.
     each: Vec<Moments>,
-    ladder: &'a Ladder,
+    extents: &'a ExtentGrid,
     motion: Motion,
 }
 
 impl<'a> Intervals<'a> {
-    pub(super) fn new(sample: &'a Sample<'a>, ladder: &'a Ladder, motion: Motion) -> Self {
+    pub(super) fn new(sample: &'a Sample<'a>, extents: &'a ExtentGrid, motion: Motion) -> Self {
         let all: Vec<u32> = (0..sample.displacement.len() as u32).collect();
-        Self { sample, each: Moments::of_each(&all, &sample.mesh.positions, sample.displacement), ladder, motion }
+        Self { sample, each: Moments::of_each(&all, &sample.mesh.positions, sample.displacement), extents, motion }
     }
 
-    /// The costs of [a, a + 1), [a, a + 2), ... at each step of the ladder, for the vertices of the smallest levels from a on.
+    /// The costs of the levels [a, a + 1), [a, a + 2), ..., each with every extent of the grid. `members` are the vertices of the
+    /// smallest levels from a on.
     pub(super) fn row(&self, members: &[Vec<u32>]) -> Vec<Cost> {
         let mut pieces = Pieces::new(self);
-        let mut row = Vec::with_capacity(members.len() * self.ladder.len());
+        let mut row = Vec::with_capacity(members.len() * self.extents.len());
         for vertices in members {
             pieces.grow(vertices);
             pieces.costs(&mut row);
@@ -54,24 +67,24 @@ impl<'a> Intervals<'a> {
     }
 }
 
-/// The connected pieces of the vertices so far.
+/// The connected pieces of the vertices added so far.
 struct Pieces<'a> {
     of: &'a Intervals<'a>,
-    /// Union-find; `ABSENT` for vertices not in yet.
+    /// Union-find; `ABSENT` for vertices that are not added yet.
     parent: Vec<u32>,
     /// Number of pieces and their squared errors, uncut.
     whole: Cost,
-    /// By root: number of vertices, their sums, and their squared error, 0 until it is known.
+    /// By root: number of vertices, their moments, and their squared error, 0 until it is computed.
     size: Vec<u32>,
     sum: Vec<Moments>,
     error: Vec<f64>,
     /// Roots that have grown.
     grown: Vec<u32>,
-    /// By root, only where PARTs are cut: the vertices, and the costs at each step, empty where not known.
+    /// By root, only if the grid has extents: the vertices, and the cost with each extent, empty until it is computed.
     vertices: Vec<Vec<u32>>,
     cut: Vec<Vec<Cost>>,
     roots: Vec<u32>,
-    /// Scratch: the place of a vertex in its piece.
+    /// Scratch: the index of a vertex in its piece.
     place: Vec<u32>,
 }
 
@@ -80,7 +93,7 @@ const ABSENT: u32 = u32::MAX;
 impl<'a> Pieces<'a> {
     fn new(of: &'a Intervals<'a>) -> Self {
         let n = of.each.len();
-        let cuts = if of.ladder.cuts() { n } else { 0 };
+        let cuts = if of.extents.cuts() { n } else { 0 };
         Self {
             of,
             parent: vec![ABSENT; n],
@@ -110,7 +123,7 @@ impl<'a> Pieces<'a> {
             let i = v as usize;
             (self.parent[i], self.size[i], self.sum[i]) = (v, 1, self.of.each[i]);
             self.whole.parts += 1;
-            if self.of.ladder.cuts() {
+            if self.of.extents.cuts() {
                 self.vertices[i] = vec![v];
                 self.roots.push(v);
             }
@@ -142,7 +155,7 @@ impl<'a> Pieces<'a> {
         if p == q {
             return;
         }
-        // The larger stays root; of equals the lower number, so that sums do not depend on anything but the input.
+        // The larger piece keeps its root; of two equal pieces, the lower index does, so that sums depend on the input alone.
         let (p, q) = if (self.size[q as usize], p) > (self.size[p as usize], q) { (q, p) } else { (p, q) };
         let (i, j) = (p as usize, q as usize);
         self.whole.error -= std::mem::take(&mut self.error[i]) + std::mem::take(&mut self.error[j]);
@@ -152,7 +165,7 @@ impl<'a> Pieces<'a> {
         let sum = self.sum[j];
         self.sum[i] += &sum;
         self.grown.push(p);
-        if self.of.ladder.cuts() {
+        if self.of.extents.cuts() {
             let moved = std::mem::take(&mut self.vertices[j]);
             self.vertices[i].extend(moved);
             self.cut[i].clear();
@@ -160,21 +173,22 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    /// Appends the costs of all vertices so far, uncut and at each further step.
+    /// Appends the costs of all vertices added so far, uncut and with each extent.
     fn costs(&self, out: &mut Vec<Cost>) {
-        // Rounding may leave less than nothing of what came and went.
+        // Rounding of added and subtracted errors may leave a negative sum.
         out.push(Cost { error: self.whole.error.max(0.0), ..self.whole });
-        let at = |step: usize| self.roots.iter().map(|&r| self.cut[r as usize][step]).fold(Cost::default(), Cost::plus);
-        out.extend((0..self.of.ladder.len() - 1).map(at));
+        let at =
+            |extent: usize| self.roots.iter().map(|&r| self.cut[r as usize][extent]).fold(Cost::default(), Cost::plus);
+        out.extend((0..self.of.extents.len() - 1).map(at));
     }
 }
 
-/// The costs of one connected piece cut to each extent, or [`TOO_MANY`] where no table may have as many PARTs.
+/// The costs of one connected piece cut to each extent; [`TOO_MANY`] if it has more PARTs than the garment may have.
 fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec<Cost> {
-    let Intervals { sample, ladder, motion, .. } = of;
+    let Intervals { sample, extents, motion, .. } = of;
     vertices.sort_unstable();
     if vertices.len() == 1 {
-        return vec![Cost { parts: 1, error: 0.0 }; ladder.len() - 1];
+        return vec![Cost { parts: 1, error: 0.0 }; extents.len() - 1];
     }
     // `place` keeps entries of other pieces, so an entry counts only if it points back.
     for (&v, i) in vertices.iter().zip(0..) {
@@ -184,10 +198,10 @@ fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec
         let i = place[w as usize] as usize;
         (vertices.get(i) == Some(&w)).then_some(i)
     };
-    // About the middle of the piece, so that little is lost where vertices leave.
+    // Moments about the centroid of the piece keep cancellation small when vertices are subtracted.
     let each = Moments::of_each(vertices, &sample.mesh.positions, sample.displacement);
-    let mut all = Vec::with_capacity(ladder.len() - 1);
-    for shape in ladder.shapes() {
+    let mut all = Vec::with_capacity(extents.len() - 1);
+    for shape in extents.shapes() {
         let mut left = &shape.extents_m[..];
         let ruler =
             Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };
@@ -206,12 +220,12 @@ fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec
     all
 }
 
-/// Sums and errors by seed, kept from one number of seeds to the next.
+/// Moments and errors by seed, updated from one number of seeds to the next.
 struct Seeded<'a> {
     each: &'a [Moments],
     seed_of_vertex: Vec<u32>,
     sums: Vec<Moments>,
-    /// Negative where a seed's vertices have changed.
+    /// Negative if the vertices of the seed have changed.
     errors: Vec<f64>,
 }
 

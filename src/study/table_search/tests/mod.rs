@@ -1,4 +1,4 @@
-//! The table search: against every table there is on a small garment, and against stage one itself on a larger one.
+//! Tests of the table search: against all tables on a small garment, and against stage one on a larger one.
 
 mod every_table;
 
@@ -70,7 +70,7 @@ impl Wavy {
         Sample { mesh, topology, grain, distances_m: distances, displacement, weight, max_parts }
     }
 
-    /// What the PARTs of a table leave, moved by translations or affine maps, m.
+    /// Representable error of the PARTs, moved by translations or affine maps, m.
     fn rms(&self, parts: &Parts, motion: Motion) -> f64 {
         unblended_rms_m(parts, &self.mesh.positions, &self.displacement, motion)
     }
@@ -80,12 +80,12 @@ impl Wavy {
     }
 }
 
-/// For who does not look at the progress.
-fn unheard(_: Progress) -> ControlFlow<()> {
+/// Ignores the progress.
+fn ignore(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Few candidates and rounds, for the sake of time.
+/// Few candidates and rounds, to keep the tests short.
 fn coarse(candidates: usize, options: SearchOptions) -> SearchOptions {
     SearchOptions { candidates, candidates_around: 9, exact_up_to: 0, rounds: 3, ..options }
 }
@@ -95,14 +95,14 @@ fn is_a_front(front: &Front) {
 }
 
 #[test]
-fn every_point_is_what_stage_one_makes_of_its_table() {
+fn every_point_has_the_parts_and_the_error_of_stage_one() {
     let (a, b) = (Wavy::new(31, 24, 0.0), Wavy::new(17, 28, 1.3));
     let kinds =
         [(120, &[][..], Motion::Translation), (120, &[], Motion::Affine), (300, &[8.0, 10.0, 15.0], Motion::Affine)];
     for (max_parts, widths_cm, motion) in kinds {
         let options = SearchOptions { motion, ..coarse(40, SearchOptions::with_extents(widths_cm)) };
         let samples = [a.sample(1.0, 2 * max_parts / 3), b.sample(3.0, max_parts / 3)];
-        let found = search(&samples, &options, &unheard).unwrap();
+        let found = search(&samples, &options, &ignore).unwrap();
         is_a_front(found.front());
         assert!(found.front().points.len() > 10);
         for point in &found.front().points {
@@ -124,13 +124,13 @@ fn no_included_table_is_better_and_no_round_is_worse() {
     let parts = garment.parts(&included);
     let rms = garment.rms(&parts, Motion::Affine);
     let options = SearchOptions { candidates: 20, exact_up_to: 0, include: vec![included], ..SearchOptions::default() };
-    let found = search(&[garment.sample(1.0, parts.len())], &options, &unheard).unwrap();
+    let found = search(&[garment.sample(1.0, parts.len())], &options, &ignore).unwrap();
     let best: Vec<f64> = found.rounds.iter().map(|f| f.best_within(parts.len()).unwrap().rms_m).collect();
     assert!(best[0] <= rms);
     assert!(best.windows(2).all(|w| w[1] <= w[0]));
     assert!(best[2] < best[0], "rounds around the best table should find a better one: {best:?}");
-    // Every bound there is: no search over some of them finds better, for any number of PARTs.
-    let exact = search(&[garment.sample(1.0, parts.len())], &SearchOptions::default(), &unheard).unwrap();
+    // The search over all bounds is at least as good as one over some, for any number of PARTs.
+    let exact = search(&[garment.sample(1.0, parts.len())], &SearchOptions::default(), &ignore).unwrap();
     assert!(exact.exact && exact.rounds.len() == 1 && !found.exact);
     for point in &found.front().points {
         assert!(exact.front().best_within(point.parts).unwrap().rms_m <= point.rms_m + 1e-12);
@@ -146,7 +146,7 @@ fn an_extent_for_each_level_is_never_worse_than_one_for_all() {
     let garment = Wavy::new(31, 24, 0.4);
     let found = |widths_cm: &[f64]| {
         let options = SearchOptions { candidates: 25, rounds: 1, ..SearchOptions::with_extents(widths_cm) };
-        search(&[garment.sample(1.0, 60)], &options, &unheard).unwrap().front().clone()
+        search(&[garment.sample(1.0, 60)], &options, &ignore).unwrap().front().clone()
     };
     let front = found(&[20.0, 30.0, 1.0]);
     is_a_front(&front);
@@ -167,21 +167,21 @@ fn an_extent_for_each_level_is_never_worse_than_one_for_all() {
 }
 
 #[test]
-fn no_garment_uses_up_what_is_meant_for_all() {
-    // One garment breaks into many pieces at any extent, the other into few: what is best for the sum would starve one.
+fn no_garment_exceeds_its_limit_for_the_sake_of_another() {
+    // One garment breaks into many pieces at any extent, the other into few, so minimising the sum alone would exceed a limit.
     let (large, small) = (Wavy::new(40, 30, 0.0), Wavy::new(16, 10, 1.3));
     let limits = [90, 70];
     let samples = [large.sample(1.0, limits[0]), small.sample(1.0, limits[1])];
     let options = coarse(30, SearchOptions::with_extents(&[4.0, 6.0, 8.0, 10.0, 15.0, 20.0]));
-    let front = search(&samples, &options, &unheard).unwrap().front().clone();
+    let front = search(&samples, &options, &ignore).unwrap().front().clone();
     let best = front.best.as_ref().unwrap();
     let table = best.table("best", "test").unwrap();
     let parts = [&large, &small].map(|g| g.parts(&table).len());
     assert_eq!(best.parts, parts[0] + parts[1]);
     assert!(parts[0] <= limits[0] && parts[1] <= limits[1], "{parts:?}");
-    // Some garment is near its limit, or another table would be better.
+    // At least one garment is near its limit; otherwise a finer table would be better.
     assert!(10 * parts[0] > 9 * limits[0] || 10 * parts[1] > 9 * limits[1], "{parts:?}");
-    // As good as any table within the limits that the front holds.
+    // The best table is at least as good as every table of the front within the limits.
     let mut within = 0;
     for point in &front.points {
         let table = point.table("other", "test").unwrap();
@@ -194,14 +194,14 @@ fn no_garment_uses_up_what_is_meant_for_all() {
 }
 
 #[test]
-fn thin_and_whole_levels_are_left_out_where_asked() {
+fn thin_and_uncut_levels_are_excluded_on_request() {
     let garment = Wavy::new(31, 24, 0.4);
     let other = Wavy::new(17, 28, 1.3);
     for samples in [&[garment.sample(1.0, 60)][..], &[garment.sample(1.0, 60), other.sample(1.0, 60)]] {
         let options = coarse(40, SearchOptions::with_extents(&[10.0, 20.0, 30.0]));
         let thinnest = |thinnest_cm: f64, uncut: bool| {
             let options = SearchOptions { thinnest_cm, uncut, ..options.clone() };
-            let front = search(samples, &options, &unheard).unwrap().front().clone();
+            let front = search(samples, &options, &ignore).unwrap().front().clone();
             let levels = front.points.iter().flat_map(|p| p.table("t", "test").unwrap().levels);
             let whole = front.points.iter().any(|p| p.extents.iter().any(|e| !e.cuts()));
             (levels.map(|l| l.upper_cm - l.lower_cm).fold(f64::INFINITY, f64::min), whole)
@@ -239,7 +239,7 @@ fn threads_do_not_change_the_search_and_progress_counts_up() {
 }
 
 #[test]
-fn a_search_that_is_broken_off_keeps_the_rounds_before() {
+fn a_cancelled_search_keeps_the_finished_rounds() {
     let garment = Wavy::new(25, 20, 0.0);
     for samples in [&[garment.sample(1.0, 80)][..], &[garment.sample(1.0, 80), garment.sample(2.0, 80)]] {
         let until = |round: usize| {
@@ -255,45 +255,46 @@ fn a_search_that_is_broken_off_keeps_the_rounds_before() {
 }
 
 #[test]
-fn a_limit_beyond_all_vertices_is_their_number() {
+fn a_limit_above_the_vertex_count_equals_the_vertex_count() {
     let garment = Wavy::new(12, 10, 0.2);
-    let found = |most: usize| search(&[garment.sample(1.0, most)], &coarse(20, SearchOptions::default()), &unheard);
+    let found =
+        |max_parts: usize| search(&[garment.sample(1.0, max_parts)], &coarse(20, SearchOptions::default()), &ignore);
     assert_eq!(found(usize::MAX), found(120));
     let both = [garment.sample(1.0, usize::MAX), garment.sample(2.0, 1 << 60)];
-    assert!(search(&both, &coarse(20, SearchOptions::default()), &unheard).is_ok());
+    assert!(search(&both, &coarse(20, SearchOptions::default()), &ignore).is_ok());
 }
 
 #[test]
-fn affine_maps_hold_a_turn_that_translations_do_not() {
+fn affine_maps_represent_a_rotation_and_translations_do_not() {
     let mut garment = Wavy::new(31, 24, 0.4);
     garment.displacement = garment.mesh.positions.iter().map(|x| DVec3::new(-x.y, x.x, 0.0) * 0.3).collect();
     let best = |motion: Motion| {
         let options = SearchOptions { motion, ..SearchOptions::default() };
-        let found = search(&[garment.sample(1.0, 40)], &options, &unheard).unwrap();
+        let found = search(&[garment.sample(1.0, 40)], &options, &ignore).unwrap();
         found.front().best.clone().unwrap()
     };
     let (affine, translation) = (best(Motion::Affine), best(Motion::Translation));
-    // One PART is all it takes to turn.
+    // One PART represents the rotation exactly.
     assert!(affine.rms_m < 1e-5 && translation.rms_m > 1e-3, "{affine:?} {translation:?}");
 }
 
 #[test]
-fn what_cannot_be_searched_is_refused() {
+fn invalid_samples_are_rejected() {
     let garment = Wavy::new(5, 4, 0.0);
-    let refuse = |sample: Sample<'_>| search(&[sample], &SearchOptions::default(), &unheard).unwrap_err();
-    assert_eq!(search(&[], &SearchOptions::default(), &unheard), Err(SearchError::NoGarment));
+    let error_of = |sample: Sample<'_>| search(&[sample], &SearchOptions::default(), &ignore).unwrap_err();
+    assert_eq!(search(&[], &SearchOptions::default(), &ignore), Err(SearchError::NoGarment));
     let short = Sample { distances_m: &garment.distances[1..], ..garment.sample(1.0, 5) };
-    assert!(matches!(refuse(short), SearchError::Length { garment: 1, found: 19, expected: 20, .. }));
-    assert!(matches!(refuse(garment.sample(0.0, 5)), SearchError::Weight { .. }));
-    assert_eq!(refuse(garment.sample(1.0, 0)), SearchError::TooFewParts { max_parts: vec![0] });
+    assert!(matches!(error_of(short), SearchError::Length { garment: 1, found: 19, expected: 20, .. }));
+    assert!(matches!(error_of(garment.sample(0.0, 5)), SearchError::Weight { .. }));
+    assert_eq!(error_of(garment.sample(1.0, 0)), SearchError::TooFewParts { max_parts: vec![0] });
     let mut distances = garment.distances.clone();
     distances[7] = f64::NAN;
     let holed = Sample { distances_m: &distances, ..garment.sample(1.0, 5) };
-    assert_eq!(refuse(holed), SearchError::NotFinite { garment: 1, vertex: 7 });
+    assert_eq!(error_of(holed), SearchError::NotFinite { garment: 1, vertex: 7 });
 }
 
 #[test]
-fn the_tables_that_come_with_the_program_read_back_equal() {
+fn the_built_in_tables_survive_a_round_trip() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/tuned");
     let mut found = 0;
     let entries = |folder: &std::path::Path| -> Vec<std::path::PathBuf> {
