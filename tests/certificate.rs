@@ -247,7 +247,7 @@ fn stretched_by_sixty_percent_it_tears() {
 }
 
 #[test]
-fn what_is_no_garment_is_refused() {
+fn a_mesh_that_is_not_a_garment_is_refused() {
     let (scene, mut x) = lying();
     x[7].y = f64::NAN;
     let said = certify(&scene, &jersey(), &x).unwrap_err();

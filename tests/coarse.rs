@@ -39,7 +39,7 @@ fn coarse(mesh: &TriMesh) -> Coarse {
 }
 
 #[test]
-fn each_triangle_is_cut_from_what_most_of_the_cloth_there_is() {
+fn each_coarse_triangle_has_the_fabric_of_most_of_its_area() {
     let mesh = tube(0.3, 0.6, 64, 30);
     let low = |t: &[u32; 3]| t.iter().map(|&v| mesh.positions[v as usize].z).sum::<f64>() < 3.0 * 0.25;
     let cut_from: Vec<u16> = mesh.triangles.iter().map(|t| u16::from(low(t))).collect();
@@ -158,7 +158,7 @@ fn it_bends_between_coarse_vertices_and_is_not_creased_along_their_edges() {
 }
 
 #[test]
-fn what_is_no_manifold_or_far_from_its_rest_shape_has_none() {
+fn a_mesh_that_is_non_manifold_or_far_from_its_rest_shape_has_no_coarse_mesh() {
     let mesh = tube(0.2, 0.6, 60, 33);
     let mut rest = RestShape::from_edges(&mesh).unwrap();
     rest.corners[7] = rest.corners[7].map(|p| 0.2 * p);
@@ -174,7 +174,7 @@ fn what_is_no_manifold_or_far_from_its_rest_shape_has_none() {
 }
 
 #[test]
-fn a_preview_that_begins_on_it_hangs_as_its_parts_can_whatever_the_threads() {
+fn a_preview_that_starts_on_the_coarse_mesh_hangs_by_its_parts_on_any_number_of_threads() {
     // 425 vertices on the coarse cloth, for three rings.
     let mut job = Job { accuracy: Against::Own, ..Job::preview() };
     job.scene.garment = "flared-skirt@1700".to_owned();
@@ -191,26 +191,26 @@ fn a_preview_that_begins_on_it_hangs_as_its_parts_can_whatever_the_threads() {
 }
 
 #[test]
-fn a_large_garment_rests_on_it_first_whatever_the_threads_and_may_be_stopped_there() {
+fn a_large_garment_rests_on_the_coarse_mesh_first_on_any_number_of_threads_and_can_be_stopped_there() {
     let job = Job { scene: partwise::SceneSpec::new("form", "flared-skirt@6000"), ..Job::default() };
     let scene = job.scene.load().unwrap().scene;
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let mut told = Vec::new();
+        let mut iterations = Vec::new();
         let draped = pool.install(|| {
             job.drape(&scene, &mut |step| {
-                told.push(step.iteration);
+                iterations.push(step.iteration);
                 ControlFlow::Continue(())
             })
         });
-        (draped.unwrap(), told)
+        (draped.unwrap(), iterations)
     };
-    let ((one, told), (two, _)) = (on(1), on(2));
+    let ((one, iterations), (two, _)) = (on(1), on(2));
     assert_eq!(one.positions, two.positions);
     let state = one.state.as_ref().unwrap();
     assert!(state.stop == Stop::Converged && one.self_intersecting_pairs == 0 && one.penetrating_vertices == 0);
     // What the coarse garment does is told as step 0 of the full one: its start, twenty steps at most, its rest, and the full one's start.
-    let before = told.iter().filter(|iteration| **iteration == 0).count();
+    let before = iterations.iter().filter(|iteration| **iteration == 0).count();
     assert!((4..=23).contains(&before) && state.steps <= 12, "{before} before, then {}", state.steps);
 
     let mut seen = 0;

@@ -58,7 +58,7 @@ fn settle(
 }
 
 #[test]
-fn a_hanging_strip_of_one_two_and_five_parts_stretches_as_its_closed_form_says() {
+fn a_hanging_strip_of_one_two_and_five_parts_stretches_by_its_closed_form() {
     let (length, k) = (0.6, 60.0);
     let mesh = sheet(10, 60, 0.01);
     let held: Vec<u32> = (0..=10).collect();
@@ -137,7 +137,7 @@ fn a_falling_sheet_turns_freely() {
 }
 
 #[test]
-fn a_plate_of_parts_bends_nearly_as_its_closed_form_says() {
+fn a_plate_of_parts_bends_close_to_its_closed_form() {
     // Clamped at one end by two rows, stiff enough to droop a little: q L⁴ / 8 B.
     let (rows, h) = (24, 0.01);
     let upright = sheet(8, rows, h);
@@ -230,7 +230,7 @@ fn the_push_out_leaves_held_vertices_and_nothing_inside() {
 }
 
 #[test]
-fn what_cannot_be_solved_says_why() {
+fn unsolvable_inputs_are_refused_with_the_cause() {
     let mesh = sheet(8, 8, 0.01);
     let topology = Topology::new(&mesh);
     let rest = RestShape::from_edges(&mesh).unwrap();

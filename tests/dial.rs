@@ -58,9 +58,9 @@ impl Bench {
 
     fn refuses(&self, arguments: &[&str], word: &str) {
         let output = self.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(said.contains(word), "{arguments:?} should say `{word}`: {said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(word), "{arguments:?} should say `{word}`: {message}");
     }
 
     /// The rows of a sweep's CSV without what differs from run to run.
@@ -171,7 +171,7 @@ fn a_point_that_fails_is_a_row_and_the_rest_are_done() {
 }
 
 #[test]
-fn compared_tables_tell_what_is_split_and_what_is_merged() {
+fn compared_tables_list_split_and_merged_levels() {
     let bench = Bench::new();
     bench.write("coarse.toml", "name = \"coarse\"\nunit = \"cm\"\nlevels = [[0.0, 4.0], [4.0, inf]]\n");
     bench.write("fine.toml", "name = \"fine\"\nunit = \"cm\"\nlevels = [[0.0, 2.0], [2.0, 4.0], [4.0, inf]]\n");
@@ -194,7 +194,7 @@ fn compared_tables_tell_what_is_split_and_what_is_merged() {
 }
 
 #[test]
-fn a_tuned_table_holds_more_with_no_more_parts_and_says_where_it_comes_from() {
+fn a_tuned_table_has_a_smaller_error_with_no_more_parts_and_names_its_source() {
     let bench = Bench::new();
     let tune = [
         "tune",

@@ -1,7 +1,7 @@
-//! Families of synthetic garments on simple bodies, through files as a user would bring them: what opens comes to rest with
-//! nothing inside, coarse or fine, whole or with slivers, holes and doubled layers, in knit and woven.
+//! Synthetic garments on simple bodies, loaded from files: every garment that loads must converge without penetration, for
+//! coarse and fine meshes, intact or with slivers, holes and doubled layers, in knitted and woven fabric.
 
-#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "a test fails by panicking, and tells counts")]
+#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "a test fails by panicking, and prints counts")]
 
 mod fixtures;
 
@@ -20,7 +20,7 @@ use partwise::mesh::export::write_mesh;
 use partwise::mesh::{Axis, TriMesh, Unit};
 use partwise::{SceneSpec, Settings};
 
-/// SplitMix64, for garments that are the same everywhere.
+/// SplitMix64, so that the garments are the same on every machine.
 struct Random(u64);
 
 impl Random {
@@ -34,7 +34,7 @@ impl Random {
     }
 }
 
-/// What is worn on what: top of the body and its radius, m.
+/// Garment, body, top of the body (m) and its radius (m).
 const PAIRS: [(&str, &str, f64, f64); 12] = [
     ("tube", "sphere", 1.5, 0.3),
     ("tube", "capsule", 1.5, 0.15),
@@ -52,7 +52,7 @@ const PAIRS: [(&str, &str, f64, f64); 12] = [
 const DEFECTS: [&str; 4] = ["whole", "slivers", "holes", "doubled"];
 const FABRICS: [&str; 2] = ["interlock", "denim"];
 
-/// A capsule along z around `at`, closed, its surface `half` longer either way.
+/// A closed capsule along z with its centre at `at`; its cylinder is 2 `half` long.
 fn capsule(at: DVec3, radius: f64, half: f64, n: u32) -> TriMesh {
     let rows = n / 2;
     let mut mesh = TriMesh::new(vec![at - DVec3::Z * (radius + half)], Vec::new());
@@ -120,7 +120,7 @@ fn trousers(top: f64, radius: f64, around: u32, rows: u32) -> TriMesh {
     let hip = mesh.positions.len() as u32 - 2 * half;
     let inner = half / 2;
     let crotch = mesh.positions.len() as u32;
-    // Through the legs from the front, half way round, to the back, where the rings begin.
+    // The crotch line runs from the front between the legs to the back, where the rings begin.
     mesh.positions.extend((1..=inner).map(|k| {
         let t = f64::from(k) / f64::from(inner + 1);
         DVec3::new(0.0, 0.6 * radius * (2.0 * t - 1.0), top - 0.25 - 0.03 * (PI * t).sin())
@@ -177,7 +177,7 @@ fn garment(kind: &str, (top, radius): (f64, f64), vertices: usize, defect: &str,
     match defect {
         "slivers" => {
             for _ in 0..few {
-                // A point a ten-thousandth off an edge cuts a triangle into three, one of them next to nothing.
+                // A point close to an edge (1e-4 of the height) splits a triangle into three, one of them a sliver.
                 let t = pick(mesh.triangles.len());
                 let [a, b, c] = mesh.triangles[t];
                 let [pa, pb, pc] = mesh.corners(t);
@@ -208,10 +208,10 @@ fn garment(kind: &str, (top, radius): (f64, f64), vertices: usize, defect: &str,
     mesh
 }
 
-/// Steps after which a garment counts as one that does not come to rest.
-const STEPS: usize = 600;
+/// Newton steps after which a garment counts as not converged.
+const MAX_STEPS: usize = 600;
 
-/// How a garment ended.
+/// Drapes one case and describes its outcome; `rest` is success.
 fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, usize, &str, &str)) -> String {
     let (kind, on, top, radius) = PAIRS[pair];
     let seed = name
@@ -224,7 +224,7 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         write_mesh(&body_file, &body(on)).unwrap();
     }
     write_mesh(&file, &mesh).unwrap();
-    // To be looked at: `PARTWISE_FAMILIES_KEEP=FOLDER`.
+    // `PARTWISE_FAMILIES_KEEP=FOLDER` keeps the meshes for inspection.
     if let Some(kept) = std::env::var_os("PARTWISE_FAMILIES_KEEP").map(std::path::PathBuf::from) {
         write_mesh(&kept.join(format!("{on}.obj")), &body(on)).unwrap();
         write_mesh(&kept.join(format!("{name}.obj")), &mesh).unwrap();
@@ -248,7 +248,7 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         if trace {
             eprintln!("{:4} E {:.6} J, residual {residual:.1e}, {} touch", step.iteration, step.energy, step.contacts);
         }
-        if step.iteration > STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if step.iteration > MAX_STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     match found {
         Err(e) => format!("failed: {e}"),
@@ -257,17 +257,17 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         Ok(found) if found.penetrating_vertices > 0 => format!("inside: {}", found.penetrating_vertices),
         Ok(found) => match found.state.as_ref().map(|state| state.stop) {
             Some(Stop::Converged) => "rest".to_owned(),
-            // Why not is in the numbers: of a cloth that is nearly there, or of one whose layers cannot be told apart.
+            // The numbers show the cause: slow convergence has a small residual, tangled layers have crossing pairs.
             _ => format!(
-                "unsettled after {STEPS} steps, residual {residual:.0e}, {} pairs cross",
+                "unsettled after {MAX_STEPS} steps, residual {residual:.0e}, {} pairs cross",
                 found.self_intersecting_pairs
             ),
         },
     }
 }
 
-/// Only the cases whose name holds this are run: `PARTWISE_FAMILIES_ONLY="trousers on legs, 4000"`.
-fn wanted(name: &str) -> bool {
+/// Whether the name of a case contains `PARTWISE_FAMILIES_ONLY`, such as "trousers on legs, 4000".
+fn is_selected(name: &str) -> bool {
     std::env::var("PARTWISE_FAMILIES_ONLY").map_or(true, |only| name.contains(&only))
 }
 
@@ -277,7 +277,7 @@ fn family(cases: impl Iterator<Item = (usize, usize, &'static str, &'static str)
     for case in cases {
         let (kind, on, ..) = PAIRS[case.0];
         let name = format!("{kind} on {on}, {} vertices, {}, {}", case.1, case.2, case.3);
-        if !wanted(&name) {
+        if !is_selected(&name) {
             continue;
         }
         let began = std::time::Instant::now();
@@ -290,35 +290,35 @@ fn family(cases: impl Iterator<Item = (usize, usize, &'static str, &'static str)
 }
 
 #[test]
-fn a_sample_comes_to_rest() {
-    // Each pair once, sizes, defects and fabrics in turn; the form is for the whole family.
+fn a_sample_of_the_family_converges() {
+    // Each pair once, with sizes, defects and fabrics in turn; the dress form is in the whole family only.
     let pairs = (0..PAIRS.len()).filter(|&pair| PAIRS[pair].1 != "form");
     let ends = family(pairs.map(|pair| (pair, 60 + 40 * (pair % 4), DEFECTS[pair % 4], FABRICS[pair % 2])));
     assert_eq!(ends.keys().collect::<Vec<_>>(), ["rest"], "{ends:?}");
 }
 
 #[test]
-fn layers_where_what_faces_what_jumps_rest_between_both() {
-    // Went to and fro for ever: in two steps, over a hundredth of the weight; in four, under it.
+fn layers_whose_facing_features_alternate_converge() {
+    // Regression: the solver cycled with a period of two steps (residual above 0.01 of the weight) or four steps (below it).
     let cases = [(7, 60, "doubled", "interlock"), (5, 250, "doubled", "interlock"), (8, 1000, "doubled", "interlock")];
     let ends = family(cases.into_iter());
     assert_eq!(ends.keys().collect::<Vec<_>>(), ["rest"], "{ends:?}");
 }
 
-/// A list of words in an environment variable, or all of them.
-fn chosen<'a>(variable: &str, all: &[&'a str]) -> Vec<&'a str> {
+/// The words that an environment variable selects; all if it is not set.
+fn selected<'a>(variable: &str, all: &[&'a str]) -> Vec<&'a str> {
     let Ok(text) = std::env::var(variable) else { return all.to_vec() };
-    all.iter().copied().filter(|word| text.split(',').any(|asked| asked == *word)).collect()
+    all.iter().copied().filter(|word| text.split(',').any(|chosen| chosen == *word)).collect()
 }
 
 #[test]
 #[ignore = "hours, with 60,000 vertices; PARTWISE_FAMILIES_VERTICES, _DEFECTS, _FABRICS and _ONLY choose: `cargo test --release --no-default-features --test families -- --ignored --nocapture`"]
-fn all_come_to_rest() {
-    let asked = std::env::var("PARTWISE_FAMILIES_VERTICES");
-    let sizes = asked.as_deref().unwrap_or("60,250,1000,4000,16000,60000");
+fn the_whole_family_converges() {
+    let vertices = std::env::var("PARTWISE_FAMILIES_VERTICES");
+    let sizes = vertices.as_deref().unwrap_or("60,250,1000,4000,16000,60000");
     let sizes = sizes.split(',').map(|n| n.parse().unwrap());
-    let defects = chosen("PARTWISE_FAMILIES_DEFECTS", &DEFECTS);
-    let fabrics = chosen("PARTWISE_FAMILIES_FABRICS", &FABRICS);
+    let defects = selected("PARTWISE_FAMILIES_DEFECTS", &DEFECTS);
+    let fabrics = selected("PARTWISE_FAMILIES_FABRICS", &FABRICS);
     let ends = family(sizes.flat_map(|vertices| {
         let (defects, fabrics) = (&defects, &fabrics);
         (0..PAIRS.len()).flat_map(move |pair| {

@@ -15,15 +15,15 @@ fn refusal(name: &str, bytes: &[u8]) -> String {
     fs::write(&path, bytes).unwrap();
     let frame = Frame::given(Unit::M, Axis::Z);
     let error = import_garment(&path, &ImportOptions::default(), &Beside::File(&frame)).unwrap_err();
-    let said = error.to_string();
-    assert!(said.contains(name), "no file name in: {said}");
-    said
+    let message = error.to_string();
+    assert!(message.contains(name), "no file name in: {message}");
+    message
 }
 
 fn says(text: &str, parts: &[&str]) {
-    let said = refusal("garment.obj", text.as_bytes());
+    let message = refusal("garment.obj", text.as_bytes());
     for part in parts {
-        assert!(said.contains(part), "no \"{part}\" in: {said}");
+        assert!(message.contains(part), "no \"{part}\" in: {message}");
     }
 }
 
@@ -93,7 +93,7 @@ fn a_fan_is_refused_above_the_number_of_triangles_that_a_drape_can_bear() {
 }
 
 #[test]
-fn empty_meshes_say_what_there_was() {
+fn an_empty_mesh_is_refused_with_its_contents() {
     says("", &["empty", "0 vertices"]);
     says("v 0 0 0\nv 1 0 0\nv 0 1 0\n", &["empty", "3 vertices and 0 faces"]);
     says("v 0 0 0\nv 1 0 0\nf 1 2\nf 1 1 2\n", &["empty", "no triangle"]);
@@ -101,23 +101,23 @@ fn empty_meshes_say_what_there_was() {
 
 #[test]
 fn other_formats_are_named() {
-    let said = |name: &str, bytes: &[u8], format: &str| {
-        let said = refusal(name, bytes);
-        assert!(said.contains(format) && said.contains("OBJ"), "{said}");
+    let refused_as = |name: &str, bytes: &[u8], format: &str| {
+        let message = refusal(name, bytes);
+        assert!(message.contains(format) && message.contains("OBJ"), "{message}");
     };
-    said("a.stl", b"solid box\n facet normal 0 0 1\n", "STL");
+    refused_as("a.stl", b"solid box\n facet normal 0 0 1\n", "STL");
     let mut binary = vec![0u8; 84 + 50];
     binary[80] = 1;
-    said("b.stl", &binary, "STL");
-    said("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "glTF");
-    said("a.glb", b"glTF\x02\0\0\0", "glTF");
-    said("pattern.dxf", b"  0\nSECTION\n  2\nHEADER\n", "DXF");
-    said("a.ply", b"ply\nformat ascii 1.0\n", "PLY");
-    said("a.fbx", b"Kaydara FBX Binary  \0", "FBX");
+    refused_as("b.stl", &binary, "STL");
+    refused_as("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "glTF");
+    refused_as("a.glb", b"glTF\x02\0\0\0", "glTF");
+    refused_as("pattern.dxf", b"  0\nSECTION\n  2\nHEADER\n", "DXF");
+    refused_as("a.ply", b"ply\nformat ascii 1.0\n", "PLY");
+    refused_as("a.fbx", b"Kaydara FBX Binary  \0", "FBX");
 }
 
 #[test]
-fn a_missing_file_and_a_folder_are_told_apart() {
+fn a_missing_file_and_a_folder_have_different_errors() {
     let read = |path: &Path| import_body(path, &ImportOptions::default()).unwrap_err();
     let missing = read(Path::new("no/such/body.obj"));
     assert!(matches!(missing, MeshError::Unreadable { .. }) && missing.to_string().contains("no/such/body.obj"));
@@ -130,8 +130,8 @@ fn a_path_that_cannot_be_written_is_named_and_nothing_is_left_behind() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = TriMesh::new(vec![glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Y], vec![[0, 1, 2]]);
     for path in [folder.path().join("missing/out.obj"), folder.path().to_owned()] {
-        let said = write_mesh(&path, &mesh).unwrap_err().to_string();
-        assert!(said.contains(&path.display().to_string()) && said.contains("cannot be written"), "{said}");
+        let message = write_mesh(&path, &mesh).unwrap_err().to_string();
+        assert!(message.contains(&path.display().to_string()) && message.contains("cannot be written"), "{message}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -141,7 +141,7 @@ fn a_body_of_no_human_size_asks_for_its_unit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("body.obj");
     fs::write(&path, "v 0 0 0\nv 3 0 0\nv 0 3.2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n").unwrap();
-    let said = import_body(&path, &ImportOptions::default()).unwrap_err().to_string();
-    assert!(said.contains("units tall") && said.contains("--unit"), "{said}");
+    let message = import_body(&path, &ImportOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("units tall") && message.contains("--unit"), "{message}");
     assert!(import_body(&path, &ImportOptions { unit: Some(Unit::M), ..ImportOptions::default() }).is_ok());
 }

@@ -56,7 +56,7 @@ fn two_spheres_that_overlap_are_found_to_cross() {
 }
 
 #[test]
-fn a_tube_has_two_loops_and_faces_away_from_what_it_holds() {
+fn a_tube_has_two_loops_and_outward_normals() {
     let garment = tube(21, 60, 0.4, |_, _| 0.6);
     let found = health(&garment);
     assert_eq!((found.boundary_loops, found.boundary_edges, found.closed), (2, 120, false));

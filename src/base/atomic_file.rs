@@ -1,11 +1,11 @@
-//! A file that is there whole or not at all: the one place that writes and renames.
+//! Atomic writes: a file appears complete or not at all. No other module writes or renames files.
 //!
-//! Where inputs are protected (`protect_inputs`), a file that the process has read as an input is not replaced.
+//! The contents are written to a temporary file in the same folder under a random name (created with `O_EXCL`, so that it cannot exist
+//! already) and renamed when complete. A symbolic link is followed and kept; its target is replaced. A device or a
+//! pipe is written directly, because a rename would replace it by a regular file.
 //!
-//! What is written grows beside its place under a random name that nobody can have planted (created with `O_EXCL`), and
-//! takes the place when it is complete. A symbolic link is followed and stays: the file it points at is replaced. What
-//! is no regular file, a device or a pipe, is written straight to, as a rename would put a file where it was. Whoever ends the
-//! program while files are in the making calls `abandon_all` first.
+//! If inputs are protected (`protect_inputs`), a file that the process has read as an input is not replaced. Code that exits the
+//! process without dropping values calls `abandon_all` first.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
@@ -17,98 +17,97 @@ use tempfile::TempPath;
 
 use super::files;
 
-/// Where files grow, of all threads.
-static GROWING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// The temporary files of all threads.
+static TEMPORARY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-fn growing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    GROWING.lock().unwrap_or_else(PoisonError::into_inner)
+fn temporary() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every file in the making, for a program that ends at once and drops nothing. From then on no file begins or gets its place:
-/// whoever tries waits for the end.
+/// Removes all temporary files before the process exits without dropping values. The lock stays taken, so that later writes block
+/// until the exit.
 pub(crate) fn abandon_all() {
-    let growing = growing();
-    for path in &*growing {
-        // What cannot be removed stays under its hidden name, as it would after a power cut.
+    let temporary = temporary();
+    for path in &*temporary {
+        // On failure the hidden file stays, as after a power cut.
         let _ = fs::remove_file(path);
     }
-    std::mem::forget(growing);
+    std::mem::forget(temporary);
 }
 
-/// A file beside its place, known to be there as long as it is.
+/// A temporary file, listed in [`TEMPORARY`] while it exists.
 #[derive(Debug)]
-struct Beside(Option<TempPath>);
+struct Temporary(Option<TempPath>);
 
-impl Beside {
-    fn begin(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> io::Result<(File, Self)> {
-        let mut growing = growing();
+impl Temporary {
+    fn create(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> io::Result<(File, Self)> {
+        let mut temporary = temporary();
         let (file, path) = builder.tempfile_in(folder)?.into_parts();
-        growing.insert(path.to_path_buf());
+        temporary.insert(path.to_path_buf());
         Ok((file, Self(Some(path))))
     }
 
-    /// Takes its place, whole, or is removed.
-    fn take_place(mut self, place: &Path) -> io::Result<()> {
+    /// Renames the file to `target`, or removes it on failure.
+    fn persist(mut self, target: &Path) -> io::Result<()> {
         let Some(path) = self.0.take() else { return Ok(()) };
-        let mut growing = growing();
-        growing.remove::<Path>(&path);
-        Ok(path.persist(place)?)
+        let mut temporary = temporary();
+        temporary.remove::<Path>(&path);
+        Ok(path.persist(target)?)
     }
 }
 
-impl Drop for Beside {
+impl Drop for Temporary {
     fn drop(&mut self) {
         if let Some(path) = self.0.take() {
-            growing().remove::<Path>(&path);
+            temporary().remove::<Path>(&path);
         }
     }
 }
 
-/// Links to follow before a chain of them is taken for a circle: the system's own limit.
-const MOST_LINKS: usize = 40;
+/// Largest number of symbolic links to follow; a longer chain is reported as a cycle. This is the limit of Linux.
+const MAX_LINKS: usize = 40;
 
-/// A file in the making. Dropped before [`finish`](Self::finish), it removes what it wrote and leaves an older file as
-/// it was.
+/// A file that is being written. Dropping it before [`finish`](Self::finish) removes the temporary file and leaves an existing file
+/// unchanged.
 #[derive(Debug)]
-pub(crate) struct WholeFile {
+pub(crate) struct AtomicFile {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Where it grows; none for a device or a pipe.
-    beside: Option<Beside>,
+    /// The temporary file; `None` for a device or a pipe.
+    temporary: Option<Temporary>,
 }
 
-impl WholeFile {
-    /// Begins a file that will be called `path`.
+impl AtomicFile {
+    /// Starts to write the file `path`.
     ///
     /// # Errors
-    /// What the system says where the folder is missing or not writable, where the path is a folder or a circle of
-    /// links.
+    /// The folder is missing or not writable; the path is a folder, a cycle of symbolic links or a protected input.
     pub(crate) fn create(path: impl AsRef<Path>) -> io::Result<Self> {
-        let path = place(path.as_ref())?;
+        let path = follow_links(path.as_ref())?;
         let found = fs::metadata(&path).ok();
         if found.as_ref().is_some_and(fs::Metadata::is_dir) {
             return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a file name"));
         }
         files::refuse_input(&path)?;
         if found.as_ref().is_some_and(|found| !found.is_file()) {
-            #[allow(clippy::disallowed_methods, reason = "a device or a pipe, which is written straight to")]
+            #[allow(clippy::disallowed_methods, reason = "a device or a pipe is written directly")]
             let device = OpenOptions::new().write(true).open(&path)?;
-            return Ok(Self { path, writer: BufWriter::new(device), beside: None });
+            return Ok(Self { path, writer: BufWriter::new(device), temporary: None });
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".partwise-").suffix(".part");
-        // A new file is as readable as any other, less the user's umask; a replaced one keeps its permissions.
+        // A new file gets the usual permissions less the umask; a replaced file keeps its permissions.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let (file, beside) = Beside::begin(&builder, folder_of(&path))?;
+        let (file, temporary) = Temporary::create(&builder, folder_of(&path))?;
         if let Some(found) = found {
             file.set_permissions(found.permissions())?;
         }
-        Ok(Self { path, writer: BufWriter::new(file), beside: Some(beside) })
+        Ok(Self { path, writer: BufWriter::new(file), temporary: Some(temporary) })
     }
 
-    /// Whether a file could begin at `path`; what is no plain file, a pipe or a device, is not tried. From then on `path` is an output, and
-    /// not read as an input.
+    /// Checks that `path` can be written, and marks it as an output, which is not read as an input from then on. Devices and pipes
+    /// are not checked.
     ///
     /// # Errors
     /// As [`create`](Self::create).
@@ -122,34 +121,34 @@ impl WholeFile {
         files::claim_output(path)
     }
 
-    /// Writes `bytes` as the whole of `path`.
+    /// Writes the file `path` with the contents `bytes`.
     ///
     /// # Errors
-    /// What the system says; `path` is then as it was.
+    /// An error of the file system; the file `path` is unchanged then.
     pub(crate) fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         let mut file = Self::create(path)?;
         file.write_all(bytes.as_ref())?;
         file.finish().map(|_| ())
     }
 
-    /// Puts the file in its place, on the disk and not only on its way there; returns its length in bytes.
+    /// Flushes the file to disk and renames it to its path; returns its length in bytes.
     ///
     /// # Errors
-    /// What the system says; the place is then as it was.
+    /// An error of the file system; an existing file is unchanged then.
     pub(crate) fn finish(self) -> io::Result<u64> {
         let file = self.writer.into_inner().map_err(io::IntoInnerError::into_error)?;
         // A device has no length, and many cannot be synced.
-        let Some(beside) = self.beside else { return Ok(0) };
+        let Some(temporary) = self.temporary else { return Ok(0) };
         file.sync_all()?;
         let length = file.metadata()?.len();
         drop(file);
-        beside.take_place(&self.path)?;
+        temporary.persist(&self.path)?;
         sync_folder(&self.path);
         Ok(length)
     }
 }
 
-impl Write for WholeFile {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.writer.write(bytes)
     }
@@ -159,25 +158,25 @@ impl Write for WholeFile {
     }
 }
 
-/// Whether two paths are one place, links followed: what is written to the one would replace the other.
+/// Whether two paths, after following links, name the same file; writing one would replace the other.
 #[must_use]
 pub(crate) fn same_place(a: &Path, b: &Path) -> bool {
-    let known = |path: &Path| {
-        let path = place(path).ok()?;
-        // The folder is there even where the file is not yet; a device may have several names in it.
+    let resolved = |path: &Path| {
+        let path = follow_links(path).ok()?;
+        // Compares folder and file name, because the file may not exist yet.
         let folder = folder_of(&path);
         let folder = fs::canonicalize(folder).or_else(|_| std::path::absolute(folder)).ok()?;
         Some(folder.join(path.file_name()?))
     };
     let device = |path: &Path| fs::metadata(path).is_ok_and(|found| !found.is_file());
-    !device(a) && !device(b) && known(a).is_some_and(|a| known(b) == Some(a))
+    !device(a) && !device(b) && resolved(a).is_some_and(|a| resolved(b) == Some(a))
 }
 
-/// Where a path leads, whether or not there is anything.
-fn place(path: &Path) -> io::Result<PathBuf> {
+/// Follows the symbolic links of a path; the target need not exist.
+fn follow_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
-    for _ in 0..MOST_LINKS {
-        // Links to what is there are the system's to follow: those of `/dev/stdout` have no readable target.
+    for _ in 0..MAX_LINKS {
+        // Links to devices and pipes are kept: the target of `/dev/stdout` is not a readable path.
         if fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
             return Ok(path);
         }
@@ -189,14 +188,14 @@ fn place(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("it is a circle of symbolic links, expected a file name"))
 }
 
-/// The folder a path lies in.
+/// The folder that contains `path`.
 #[must_use]
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Makes a rename last through a power cut where the system can (a folder cannot be opened everywhere).
-#[allow(clippy::disallowed_methods, reason = "a folder, of which nothing is read")]
+/// Makes a rename durable against power loss on systems that can open a folder.
+#[allow(clippy::disallowed_methods, reason = "opens a folder and reads nothing")]
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(folder_of(path)) {
         let _ = folder.sync_all();
@@ -217,16 +216,16 @@ mod tests {
     }
 
     #[test]
-    fn an_unfinished_file_leaves_the_old_one_and_nothing_else() {
+    fn an_unfinished_file_leaves_the_existing_file_unchanged() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
-        WholeFile::write(&path, "old").unwrap();
-        let mut file = WholeFile::create(&path).unwrap();
+        AtomicFile::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
         file.write_all(b"half").unwrap();
         drop(file);
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(&folder), ["a.obj"]);
-        WholeFile::write(&path, "new").unwrap();
+        AtomicFile::write(&path, "new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(names(&folder), ["a.obj"]);
     }
@@ -234,16 +233,16 @@ mod tests {
     #[test]
     fn a_folder_or_a_missing_folder_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(WholeFile::write(folder.path(), "x").is_err());
-        assert!(WholeFile::write(folder.path().join("no/such/a.obj"), "x").is_err());
+        assert!(AtomicFile::write(folder.path(), "x").is_err());
+        assert!(AtomicFile::write(folder.path().join("no/such/a.obj"), "x").is_err());
         assert!(names(&folder).is_empty());
     }
 
     #[test]
-    fn two_that_write_one_path_at_a_time_do_not_share_a_file() {
+    fn concurrent_writers_of_one_path_do_not_share_a_temporary_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
-        let (mut one, mut other) = (WholeFile::create(&path).unwrap(), WholeFile::create(&path).unwrap());
+        let (mut one, mut other) = (AtomicFile::create(&path).unwrap(), AtomicFile::create(&path).unwrap());
         one.write_all(b"one").unwrap();
         other.write_all(b"the other").unwrap();
         assert_eq!(one.finish().unwrap(), 3);
@@ -255,44 +254,41 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_stay_and_what_they_point_at_is_replaced() {
+    fn symbolic_links_are_kept_and_their_targets_replaced() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("elsewhere")).unwrap();
         let [link, chain, target] = ["link", "chain", "elsewhere/target"].map(|name| folder.path().join(name));
         symlink("elsewhere/target", &link).unwrap();
         symlink(&link, &chain).unwrap();
-        // First where nothing is, then over what is there.
+        // First without an existing file, then over one.
         for text in ["first", "second"] {
-            WholeFile::write(&chain, text).unwrap();
+            AtomicFile::write(&chain, text).unwrap();
             assert_eq!(fs::read_to_string(&target).unwrap(), text);
             assert!(link.is_symlink() && chain.is_symlink() && !target.is_symlink());
             fs::set_permissions(&target, fs::Permissions::from_mode(0o640)).unwrap();
         }
-        WholeFile::write(&chain, "third").unwrap();
+        AtomicFile::write(&chain, "third").unwrap();
         assert_eq!(target.metadata().unwrap().permissions().mode() & 0o777, 0o640);
         assert!(same_place(&link, &target) && same_place(&chain, &link));
         assert!(!same_place(&link, &folder.path().join("target")));
         symlink("round", folder.path().join("round")).unwrap();
-        assert!(WholeFile::write(folder.path().join("round"), "x").is_err());
-        // What somebody planted under a name we might have taken is left alone.
+        assert!(AtomicFile::write(folder.path().join("round"), "x").is_err());
+        // A link under a predictable temporary name is not followed.
         symlink(&target, folder.path().join("a.obj.part")).unwrap();
-        WholeFile::write(folder.path().join("a.obj"), "mine").unwrap();
+        AtomicFile::write(folder.path().join("a.obj"), "mine").unwrap();
         assert_eq!(fs::read_to_string(&target).unwrap(), "third");
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn devices_and_pipes_are_written_to_and_stay() {
+    fn devices_and_pipes_are_written_directly() {
         use std::os::unix::fs::FileTypeExt as _;
-        WholeFile::write("/dev/null", "x").unwrap();
+        AtomicFile::write("/dev/null", "x").unwrap();
         assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
-        let full = WholeFile::write("/dev/full", "x").unwrap_err();
+        let full = AtomicFile::write("/dev/full", "x").unwrap_err();
         assert_eq!(full.kind(), io::ErrorKind::StorageFull);
         assert!(fs::metadata("/dev/full").unwrap().file_type().is_char_device());
-        assert!(
-            !same_place(Path::new("/dev/null"), Path::new("/dev/null")),
-            "what is no file takes any number of writers"
-        );
+        assert!(!same_place(Path::new("/dev/null"), Path::new("/dev/null")), "a device accepts several writers");
     }
 }

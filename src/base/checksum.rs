@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::base::atomic_file::{WholeFile, folder_of};
+use crate::base::atomic_file::{AtomicFile, folder_of};
 use crate::base::files::regular;
 
 /// First bytes of a serialised value: the type and the version of its format.
@@ -28,7 +28,7 @@ pub(crate) fn write(path: &Path, tag: &Tag, value: &impl Serialize) -> std::io::
     if let Ok(found) = std::fs::metadata(path) {
         regular(&found)?;
     }
-    WholeFile::write(path, encode(tag, value)?)
+    AtomicFile::write(path, encode(tag, value)?)
 }
 
 /// The hash of `value`, used as a file name or key.

@@ -47,7 +47,7 @@ struct Claims {
 static CLAIMS: Mutex<Option<Claims>> = Mutex::new(None);
 
 /// Protects inputs for the rest of the process, as the command line does without `--force`: a file that is read as an input
-/// ([`bounded`]) and is also an output ([`WholeFile`](crate::base::atomic_file::WholeFile)) is refused, whichever of the two is tried second.
+/// ([`bounded`]) and is also an output ([`AtomicFile`](crate::base::atomic_file::AtomicFile)) is refused, whichever of the two is tried second.
 pub(crate) fn protect_inputs() {
     CLAIMS.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
 }
@@ -138,12 +138,12 @@ pub(crate) fn listed(names: &[String]) -> String {
     first_of(names, 20)
 }
 
-/// Names in a sentence, the first so many of more.
+/// Names in a sentence: the first `limit`, and the number of the others.
 #[must_use]
-pub(crate) fn first_of(names: &[String], most: usize) -> String {
-    let shown: Vec<Cow<'_, str>> = names.iter().take(most).map(|name| shortened(name, [60, 20])).collect();
+pub(crate) fn first_of(names: &[String], limit: usize) -> String {
+    let shown: Vec<Cow<'_, str>> = names.iter().take(limit).map(|name| shortened(name, [60, 20])).collect();
     let shown = shown.join(", ");
-    match names.len().saturating_sub(most) {
+    match names.len().saturating_sub(limit) {
         0 => shown,
         more => format!("{shown} and {more} more"),
     }
@@ -163,22 +163,22 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Unreadable> {
 /// The text of an input of at most [`MOST_TEXT`] bytes.
 ///
 /// # Errors
-/// As [`bounded`]; or that it is not UTF-8.
+/// As [`bounded`], or the text is not UTF-8.
 pub(crate) fn bounded_text(path: &Path) -> io::Result<String> {
-    let utf8 = |e| io::Error::new(io::ErrorKind::InvalidData, format!("found what is no UTF-8 text: {e}"));
+    let utf8 = |e| io::Error::new(io::ErrorKind::InvalidData, format!("found text that is not UTF-8: {e}"));
     String::from_utf8(bounded(path, MOST_TEXT)?).map_err(|e| utf8(e.utf8_error()))
 }
 
-/// The bytes of an input of at most `most`.
+/// The bytes of an input of at most `limit` bytes.
 ///
 /// # Errors
-/// That it cannot be read, is no regular file, is larger, or is an output of this run ([`protect_inputs`]).
-pub(crate) fn bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+/// It cannot be read, is not a regular file, is larger, or is an output of this run ([`protect_inputs`]).
+pub(crate) fn bounded(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     with_claims(|claims| claims.input(path))?;
-    read(path, most)
+    read(path, limit)
 }
 
-/// The bytes of a file that the program wrote itself and may write again: rows, points, made meshes, references.
+/// The bytes of a file that the program writes and reads: rows, points, cached meshes, references.
 ///
 /// # Errors
 /// As [`bounded`], but for outputs.
@@ -186,25 +186,25 @@ pub(crate) fn read_own(path: &Path) -> io::Result<Vec<u8>> {
     read(path, MOST_MESH)
 }
 
-fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let mut bytes = Vec::new();
-    // A length of 0 is no promise: the files of /proc have it.
-    if file.metadata()?.len() <= most {
-        file.take(most + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 <= most {
+    // Files in /proc report a length of 0 and are not empty.
+    if file.metadata()?.len() <= limit {
+        file.take(limit + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 <= limit {
             return Ok(bytes);
         }
     }
-    let larger = format!("found more than {} MB, expected no more than that", most >> 20);
+    let larger = format!("found more than {} MB, expected no more than that", limit >> 20);
     Err(io::Error::new(io::ErrorKind::FileTooLarge, larger))
 }
 
 /// Opens a regular file to read.
 ///
 /// # Errors
-/// What the system says; that it is a folder, a pipe or a device.
-#[allow(clippy::disallowed_methods, reason = "the one place that opens files to read")]
+/// An error of the file system, or that it is a folder, a pipe or a device.
+#[allow(clippy::disallowed_methods, reason = "the only function that opens files to read")]
 pub(crate) fn open(path: &Path) -> io::Result<File> {
     regular(&fs::metadata(path)?)?;
     let file = File::open(path)?;
@@ -258,8 +258,8 @@ mod tests {
         written.output(&path("garment.obj")).unwrap();
         for name in ["garment.obj", "link.obj", "below/hard.obj", "below/../garment.obj"] {
             for refused in [read.output(&path(name)), written.input(&path(name))] {
-                let said = refused.unwrap_err().to_string();
-                assert!(said.contains("reads and writes") && said.contains("--force"), "{name}: {said}");
+                let message = refused.unwrap_err().to_string();
+                assert!(message.contains("reads and writes") && message.contains("--force"), "{name}: {message}");
             }
             read.input(&path(name)).unwrap();
             written.output(&path(name)).unwrap();
@@ -280,9 +280,9 @@ mod tests {
         let pipe = folder.path().join("pipe.obj");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         for path in [&*pipe, Path::new("/dev/zero"), folder.path()] {
-            let said = read_text(path).unwrap_err().to_string();
-            assert!(said.contains("expected a") && said.contains("file"), "{said}");
-            assert!(!said.contains("permissions"), "{said}");
+            let message = read_text(path).unwrap_err().to_string();
+            assert!(message.contains("expected a") && message.contains("file"), "{message}");
+            assert!(!message.contains("permissions"), "{message}");
         }
         assert!(read_own(&pipe).unwrap_err().to_string().contains("write what it holds to a file first"));
         let missing = read_text(&folder.path().join("none")).unwrap_err().to_string();

@@ -123,7 +123,7 @@ impl LiveArgs {
             None if !self.bind.is_loopback() => Some(random_token()?),
             None => None,
         };
-        let onlooker = control.as_ref().map(|_| random_token()).transpose()?;
+        let read_only = control.as_ref().map(|_| random_token()).transpose()?;
         let mut files: Vec<_> =
             job.scene.file_names().into_iter().map(|(role, name)| (role, name.to_owned())).collect();
         files.push((FileRole::Table, self.stages.table.clone()));
@@ -132,7 +132,7 @@ impl LiveArgs {
             address: SocketAddr::new(self.bind, self.port.unwrap_or(PORT)),
             host: self.host.clone(),
             control,
-            onlooker,
+            read_only,
             files,
             limits: Limits::default(),
             name: format!("live {}", job.scene.garment_name()),
@@ -150,8 +150,8 @@ impl LiveArgs {
             Some(control) => with_token(&name, control),
         };
         console::result(&page);
-        if let (Some(_), Some(onlooker)) = (&options.control, &options.onlooker) {
-            console::note(&format!("read-only access: {}", with_token(&name, onlooker)));
+        if let (Some(_), Some(read_only)) = (&options.control, &options.read_only) {
+            console::note(&format!("read-only access: {}", with_token(&name, read_only)));
         }
         console::note("open this address in a browser, or see `partwise live --help` for curl; Ctrl-C ends");
         if address.ip().is_unspecified() {

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::base::atomic_file::{self, WholeFile};
+use crate::base::atomic_file::{self, AtomicFile};
 use crate::drape::DrapeError;
 use crate::live::LiveError;
 use crate::mechanics::refine::Observer;
@@ -146,12 +146,12 @@ pub(crate) fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
 
 /// Refuses an output that cannot be written or is an input, before anything is computed.
 pub(crate) fn check(path: &Path, flag: &str) -> anyhow::Result<()> {
-    WholeFile::check(path).map_err(unwritable(path, flag))
+    AtomicFile::check(path).map_err(unwritable(path, flag))
 }
 
 /// Writes the output of `flag`.
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>, flag: &str) -> anyhow::Result<()> {
-    WholeFile::write(path, text).map_err(unwritable(path, flag))
+    AtomicFile::write(path, text).map_err(unwritable(path, flag))
 }
 
 /// The error of an output that cannot be written; `flag` selects another place.

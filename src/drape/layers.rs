@@ -58,7 +58,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
     };
     let mut before = Vec::new();
     for k in 0..scene.layers.len() {
-        let alone = scene.alone(k, &worn.positions)?;
+        let alone = scene.layer_scene(k, &worn.positions)?;
         before.clone_from(&worn.positions);
         before[scene.layers[k].vertices.clone()].copy_from_slice(&alone.garment.positions);
         worn.put_on(k, &alone, settings, &parts, &mut times, observer)?;
@@ -70,7 +70,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         let Scene { garment, topology, rest, held, .. } = scene;
         let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
-        let start = scene.lifted_off(worn.positions.clone());
+        let start = scene.lift_layers(worn.positions.clone());
         let refined = refine_from(scene, settings, &cloth, None, (start, StartsFrom::Parts), &mut |step| {
             if stopped {
                 return ControlFlow::Break(());

@@ -68,7 +68,7 @@ pub(crate) fn let_go(
     held: Refined,
     observer: Observer<'_>,
 ) -> Result<Released, DrapeError> {
-    let asked = scene.let_go && !scene.held.is_empty() && settings.refine == Refine::Converged;
+    let asked = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
     if !asked || held.stop != Stop::Converged {
         return Ok(Released { cloth: None, refined: held, let_go: None });
     }

@@ -13,7 +13,7 @@ const SHORTEST_TOKEN: usize = 16;
 pub(super) struct Access {
     pub(super) hosts: Hosts,
     control: Option<String>,
-    onlooker: Option<String>,
+    read_only: Option<String>,
 }
 
 /// The permissions of a request.
@@ -22,21 +22,21 @@ pub(super) enum Right {
     /// Read and control.
     Control,
     /// Read.
-    Look,
+    Read,
 }
 
 impl Access {
     pub(super) fn new(options: &LiveOptions) -> Result<Self, LiveError> {
-        let LiveOptions { host, control, onlooker, .. } = options.clone();
+        let LiveOptions { host, control, read_only, .. } = options.clone();
         if control.is_none() && !options.address.ip().is_loopback() {
             return Err(LiveError::Open(options.address.ip()));
         }
-        let short = control.iter().chain(&onlooker).map(|token| token.chars().count());
+        let short = control.iter().chain(&read_only).map(|token| token.chars().count());
         if let Some(found) = short.filter(|count| *count < SHORTEST_TOKEN).min() {
             return Err(LiveError::ShortToken(found));
         }
         let hosts = Hosts { name: host, any_address: control.is_some() };
-        Ok(Self { hosts, control, onlooker })
+        Ok(Self { hosts, control, read_only })
     }
 
     /// The permissions of the request's token, from `Authorization: Bearer` or from the address (`?token=`).
@@ -47,7 +47,7 @@ impl Access {
         let given = bearer.map(str::to_owned).or_else(|| query(uri, "token"));
         match given.as_deref() {
             Some(token) if same(token, control) => Ok(Right::Control),
-            Some(token) if self.onlooker.as_ref().is_some_and(|onlooker| same(token, onlooker)) => Ok(Right::Look),
+            Some(token) if self.read_only.as_ref().is_some_and(|read_only| same(token, read_only)) => Ok(Right::Read),
             found => {
                 let found = if found.is_some() { "found another token" } else { "found no token" };
                 let refused = format!("{found}, expected `Authorization: Bearer TOKEN` with the printed one");
@@ -73,7 +73,7 @@ pub(super) fn may(right: Right, method: &Method) -> Result<(), Refused> {
     if right == Right::Control || [Method::GET, Method::HEAD].contains(method) {
         return Ok(());
     }
-    Err((StatusCode::FORBIDDEN, format!("found {method} with an onlooker's token, expected the one for control")))
+    Err((StatusCode::FORBIDDEN, format!("found {method} with the read-only token, expected the control token")))
 }
 
 /// Compares two tokens in a time that does not depend on where they differ.
@@ -101,7 +101,7 @@ mod tests {
             address: address.parse().unwrap(),
             host: Some("drape.example".to_owned()),
             control: control.map(str::to_owned),
-            onlooker: control.map(|_| "o".repeat(20)),
+            read_only: control.map(|_| "o".repeat(20)),
             files: Vec::new(),
             limits: Limits::default(),
             name: String::new(),
@@ -116,10 +116,10 @@ mod tests {
         let far = access("0.0.0.0:0", Some(&"c".repeat(20))).unwrap();
         let right = |uri: &str| far.right(&HeaderMap::new(), &uri.parse().unwrap()).map_err(|refused| refused.0);
         assert_eq!(right(&format!("/?token={}", "c".repeat(20))), Ok(Right::Control));
-        assert_eq!(right(&format!("/?token={}", "o".repeat(20))), Ok(Right::Look));
+        assert_eq!(right(&format!("/?token={}", "o".repeat(20))), Ok(Right::Read));
         assert_eq!(right("/?token=guess"), Err(StatusCode::UNAUTHORIZED));
         assert_eq!(right("/"), Err(StatusCode::UNAUTHORIZED));
-        assert!(may(Right::Look, &Method::GET).is_ok() && may(Right::Look, &Method::PATCH).is_err());
+        assert!(may(Right::Read, &Method::GET).is_ok() && may(Right::Read, &Method::PATCH).is_err());
         let (a, b) = (random_token().unwrap(), random_token().unwrap());
         assert!(a.len() == 32 && a != b);
     }

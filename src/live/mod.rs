@@ -34,7 +34,7 @@ pub struct LiveOptions {
     /// Token for control; may be none on a loopback address.
     pub control: Option<String>,
     /// Token for reading alone.
-    pub onlooker: Option<String>,
+    pub read_only: Option<String>,
     /// Files that requests may name, each in its field: those of the command line. A request opens no other file.
     pub files: Vec<(FileRole, String)>,
     /// Limits of connections.

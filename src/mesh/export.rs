@@ -13,7 +13,7 @@ use super::error::MeshError;
 use super::import::Imported;
 use super::topology::NONE;
 use super::{TriMesh, renumbered};
-use crate::base::atomic_file::WholeFile;
+use crate::base::atomic_file::AtomicFile;
 
 /// Writes the imported mesh with its vertices at `positions` (m, z up), in the frame of the file it came from.
 pub fn write_imported(path: &Path, imported: &Imported, positions: &[DVec3]) -> Result<(), MeshError> {
@@ -70,7 +70,7 @@ fn text_of(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> String {
 
 pub(super) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), MeshError> {
     let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-    WholeFile::write(path, contents).map_err(unwritable)
+    AtomicFile::write(path, contents).map_err(unwritable)
 }
 
 fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, MeshError> {

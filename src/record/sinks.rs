@@ -17,7 +17,7 @@ use super::native;
 use super::remote::Remote;
 use super::web::WebViewer;
 use super::writer::RrdWriter;
-use crate::base::atomic_file::{WholeFile, folder_of};
+use crate::base::atomic_file::{AtomicFile, folder_of};
 
 /// Longest wait for a viewer's answer.
 const ANSWER: Duration = Duration::from_secs(3);
@@ -55,14 +55,14 @@ impl Sink {
         if path.is_relative() && !folder_of(path).exists() {
             return Ok(());
         }
-        WholeFile::check(path).map_err(unwritable(path))
+        AtomicFile::check(path).map_err(unwritable(path))
     }
 }
 
 /// A file that is being written.
 pub(crate) struct Target {
     /// Its encoder.
-    pub(super) writer: RrdWriter<WholeFile>,
+    pub(super) writer: RrdWriter<AtomicFile>,
     /// Path of the complete file.
     pub(super) path: PathBuf,
 }
@@ -118,7 +118,7 @@ fn file(path: &Path) -> Result<Target, RecordError> {
     if let Some(folder) = path.parent().filter(|_| path.is_relative()) {
         std::fs::create_dir_all(folder).map_err(unwritable(path))?;
     }
-    let file = WholeFile::create(path).map_err(unwritable(path))?;
+    let file = AtomicFile::create(path).map_err(unwritable(path))?;
     let writer = RrdWriter::new(file).map_err(|reason| unwritable(path)(std::io::Error::other(reason)))?;
     Ok(Target { writer, path: path.to_owned() })
 }

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_that_was_cut_off_anywhere_is_refused_or_said_to_be_incomplete() {
+    fn a_truncated_recording_is_refused_or_reported_as_incomplete() {
         let folder = tempfile::tempdir().unwrap();
         let [path, cut] = ["whole.rrd", "cut.rrd"].map(|name| folder.path().join(name));
         let recording = rerun::RecordingStreamBuilder::new("cut").save(&path).unwrap();
@@ -146,9 +146,12 @@ mod tests {
             std::fs::write(&cut, &whole[..length]).unwrap();
             match check_file(&cut) {
                 Err(error) => assert!(matches!(error, RecordError::NotARecording { .. }), "{length}: {error}"),
-                Ok(said) => {
-                    let said = said.unwrap_or_else(|| panic!("{length} of {} bytes pass for whole", whole.len()));
-                    assert!(said.contains("cut.rrd") && said.contains(&format!("after {length} bytes")), "{said}");
+                Ok(message) => {
+                    let message = message.unwrap_or_else(|| panic!("{length} of {} bytes pass for whole", whole.len()));
+                    assert!(
+                        message.contains("cut.rrd") && message.contains(&format!("after {length} bytes")),
+                        "{message}"
+                    );
                     shown += 1;
                 }
             }

@@ -48,7 +48,7 @@ pub struct Scene {
     /// Vertices that keep their positions (the edge of a waistband).
     pub held: Vec<u32>,
     /// Whether the held vertices are released once the garment is at rest, to find out whether it stays up by itself.
-    pub let_go: bool,
+    pub releases_held: bool,
     /// The garments, inner to outer; usually one.
     pub layers: Vec<Layer>,
     /// The surface that distances are measured to.
@@ -126,7 +126,7 @@ impl Scene {
             garment,
             rest,
             held: Vec::new(),
-            let_go: false,
+            releases_held: false,
             layers: vec![layer],
             distance_to: DistanceTo::Body,
             own_fabrics: vec![None],
@@ -197,7 +197,7 @@ impl Scene {
     }
 
     /// The body under garment number `k`, covered by the garments below it with the vertices at `positions` (m).
-    pub(crate) fn below(&self, k: usize, positions: &[DVec3]) -> Result<Body, SceneError> {
+    pub(crate) fn body_below(&self, k: usize, positions: &[DVec3]) -> Result<Body, SceneError> {
         if k == 0 {
             return Ok(self.body.clone());
         }
@@ -205,7 +205,7 @@ impl Scene {
     }
 
     /// A scene of garment number `k` alone, put over those below it with the vertices at `positions` (m).
-    pub(crate) fn alone(&self, k: usize, positions: &[DVec3]) -> Result<Self, SceneError> {
+    pub(crate) fn layer_scene(&self, k: usize, positions: &[DVec3]) -> Result<Self, SceneError> {
         let layer = self.layers[k].clone();
         let mut garment = layer.cut_out(&self.garment.triangles, positions);
         if k > 0 {
@@ -214,17 +214,17 @@ impl Scene {
         let first = layer.vertices.start as u32;
         let cut_from = self.rest.cut_from.get(layer.triangles.clone()).unwrap_or_default().to_vec();
         let rest = RestShape { corners: self.rest.corners[layer.triangles.clone()].to_vec(), cut_from };
-        let mut alone = Self::new(self.below(k, positions)?, garment, rest);
-        alone.held = self.held.iter().filter(|&&v| layer.vertices.contains(&(v as usize))).map(|v| v - first).collect();
-        alone.layers[0].name = layer.name;
-        alone.distance_to = self.distance_to;
-        alone.own_fabrics.clone_from(&self.own_fabrics);
-        Ok(alone)
+        let mut scene = Self::new(self.body_below(k, positions)?, garment, rest);
+        scene.held = self.held.iter().filter(|&&v| layer.vertices.contains(&(v as usize))).map(|v| v - first).collect();
+        scene.layers[0].name = layer.name;
+        scene.distance_to = self.distance_to;
+        scene.own_fabrics.clone_from(&self.own_fabrics);
+        Ok(scene)
     }
 
     /// The positions at which each garment, at `positions` (m), is lifted off those below it where it crossed them.
     #[must_use]
-    pub(crate) fn lifted_off(&self, mut positions: Vec<DVec3>) -> Vec<DVec3> {
+    pub(crate) fn lift_layers(&self, mut positions: Vec<DVec3>) -> Vec<DVec3> {
         for k in 1..self.layers.len() {
             let mut outer = self.layers[k].cut_out(&self.garment.triangles, &positions);
             lift_off(&mut outer, &self.mesh_below(k, &positions));

@@ -306,7 +306,7 @@ impl SceneSpec {
             .map_err(SceneError::about(&self.garment))?;
         (scene.layers, scene.distance_to) = (layers, self.distance_to);
         scene.own_fabrics = unplaced.cut.fabrics;
-        scene.let_go = self.hold.is_none() && unplaced.tailored.is_some();
+        scene.releases_held = self.hold.is_none() && unplaced.tailored.is_some();
         scene.held = match &self.hold {
             None => unplaced.held,
             Some(edges) => scene.edges(edges).map_err(SceneError::about(&self.garment))?,

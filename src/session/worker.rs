@@ -307,7 +307,7 @@ impl Worker {
         let mut balanced = false;
         let mut observer = |step: &Step<'_>| {
             // A garment that is held balances once before its release, which does not count.
-            balanced |= step.at_rest && !scene.let_go;
+            balanced |= step.at_rest && !scene.releases_held;
             if step.iteration > 0 || balanced {
                 let at = refinement.at(step.positions, step.residual_over_weight, step.iteration);
                 let rest = Arc::new(AtRest { balanced, ..at });

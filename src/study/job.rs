@@ -307,8 +307,8 @@ mod tests {
         ] {
             assert!(tried.contains(&format!("settings.{place}")), "{place} is not among {tried:?}");
         }
-        let said = toml::from_str::<Job>("[settings.model.coupled]\nsoft_strain = nan\n").unwrap_err().to_string();
-        assert!(said.contains("soft_strain: found NaN, expected 0.0 to 1.0"), "{said}");
+        let message = toml::from_str::<Job>("[settings.model.coupled]\nsoft_strain = nan\n").unwrap_err().to_string();
+        assert!(message.contains("soft_strain: found NaN, expected 0.0 to 1.0"), "{message}");
     }
 
     #[test]

@@ -91,8 +91,8 @@ fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
     assert!(String::from_utf8_lossy(&floating.stderr).contains("not certified"));
     bench.write("other.obj", &sheet(11, 1.51));
     let other = certified("other.obj");
-    let said = String::from_utf8_lossy(&other.stderr);
-    assert!(other.status.code() == Some(2) && said.contains("other.obj") && said.contains("169"), "{said}");
+    let message = String::from_utf8_lossy(&other.stderr);
+    assert!(other.status.code() == Some(2) && message.contains("other.obj") && message.contains("169"), "{message}");
 }
 
 #[test]
@@ -109,8 +109,8 @@ fn a_pattern_is_summed_up_and_drawn_and_a_bad_one_refused() {
     bench.write("bad.json", &fs::read_to_string(&skirt).unwrap().replace("[3, 0]", "[3, 7]"));
     for arguments in [&["pattern", "bad.json"][..], &["--pattern", "bad.json", "--no-save"][..]] {
         let out = bench.run(arguments);
-        let said = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{said}");
-        assert!(said.contains("bad.json") && said.contains("edge 3") && said.contains("[3,7]"), "{said}");
+        let message = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{message}");
+        assert!(message.contains("bad.json") && message.contains("edge 3") && message.contains("[3,7]"), "{message}");
     }
 }

@@ -5,7 +5,7 @@ use super::{Bench, json};
 const OUTFIT: [&str; 5] = ["run", "--garment", "flared-skirt@400", "--garment", "pullover-1@500"];
 
 #[test]
-fn a_fabric_for_each_garment_is_told_and_certified() {
+fn a_fabric_for_each_garment_is_listed_and_certified() {
     let bench = Bench::new();
     let cloth = ["--fabric", "denim", "--fabric", "interlock"];
     let more = ["--refine", "0", "--no-save", "--format", "json"];
@@ -37,7 +37,7 @@ fn run<'a>(more: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-fn groups_of_a_mesh_are_cut_from_what_a_file_says() {
+fn groups_of_a_mesh_get_the_fabrics_of_a_file() {
     let bench = Bench::new();
     bench.write("other.toml", "[panels]\nback = \"denim\"\n");
     let given = ["--fabrics", "other.toml", "--no-save"];

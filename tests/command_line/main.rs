@@ -77,12 +77,12 @@ impl Bench {
     /// The run is refused with exit code 2, names what it should, and leaves no recording, whole or half.
     fn refuses(&self, arguments: &[&str], words: &[&str]) {
         let output = self.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         for word in words {
-            assert!(said.contains(word), "{arguments:?} should say `{word}`: {said}");
+            assert!(message.contains(word), "{arguments:?} should say `{word}`: {message}");
         }
-        assert!(!said.contains("panicked"), "{said}");
+        assert!(!message.contains("panicked"), "{message}");
         let left: Vec<_> = walk(self.folder.path()).into_iter().filter(|f| f.contains(".rrd")).collect();
         assert!(left.is_empty(), "{arguments:?} left {left:?}");
     }
@@ -202,7 +202,7 @@ fn bad_tables_are_refused_by_file_and_row() {
 }
 
 #[test]
-fn sinks_that_cannot_be_had_are_said() {
+fn unavailable_sinks_are_reported() {
     let bench = Bench::new();
     let scene = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z"];
     bench.write("file", "");
@@ -235,7 +235,7 @@ fn a_held_edge_stays_and_an_unknown_one_is_refused() {
 }
 
 #[test]
-fn the_table_alone_makes_the_parts_and_they_move_as_asked() {
+fn the_table_alone_makes_the_parts_and_the_option_their_motion() {
     let bench = Bench::new();
     let preview =
         |more: &[&str]| json(&bench.drape(&[&["--refine", "0", "--no-save", "--format", "json"], more].concat()));
@@ -254,7 +254,7 @@ fn the_table_alone_makes_the_parts_and_they_move_as_asked() {
 }
 
 #[test]
-fn what_parts_could_hold_is_said_in_words_and_figures() {
+fn the_representable_error_is_reported_in_words_and_numbers() {
     let bench = Bench::new();
     let cache = bench.path("cache");
     let measured = ["--refine", "0", "--accuracy", "--cache", &cache, "--no-save"];
@@ -262,10 +262,10 @@ fn what_parts_could_hold_is_said_in_words_and_figures() {
     let [affine, one] =
         ["representable_affine_rms_mm", "representable_rms_mm"].map(|key| figures[key].as_f64().unwrap());
     assert!(affine < one, "{affine} {one}");
-    let said = String::from_utf8(bench.drape(&measured).stdout).unwrap();
+    let message = String::from_utf8(bench.drape(&measured).stdout).unwrap();
     let words =
         format!("its PARTs could hold it to {affine:.1} mm by affine maps, {one:.1} mm by one displacement each");
-    assert!(said.contains(&words), "{words}: {said}");
+    assert!(message.contains(&words), "{words}: {message}");
 }
 
 #[test]

@@ -126,7 +126,7 @@ fn nothing_is_pushed_into_the_body() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn mismatched_inputs_are_refused() {
     let case = tilted(30.0);
     let run = |surface: &[SurfacePoint], fabric: &Fabric, options: &PaperOptions| {
         solve(&case.garment, &case.topology, &case.body, surface, &case.parts, fabric, options).unwrap_err()

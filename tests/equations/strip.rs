@@ -9,7 +9,7 @@ use partwise::mesh::RestShape;
 use super::*;
 
 #[test]
-fn a_vertical_wall_carries_nothing_and_says_so() {
+fn a_vertical_wall_carries_nothing_and_is_reported() {
     let wall = block(DVec3::new(0.5, 1.0, 1.0), DQuat::IDENTITY, DVec3::new(-0.5, 0.0, 0.0));
     let strip = patch(DVec3::new(0.002, 0.0, -0.5), DVec3::Y * 0.05, DVec3::Z * 0.5, 1, 10);
     let found = Case::new(strip, &wall, &ONE_LEVEL).solve(&PaperOptions::default());
@@ -40,7 +40,7 @@ fn mean_sink(length: f64, s1: f64, s2: f64) -> f64 {
 }
 
 #[test]
-fn a_hanging_strip_sinks_as_its_closed_form_says() {
+fn a_hanging_strip_sinks_by_its_closed_form() {
     let options = [Cosine::Absolute, Cosine::InSurface].map(|cosine| PaperOptions {
         cosine,
         untouched: Untouched::Contactless,

@@ -75,8 +75,8 @@ fn a_garment_that_slides_down_is_reported_with_the_edge_to_hold() {
     let (metrics, warnings, x) = draped(&scene);
     let sank = (0..40).map(|v| scene.garment.positions[v].z - x[v].z).sum::<f64>() / 40.0;
     assert!(sank > 0.2 && (metrics.top_sank_mm - 1e3 * sank).abs() < 1e-9, "{sank}");
-    let said = warnings.join("\n");
-    assert!(said.contains("slid down") && said.contains("--hold top") && said.contains("waist"), "{said}");
+    let message = warnings.join("\n");
+    assert!(message.contains("slid down") && message.contains("--hold top") && message.contains("waist"), "{message}");
     // A held garment stays, without a warning.
     scene.held = scene.edge("top").unwrap();
     let (metrics, warnings, _) = draped(&scene);
@@ -105,12 +105,12 @@ fn the_connected_part_that_slides_or_falls_is_reported_by_its_number() {
     let sank = [0..24, 96..136].map(|ring| ring.clone().map(of).sum::<f64>() / ring.len() as f64);
     assert!(sank[0] < 0.05 && sank[1] > 0.15, "{sank:?}");
     assert!((metrics.top_sank_mm - 1e3 * sank[1]).abs() < 1e-9, "{} mm", metrics.top_sank_mm);
-    let said =
+    let message =
         format!("connected part 2 of the garment's 2 has slid down: its highest edge sank by {:.0} cm", 1e2 * sank[1]);
-    assert!(warnings.iter().any(|w| w.contains(&said) && w.contains("(--hold top:2)")), "{warnings:?}");
+    assert!(warnings.iter().any(|w| w.contains(&message) && w.contains("(--hold top:2)")), "{warnings:?}");
     // Holding another part does not help. Once this part is held, it stays, without a warning.
     scene.held = scene.edge("top:1").unwrap();
-    assert!(draped(&scene).1.iter().any(|w| w.contains(&said[..50])), "{warnings:?}");
+    assert!(draped(&scene).1.iter().any(|w| w.contains(&message[..50])), "{warnings:?}");
     scene.held = scene.edge("top:2").unwrap();
     assert!(!draped(&scene).1.iter().any(|w| w.contains("slid")));
 
@@ -118,8 +118,8 @@ fn the_connected_part_that_slides_or_falls_is_reported_by_its_number() {
     let ring = turned(&[(0.6, 0.9), (0.6, 0.85), (0.6, 0.8)], 24, None);
     let scene = Scene::of_meshes(&cone(), beside(cape, &ring)).unwrap();
     let result = drape(&scene, &Job::default().settings, &mut unobserved).unwrap();
-    let said = "connected part 2 of the garment's 2 has fallen off the body; hold its edge (--hold top:2)";
-    assert!(result.warnings.iter().any(|w| w.contains(said)), "{:?}", result.warnings);
+    let message = "connected part 2 of the garment's 2 has fallen off the body; hold its edge (--hold top:2)";
+    assert!(result.warnings.iter().any(|w| w.contains(message)), "{:?}", result.warnings);
     assert!(
         result.state.is_some_and(|state| state.steps < 100) && !draped(&scene).1.iter().any(|w| w.contains("slid"))
     );
@@ -163,9 +163,9 @@ fn skin_between_vertices_outside_the_body_is_reported() {
     let (metrics, warnings, x) = draped_by(&scene, &bare);
     let pairs = crossing_pairs(&scene.garment.with_positions(x), scene.body.mesh()).len();
     assert!(pairs > 0 && metrics.body_crossing_pairs == pairs && metrics.penetrating_vertices == 0, "{pairs}");
-    let said = warnings.join("\n");
-    assert!(said.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{said}");
-    assert!(said.contains("no vertex is inside"), "{said}");
+    let message = warnings.join("\n");
+    assert!(message.contains(&format!("skin shows through the cloth: {pairs} pairs")), "{message}");
+    assert!(message.contains("no vertex is inside"), "{message}");
     // A fine mesh shows none even so.
     let (metrics, warnings, _) = draped_by(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap(), &bare);
     assert_eq!(metrics.body_crossing_pairs, 0);
@@ -182,8 +182,8 @@ fn intersecting_cloth_is_reported() {
     let mut bare = Job::default();
     bare.settings.self_contact = false;
     let (metrics, warnings, _) = draped_by(&scene, &bare);
-    let said = format!("cloth goes through cloth: {} pairs", metrics.self_intersecting_pairs);
-    assert!(metrics.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&said)), "{warnings:?}");
+    let message = format!("cloth goes through cloth: {} pairs", metrics.self_intersecting_pairs);
+    assert!(metrics.self_intersecting_pairs > 0 && warnings.iter().any(|w| w.contains(&message)), "{warnings:?}");
     // Layers that stay apart give no warning.
     let (metrics, warnings, _) = draped(&over(DVec3::Z * 0.008));
     assert_eq!((metrics.self_intersecting_pairs, warnings.len()), (0, 0), "{warnings:?}");
@@ -230,8 +230,8 @@ fn each_connected_part_and_each_group_can_be_held_by_its_edge() {
     for (what, expected) in
         [("top:3", "`top:1` to `top:2`"), ("top:x", "2 connected parts"), ("inside", "no open edge"), ("hem", "upper")]
     {
-        let said = scene.edges(what).unwrap_err().to_string();
-        assert!(said.contains("--hold") && said.contains(expected), "{said}");
+        let message = scene.edges(what).unwrap_err().to_string();
+        assert!(message.contains("--hold") && message.contains(expected), "{message}");
     }
     scene.held = scene.edges("top:1,top:2").unwrap();
     let (metrics, _, x) = draped(&scene);

@@ -113,7 +113,7 @@ fn a_rest_shape_drawn_far_too_large_or_small_is_solved_all_the_same() {
 }
 
 #[test]
-fn a_pattern_torn_in_one_corner_is_told_with_its_face() {
+fn a_pattern_torn_in_one_corner_is_reported_with_its_face() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     write_mesh(&folder.path().join("body.obj"), &cone()).unwrap();
@@ -191,7 +191,7 @@ fn a_stray_triangle_in_an_open_body_does_not_end_the_drape() {
 }
 
 #[test]
-fn seams_that_long_triangles_bridge_are_told_when_the_garment_falls_through() {
+fn seams_bridged_by_long_triangles_are_reported_when_the_garment_falls_through() {
     // Two panels on either side of a ball, each 60 cm wide, and nothing but long triangles between them over it.
     let (columns, rows, side) = (31_u32, 16_u32, 0.02);
     let mut mesh = TriMesh::default();

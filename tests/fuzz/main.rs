@@ -1,13 +1,13 @@
-//! Mutated input through every reader of the library: it is taken or refused, in bounded time and in plain words.
+//! Mutated input through every reader of the library: each input is accepted, or refused with a clear message, in bounded time.
 //!
-//! `PARTWISE_FUZZ_CASES` sets how many inputs each reader gets, without it a few seconds' worth; `PARTWISE_FUZZ_SEED` (0 to 255) which
-//! ones. An input that shows something wrong is shrunk and kept in `tests/fuzz/corpus/`, whose files are tried first, and mutated, ever after.
+//! `PARTWISE_FUZZ_CASES` sets the number of inputs for each reader (the default takes a few seconds), `PARTWISE_FUZZ_SEED` (0 to 255)
+//! the random seed. A failing input is shrunk and stored in `tests/fuzz/corpus/`. Later runs try these files first and mutate them.
 
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
     clippy::print_stderr,
-    reason = "a test fails by panicking, and tells counts"
+    reason = "a test fails by panicking, and prints counts"
 )]
 
 mod meshes;
@@ -24,46 +24,46 @@ use std::time::{Duration, Instant};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
-use readers::Said;
+use readers::Outcome;
 
-/// What one input may take: far more than any does, on a machine that is busy with other things.
-const LIMIT: Duration = Duration::from_secs(20);
+/// Time limit for one input; far above the usual milliseconds, so that a busy machine does not exceed it.
+const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// A seed and up to three changes.
 fn mutated() -> impl Strategy<Value = (u32, Vec<mutate::Mutation>)> {
     (any::<u32>(), prop::collection::vec((0_u8..16, any::<u32>(), any::<u32>()), 0..4))
 }
 
-/// What came of an input: a message where it was refused; or what is wrong.
-type Reader = dyn Fn(&str) -> Result<Said, String> + Send + Sync;
+/// Reads an input and returns its outcome, or the description of a fault in the reader.
+type Reader = dyn Fn(&str) -> Result<Outcome, String> + Send + Sync;
 
-/// Runs one input and judges what the reader says.
-fn judge(reader: &Reader, text: &str) -> Result<Said, String> {
+/// Runs one input and checks time, panics and the message.
+fn judge(reader: &Reader, text: &str) -> Result<Outcome, String> {
     let began = Instant::now();
-    let said = catch_unwind(AssertUnwindSafe(|| reader(text))).map_err(|_| "it panicked".to_owned())??;
-    if began.elapsed() > LIMIT {
+    let outcome = catch_unwind(AssertUnwindSafe(|| reader(text))).map_err(|_| "it panicked".to_owned())??;
+    if began.elapsed() > TIME_LIMIT {
         return Err(format!("it took {:?}", began.elapsed()));
     }
-    if let Said::Refused(message) = &said {
+    if let Outcome::Refused(message) = &outcome {
         if message.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
             return Err(format!("control characters in the message: {message:?}"));
         }
         if message.len() > 5_000 {
             return Err(format!("a message of {} bytes", message.len()));
         }
-        if !readers::TELLING.iter().any(|word| message.contains(word)) {
-            return Err(format!("a message that tells nothing: {message:?}"));
+        if !readers::INFORMATIVE.iter().any(|word| message.contains(word)) {
+            return Err(format!("a message without found, expected or remedy: {message:?}"));
         }
     }
-    Ok(said)
+    Ok(outcome)
 }
 
-/// Gives `reader` the seeds, what was found before, and so many mutations of both for every one that is due.
+/// Runs `reader` on the seeds, on the stored corpus, and on mutations of both; `share` scales the number of mutations.
 fn fuzz(
     class: &'static str,
     share: f64,
     seeds: Vec<String>,
-    reader: impl Fn(&str) -> Result<Said, String> + Send + Sync + 'static,
+    reader: impl Fn(&str) -> Result<Outcome, String> + Send + Sync + 'static,
 ) {
     let cases = std::env::var("PARTWISE_FUZZ_CASES").ok().map_or(300, |text| text.parse::<u32>().unwrap());
     let cases = ((f64::from(cases) * share) as u32).max(20);
@@ -78,9 +78,9 @@ fn fuzz(
             panic!("{class}: {wrong}, of a seed:\n{seed}");
         }
     }
-    // What is being read, for who waits: an endless loop is told by its input.
+    // The current input, so that an endless loop can be reported with it.
     let current = Arc::new(Mutex::new((Instant::now(), String::new())));
-    let (told, of_thread) = (current.clone(), seeds.clone());
+    let (reading, of_thread) = (current.clone(), seeds.clone());
     let worker = std::thread::spawn(move || {
         let (seeds, mut counts) = (of_thread, BTreeMap::<&str, usize>::new());
         let input = |(seed, changes): &(u32, Vec<mutate::Mutation>)| {
@@ -95,9 +95,9 @@ fn fuzz(
         let counted = Mutex::new(&mut counts);
         let outcome = runner.run(&mutated(), |case| {
             let text = input(&case);
-            *told.lock().unwrap() = (Instant::now(), text.clone());
-            let said = judge(&reader, &text).map_err(TestCaseError::fail)?;
-            *counted.lock().unwrap().entry(said.name()).or_default() += 1;
+            *reading.lock().unwrap() = (Instant::now(), text.clone());
+            let outcome = judge(&reader, &text).map_err(TestCaseError::fail)?;
+            *counted.lock().unwrap().entry(outcome.name()).or_default() += 1;
             Ok(())
         });
         (
@@ -112,7 +112,7 @@ fn fuzz(
         std::thread::sleep(Duration::from_millis(20));
         let (since, text) = current.lock().unwrap().clone();
         assert!(
-            since.elapsed() < 3 * LIMIT || text.is_empty(),
+            since.elapsed() < 3 * TIME_LIMIT || text.is_empty(),
             "{class}: still at work after {:?} on:\n{text}",
             since.elapsed()
         );

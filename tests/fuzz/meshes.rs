@@ -12,7 +12,7 @@ use partwise::study::sweep::{Existing, Manifest, Plan, Row, Store, Timing, csv_t
 use partwise::{Job, SceneSpec};
 
 use super::fuzz;
-use super::readers::{Said, check, refused};
+use super::readers::{Outcome, check, refused};
 
 /// A cube's eight corners and six quads, half a metre wide, a metre up.
 const CUBE: &str = "v -0.25 -0.25 1\nv 0.25 -0.25 1\nv -0.25 0.25 1\nv 0.25 0.25 1\nv -0.25 -0.25 1.5\nv 0.25 -0.25 1.5\n\
@@ -83,7 +83,7 @@ fn meshes() {
         let again = import_garment(&out, &metres, &Beside::File(&Frame::given(Unit::M, Axis::Z)));
         let again = again.map_err(|e| format!("written and refused: {e}"))?;
         check(named(&again.mesh) == named(&garment.mesh), "it reads back as another")?;
-        Ok(Said::Taken)
+        Ok(Outcome::Taken)
     });
 }
 
@@ -125,7 +125,7 @@ fn drapes() {
         check(counts, "PARTs, rest shape and mesh count otherwise")?;
         let out = folder.path().join("out.obj");
         loaded.write(&out, &found.positions).map_err(|e| e.to_string())?;
-        Ok(Said::Taken)
+        Ok(Outcome::Taken)
     });
 }
 
@@ -158,7 +158,7 @@ fn rows() {
                 let text = csv_text(&rows);
                 check(text.iter().filter(|&&b| b == b'\n').count() > rows.len(), "the CSV has fewer lines")?;
                 check(folder.path().is_dir(), "")?;
-                Ok(Said::Taken)
+                Ok(Outcome::Taken)
             }
         }
     });

@@ -1,9 +1,9 @@
-//! Texts mutated by their structure: numbers, words and lines, swapped for what breaks readers.
+//! Structured mutations of texts: numbers, words and lines are replaced by values that often break readers.
 
-/// One change: what is done, where, and with what; places count modulo what there is, so that any three numbers do.
+/// One change: its kind, its place and its operand. Places are taken modulo the number of pieces, so any three numbers are valid.
 pub(crate) type Mutation = (u8, u32, u32);
 
-/// Values that were met where numbers or words should be.
+/// Unusual values for numbers and words.
 const ODD: [&str; 40] = [
     "0",
     "-0.0",
@@ -47,8 +47,8 @@ const ODD: [&str; 40] = [
     "../../x",
 ];
 
-/// Longest text that comes of it: what is read must be bounded by this.
-const LONGEST: usize = 200_000;
+/// Longest mutated text, bytes.
+const MAX_LENGTH: usize = 200_000;
 
 /// The pieces of a text: runs of word characters, runs of blanks, every other character by itself.
 fn pieces(text: &str) -> Vec<&str> {
@@ -72,7 +72,7 @@ fn pieces(text: &str) -> Vec<&str> {
     out
 }
 
-/// `seed` after one change; `others` lend words and lines.
+/// `text` after one change; words and lines are also taken from `others`.
 pub(crate) fn mutate(text: &str, others: &[String], (what, a, b): Mutation) -> String {
     let (a, b) = (a as usize, b as usize);
     let other = &others[b % others.len()];
@@ -154,8 +154,8 @@ pub(crate) fn mutate(text: &str, others: &[String], (what, a, b): Mutation) -> S
             chars.into_iter().collect()
         }
     };
-    if out.len() > LONGEST {
-        out = out.chars().take(LONGEST / 4).collect();
+    if out.len() > MAX_LENGTH {
+        out = out.chars().take(MAX_LENGTH / 4).collect();
     }
     out
 }

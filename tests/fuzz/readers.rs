@@ -1,4 +1,4 @@
-//! The readers, what they are given to begin with, and what must hold of what they take.
+//! The readers, their seed inputs, and the properties of accepted inputs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,13 +16,13 @@ use partwise::{Job, SceneSpec};
 
 use super::fuzz;
 
-/// What became of an input.
-pub(crate) enum Said {
+/// The outcome of an input.
+pub(crate) enum Outcome {
     Taken,
     Refused(String),
 }
 
-impl Said {
+impl Outcome {
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Taken => "taken",
@@ -31,8 +31,8 @@ impl Said {
     }
 }
 
-/// Words by which a message says what it found or expected; the last are the parsers' own, of TOML and JSON.
-pub(crate) const TELLING: &[&str] = &[
+/// Words of messages that state what was found, expected or needed; the last come from the TOML and JSON parsers.
+pub(crate) const INFORMATIVE: &[&str] = &[
     "expected",
     "must be",
     "found",
@@ -60,8 +60,8 @@ pub(crate) const TELLING: &[&str] = &[
     "cannot extend",
 ];
 
-pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Said, String> {
-    Ok(Said::Refused(with_causes(error, ": ")))
+pub(crate) fn refused(error: &(dyn std::error::Error + 'static)) -> Result<Outcome, String> {
+    Ok(Outcome::Refused(with_causes(error, ": ")))
 }
 
 pub(crate) fn check(holds: bool, what: &str) -> Result<(), String> {
@@ -89,13 +89,13 @@ fn range_tables() {
             Ok(table) => table,
             Err(e) => return refused(&e),
         };
-        check(table.levels.iter().all(|l| l.lower_cm.is_finite() && !l.upper_cm.is_nan()), "a bound is no number")?;
+        check(table.levels.iter().all(|l| l.lower_cm.is_finite() && !l.upper_cm.is_nan()), "a bound is not a number")?;
         let distances: Vec<f64> = (0..200).map(|i| 1e-3 * f64::from(i)).collect();
         let levels = table.assign(&distances).0;
         check(levels.len() == distances.len(), "levels do not match distances")?;
         let again = RangeTable::parse(&table.to_toml(), "again").map_err(|e| format!("written and refused: {e}"))?;
         check(again == table, "it reads back as another")?;
-        Ok(Said::Taken)
+        Ok(Outcome::Taken)
     });
 }
 
@@ -107,8 +107,8 @@ fn fabrics() {
             let numbers =
                 [f.density_kg_per_m2, f.thickness_m, f.stretch_weft_n_per_m, f.stretch_warp_n_per_m, f.shear_n_per_m];
             check(numbers.iter().chain(&f.bending_nm).all(|x| x.is_finite() && *x > 0.0), "a constant is not above 0")?;
-            check(f.poisson.is_finite() && f.friction.is_finite() && f.friction >= 0.0, "a ratio is no number")?;
-            Ok(Said::Taken)
+            check(f.poisson.is_finite() && f.friction.is_finite() && f.friction >= 0.0, "a ratio is not a number")?;
+            Ok(Outcome::Taken)
         }
     });
 }
@@ -131,7 +131,7 @@ fn fabrics_of_panels() {
                         }
                     }
                 }
-                Ok(Said::Taken)
+                Ok(Outcome::Taken)
             }
         }
     });
@@ -144,7 +144,7 @@ fn garments() {
         Ok(spec) => {
             let again = toml::from_str::<GarmentSpec>(&toml::to_string(&spec).map_err(|e| e.to_string())?);
             check(again.is_ok_and(|again| again == spec), "it reads back as another")?;
-            Ok(Said::Taken)
+            Ok(Outcome::Taken)
         }
     });
 }
@@ -165,7 +165,7 @@ fn bodies() {
                     [m.stature, m.bust, m.waist, m.hip, m.crotch_height].iter().all(|x| x.is_finite() && *x > 0.0),
                     "no length",
                 )?;
-                Ok(Said::Taken)
+                Ok(Outcome::Taken)
             }
         }
     });
@@ -173,7 +173,7 @@ fn bodies() {
 
 #[test]
 fn made_garments_on_made_bodies() {
-    // Any spec that is taken makes a mesh, or says why not: a quarter of a second each.
+    // Every accepted spec makes a mesh or is refused with the cause; each takes a quarter of a second.
     let body = toml::to_string(&BodySpec::default()).unwrap();
     let seeds = assets("garments").into_iter().map(|garment| format!("{garment}\n=====\n{body}")).collect();
     fuzz("made", 1.0 / 3000.0, seeds, |text| {
@@ -186,9 +186,9 @@ fn made_garments_on_made_bodies() {
             Err(e) => refused(&e),
             Ok(made) => {
                 check(made.mesh.vertex_count() <= 600, "it has more vertices than asked for")?;
-                check(made.mesh.positions.iter().all(|p| p.is_finite()), "a position is no number")?;
+                check(made.mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite")?;
                 check(made.rest.areas().iter().all(|a| *a > 0.0), "a triangle has no area at rest")?;
-                Ok(Said::Taken)
+                Ok(Outcome::Taken)
             }
         }
     });
@@ -202,7 +202,7 @@ fn sweep_files() {
         Ok(plan) => {
             check(!plan.points.is_empty() && plan.repeats > 0, "it has no points")?;
             check(plan.points.iter().enumerate().all(|(i, point)| point.index == i), "points are not in order")?;
-            Ok(Said::Taken)
+            Ok(Outcome::Taken)
         }
     });
 }
@@ -218,26 +218,26 @@ fn jobs() {
         Ok(job) => {
             let again = serde_json::to_string(&job).map_err(|e| e.to_string())?;
             check(serde_json::from_str::<Job>(&again).is_ok_and(|again| again == job), "it reads back as another")?;
-            Ok(Said::Taken)
+            Ok(Outcome::Taken)
         }
     });
 }
 
 #[test]
 fn patterns() {
-    // Every one that is taken is sewn, too: some milliseconds each.
+    // Every accepted pattern is also sewn, which takes some milliseconds.
     fuzz("pattern", 0.1, with_ending("patterns", "json"), |text| match pattern::parse(text, "input") {
         Err(e) => refused(&e),
         Ok(pattern) => match pattern::sew(&pattern, 0.04) {
             Err(e) => refused(&e),
             Ok(sewn) => {
-                check(sewn.mesh.positions.iter().all(|p| p.is_finite()), "a position is no number")?;
+                check(sewn.mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite")?;
                 check(sewn.rest.areas().iter().all(|a| *a > 0.0), "a triangle has no area at rest")?;
                 check(sewn.rest.corners.len() == sewn.mesh.triangles.len(), "rest and mesh differ")?;
                 let known = |v: &u32| (*v as usize) < sewn.mesh.vertex_count();
                 check(sewn.mesh.triangles.as_flattened().iter().all(known), "a triangle has no vertex")?;
                 check(pattern::to_svg(&pattern).ends_with("</svg>\n"), "its drawing has no end")?;
-                Ok(Said::Taken)
+                Ok(Outcome::Taken)
             }
         },
     });
@@ -248,6 +248,6 @@ fn names() {
     let seeds = BUILT_IN.iter().map(|name| format!("{name}@900")).chain(fabric::BUILT_IN.map(str::to_owned)).collect();
     fuzz("name", 0.2, seeds, |text| match SceneSpec::new("form", text.replace(['/', '\\', '.'], "")).check_names() {
         Err(e) => refused(&e),
-        Ok(()) => Ok(Said::Taken),
+        Ok(()) => Ok(Outcome::Taken),
     });
 }

@@ -159,7 +159,7 @@ fn a_closed_body_faces_outward_and_an_open_one_is_refused_unless_allowed() {
 }
 
 #[test]
-fn a_body_of_loose_faces_is_told_to_be_welded_and_a_scene_to_be_chosen_from() {
+fn a_body_of_loose_faces_needs_weld_and_a_scene_needs_a_group() {
     // Each face of the box with its own four corners, as formats without shared vertices write it.
     let corners: Vec<String> = inward_box().lines().filter(|l| l.starts_with('v')).map(str::to_owned).collect();
     let mut loose = String::new();

@@ -12,7 +12,7 @@ use partwise::mesh::{Axis, Unit};
 use super::{METRES, SQUARE, file, read, read_with};
 
 #[test]
-fn degenerate_double_and_unused_parts_are_dropped_and_said() {
+fn degenerate_duplicate_and_unused_parts_are_dropped_with_a_note() {
     let text = format!("v 9 9 9\n{SQUARE}f 2 3 4\nf 2 4 5\nf 4 3 2\nf 2 2 3\nf 2 3 3 4\nf 2 3\n");
     let imported = read(&text);
     assert_eq!((imported.mesh.vertex_count(), imported.mesh.triangles.len()), (4, 2));
@@ -58,7 +58,7 @@ fn panels_drawn_at_one_place_are_a_rest_shape_of_panels_that_are_apart() {
 }
 
 #[test]
-fn nothing_is_welded_unless_asked() {
+fn welding_is_off_by_default() {
     // Two triangles whose common edge is there twice.
     let text = format!("{SQUARE}v 0 0 0\nv 1 1 -0\nf 1 2 3\nf 5 6 4\n");
     let apart = read(&text);
@@ -82,7 +82,7 @@ fn winding_is_made_consistent_and_odd_edges_and_vertices_are_counted() {
 }
 
 #[test]
-fn triangles_without_area_at_rest_are_dropped_with_what_only_they_had() {
+fn triangles_without_rest_area_are_dropped_with_their_vertices() {
     // A tip without area on its own two vertices, a quad of which half has none, a sliver that is kept.
     let text = format!("{SQUARE}v 2 1 0\nv 3 1 0\nv 0.5 2 0\nf 1 2 3 4\nf 3 5 6\nf 4 3 7\n");
     let (folder, path) = file(&text);

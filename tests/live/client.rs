@@ -26,7 +26,7 @@ pub(crate) fn options() -> LiveOptions {
         address: "127.0.0.1:0".parse().unwrap(),
         host: None,
         control: None,
-        onlooker: None,
+        read_only: None,
         files: Vec::new(),
         limits: Limits::default(),
         name: "test".to_owned(),

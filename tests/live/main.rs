@@ -80,7 +80,7 @@ fn edits_answer_with_the_state_and_results_follow() {
 }
 
 #[test]
-fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
+fn invalid_edits_are_refused_and_the_session_continues() {
     let live = Live::start(&options());
     let json = "Content-Type: application/json";
     let deep = "[".repeat(100_000);
@@ -143,10 +143,10 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
         ("PUT", "/", vec![], "", 405, "GET"),
     ];
     for (method, path, headers, body, status, words) in cases {
-        let (found, said) = live.ask(method, path, &headers, body);
+        let (found, answer) = live.ask(method, path, &headers, body);
         let start: String = body.chars().take(80).collect();
-        assert_eq!(found, status, "{method} {path} {headers:?} {start}: {said}");
-        let sentence = said["error"].as_str().unwrap_or_else(|| panic!("{path}: {said}"));
+        assert_eq!(found, status, "{method} {path} {headers:?} {start}: {answer}");
+        let sentence = answer["error"].as_str().unwrap_or_else(|| panic!("{path}: {answer}"));
         assert!(sentence.contains(words) && sentence.len() < 2100, "{method} {path} {start}: {sentence}");
     }
     // A body that does not say how long it is.
@@ -165,8 +165,8 @@ fn whatever_cannot_be_used_is_refused_and_the_session_goes_on() {
 #[test]
 fn pinned_states_become_a_sweep_that_makes_them_again() {
     let live = Live::start(&options());
-    let (status, said) = live.get("/api/sweep.toml");
-    assert!(status == 409 && said["error"].as_str().unwrap().contains("pinned"), "{said}");
+    let (status, answer) = live.get("/api/sweep.toml");
+    assert!(status == 409 && answer["error"].as_str().unwrap().contains("pinned"), "{answer}");
     let mut counts = Vec::new();
     for edit in [r#"{"refine": {"steps": 0}}"#, r#"{"table": {"levels": [[0, 2], [2, "inf", 12]]}, "fabric": "denim"}"#]
     {
@@ -191,9 +191,9 @@ fn pinned_states_become_a_sweep_that_makes_them_again() {
 #[test]
 fn elsewhere_a_token_steers_and_another_looks_on() {
     // Characters that mean something in an address are encoded there.
-    let (control, onlooker) = ("c&#%+ c".repeat(5), "o".repeat(32));
+    let (control, read_only) = ("c&#%+ c".repeat(5), "o".repeat(32));
     let encoded = "c%26%23%25%2B%20c".repeat(5);
-    let far = LiveOptions { control: Some(control.clone()), onlooker: Some(onlooker.clone()), ..options() };
+    let far = LiveOptions { control: Some(control.clone()), read_only: Some(read_only.clone()), ..options() };
     let live = Live::start(&far);
     let bearer = |token: &str| format!("Authorization: Bearer {token}");
     let ask = |method: &str, path: &str, token: Option<&str>| {
@@ -210,11 +210,11 @@ fn elsewhere_a_token_steers_and_another_looks_on() {
         assert_eq!(ask("GET", path, None).0, 401, "{path}");
         assert_eq!(ask("GET", path, Some("guess")).0, 401, "{path}");
     }
-    assert_eq!(ask("GET", "/api/state", Some(&onlooker)).1["may_steer"], false);
+    assert_eq!(ask("GET", "/api/state", Some(&read_only)).1["may_steer"], false);
     for (method, path) in
         [("PATCH", "/api/state"), ("POST", "/api/undo"), ("POST", "/api/pins"), ("DELETE", "/api/pins/1")]
     {
-        assert_eq!(ask(method, path, Some(&onlooker)).0, 403, "{path}");
+        assert_eq!(ask(method, path, Some(&read_only)).0, 403, "{path}");
     }
     assert_eq!(ask("PATCH", "/api/state", Some(&control)).0, 200);
     assert_eq!(live.get(&format!("/api/state?token={encoded}")).0, 200);
@@ -226,7 +226,7 @@ fn elsewhere_a_token_steers_and_another_looks_on() {
 }
 
 #[test]
-fn a_port_in_use_is_told() {
+fn a_port_in_use_is_reported() {
     let live = Live::start(&options());
     let taken = LiveOptions { address: live.address, ..options() };
     let error = LiveServer::start(&Session::new(partwise::Job::default(), true), &taken).err().unwrap();
@@ -271,7 +271,7 @@ fn events_tell_each_state_and_a_reader_that_never_reads_hinders_nobody() {
 }
 
 #[test]
-fn a_viewer_gets_triangles_once_and_then_what_moved() {
+fn a_viewer_gets_triangles_once_and_then_positions() {
     let live = Live::start(&options());
     let mut stream = BufReader::new(live.open("GET", "/api/stream", &[]));
     assert_eq!(head(&mut stream).0, 200);
@@ -319,8 +319,13 @@ fn the_lines_of_the_documentation_run() {
         let ended = shell.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
         // 28: the time that events were asked for is over.
         let fine = ended.status.success() || line.contains("--max-time") && ended.status.code() == Some(28);
-        let said = String::from_utf8_lossy(&ended.stdout);
-        assert!(fine && !said.is_empty(), "{line}: {} {said} {}", ended.status, String::from_utf8_lossy(&ended.stderr));
+        let answer = String::from_utf8_lossy(&ended.stdout);
+        assert!(
+            fine && !answer.is_empty(),
+            "{line}: {} {answer} {}",
+            ended.status,
+            String::from_utf8_lossy(&ended.stderr)
+        );
     }
     let done = live.idle();
     assert_eq!(done["job"]["measurements"]["waist"], 76.0);

@@ -36,7 +36,7 @@ fn asked(path: &str) -> String {
 
 #[test]
 #[allow(clippy::print_stderr, reason = "a test that reports what it measured")]
-fn whatever_is_asked_is_answered_and_the_session_goes_on() {
+fn every_request_is_answered_and_the_session_continues() {
     let (requests, limit_s) = std::env::var("PARTWISE_FUZZ_REQUESTS")
         .map_or((200, f64::INFINITY), |text| (text.parse::<u32>().unwrap(), 1.0));
     let mut slowest_s = 0.0_f64;
@@ -56,17 +56,17 @@ fn whatever_is_asked_is_answered_and_the_session_goes_on() {
             _ => (path.to_owned(), mutate(body, &bodies, change(1))),
         };
         let path = if path.starts_with('/') { path } else { format!("/{path}") };
-        let (status, said) = live.ask(method, &path, &[kind], &body);
+        let (status, answer) = live.ask(method, &path, &[kind], &body);
         let what: String = format!("request {i}: {method} {path} {body}").chars().take(600).collect();
         match status {
             200 => taken += 1,
             400..500 => {
-                let sentence = said["error"].as_str().unwrap_or_else(|| panic!("{what}: {said}"));
+                let sentence = answer["error"].as_str().unwrap_or_else(|| panic!("{what}: {answer}"));
                 let plain = sentence.chars().all(|c| !c.is_control() || c == '\n' || c == '\t');
                 assert!(plain && !sentence.is_empty() && sentence.len() < 2100, "{what}: {sentence:?}");
                 refused += 1;
             }
-            _ => panic!("{what}: {status} {said}"),
+            _ => panic!("{what}: {status} {answer}"),
         }
         let asked = Instant::now();
         assert_eq!(live.get("/api/state").0, 200, "{what}");

@@ -35,7 +35,7 @@ fn save(table: &Path, levels: &str) {
 }
 
 #[test]
-fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_it() {
+fn saves_make_states_despite_other_changes_in_the_folder_until_an_interrupt() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("mine.toml");
     save(&table, "[[0, inf]]");
@@ -53,8 +53,8 @@ fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_i
             }
         });
         let next = || {
-            let told = results.recv_timeout(Duration::from_secs(120)).unwrap();
-            (told["part_count"].as_u64().unwrap(), told["since_last"].as_str().map(str::to_owned))
+            let result = results.recv_timeout(Duration::from_secs(120)).unwrap();
+            (result["part_count"].as_u64().unwrap(), result["since_last"].as_str().map(str::to_owned))
         };
         let (first, since) = next();
         assert_eq!(since, None);
@@ -74,9 +74,9 @@ fn saves_make_states_whatever_else_happens_in_the_folder_and_an_interrupt_ends_i
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", asked.elapsed());
-    let mut said = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-    assert!(said.contains("row 2 starts at 1"), "{said}");
+    let mut message = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
+    assert!(message.contains("row 2 starts at 1"), "{message}");
 }
 
 /// Resident memory of a process, MB.
@@ -91,7 +91,7 @@ fn resident_mb(child: &Child) -> f64 {
 #[test]
 #[cfg(target_os = "linux")]
 #[allow(clippy::print_stderr, reason = "a test that tells what it measured")]
-fn memory_does_not_grow_with_edits_beyond_what_is_kept_for_pages() {
+fn memory_does_not_grow_with_the_number_of_edits() {
     let edits = std::env::var("PARTWISE_WATCH_EDITS").map_or(60, |text| text.parse::<usize>().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("mine.toml");
@@ -106,8 +106,8 @@ fn memory_does_not_grow_with_edits_beyond_what_is_kept_for_pages() {
     }
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     child.wait().unwrap();
-    let told: Vec<String> = memory.iter().step_by((edits / 12).max(1)).map(|mb| format!("{mb:.0}")).collect();
-    eprintln!("{edits} edits, resident, MB: {}, at the end {:.0}", told.join(" "), memory[edits - 1]);
+    let samples: Vec<String> = memory.iter().step_by((edits / 12).max(1)).map(|mb| format!("{mb:.0}")).collect();
+    eprintln!("{edits} edits, resident, MB: {}, at the end {:.0}", samples.join(" "), memory[edits - 1]);
     // Without the bound each edit of this garment stays, 0.3 MB at the least; allocators breathe.
     let (half, end) = (memory[edits / 2], memory[edits - 1]);
     assert!(

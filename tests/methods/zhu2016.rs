@@ -49,7 +49,7 @@ fn dressed() -> Scene {
 }
 
 #[test]
-fn the_hierarchy_finds_what_an_exact_search_finds() {
+fn the_hierarchy_agrees_with_an_exact_search() {
     let scene = dressed();
     let fabric = isotropic(0.2, 60.0, 0.3, 1e-5);
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabric, &[]).unwrap();

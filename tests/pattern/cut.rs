@@ -36,7 +36,7 @@ fn by_name(name: &str) -> Fabric {
 }
 
 #[test]
-fn panels_are_cut_from_what_the_file_beside_the_pattern_says() {
+fn panels_get_the_fabrics_of_the_file_beside_the_pattern() {
     let dial = by_name("wool");
     let of = |loaded: &Loaded, panel: &str| {
         let group = loaded.scene.garment.groups.iter().position(|g| g == panel).unwrap() as u32;
@@ -81,7 +81,7 @@ fn a_fabrics_file_counts_from_the_file_that_names_it() {
 }
 
 #[test]
-fn files_that_say_nothing_useful_are_told_so() {
+fn invalid_fabric_files_are_refused_with_the_cause() {
     for (file, words) in [
         ("[panels]\nback = \"tweed\"\n", &["shirt.fabrics.toml", "line 2", "panels.back", "tweed", "denim"][..]),
         ("[panels]\n\n\"sleeve*\" = \"silk\"\n", &["line 3", "sleeve*", "shirt", "front, back"]),
@@ -92,23 +92,26 @@ fn files_that_say_nothing_useful_are_told_so() {
         ("[panels]\nback = \"missing.toml\"\n", &["line 2", "missing.toml", "cannot be read"]),
         ("[panels]\n\"b*\" = \"silk\"\n\"*k\" = \"denim\"\n", &["back", "b*", "*k", "line of its own"]),
     ] {
-        let said = load(file).err().unwrap_or_default();
+        let message = load(file).err().unwrap_or_default();
         for word in words {
-            assert!(said.contains(word), "{file:?} should say {word:?}: {said}");
+            assert!(message.contains(word), "{file:?} should say {word:?}: {message}");
         }
     }
     let (folder, spec) = shirt("default = \"silk\"\n");
     let wrong = |spec: &SceneSpec| spec.load().unwrap_err().to_string();
     let given = |fabrics: &[&str]| fabrics.iter().map(|f| (*f).to_owned()).collect();
-    let said = wrong(&SceneSpec { fabrics: given(&["denim"]), ..spec.clone() });
-    assert!(said.contains("silk") && said.contains("denim") && said.contains("take one of them away"), "{said}");
-    let said = wrong(&SceneSpec { fabrics: given(&["denim", "silk"]), ..spec.clone() });
-    assert!(said.contains("2 fabrics for 1 garments"), "{said}");
+    let message = wrong(&SceneSpec { fabrics: given(&["denim"]), ..spec.clone() });
+    assert!(
+        message.contains("silk") && message.contains("denim") && message.contains("take one of them away"),
+        "{message}"
+    );
+    let message = wrong(&SceneSpec { fabrics: given(&["denim", "silk"]), ..spec.clone() });
+    assert!(message.contains("2 fabrics for 1 garments"), "{message}");
     let nowhere = folder.path().join("nowhere.toml").display().to_string();
-    let said = wrong(&SceneSpec { fabrics_file: Some(nowhere.clone()), ..spec.clone() });
-    assert!(said.contains("nowhere.toml") && said.contains("cannot be read"), "{said}");
-    let said = wrong(&SceneSpec { fabrics_file: Some(nowhere), over: given(&["flared-skirt"]), ..spec });
-    assert!(said.contains("2 garments, expected one"), "{said}");
+    let message = wrong(&SceneSpec { fabrics_file: Some(nowhere.clone()), ..spec.clone() });
+    assert!(message.contains("nowhere.toml") && message.contains("cannot be read"), "{message}");
+    let message = wrong(&SceneSpec { fabrics_file: Some(nowhere), over: given(&["flared-skirt"]), ..spec });
+    assert!(message.contains("2 garments, expected one"), "{message}");
 }
 
 /// How far nine in ten triangles of a panel are stretched at most, along the weft or the warp.
@@ -127,7 +130,7 @@ fn stretched(loaded: &Loaded, drape: &Drape, panel: u32) -> f64 {
 }
 
 #[test]
-fn a_denim_back_stretches_less_than_one_in_jersey_and_weighs_what_it_weighs() {
+fn a_denim_back_stretches_less_than_a_jersey_back_and_has_its_weight() {
     let settings = Settings { fabric: by_name("jersey"), ..Settings::default() };
     let (jersey, half) = (load("").unwrap(), load("[panels]\nback = \"denim\"\n").unwrap());
     let [of_jersey, of_half] = [&jersey, &half].map(|loaded| drape(&loaded.scene, &settings, &mut unobserved).unwrap());

@@ -59,7 +59,7 @@ fn seams_of_patterns_are_closed_outside_the_body() {
         let p95 = strains[strains.len() * 95 / 100];
         assert!(p95 < 0.1, "{name}: strain P95 {p95} before any drape");
         assert_eq!(!scene.held.is_empty(), held, "{name}");
-        assert!(scene.let_go);
+        assert!(scene.releases_held);
         let again = SceneSpec { edge_cm: 2.5, ..SceneSpec::new("form", asset(name)) }.load().unwrap();
         assert_eq!(again.scene.garment, scene.garment);
     }

@@ -18,7 +18,7 @@ fn skin(scene: &Scene, drape: &Drape) -> usize {
 }
 
 #[test]
-fn a_pullover_over_a_skirt_rests_without_a_crossing_whatever_the_threads() {
+fn a_pullover_over_a_skirt_rests_without_intersections_on_any_number_of_threads() {
     let scene = outfit(DistanceTo::Body);
     let settings = Settings::default();
     let on = |threads: usize| {
@@ -86,7 +86,7 @@ fn each_garment_has_its_own_fabric_and_all_of_them_rest() {
 }
 
 #[test]
-fn parts_are_those_of_each_garment_and_distances_count_to_what_is_asked() {
+fn parts_do_not_span_garments_and_distances_count_to_the_chosen_surface() {
     let settings = Settings { refine: Refine::Steps(0), ..Settings::default() };
     let (to_body, to_below) = (outfit(DistanceTo::Body), outfit(DistanceTo::Below));
     let both = drape(&to_body, &settings, &mut unobserved).unwrap();

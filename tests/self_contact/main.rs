@@ -146,7 +146,7 @@ fn a_cloth_on_a_ball_and_the_floor_lies_in_folds() {
 }
 
 #[test]
-fn sheets_that_cross_come_apart() {
+fn intersecting_sheets_separate() {
     // The one is held at its upper edge; the other, held too, was pushed through it up to a third.
     let h = 0.01;
     let one = sheet(12, 12, DVec3::new(-0.06, 0.0, 0.0), DVec3::X * h, DVec3::NEG_Z * h);
@@ -210,7 +210,7 @@ fn a_ring_through_a_ring_is_carried_by_it() {
 }
 
 #[test]
-fn a_garment_that_touches_itself_ends_without_a_crossing_whatever_the_threads() {
+fn a_garment_in_self_contact_ends_without_intersections_on_any_number_of_threads() {
     // A pullover in cotton, small for its vertices, whose sleeves fold.
     let scene = SceneSpec { garment: "flared-skirt@1500".into(), ..SceneSpec::default() }.load().unwrap().scene;
     let settings = Settings { fabric: Fabric::by_name("cotton").unwrap(), ..Settings::default() };

@@ -49,7 +49,7 @@ fn a_coarse_cloth_lies_on_a_knob_that_would_show_through_it() {
 }
 
 #[test]
-fn a_foot_that_sticks_through_a_trouser_leg_is_said_and_taken_inside() {
+fn a_foot_through_a_trouser_leg_is_reported_and_moved_inside() {
     // Four centimetres thick, and 5 cm out of the leg.
     let round = ball(1.0);
     let at = |x: &DVec3| DVec3::new(0.045, 0.0, 0.03) + (*x - DVec3::Z) * DVec3::new(0.095, 0.035, 0.02);
@@ -74,8 +74,8 @@ fn a_foot_that_sticks_through_a_trouser_leg_is_said_and_taken_inside() {
     let spec = SceneSpec::new(on.display().to_string(), cut.display().to_string());
     let spec = SceneSpec { unit: Some(Unit::M), up: Some(Axis::Z), hold: Some("top".into()), ..spec };
     let loaded = spec.load().unwrap();
-    let said = loaded.notes().join("\n");
-    assert!(said.contains("stuck through the garment") && loaded.warnings().is_empty(), "{said}");
+    let message = loaded.notes().join("\n");
+    assert!(message.contains("stuck through the garment") && loaded.warnings().is_empty(), "{message}");
     // As it was put on it is taken inside when it has come to rest.
     let as_it_is = SceneSpec { push_out: false, ..spec }.load().unwrap();
     assert_eq!(as_it_is.pushed_out.off_ends_m, 0.0);

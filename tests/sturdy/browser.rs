@@ -30,12 +30,12 @@ fn serving(mut command: Command) -> (String, Child) {
 }
 
 /// The stderr of a child, which is killed first.
-fn said(mut child: Child) -> String {
+fn stderr_of(mut child: Child) -> String {
     child.kill().unwrap();
-    let mut said = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    let mut message = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
     child.wait().unwrap();
-    said
+    message
 }
 
 fn soon(what: impl Fn() -> bool) -> bool {
@@ -76,9 +76,9 @@ fn the_page_is_opened_in_the_browser_that_is_named_or_that_the_system_has() {
             }
             let opened = || fs::read_to_string(bench.path("opened")).unwrap_or_default();
             let as_asked = soon(|| opened().lines().eq(&expected));
-            let said = said(child);
-            assert!(as_asked, "{line:?} with {browser:?}: found {:?}, expected {expected:?}: {said}", opened());
-            assert!(!said.contains("--open"), "{said}");
+            let message = stderr_of(child);
+            assert!(as_asked, "{line:?} with {browser:?}: found {:?}, expected {expected:?}: {message}", opened());
+            assert!(!message.contains("--open"), "{message}");
         }
     }
 }
@@ -96,7 +96,7 @@ fn without_a_browser_the_page_is_served_all_the_same() {
         assert!(std::net::TcpStream::connect(host).is_ok() && child.try_wait().unwrap().is_none());
         let _ = soon(|| browser != broken || bench.path("opened").exists());
         std::thread::sleep(Duration::from_millis(300));
-        let said = said(child);
-        assert!(said.contains(why) && said.contains("open the address by hand"), "{said}");
+        let message = stderr_of(child);
+        assert!(message.contains(why) && message.contains("open the address by hand"), "{message}");
     }
 }

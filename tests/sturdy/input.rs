@@ -22,7 +22,7 @@ fn numbers_beyond_all_measure_are_refused_with_their_limit() {
 }
 
 #[test]
-fn what_the_user_can_mend_ends_with_two() {
+fn errors_of_the_user_exit_with_code_2() {
     let bench = Bench::new();
     bench.run(&["merge", "nope", "--out", "x"]).with(2, &["nope", "partwise sweep"]);
     bench.run(&["merge", "body.obj", "--out", "x"]).with(2, &["body.obj", "partwise sweep"]);
@@ -206,7 +206,7 @@ fn figures_beyond_all_measure_in_a_row_are_merged_in_little_memory() {
 }
 
 #[test]
-fn a_group_by_the_name_of_an_edge_is_held_and_said_and_a_long_name_is_cut() {
+fn a_group_named_like_an_edge_is_held_with_a_note_and_a_long_name_is_shortened() {
     let bench = Bench::new();
     bench.write("named.obj", &GARMENT.replacen("f 1 2 5", "g top\nf 1 2 5\ng rest", 1));
     let named =
@@ -216,7 +216,7 @@ fn a_group_by_the_name_of_an_edge_is_held_and_said_and_a_long_name_is_cut() {
     let long = ["--body", "body.obj", "--garment", "long.obj", "--unit", "m", "--up", "z", "--no-save"];
     let refused = bench.run(&[&long[..], &["--hold", "cuff"]].concat());
     refused.with(2, &["cuff", "bytes in all", "rest"]);
-    assert!(refused.said.len() < 1000, "{} bytes", refused.said.len());
+    assert!(refused.stderr.len() < 1000, "{} bytes", refused.stderr.len());
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn constants_of_no_cloth_are_warned_of() {
 }
 
 #[test]
-fn a_number_below_zero_is_told_what_it_may_be() {
+fn a_negative_number_is_refused_with_the_allowed_range() {
     let bench = Bench::new();
     let pattern = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/patterns/skirt.json");
     for (line, expected) in [
@@ -242,9 +242,9 @@ fn a_number_below_zero_is_told_what_it_may_be() {
         (vec!["tune", "--max-parts", "0"], "a whole number of PARTs, 1 or more"),
         (vec!["tune", "--max-parts", "-5"], "found `-5`"),
     ] {
-        let told = bench.run(&line);
-        told.with(2, &[expected]);
-        assert!(!told.said.contains("unexpected argument"), "{}", told.said);
+        let refused = bench.run(&line);
+        refused.with(2, &[expected]);
+        assert!(!refused.stderr.contains("unexpected argument"), "{}", refused.stderr);
     }
 }
 
@@ -254,15 +254,15 @@ fn messages_neither_move_the_cursor_nor_fill_the_screen() {
     bench.write("escape.obj", "v 0 0 0\nv \u{1b}]0;title\u{7} 0 0\n");
     let escape = bench.run(&["--body", "body.obj", "--garment", "escape.obj", "--no-save"]);
     escape.with(2, &["escape.obj, line 2", "\\u{1b}]0;title"]);
-    assert!(!escape.said.contains(|c: char| c.is_control() && c != '\n'), "{:?}", escape.said);
+    assert!(!escape.stderr.contains(|c: char| c.is_control() && c != '\n'), "{:?}", escape.stderr);
     bench.write("long.obj", &format!("v 0 0 0\nv {} 0 0\n", "x".repeat(3_000_000)));
     let long = bench.run(&["--body", "body.obj", "--garment", "long.obj", "--no-save"]);
     long.with(2, &["long.obj, line 2", "3000000 bytes"]);
-    assert!(long.said.len() < 1000, "{} bytes", long.said.len());
+    assert!(long.stderr.len() < 1000, "{} bytes", long.stderr.len());
     bench.write("table.toml", &format!("levels = \"{}\"\n", "y".repeat(3_000_000)));
     let table = bench.drape(&["--no-save", "--table", "table.toml"]);
     table.with(2, &["table.toml"]);
-    assert!(table.said.len() < 5000, "{} bytes", table.said.len());
+    assert!(table.stderr.len() < 5000, "{} bytes", table.stderr.len());
 }
 
 #[test]
@@ -280,7 +280,7 @@ fn names_of_files_need_not_be_unicode() {
     let mut arguments: Vec<_> = tune.iter().map(|a| OsStr::new(a).to_owned()).collect();
     arguments.extend([name(b"--format"), name(b"json"), name(b"--out"), name(b"d\xff")]);
     let tuned = bench.run(&arguments);
-    assert!(!tuned.said.contains("panicked"), "{}", tuned.said);
+    assert!(!tuned.stderr.contains("panicked"), "{}", tuned.stderr);
 }
 
 /// SplitMix64, for mutations that are the same everywhere.
@@ -322,10 +322,10 @@ fn mutated_recordings_are_viewed_or_refused() {
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
         if address.is_empty() {
-            let mut said = String::new();
-            child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-            assert_eq!(child.wait().unwrap().code(), Some(2), "mutation {i}: {said}");
-            assert!(said.contains("mutated.rrd") && !said.contains("panicked"), "mutation {i}: {said}");
+            let mut message = String::new();
+            child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
+            assert_eq!(child.wait().unwrap().code(), Some(2), "mutation {i}: {message}");
+            assert!(message.contains("mutated.rrd") && !message.contains("panicked"), "mutation {i}: {message}");
             refused += 1;
         } else {
             assert!(address.starts_with("http://127.0.0.1:"), "{address}");

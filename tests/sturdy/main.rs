@@ -5,8 +5,8 @@
 
 mod browser;
 mod input;
+mod messages;
 mod outputs;
-mod told;
 mod waiting;
 
 use std::ffi::OsStr;
@@ -69,23 +69,23 @@ impl Bench {
 
 struct Ended {
     code: Option<i32>,
-    said: String,
+    stderr: String,
     took: Duration,
 }
 
 impl Ended {
     #[track_caller]
     fn with(&self, code: i32, words: &[&str]) {
-        assert_eq!(self.code, Some(code), "{}", self.said);
+        assert_eq!(self.code, Some(code), "{}", self.stderr);
         for word in words {
-            assert!(self.said.contains(word), "should say `{word}`: {}", self.said);
+            assert!(self.stderr.contains(word), "should say `{word}`: {}", self.stderr);
         }
-        assert!(!self.said.contains("panicked"), "{}", self.said);
+        assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
     }
 }
 
 fn ended(command: &mut Command) -> Ended {
     let started = Instant::now();
     let Output { status, stderr, .. } = command.output().unwrap();
-    Ended { code: status.code(), said: String::from_utf8_lossy(&stderr).into_owned(), took: started.elapsed() }
+    Ended { code: status.code(), stderr: String::from_utf8_lossy(&stderr).into_owned(), took: started.elapsed() }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::{Bench, SCENE, ended};
 
 #[test]
-fn devices_stay_devices_and_a_full_one_is_said() {
+fn devices_are_kept_and_a_full_device_is_reported() {
     let bench = Bench::new();
     bench.drape(&["--save", "/dev/null", "--export", "/dev/null"]).with(0, &[]);
     bench.drape(&["--save", "/dev/full"]).with(2, &["/dev/full", "No space left"]);
@@ -34,7 +34,7 @@ fn an_output_that_cannot_be_is_refused_before_anything_is_read_or_solved() {
         arguments.extend(output);
         let ended = bench.run(&arguments);
         ended.with(2, &[output[1], "cannot"]);
-        assert!(!ended.said.contains("nowhere.obj"), "{}", ended.said);
+        assert!(!ended.stderr.contains("nowhere.obj"), "{}", ended.stderr);
     }
     assert_eq!(bench.names(), ["body.obj", "garment.obj"]);
 }
@@ -156,7 +156,7 @@ fn links_are_written_through_and_planted_ones_left_alone() {
 }
 
 #[test]
-fn what_is_written_is_what_the_name_says_and_where_one_works() {
+fn the_ending_of_a_name_chooses_the_format_relative_to_the_working_folder() {
     let bench = Bench::new();
     bench.drape(&["--no-save", "--export", "garment.fbx"]).with(2, &["--export", ".fbx", ".obj"]);
     assert!(!bench.path("garment.fbx").exists());
@@ -196,7 +196,7 @@ fn two_runs_at_once_on_one_output_and_one_cache_leave_one_whole_file_each() {
 }
 
 #[test]
-fn a_poisoned_reference_is_computed_again_and_said() {
+fn a_damaged_reference_is_recomputed_with_a_note() {
     let bench = Bench::new();
     let run = || bench.run(&["--garment", "flared-skirt@400", "--no-save", "--accuracy", "--cache", "kept"]);
     run().with(0, &[]);
@@ -237,12 +237,12 @@ fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
         let run =
             ended(command.current_dir(bench.0.path()).env("XDG_CACHE_HOME", bench.0.path()).arg("-c").arg(&script));
         // A sweep whose points cannot be kept has failed points, which is no mistake of the user's.
-        let failed = run.said.contains("points failed");
-        assert_eq!(run.code, Some(if failed { 1 } else { 2 }), "{arguments}: {}", run.said);
+        let failed = run.stderr.contains("points failed");
+        assert_eq!(run.code, Some(if failed { 1 } else { 2 }), "{arguments}: {}", run.stderr);
         // A point that could not be kept is a row, which says so.
         let rows = fs::read_to_string(bench.path("part/rows.jsonl")).unwrap_or_default();
-        assert!(run.said.contains("too large") || rows.contains("too large"), "{arguments}: {}", run.said);
-        assert!(!run.said.contains("panicked"), "{arguments}: {}", run.said);
+        assert!(run.stderr.contains("too large") || rows.contains("too large"), "{arguments}: {}", run.stderr);
+        assert!(!run.stderr.contains("panicked"), "{arguments}: {}", run.stderr);
         assert!(run.took < Duration::from_secs(90), "{arguments}: {:?}", run.took);
         let left = Command::new("find").arg(bench.0.path()).args(["-name", "*.part"]).output().unwrap().stdout;
         assert!(left.is_empty(), "{arguments}: {}", String::from_utf8_lossy(&left));

@@ -70,10 +70,10 @@ fn a_viewer_that_is_closed_ends_no_watch_and_takes_no_recording_with_it() {
     table("[[0, 10], [10, inf]]");
     assert!(parts(results.next().unwrap().unwrap()) > Some(1));
     let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    let mut said = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
-    assert!(said.contains("a viewer does not take the data"), "{said}");
+    let mut message = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{message}");
+    assert!(message.contains("a viewer does not take the data"), "{message}");
     bench.run(&["view", "--check", "kept.rrd"]).with(0, &[]);
 }
 
@@ -86,9 +86,9 @@ fn ctrl_c_ends_a_drape_test_even_where_the_shell_ignores_it() {
     let mut shell = Command::new("sh");
     let mut child = shell.arg("-c").arg(script).current_dir(bench.0.path()).stdout(Stdio::piped()).spawn().unwrap();
     // Before its trap is set the shell itself would be interrupted.
-    let mut said = [0; 6];
-    child.stdout.take().unwrap().read_exact(&mut said).unwrap();
-    assert_eq!(&said, b"ready\n");
+    let mut message = [0; 6];
+    child.stdout.take().unwrap().read_exact(&mut message).unwrap();
+    assert_eq!(&message, b"ready\n");
     let patience = Instant::now() + Duration::from_secs(60);
     let code = loop {
         let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
@@ -124,10 +124,10 @@ fn ctrl_c_while_a_mesh_is_made_ends_the_run_at_once() {
     }
     let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let status = child.wait().unwrap();
-    let mut said = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-    assert_eq!(status.code(), Some(130), "{said}");
-    assert!(!said.contains("the results so far are kept"), "{said}");
+    let mut message = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
+    assert_eq!(status.code(), Some(130), "{message}");
+    assert!(!message.contains("the results so far are kept"), "{message}");
 }
 
 #[test]
@@ -186,13 +186,15 @@ fn a_session_is_shown_to_a_viewer_that_comes_late_and_to_one_that_comes_back() {
     command.arg("live").args(super::SCENE).args(["--port", "0", "--record", "kept.rrd"]);
     command.args(["--connect", &format!("rerun+http://127.0.0.1:{port}/proxy")]);
     let mut session = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let said = std::io::BufRead::lines(std::io::BufReader::new(session.stderr.take().unwrap()));
-    let (tell, told) = std::sync::mpsc::channel();
-    std::thread::spawn(move || said.map_while(Result::ok).try_for_each(|line| tell.send(line)));
+    let lines = std::io::BufRead::lines(std::io::BufReader::new(session.stderr.take().unwrap()));
+    let (tell, received) = std::sync::mpsc::channel();
+    std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| tell.send(line)));
     let mut all = Vec::new();
     let mut until = |words: &str| {
         while !all.last().is_some_and(|line: &String| line.contains(words)) {
-            let Ok(line) = told.recv_timeout(Duration::from_secs(60)) else { return Err(format!("{words}: {all:?}")) };
+            let Ok(line) = received.recv_timeout(Duration::from_secs(60)) else {
+                return Err(format!("{words}: {all:?}"));
+            };
             all.push(line);
         }
         Ok(())

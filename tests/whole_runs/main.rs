@@ -37,7 +37,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 /// Memory that one run may ask for, KiB: the program and its libraries map two gigabytes before anything is read.
 const MEMORY: u64 = 6 << 20;
 /// Longest message: errors quote, and cut what they quote.
-const LONGEST_SAID: usize = 20_000;
+const MAX_STDERR: usize = 20_000;
 
 /// How a run ended, or what is wrong with it.
 fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
@@ -72,29 +72,29 @@ fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
         }
         std::thread::sleep(Duration::from_millis(2));
     };
-    let mut said = Vec::new();
-    fs::File::open(&err).unwrap().read_to_end(&mut said).unwrap();
-    let said = String::from_utf8(said).map_err(|_| "what it says is no text".to_owned())?;
-    if said.contains("panicked") || said.contains("overflowed its stack") {
-        return Err(format!("it panicked: {said}"));
+    let mut message = Vec::new();
+    fs::File::open(&err).unwrap().read_to_end(&mut message).unwrap();
+    let message = String::from_utf8(message).map_err(|_| "what it says is no text".to_owned())?;
+    if message.contains("panicked") || message.contains("overflowed its stack") {
+        return Err(format!("it panicked: {message}"));
     }
-    if said.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
-        return Err(format!("control characters in what it says: {said:?}"));
+    if message.chars().any(|c| c.is_control() && c != '\n' && c != '\t') {
+        return Err(format!("control characters in what it says: {message:?}"));
     }
-    if said.len() > LONGEST_SAID {
-        return Err(format!("it says {} bytes", said.len()));
+    if message.len() > MAX_STDERR {
+        return Err(format!("it says {} bytes", message.len()));
     }
     let outcome = match status.code() {
         Some(0) => "done",
         Some(2) => "refused",
         // A sweep of which points failed, each a row that says why.
-        Some(1) if said.contains("points failed: the column `error`") => "failed points",
+        Some(1) if message.contains("points failed: the column `error`") => "failed points",
         // A certificate that is not given, which names what it is that fails.
-        Some(1) if said.contains("not certified") => "not certified",
-        other => return Err(format!("it ended with {other:?} ({status}): {said}")),
+        Some(1) if message.contains("not certified") => "not certified",
+        other => return Err(format!("it ended with {other:?} ({status}): {message}")),
     };
-    if outcome != "done" && !said.contains("error: ") {
-        return Err(format!("refused without a word: {said}"));
+    if outcome != "done" && !message.contains("error: ") {
+        return Err(format!("refused without a word: {message}"));
     }
     let half: Vec<PathBuf> =
         all_files(folder).into_iter().filter(|p| p.extension().is_some_and(|e| e == "part")).collect();
@@ -117,15 +117,15 @@ fn all_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Whether the exported garment loads and has the reported figures.
-fn agrees(folder: &Path, told: &str, converged: bool) -> Result<(), String> {
-    let report: serde_json::Value = serde_json::from_str(told).map_err(|e| format!("no JSON: {e}: {told}"))?;
+fn agrees(folder: &Path, report: &str, converged: bool) -> Result<(), String> {
+    let report: serde_json::Value = serde_json::from_str(report).map_err(|e| format!("no JSON: {e}: {report}"))?;
     let exported = fs::read_to_string(folder.join("out.obj")).map_err(|e| format!("no export: {e}"))?;
     let coordinates = exported.lines().filter(|line| line.starts_with('v')).flat_map(str::split_whitespace).skip(1);
     if coordinates.filter_map(|word| word.parse::<f64>().ok()).any(|x| !x.is_finite()) {
         return Err("the export holds what is no number".to_owned());
     }
     if converged && (report["strain_max"].is_null() || report["residual_over_weight"].is_null()) {
-        return Err(format!("a figure is no number: {told}"));
+        return Err(format!("a figure is no number: {report}"));
     }
     let place = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let spec = SceneSpec {
@@ -159,9 +159,9 @@ fn keep(case: &Case, number: u32, reason: &str) {
     for (name, bytes) in &case.files {
         fs::write(kept.join(name.replace('/', "-")), bytes).unwrap();
     }
-    let told = format!("run {number}: partwise {}\n{reason}\n", case.arguments.join(" "));
-    fs::write(kept.join("told.txt"), &told).unwrap();
-    eprintln!("{told}");
+    let report = format!("run {number}: partwise {}\n{reason}\n", case.arguments.join(" "));
+    fs::write(kept.join("report.txt"), &report).unwrap();
+    eprintln!("{report}");
 }
 
 #[test]

@@ -133,7 +133,7 @@ impl RunArgs {
         add_time("method", drape.total);
         add_time("measure", measuring.elapsed());
         let mut warnings = [loaded.warnings(), metrics.warnings(&input), fabric.warnings()].concat();
-        if scene.let_go && !scene.held.is_empty() {
+        if scene.releases_held && !scene.held.is_empty() {
             warnings.push(format!("{} does not release held edges: they stay held", self.method));
         }
         let mut report = Report {

@@ -94,7 +94,7 @@ function show() {
   at("status").textContent =
     `state ${state.state} · PARTs ${parts?.count ?? "–"} ${done(parts)} · two stages ${preview?.warm ? "…" : done(preview)} · ` +
     `at rest ${lasts}${state.idle ? "" : " · working"}`;
-  document.body.classList.toggle("onlooker", state.may_steer === false);
+  document.body.classList.toggle("read-only", state.may_steer === false);
   at("undo").disabled = state.undo === 0 || state.may_steer === false;
   at("redo").disabled = state.redo === 0 || state.may_steer === false;
   at("pin").disabled = state.may_steer === false;

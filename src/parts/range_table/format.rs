@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_is_an_error_where_the_table_says_so() {
+    fn a_hole_is_an_error_if_the_table_requires_it() {
         let text = format!("gap = \"error\"\n{}", file("[0, 3],\n[3.5, inf]"));
         let error = RangeTable::parse(&text, "t.toml").unwrap_err();
         let problem = BoundProblem::Hole { lower: 3.5, before: 3.0 };

@@ -162,7 +162,7 @@ fn drapes_of_different_meshes_are_refused() {
 }
 
 #[test]
-fn an_affine_motion_per_part_holds_what_a_translation_cannot() {
+fn an_affine_motion_per_part_represents_a_rotation_and_a_translation_does_not() {
     let mesh = tube(0.2, 0.5, 40, 20);
     let topology = Topology::new(&mesh);
     let table = RangeTable::from_bounds("one", &[0.0, f64::INFINITY]).unwrap();

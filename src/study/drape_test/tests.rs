@@ -54,7 +54,7 @@ fn results_come_as_csv_with_their_bands() {
 }
 
 #[test]
-fn the_results_beside_the_code_are_what_the_code_gives() {
+fn the_stored_results_equal_the_computed_ones() {
     // One row is drawn again; all of them would take the better part of a minute.
     let kept = include_str!("../../../assets/cusick/results.csv");
     let drawn = results_csv(&["interlock"], 10).unwrap();

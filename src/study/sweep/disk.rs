@@ -6,7 +6,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
-use crate::base::atomic_file::WholeFile;
+use crate::base::atomic_file::AtomicFile;
 use crate::base::files::read_own;
 
 /// Where lines are appended: a file, or what a test puts in its place.
@@ -55,7 +55,7 @@ pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> 
 
 /// Replaces a file atomically.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    WholeFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
+    AtomicFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
 }
 
 /// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for

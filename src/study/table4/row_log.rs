@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::methods::METHODS;
 use super::row::{Table4Options, Table4Row};
-use crate::base::atomic_file::WholeFile;
+use crate::base::atomic_file::AtomicFile;
 use crate::base::files::{Unreadable, read_own};
 
 /// Conditions of a measurement. Rows of one table have equal conditions.
@@ -119,7 +119,7 @@ impl RowLog {
     /// # Errors
     /// Errors of the disk.
     pub(crate) fn write(&self, path: &Path) -> std::io::Result<()> {
-        WholeFile::write(path, serde_json::to_string(self).map_err(std::io::Error::other)?)
+        AtomicFile::write(path, serde_json::to_string(self).map_err(std::io::Error::other)?)
     }
 }
 

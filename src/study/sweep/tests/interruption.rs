@@ -33,7 +33,7 @@ fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
 }
 
 #[test]
-fn what_is_done_is_not_computed_again() {
+fn finished_points_are_not_computed_again() {
     let folder = tempfile::tempdir().unwrap();
     let solved = Mutex::new(Vec::new());
     let counting = |point: &Point| {
@@ -72,7 +72,7 @@ proptest! {
 
     /// The disk takes `room` bytes of rows and then no more.
     #[test]
-    fn a_full_disk_loses_the_point_in_hand_and_says_so(room in 0..90_000_usize, jobs in 1..4_usize, cuts in any::<bool>()) {
+    fn a_full_disk_loses_the_current_point_and_is_reported(room in 0..90_000_usize, jobs in 1..4_usize, cuts in any::<bool>()) {
         let (_, whole) = shared();
         let folder = tempfile::tempdir().unwrap();
         let left = Room::new(AtomicUsize::new(room));
@@ -129,7 +129,7 @@ fn failed_points_are_rows_and_are_tried_again() {
 }
 
 #[test]
-fn an_interrupted_point_leaves_no_row_and_an_odd_one_says_so() {
+fn an_interrupted_point_leaves_no_row_and_a_failed_point_has_its_cause() {
     let folder = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(false);
     let run = Run { jobs: 1, stop: &stop, progress: &|_| {} };

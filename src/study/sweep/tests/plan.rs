@@ -14,7 +14,7 @@ fn parse(text: &str) -> Plan {
     Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap()
 }
 
-fn message(text: &str) -> String {
+fn error_text_of(text: &str) -> String {
     Plan::parse(text, "s.toml", Path::new(""), &Job::preview()).unwrap_err().to_string()
 }
 
@@ -82,7 +82,7 @@ fn points_of_one_garment_and_body_share_a_scene() {
 }
 
 #[test]
-fn equal_points_are_left_out_and_said() {
+fn equal_points_are_left_out_with_a_note() {
     let plan =
         parse("name = \"n\"\n[grid]\ntables = [\"table-3\", { scale = [1, 2] }]\nextents_cm = [0, \"none\", 0.0, 5]");
     assert_eq!(plan.points.len(), 4);
@@ -91,7 +91,7 @@ fn equal_points_are_left_out_and_said() {
 }
 
 #[test]
-fn parts_are_the_tables_and_move_by_affine_maps_unless_asked_otherwise() {
+fn parts_follow_the_table_and_move_by_affine_maps_by_default() {
     let plan = parse("name = \"n\"\n[grid]\nmotions = [\"affine\", \"translation\"]\nextents_cm = [\"none\", 8]");
     let found: Vec<_> = plan.points.iter().map(|p| (p.extent_text(), p.job.settings.model.motion().name())).collect();
     let [none, eight] = ["none", "8"].map(str::to_owned);
@@ -145,7 +145,7 @@ fn ids_are_made_of_contents_not_of_names_or_timings() {
 }
 
 #[test]
-fn table_entries_make_the_tables_they_say() {
+fn table_entries_make_the_named_tables() {
     let plan = parse(
         r#"
         name = "tables"
@@ -173,7 +173,7 @@ fn table_entries_make_the_tables_they_say() {
 }
 
 #[test]
-fn bad_files_are_told_where_what_and_what_to_do() {
+fn bad_files_are_refused_with_place_cause_and_remedy() {
     let point = "name = \"n\"\n[[points]]\n";
     let grid = "name = \"n\"\n[grid]\n";
     for (text, start, words) in [
@@ -229,12 +229,12 @@ fn bad_files_are_told_where_what_and_what_to_do() {
         ("name = \"n\"\nwarm_up = 101\n[grid]".to_owned(), "s.toml:2: warm_up: found 101", "0 and at most 100"),
         ("name = \"n\"".to_owned(), "s.toml: found no points", "[grid]"),
     ] {
-        let said = message(&text);
-        assert!(said.starts_with(start) && said.contains(words), "{text}\n-> {said}");
+        let message = error_text_of(&text);
+        assert!(message.starts_with(start) && message.contains(words), "{text}\n-> {message}");
     }
     let axis = (0..1001).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
-    let said = message(&format!("{grid}seeds = [{axis}]\nrefine = [{axis}]"));
-    assert!(said.contains("found 1002001 points"), "{said}");
+    let message = error_text_of(&format!("{grid}seeds = [{axis}]\nrefine = [{axis}]"));
+    assert!(message.contains("found 1002001 points"), "{message}");
 }
 
 #[test]
@@ -281,8 +281,8 @@ fn jobs_written_as_a_sweep_file_are_its_points() {
     // What has no key is not left out in silence.
     let mut odd = jobs[0].clone();
     odd.scene.rest = obj.to_str().unwrap().to_owned();
-    let said = sweep_file("pinned", &[("state 9".to_owned(), odd)]).unwrap_err().to_string();
-    assert!(said.contains("state 9") && said.contains("rest"), "{said}");
-    assert!(message("name = \"x\"\n[grid]\ntables = [{ name = \"t\", rows = [[1, 0]] }]").contains("row 1"));
-    assert!(message("name = \"x\"\n[grid]\nfabrics = [{ name = \"t\" }]").contains("s.toml:3"));
+    let message = sweep_file("pinned", &[("state 9".to_owned(), odd)]).unwrap_err().to_string();
+    assert!(message.contains("state 9") && message.contains("rest"), "{message}");
+    assert!(error_text_of("name = \"x\"\n[grid]\ntables = [{ name = \"t\", rows = [[1, 0]] }]").contains("row 1"));
+    assert!(error_text_of("name = \"x\"\n[grid]\nfabrics = [{ name = \"t\" }]").contains("s.toml:3"));
 }

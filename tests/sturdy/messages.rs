@@ -33,7 +33,7 @@ fn one_part_alone_is_solved_by_the_papers_equations_too() {
     bench.write("whole.toml", "name = \"whole\"\nunit = \"cm\"\nlevels = [[0, inf]]\n");
     let ended = bench.drape(&["--no-save", "--model", "paper", "--table", "whole.toml"]);
     ended.with(0, &[]);
-    assert!(!ended.said.contains("no three of"), "{}", ended.said);
+    assert!(!ended.stderr.contains("no three of"), "{}", ended.stderr);
 }
 
 #[test]
@@ -43,23 +43,23 @@ fn a_search_takes_no_more_parts_than_there_are_vertices() {
         let tuned =
             bench.run(&["tune", "--garment", "flared-skirt@400", "--levels-only", "--max-parts", most, "--out", "t"]);
         tuned.with(0, &[]);
-        assert!(!tuned.said.contains("memory allocation"), "{}", tuned.said);
+        assert!(!tuned.stderr.contains("memory allocation"), "{}", tuned.stderr);
     }
 }
 
 #[test]
 fn check_prints_a_verdict_and_compare_the_reasons_of_failed_tables() {
     let bench = Bench::new();
-    let told = |arguments: &[&str]| {
+    let run_check = |arguments: &[&str]| {
         let done = bench.command().args(arguments).output().unwrap();
         (String::from_utf8(done.stdout).unwrap(), done.status.code())
     };
-    let (said, code) = told(&["check", "form", "flared-skirt@400"]);
-    assert!(said.contains("verdict: no defect affects a drape") && code == Some(0), "{said}");
+    let (message, code) = run_check(&["check", "form", "flared-skirt@400"]);
+    assert!(message.contains("verdict: no defect affects a drape") && code == Some(0), "{message}");
     bench.write("low.obj", &super::GARMENT.replace("v 0 0 1.65", "v 0 0 1.55"));
-    let (said, _) = told(&["check", "body.obj", "low.obj"]);
-    assert!(said.contains("verdict: found 1 garment vertices inside the body"), "{said}");
-    // A ring that nothing is under: no table's fault, told in each one's row.
+    let (message, _) = run_check(&["check", "body.obj", "low.obj"]);
+    assert!(message.contains("verdict: found 1 garment vertices inside the body"), "{message}");
+    // A ring with nothing under it falls with every table; the row of each table has the reason.
     let ring: String = (0..2)
         .flat_map(|j| (0..12).map(move |i| (f64::from(i) * std::f64::consts::TAU / 12.0, j)))
         .map(|(a, j)| format!("v {:.4} {:.4} {}\n", 0.9 * a.cos(), 0.9 * a.sin(), 1.5 - 0.1 * f64::from(j)))
@@ -67,8 +67,8 @@ fn check_prints_a_verdict_and_compare_the_reasons_of_failed_tables() {
         .collect();
     bench.write("ring.obj", &ring);
     let scene = ["--body", "body.obj", "--garment", "ring.obj", "--repeats", "1", "--no-save", "--refine", "converged"];
-    let (said, code) = told(&[&["compare", "table-3", "table-3"], &scene[..]].concat());
-    assert!(said.contains("fallen off the body; hold its edge (--hold top)") && code == Some(2), "{said}");
+    let (message, code) = run_check(&[&["compare", "table-3", "table-3"], &scene[..]].concat());
+    assert!(message.contains("fallen off the body; hold its edge (--hold top)") && code == Some(2), "{message}");
 }
 
 /// The numbers in front of the rows of a table of levels.
@@ -80,14 +80,14 @@ fn numbered(text: &str) -> Vec<u32> {
 #[test]
 fn levels_have_the_same_numbers_in_run_and_compare() {
     let bench = Bench::new();
-    let told = |arguments: &[&str]| {
+    let levels_of = |arguments: &[&str]| {
         let mut command = bench.command();
         let done = command.args(arguments).args(["--garment", "flared-skirt@400", "--no-save"]).output().unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         numbered(&String::from_utf8(done.stdout).unwrap())
     };
-    let by_run = told(&["run", "--refine", "0"]);
-    let by_compare = told(&["compare", "table-3", "table-3", "--repeats", "1", "--accuracy", "none"]);
+    let by_run = levels_of(&["run", "--refine", "0"]);
+    let by_compare = levels_of(&["compare", "table-3", "table-3", "--repeats", "1", "--accuracy", "none"]);
     assert!(by_run.len() > 8 && by_run.is_sorted() && by_run.first() > Some(&0), "{by_run:?}");
     assert!(by_run.iter().all(|level| by_compare.contains(level)), "{by_run:?} and {by_compare:?}");
 }
@@ -127,10 +127,10 @@ fn ctrl_c_while_the_error_is_measured_keeps_the_drape() {
         // Twice at once, as `timeout -s INT` does: that is one press.
         let id = child.id().to_string();
         assert!(Command::new("kill").args(["-INT", &id, &id]).status().unwrap().success());
-        let mut said = String::new();
-        std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut said).unwrap();
-        assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
-        if !said.contains("the drape is kept without its error") {
+        let mut message = String::new();
+        std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut message).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{message}");
+        if !message.contains("the drape is kept without its error") {
             continue;
         }
         assert!(asked.elapsed() < Duration::from_secs(30), "{:?}", asked.elapsed());
