@@ -1,4 +1,4 @@
-//! A garment with fewer triangles: what it keeps, and that the full one follows it.
+//! Decimated garments: properties they preserve, and prolongation to the full mesh.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -91,7 +91,7 @@ fn a_mesh_so_full_of_holes_that_nothing_can_go_is_left_and_drapes() {
     });
     let rest = RestShape::from_edges(&mesh).unwrap();
     assert!(Coarse::new(&mesh, &rest, mesh.vertex_count() / 4).is_none());
-    // Coarser and coarser garments are made until there is none: for ever, and without bound, if each were as fine as the last.
+    // Decimation ends: a step that does not reduce the mesh returns `None`, so that the sequence of coarser garments is finite.
     let job = Job::preview();
     let body = tube(0.3, 0.6, 60, 33);
     let mut closed = body.clone();
@@ -209,7 +209,7 @@ fn a_large_garment_rests_on_the_coarse_mesh_first_on_any_number_of_threads_and_c
     assert_eq!(one.positions, two.positions);
     let state = one.state.as_ref().unwrap();
     assert!(state.stop == Stop::Converged && one.self_intersecting_pairs == 0 && one.penetrating_vertices == 0);
-    // What the coarse garment does is told as step 0 of the full one: its start, twenty steps at most, its rest, and the full one's start.
+    // Steps on the coarse mesh are reported as step 0: its start, at most twenty steps, its rest, and the start of the full mesh.
     let before = iterations.iter().filter(|iteration| **iteration == 0).count();
     assert!((4..=23).contains(&before) && state.steps <= 12, "{before} before, then {}", state.steps);
 

@@ -1,4 +1,4 @@
-//! The coupled PART solve: what PARTs must do whatever the table.
+//! The coupled PART solve: properties that hold for every table.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 

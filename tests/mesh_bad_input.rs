@@ -1,4 +1,4 @@
-//! What bad mesh input gets: one message with file, line, found, expected, what to do.
+//! Invalid mesh input is refused with one message: file, line, found, expected, remedy.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
 use std::f64::consts::TAU;

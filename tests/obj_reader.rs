@@ -1,4 +1,4 @@
-//! OBJ texts made here are read as they were meant, whatever forms they use, and a mistake is reported with its line.
+//! Generated OBJ texts in all forms of the format are read correctly, and mistakes are reported with their line.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
 use std::fmt::Write as _;

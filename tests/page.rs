@@ -66,7 +66,7 @@ fn the_page_opens_its_recording_without_a_query_and_names_no_foreign_host() {
     for text in [&page, &start, &program] {
         assert_eq!(foreign(text), [""; 0]);
     }
-    // What the page asks for is there, and nothing else.
+    // The server has the files that the page loads, and no others.
     for path in ["/?url=anything", "/re_viewer.js", "/start.js", "/program.js", "/favicon.ico"] {
         assert!(get(host, path).0.starts_with("http/1.1 200"), "{path}");
     }

@@ -12,11 +12,11 @@ use std::sync::{Mutex, PoisonError};
 
 use super::error_text::shortened;
 
-/// Most bytes of a text that is read: tables, fabrics, patterns and sweep files have thousands.
-pub(crate) const MOST_TEXT: u64 = 64 << 20;
+/// Size limit of text files, bytes; tables, fabrics, patterns and sweep files have some thousands.
+pub(crate) const MAX_TEXT: u64 = 64 << 20;
 
-/// Most bytes of a mesh's file: some twenty million vertices as OBJ.
-pub(crate) const MOST_MESH: u64 = 2 << 30;
+/// Size limit of mesh files, bytes: about twenty million vertices as OBJ.
+pub(crate) const MAX_MESH: u64 = 2 << 30;
 
 /// A file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub struct Unreadable {
 }
 
 impl Unreadable {
-    /// The failure to read `path`; errors of the system get a remedy, those of this module have one.
+    /// The failure to read `path`; errors of the file system get a remedy, those of this module contain one.
     #[must_use]
     pub fn new(path: &Path, error: &io::Error) -> Self {
         let remedy = if error.raw_os_error().is_some() { "; check the path and its permissions" } else { "" };
@@ -43,7 +43,7 @@ struct Claims {
     outputs: BTreeSet<PathBuf>,
 }
 
-/// The claims so far; `None` where inputs are not protected.
+/// The claims so far; `None` if inputs are not protected.
 static CLAIMS: Mutex<Option<Claims>> = Mutex::new(None);
 
 /// Protects inputs for the rest of the process, as the command line does without `--force`: a file that is read as an input
@@ -53,14 +53,14 @@ pub(crate) fn protect_inputs() {
 }
 
 impl Claims {
-    /// Notes that `path` is an input.
+    /// Registers that `path` is an input.
     fn input(&mut self, path: &Path) -> io::Result<()> {
         refuse(path, &self.outputs)?;
         self.inputs.insert(path.to_owned());
         Ok(())
     }
 
-    /// Notes that `path` is an output.
+    /// Registers that `path` is an output.
     fn output(&mut self, path: &Path) -> io::Result<()> {
         refuse(path, &self.inputs)?;
         self.outputs.insert(path.to_owned());
@@ -80,12 +80,12 @@ fn refuse(path: &Path, others: &BTreeSet<PathBuf>) -> io::Result<()> {
     }
 }
 
-/// Does `what` to the claims of the process.
+/// Applies `what` to the claims of the process.
 fn with_claims(what: impl FnOnce(&mut Claims) -> io::Result<()>) -> io::Result<()> {
     CLAIMS.lock().unwrap_or_else(PoisonError::into_inner).as_mut().map_or(Ok(()), what)
 }
 
-/// Notes an output before anything is computed for it.
+/// Registers an output before anything is computed for it.
 pub(crate) fn claim_output(path: &Path) -> io::Result<()> {
     with_claims(|claims| claims.output(path))
 }
@@ -95,7 +95,7 @@ pub(crate) fn refuse_input(path: &Path) -> io::Result<()> {
     with_claims(|claims| refuse(path, &claims.inputs))
 }
 
-/// Whether two paths lead to one file, by links of any kind.
+/// Whether two paths lead to the same file, including links.
 fn same_file(a: &Path, b: &Path) -> bool {
     #[cfg(unix)]
     let identity = |path| {
@@ -120,7 +120,7 @@ pub(crate) fn names_a_file(name: &str) -> bool {
     name.contains(['/', '\\', '.'])
 }
 
-/// Whether a file's name ends so, in large letters or small; `ending` without its dot.
+/// Whether the extension of a file is `ending`, ignoring case.
 #[must_use]
 pub(crate) fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
@@ -160,13 +160,14 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Unreadable> {
     bounded_text(path).map_err(|e| Unreadable::new(path, &e))
 }
 
-/// The text of an input of at most [`MOST_TEXT`] bytes.
+/// The text of an input of at most [`MAX_TEXT`] bytes.
 ///
 /// # Errors
 /// As [`bounded`], or the text is not UTF-8.
 pub(crate) fn bounded_text(path: &Path) -> io::Result<String> {
-    let utf8 = |e| io::Error::new(io::ErrorKind::InvalidData, format!("found text that is not UTF-8: {e}"));
-    String::from_utf8(bounded(path, MOST_TEXT)?).map_err(|e| utf8(e.utf8_error()))
+    let utf8 =
+        |e| io::Error::new(io::ErrorKind::InvalidData, format!("found bytes that are not UTF-8: {e}, expected text"));
+    String::from_utf8(bounded(path, MAX_TEXT)?).map_err(|e| utf8(e.utf8_error()))
 }
 
 /// The bytes of an input of at most `limit` bytes.
@@ -183,7 +184,7 @@ pub(crate) fn bounded(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As [`bounded`], but for outputs.
 pub(crate) fn read_own(path: &Path) -> io::Result<Vec<u8>> {
-    read(path, MOST_MESH)
+    read(path, MAX_MESH)
 }
 
 fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
@@ -237,7 +238,7 @@ mod tests {
         assert_eq!(bounded(file.path(), 4).unwrap(), b"four");
         assert_eq!(bounded(file.path(), 3).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         fs::write(file.path(), b"a\xff").unwrap();
-        assert!(read_text(file.path()).unwrap_err().to_string().contains("no UTF-8 text"));
+        assert!(read_text(file.path()).unwrap_err().to_string().contains("not UTF-8"));
         // Larger than the memory, and empty: refused by its length.
         file.as_file().set_len(1 << 40).unwrap();
         assert_eq!(read_own(file.path()).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
@@ -268,7 +269,7 @@ mod tests {
             read.output(&path(name)).unwrap();
             written.input(&path(name)).unwrap();
         }
-        // Another file by the same name is another file.
+        // Another file under the same name is not the input.
         fs::rename(path("other.obj"), path("link.obj")).unwrap();
         Claims { inputs: [path("garment.obj")].into(), ..Claims::default() }.output(&path("link.obj")).unwrap();
     }

@@ -9,7 +9,7 @@ use crate::parts::{Parts, UNASSIGNED, segment};
 use crate::record::Tab;
 use crate::study::job::Against;
 use crate::study::metrics::LevelCount;
-use crate::study::sweep::{Bench, MOST_PASSES, Plan, Row, Status, cell};
+use crate::study::sweep::{Bench, MAX_PASSES, Plan, Row, Status, cell};
 use crate::{Job, SceneSpec};
 use clap::Args;
 use serde::Serialize;
@@ -43,7 +43,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "N|converged", default_value_t = Job::preview().settings.refine, help_heading = "Stages")]
     refine: Refine,
     /// Timed passes per table; the median is reported
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=MOST_PASSES as u64), help_heading = "Stages")]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=MAX_PASSES as u64), help_heading = "Stages")]
     repeats: u64,
     /// Reference of the errors: `none`, `canonical` (the canonical drape of garment, body and fabric), or `own` (also each drape's own
     /// continuation to convergence)

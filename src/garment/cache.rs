@@ -1,9 +1,9 @@
-//! A cache on disk of built-in meshes: making a form and a garment takes a second, reading them a few milliseconds.
+//! Disk cache of built-in meshes: making a form and a garment takes a second, reading them a few milliseconds.
 //!
-//! An entry's name is the hash of all that determines the mesh: the specs as JSON (numbers with digits that parse to the same
-//! bits), the crate's version, and the machine's architecture, which may round differently. The entry has a checksum and that
-//! text, and is written atomically. Where an entry or its folder is damaged, the mesh is made anew: the result is the same, bit
-//! for bit.
+//! The name of an entry is the hash of everything that determines the mesh: the specs as JSON (numbers with digits that parse to the
+//! same bits), the version of the crate, and the architecture of the machine, which may round differently. An entry contains a
+//! checksum and the hashed text, and is written atomically. If an entry or its folder is damaged, the mesh is computed again, with the
+//! same bits.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;

@@ -47,7 +47,7 @@ const CHECK_INTERVAL: usize = 4;
 /// Relative change of the smallest λ that ends a search if λ is decisive: a direction of descent need not be accurate.
 const DECISIVE_CHANGE: f64 = 0.05;
 
-/// The same if λ is not decisive. Of some twenty searches none that had changed by less than a hundredth became decisive later.
+/// The same if λ is not decisive. In about twenty searches, no λ that had changed by less than 0.01 became decisive later.
 const INDECISIVE_CHANGE: f64 = 0.01;
 
 /// When to end a search.

@@ -17,7 +17,7 @@ use indexmap::IndexSet;
 use super::error::MeshError;
 use super::topology::NONE;
 use super::{each_once, retain};
-use crate::base::files::{MOST_MESH, Unreadable, bounded};
+use crate::base::files::{MAX_MESH, Unreadable, bounded};
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -79,7 +79,7 @@ pub struct ObjSource {
 impl ObjSource {
     /// Reads a file.
     pub(super) fn read(file: &Path) -> Result<Self, MeshError> {
-        let bytes = bounded(file, MOST_MESH).map_err(|e| Unreadable::new(file, &e))?;
+        let bytes = bounded(file, MAX_MESH).map_err(|e| Unreadable::new(file, &e))?;
         if let Some(found) = other_format(file, &bytes) {
             return Err(MeshError::NotObj { file: file.to_owned(), found });
         }

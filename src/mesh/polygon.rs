@@ -2,13 +2,13 @@
 //!
 //! A quad is cut along the inner diagonal with the larger smallest angle. Larger polygons are cut by ear clipping, the best
 //! shaped ear first, in the plane of their Newell normal (Sutherland, Sproull, Schumacker: "A characterization of ten
-//! hidden-surface algorithms", 1974, section on planes). Ear clipping handles concave polygons and takes up to O(n³) for n
+//! hidden-surface algorithms", 1974, section on planes). Ear clipping handles concave polygons in at most O(n³) for n
 //! corners, so polygons of more than [`MAX_EAR_CORNERS`] get a constrained Delaunay triangulation, O(n log n).
 //!
 //! The Delaunay triangulation chooses the same diagonals for the quads of the test bodies, but lists the triangles and
 //! their corners in another order, which changes the sums of every later stage; ear clipping is kept for the same bits.
 //!
-//! Limits: a polygon that crosses itself may run out of ears, and has no triangulation; the rest is then cut as a fan.
+//! Limits: a self-intersecting polygon may run out of ears; the rest is then cut as a fan.
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@ pub enum SceneError {
     /// A mesh file that cannot be used.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A body that no distance can be measured to.
+    /// A body to which no distance can be measured.
     #[error(transparent)]
     Distance(#[from] DistanceError),
     /// A rest shape that cannot be used.
@@ -24,7 +24,7 @@ pub enum SceneError {
     /// A sewing pattern that cannot be used.
     #[error(transparent)]
     Pattern(#[from] PatternError),
-    /// Measurements or a garment that no mesh can be made of.
+    /// Measurements or a garment from which no mesh can be made.
     #[error(transparent)]
     Shape(#[from] ShapeError),
     /// The same, in a file.
@@ -44,7 +44,7 @@ pub enum SceneError {
          body, or leave --body out and give its measurements (--bust, --waist, ...)"
     )]
     NotCutForIt { body: String },
-    /// Measurements, given as numbers, that no body can be made of.
+    /// Measurements on the command line from which no body can be made.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
     /// A garment that is not near the body.

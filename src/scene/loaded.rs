@@ -30,7 +30,7 @@ pub struct Loaded {
     pub reports: Vec<MeshReport>,
     /// The repair of vertices that started inside the body.
     pub pushed_out: PushOutReport,
-    /// The sewing pattern that the garment was made of.
+    /// The sewing pattern of the garment.
     pub tailored: Option<Tailored>,
     /// The flat pattern found in the texture coordinates.
     pub flat_pattern: Option<FlatPattern>,

@@ -59,7 +59,7 @@ pub struct Swatch {
 }
 
 impl Swatch {
-    /// The same with the name of its fabric, which is `of_settings` where it has none of its own.
+    /// The same with the name of its fabric; the fabric is `of_settings` if none is assigned.
     #[must_use]
     pub(crate) fn cut_from(&self, of_settings: &Fabric) -> Self {
         Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
@@ -221,7 +221,7 @@ impl PanelFabrics {
         let Some((first, _, fabric)) = matching.next() else { return Ok(self.default.as_ref()) };
         let Some((second, ..)) = matching.find(|(.., other)| other != fabric) else { return Ok(Some(fabric)) };
         Err(CutError::Unfit(format!(
-            "{}: panel `{panel}` fits both {first} and {second}, of different fabrics; give it a line of its own",
+            "{}: panel `{panel}` fits both {first} and {second}, of different fabrics; add a line for this panel",
             self.file
         )))
     }

@@ -1,8 +1,8 @@
 //! A scene: a body, and one garment or several worn over each other as one cloth.
 //!
-//! The meshes of several garments stand side by side in one [`TriMesh`], inner to outer. PARTs, energy and contact need no
-//! more: no PART spans two garments, and cloth keeps off cloth. The drape takes each [`Layer`] out again and puts it over
-//! those below it (`drape/layers.rs`), which are then a surface like the body.
+//! One [`TriMesh`] contains the meshes of all garments, inner to outer. PARTs, energy and contact need no other change: no PART
+//! spans two garments, and self-contact separates the garments. The drape cuts out each [`Layer`] and puts it over
+//! those below it (`drape/layers.rs`), which then act as a surface like the body.
 //!
 //! Edges to hold are named by the user: the highest edge of the garment or of one of its connected parts, or the edges of a
 //! group. Connected parts of which nothing is held may fall off the body, which [`Scene::fallen`] reports.

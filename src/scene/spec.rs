@@ -121,14 +121,14 @@ impl SceneSpec {
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let named = self.file_names().into_iter().filter(|(role, _)| {
-            // These, and the files that they name in turn, are found as the loader finds them.
+            // `files_of_fabrics` finds these and the files that they name.
             !matches!(role, FileRole::Fabric | FileRole::FabricsFile)
         });
         named.map(|(_, name)| PathBuf::from(name)).chain(self.files_of_fabrics()).collect()
     }
 
-    /// Every value that the loader opens as a file, with the field it stands in. A new field does not compile until it is listed
-    /// here: servers refuse whatever this returns beyond the files they were started with.
+    /// Every value that the loader opens as a file, with its field. A new field does not compile until it is listed here, because
+    /// servers refuse all files that they were not started with.
     #[must_use]
     pub fn file_names(&self) -> Vec<(FileRole, &str)> {
         let Self {
@@ -138,7 +138,7 @@ impl SceneSpec {
             fabrics,
             fabrics_file,
             rest,
-            // Names of groups within a file that is named elsewhere.
+            // Names of groups within a file.
             body_group: _,
             garment_group: _,
             hold: _,
@@ -156,7 +156,7 @@ impl SceneSpec {
         named.extend(over.iter().map(|garment| (FileRole::Garment, garment)));
         named.extend(fabrics.iter().map(|fabric| (FileRole::Fabric, fabric)));
         named.retain(|(_, name)| names_a_file(name));
-        // Opened whatever they look like.
+        // These are files under any name.
         named.extend(fabrics_file.iter().map(|file| (FileRole::FabricsFile, file)));
         named.extend((!REST_SHAPES.contains(&rest.as_str())).then_some((FileRole::Rest, rest)));
         named.into_iter().map(|(role, name)| (role, name.as_str())).collect()

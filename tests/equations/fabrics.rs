@@ -1,11 +1,11 @@
-//! PARTs of a garment cut from two fabrics: each weighs and stretches as its own.
+//! PARTs of a garment in two fabrics: each has the weight and stiffness of its fabric.
 
 use partwise::mechanics::paper::{Cut, solve_cut};
 use partwise::mesh::RestShape;
 
 use super::*;
 
-/// A curtain of two pieces side by side, a PART each, off the body: what one is made of is no business of the other's.
+/// Two pieces side by side away from the body, one PART each: the fabric of one does not affect the other.
 #[test]
 fn two_pieces_of_two_fabrics_move_as_each_would_alone() {
     let far = block(DVec3::splat(0.5), DQuat::IDENTITY, DVec3::new(0.0, 3.0, 0.0));

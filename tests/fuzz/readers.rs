@@ -55,7 +55,7 @@ pub(crate) const INFORMATIVE: &[&str] = &[
     "out of range",
     "cannot be read",
     "are missing",
-    "line of its own",
+    "a line for this panel",
     "recursion limit",
     "cannot extend",
 ];

@@ -222,7 +222,7 @@ fn an_export_gives_faces_groups_and_texture_back() {
         assert!((p - q).length() < 1e-15);
     }
     assert_eq!(again.mesh.triangles, imported.mesh.triangles);
-    // What did not move is written as it was read, digit for digit.
+    // Vertices that did not move are written with the digits of the input.
     write_imported(&path, &imported, &imported.mesh.positions).unwrap();
     let same = fs::read_to_string(&path).unwrap();
     let vertices = |text: &str| text.lines().filter(|l| l.starts_with("v ")).map(str::to_owned).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! What is dropped, joined and turned round on the way in, and said.
+//! Repairs on import: dropped, joined and reversed faces, and their notes.
 
 use std::fs;
 
@@ -40,7 +40,7 @@ fn a_part_that_is_there_twice_is_taken_once_and_exported_as_one() {
     write_imported(&out, &imported, &moved).unwrap();
     let written = fs::read_to_string(&out).unwrap();
     assert_eq!(written.lines().filter(|line| line.starts_with("v ") && line.ends_with(" 1")).count(), 8, "{written}");
-    // One that goes on beyond what it lies on stays, and that is said.
+    // A part that extends beyond the other is kept, with a note.
     let larger = read(&format!("{SQUARE}f 1 2 3\n{SQUARE}f -4 -3 -2\nf -4 -2 -1\n"));
     assert_eq!((larger.mesh.triangles.len(), larger.report.components), (3, 2));
 }

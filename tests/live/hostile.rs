@@ -35,7 +35,7 @@ fn opening(kind: usize, address: SocketAddr) -> String {
     }
 }
 
-/// Seconds that the server takes for a request on a connection of its own.
+/// Time that the server takes for a request on a new connection, s.
 fn seconds(address: SocketAddr, method: &str, path: &str, body: &str) -> f64 {
     let began = Instant::now();
     let mut stream = TcpStream::connect(address).unwrap();

@@ -295,7 +295,7 @@ fn a_viewer_gets_triangles_once_and_then_positions() {
     live.patch(r#"{"table": {"levels": [[0, 2], [2, "inf"]]}}"#);
     let parts = next();
     assert!(parts.len() * 3 < first[0].len(), "{} bytes after {}", parts.len(), first[0].len());
-    // Who comes later gets the newest of all.
+    // A later client gets the newest data.
     live.idle();
     std::thread::sleep(Duration::from_millis(300));
     let mut late = BufReader::new(live.open("GET", "/api/stream", &[]));
@@ -317,7 +317,7 @@ fn the_lines_of_the_documentation_run() {
             .args(["-c", &line.replacen("curl -s", "curl -sS --fail-with-body", 1)])
             .env("BASE", format!("http://{}", live.address));
         let ended = shell.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
-        // 28: the time that events were asked for is over.
+        // curl exits with 28 after `--max-time`.
         let fine = ended.status.success() || line.contains("--max-time") && ended.status.code() == Some(28);
         let answer = String::from_utf8_lossy(&ended.stdout);
         assert!(

@@ -1,7 +1,7 @@
-//! Mutated requests: whatever is asked, it is answered, in plain and short words, and the session goes on.
+//! Mutated requests: every request is answered with a short plain message, and the session continues.
 //!
-//! `PARTWISE_FUZZ_REQUESTS` sets their number, and then the state is answered within a second after each; the default takes a
-//! few seconds and has no such limit, as the machine may be busy.
+//! `PARTWISE_FUZZ_REQUESTS` sets their number; the state must then be answered within a second after each. The default takes a
+//! few seconds and has no such limit, because the machine may be busy.
 
 use std::time::Instant;
 
@@ -29,8 +29,8 @@ const SEEDS: [(&str, &str, &str, &str); 14] = [
     ("GET", "/api/part?number=3", JSON, ""),
 ];
 
-/// What can stand in the first line of a request; with anything else it is none, and is refused without a sentence.
-fn asked(path: &str) -> String {
+/// The path without characters that HTTP forbids in a request line; the server closes such requests without a message.
+fn valid_in_request_line(path: &str) -> String {
     path.chars().filter(|c| c.is_ascii_alphanumeric() || "/?&=,.-_~%+:;@!$'()*".contains(*c)).take(2000).collect()
 }
 
@@ -49,9 +49,11 @@ fn every_request_is_answered_and_the_session_continues() {
         let number = |k: usize| u32::from_le_bytes(random.as_bytes()[4 * k..4 * k + 4].try_into().unwrap());
         let (method, path, kind, body) = SEEDS[number(0) as usize % SEEDS.len()];
         let change = |k: usize| ((number(k) % 16) as u8, number(k + 1), number(k + 2));
-        // Mostly the body, now and then where it goes.
+        // Mutates the body in most requests, the path in some.
         let (path, body) = match number(7) % 4 {
-            0 if path.contains('?') || body.is_empty() => (asked(&mutate(path, &paths, change(1))), body.to_owned()),
+            0 if path.contains('?') || body.is_empty() => {
+                (valid_in_request_line(&mutate(path, &paths, change(1))), body.to_owned())
+            }
             3 => (path.to_owned(), mutate(&mutate(body, &bodies, change(1)), &bodies, change(4))),
             _ => (path.to_owned(), mutate(body, &bodies, change(1))),
         };

@@ -63,7 +63,7 @@ fn saves_make_states_despite_other_changes_in_the_folder_until_an_interrupt() {
         assert!(second > first, "{second} PARTs after {first}");
         let since = since.unwrap();
         assert!(since.starts_with(&format!("{second} PARTs after {first}; the drape moved by ")), "{since}");
-        // One that cannot be is told, and the next one counts.
+        // An invalid table is reported, and the next save is drawn.
         save(&table, "[[0, 2], [1, inf]]");
         std::thread::sleep(Duration::from_millis(500));
         save(&table, "[[0, inf]]");

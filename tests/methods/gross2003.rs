@@ -1,4 +1,4 @@
-//! Pieces on developable surfaces: surfaces bound the body, laid pieces keep their lengths, sewn garments come to rest.
+//! Pieces on developable surfaces: the surfaces enclose the body, laid pieces keep their lengths, sewn garments converge.
 
 use std::path::Path;
 

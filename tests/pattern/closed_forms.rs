@@ -16,11 +16,11 @@ use crate::{parse, pattern, stitch, straight};
 fn relaxed(sewn: &SewnGarment, tolerance: f64) -> (Vec<DVec3>, f64) {
     let mut fabric = Fabric::by_name("cotton").unwrap();
     fabric.density_kg_per_m2 *= 1e-5;
-    // Paper's rather than cloth's bending, the same in all directions: a cone of cloth is not round.
+    // Bending as of paper, isotropic, because a cone of anisotropic cloth is not round.
     fabric.bending_nm = [100.0 * fabric.bending_nm[1]; 3];
     let topology = Topology::new(&sewn.mesh);
     let cloth = Cloth::new(&sewn.mesh, &topology, &sewn.rest, &fabric, &[]).unwrap();
-    // Whatever lies in its plane would stay in it: moved a little, the same every time.
+    // A plane piece is an unstable equilibrium, so the start is perturbed deterministically.
     let moved = |(i, x): (usize, &DVec3)| {
         let wave = |k: f64| 1e-3 * (k * (i as f64 + 1.0)).sin();
         *x + DVec3::new(wave(12.9898), wave(78.233), wave(37.719))

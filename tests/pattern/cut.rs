@@ -90,7 +90,7 @@ fn invalid_fabric_files_are_refused_with_the_cause() {
         ("[panels\n", &["shirt.fabrics.toml", "line 1", "expected"]),
         ("[pannels]\nback = \"silk\"\n", &["pannels", "panels"]),
         ("[panels]\nback = \"missing.toml\"\n", &["line 2", "missing.toml", "cannot be read"]),
-        ("[panels]\n\"b*\" = \"silk\"\n\"*k\" = \"denim\"\n", &["back", "b*", "*k", "line of its own"]),
+        ("[panels]\n\"b*\" = \"silk\"\n\"*k\" = \"denim\"\n", &["back", "b*", "*k", "a line for this panel"]),
     ] {
         let message = load(file).err().unwrap_or_default();
         for word in words {

@@ -1,4 +1,4 @@
-//! A ribbon tied in a knot stays tied: what passes through itself could come undone.
+//! A knotted ribbon stays knotted; cloth that passes through itself could untie the knot.
 
 use std::f64::consts::TAU;
 
@@ -29,15 +29,15 @@ fn trefoil() -> TriMesh {
     TriMesh::new(positions, triangles)
 }
 
-/// In how many ways the arcs of a closed line, seen from one side, can be coloured with three colours so that at every crossing all are the
-/// same or all differ: 3 for what can be undone, 9 for a trefoil, whichever way it is pulled (Fox; a knot's invariant).
+/// Number of Fox 3-colourings of the projection of a closed line, a knot invariant: the arcs get three colours so that at every crossing
+/// all are equal or all differ. It is 3 for the unknot and 9 for a trefoil.
 fn colourings(line: &[DVec3]) -> usize {
     let (u, v) = (DVec3::new(1.0, -0.031, 0.017).normalize(), DVec3::new(0.013, -0.022, 1.0).normalize());
     let flat: Vec<DVec2> = line.iter().map(|x| DVec2::new(x.dot(u), x.dot(v))).collect();
     let toward = v.cross(u);
     let n = line.len();
     let side = |i: usize| (i, (i + 1) % n);
-    // Where the line goes under: how far along it, and which place goes over.
+    // Crossings: the parameters of the lower and of the upper strand.
     let mut under: Vec<(f64, f64)> = Vec::new();
     for i in 0..n {
         for j in i + 1..n {

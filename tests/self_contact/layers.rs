@@ -33,7 +33,7 @@ fn a_pullover_over_a_skirt_rests_without_intersections_on_any_number_of_threads(
         let finding = certificate.finding(line).unwrap();
         assert!(finding.passes, "{finding:?}");
     }
-    // The hem of the pullover lies outside the skirt: whoever goes out from the body there meets the skirt first.
+    // The hem of the pullover lies outside the skirt, at a larger distance from the axis of the body.
     let [skirt, pullover] = &scene.layers[..] else { panic!("{:?}", scene.layers) };
     let x = &one.positions;
     let of = |range: &std::ops::Range<usize>| x[range.clone()].to_vec();
@@ -56,7 +56,7 @@ fn each_garment_has_its_own_fabric_and_all_of_them_rest() {
     let spec = SceneSpec { garment: "flared-skirt@700".into(), over, fabrics, ..SceneSpec::default() };
     let loaded = spec.load().unwrap();
     let scene = &loaded.scene;
-    // That of the settings is nobody's.
+    // No garment uses the fabric of the settings.
     let settings = Settings { fabric: Fabric::by_name("silk").unwrap(), ..Settings::default() };
     assert_eq!(scene.fabric_names(&settings.fabric), "denim + interlock");
     let [skirt, pullover] = &scene.layers[..] else { panic!("{:?}", scene.layers) };
@@ -71,7 +71,7 @@ fn each_garment_has_its_own_fabric_and_all_of_them_rest() {
     // Denim's is not the drape of a skirt in interlock, nor one in which it counts as interlock at rest.
     let soft = Scene { own_fabrics: vec![Some(Fabric::by_name("interlock").unwrap()); 2], ..scene.clone() };
     assert!(!certify(&soft, &settings.fabric, &draped.positions).unwrap().finding("residual").unwrap().passes);
-    // The same garments in one fabric, said twice or once, are the same to the last bit.
+    // The same fabric given once or once per garment gives the same bits.
     let of = |fabrics: Vec<String>, dial: &str| {
         let scene = SceneSpec { fabrics, ..spec.clone() }.load().unwrap().scene;
         let refine = Refine::Steps(2);

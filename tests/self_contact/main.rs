@@ -1,11 +1,11 @@
-//! Cloth keeps off cloth: the energy of its gaps, known cases, and garments that touch themselves.
+//! Self-contact: known cases, knots, perturbed starts and garments that touch themselves.
 
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
     clippy::print_stderr,
-    reason = "a test fails by panicking, and tells counts"
+    reason = "a test fails by panicking, and prints counts"
 )]
 
 mod knot;
@@ -47,7 +47,7 @@ fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
     a
 }
 
-/// A box, closed, its upper side in the plane z = 0.
+/// A closed box with its upper side in the plane z = 0.
 fn plate() -> Body {
     let corner = |i: usize| {
         let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
@@ -67,7 +67,7 @@ fn crossings(mesh: &TriMesh, x: &[DVec3]) -> usize {
     self_intersecting_pairs(&mesh.with_positions(x.to_vec())).len()
 }
 
-/// Where `mesh` comes to rest on `body`, which must be rest, and without a crossing.
+/// Solves `mesh` on `body` and asserts convergence without intersections.
 fn rests(mesh: &TriMesh, held: &[u32], body: Option<&Body>, start: Vec<DVec3>) -> Refined {
     let cloth = cloth(mesh, held);
     let options = RefineOptions::default();
@@ -87,7 +87,7 @@ fn a_sheet_folded_over_itself_stays_folded() {
     let (h, radius) = (0.01, 0.006);
     let mesh = sheet(24, 5, DVec3::ZERO, DVec3::X * h, DVec3::Y * h);
     let turn = std::f64::consts::PI * radius;
-    // Half of it turned back over the other half about a line.
+    // One half folded back over the other.
     let bent = |p: DVec3| {
         let s = p.x - 0.12;
         let (x, z) = if s < 0.0 {
@@ -101,7 +101,7 @@ fn a_sheet_folded_over_itself_stays_folded() {
     };
     let start: Vec<DVec3> = mesh.positions.iter().map(|p| bent(*p)).collect();
     let end = rests(&mesh, &[], Some(&plate()), start);
-    // The upper half has come down on the lower one, and lies on it.
+    // The upper half rests on the lower one.
     let top = (0..6).map(|j| end.positions[j * 25 + 24].z).fold(0.0, f64::max);
     let under = (0..6).map(|j| end.positions[j * 25].z).fold(0.0, f64::max);
     assert!(top > under + 3e-4 && top < 0.009, "{top} over {under}");
@@ -147,7 +147,7 @@ fn a_cloth_on_a_ball_and_the_floor_lies_in_folds() {
 
 #[test]
 fn intersecting_sheets_separate() {
-    // The one is held at its upper edge; the other, held too, was pushed through it up to a third.
+    // Both sheets are held at an edge; a third of one reaches through the other.
     let h = 0.01;
     let one = sheet(12, 12, DVec3::new(-0.06, 0.0, 0.0), DVec3::X * h, DVec3::NEG_Z * h);
     let other = sheet(8, 8, DVec3::new(-0.031, -0.052, -0.043), DVec3::X * h, DVec3::Y * h);

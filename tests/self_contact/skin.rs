@@ -1,4 +1,4 @@
-//! Skin through cloth: bodies rounder than the cloth's mesh is fine, and ends of a body that stick through.
+//! Body through cloth: bodies with more curvature than the mesh of the cloth resolves, and protrusions.
 
 use partwise::Scene;
 use partwise::mesh::export::write_mesh;
@@ -8,10 +8,10 @@ use partwise::study::certificate::certify;
 
 use super::*;
 
-/// Its top.
+/// Top of the knob, m.
 const KNOB: DVec3 = DVec3::new(0.008, 0.016, 0.012);
 
-/// Squares of five centimetres that come down on a knob, twelve millimetres high and round as a ball of six centimetres, within one of them.
+/// A sheet of 5 cm squares above a spherical knob, 12 mm high with a diameter of 6 cm, in the interior of one square.
 fn over_a_knob() -> Scene {
     let knob = ball(0.03);
     let at = KNOB - DVec3::Z * 0.06;
@@ -33,7 +33,7 @@ fn a_coarse_cloth_lies_on_a_knob_that_would_show_through_it() {
     assert!(skin(&through.positions) > 10, "{}", skin(&through.positions));
     let end = rests(&scene.garment, &[], Some(&scene.body), start);
     assert_eq!(skin(&end.positions), 0);
-    // It lies on it rather than hovers: some place of a triangle is nearer than twice the cloth's thickness.
+    // The cloth touches the knob: a point of a triangle is nearer than twice the thickness of the cloth.
     let nearest = scene.garment.triangles.iter().flat_map(|t| {
         let [a, b, c] = t.map(|v| end.positions[v as usize]);
         let steps = (0..=20).flat_map(|i| (0..=20 - i).map(move |j| [i, j].map(|k| f64::from(k) / 20.0)));
@@ -43,14 +43,14 @@ fn a_coarse_cloth_lies_on_a_knob_that_would_show_through_it() {
     let top = on_it.map(|x| scene.body.nearest(x).signed_distance).fold(1.0, f64::min);
     let thickness = cloth.thickness[0];
     assert!(top > 0.0 && top < 2.0 * thickness, "{top} m, thickness {thickness} m");
-    // What the knob carries is found again from where the vertices are.
+    // The certificate finds the force of the knob from the positions alone.
     let certificate = certify(&scene, &Fabric::by_name("jersey").unwrap(), &end.positions).unwrap();
     assert!(certificate.passes, "{:#?}", certificate.findings);
 }
 
 #[test]
 fn a_foot_through_a_trouser_leg_is_reported_and_moved_inside() {
-    // Four centimetres thick, and 5 cm out of the leg.
+    // The foot is 4 cm thick and reaches 5 cm out of the leg.
     let round = ball(1.0);
     let at = |x: &DVec3| DVec3::new(0.045, 0.0, 0.03) + (*x - DVec3::Z) * DVec3::new(0.095, 0.035, 0.02);
     let foot = round.with_positions(round.positions.iter().map(at).collect());
@@ -76,7 +76,7 @@ fn a_foot_through_a_trouser_leg_is_reported_and_moved_inside() {
     let loaded = spec.load().unwrap();
     let message = loaded.notes().join("\n");
     assert!(message.contains("stuck through the garment") && loaded.warnings().is_empty(), "{message}");
-    // As it was put on it is taken inside when it has come to rest.
+    // Without the repair at loading, the solve moves the foot inside.
     let as_it_is = SceneSpec { push_out: false, ..spec }.load().unwrap();
     assert_eq!(as_it_is.pushed_out.off_ends_m, 0.0);
     for scene in [loaded.scene, as_it_is.scene] {

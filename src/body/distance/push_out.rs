@@ -213,7 +213,7 @@ pub(crate) fn neighbour_mean(topology: &Topology, field: &[DVec3], v: u32) -> DV
     neighbours.iter().map(|&w| field[w as usize]).sum::<DVec3>() / neighbours.len().max(1) as f64
 }
 
-/// Vertices within so many edges of the seeds, ascending, without those `excluded` and without passing through them.
+/// Vertices within `rings` edges of the seeds, ascending. Paths through `excluded` vertices do not count.
 fn rings(topology: &Topology, seeds: &[u32], rings: usize, excluded: Vec<bool>) -> Vec<u32> {
     let mut reached = excluded;
     let mut region: Vec<u32> = Vec::new();

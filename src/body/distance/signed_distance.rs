@@ -14,8 +14,8 @@
 //! | R | depth behind the cloth that counts as inside, [`COVER_DEPTH`] | m |
 //!
 //! # A covered body
-//! An outer garment keeps off an inner one as off the skin. [`Body::covered_by`] makes a body whose distance q' is that to
-//! the outermost of skin and cloth:
+//! For an outer garment, an inner garment is an obstacle like the skin. [`Body::covered_by`] makes a body whose distance q' is that
+//! to the outermost of skin and cloth:
 //!
 //! q' = d  where x is behind the cloth by less than R, else the smaller of q and |d|.
 //!

@@ -6,7 +6,7 @@
 //!
 //! The squared distance from p to the triangle a, a + u, a + w is the one to its plane, (n·(p − a))²/n² with n = u × w, where
 //! p projects into it, and otherwise the least of the squared distances to its three sides. The result depends on the point
-//! alone: of equal squares the lower triangle index wins, whatever was searched before.
+//! alone: of equal squares the lower triangle index wins, independent of earlier queries.
 //!
 //! parry3d's own search took a quarter of a drape's time; this one takes half as long (`benches/stages.rs` measures both),
 //! because it tests four at a time and starts at a triangle that is near. The point on the triangle and its pseudo-normals

@@ -40,7 +40,8 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 /// stockings: 2 to 5 kPa), so a looser garment stays well off the skin.
 const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
 
-/// Radius of the most curved body that contact at vertices keeps off the triangles between them, m: a shoulder's ridge, a bust's apex.
+/// Smallest radius of curvature of the body at which contact at vertices also keeps triangles outside, m: the ridge of a shoulder, the
+/// apex of the bust.
 const MIN_BODY_RADIUS_M: f64 = 0.03;
 
 /// Largest distance that a coarse mesh adds to the offset, m: the gap that cloth simulators commonly keep.

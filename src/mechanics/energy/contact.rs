@@ -346,7 +346,7 @@ impl<'b> Contacts<'b> {
         if changed > 0 { FaceUpdate::Places } else { FaceUpdate::Unchanged }
     }
 
-    /// Removes all contact places for good, because the cloth does not come to rest with them.
+    /// Removes all contact places permanently, because the solve does not converge with them.
     pub(crate) fn remove_face_contacts(&mut self) {
         self.face_contacts.places.clear();
         self.face_contacts.closed = true;

@@ -5,7 +5,7 @@
 //! contact places: the points of a lattice in the triangle that are deepest in the body. A place is Σ w x over the corners. It
 //! acts as a gap between the cloth and a plane of the body ([`Gap`]), with friction, and releases as a vertex does. If the
 //! places of a triangle are all outside and the triangle still intersects the body, their offset is raised. [`Contacts`](super::Contacts)
-//! repeats this each time the cloth has come to rest.
+//! repeats this each time the solve has converged.
 //!
 //! A place inside the body whose shortest way out leads back through the cloth, or along it, is ignored: pushing it out would pull
 //! a limb farther through.

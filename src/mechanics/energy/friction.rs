@@ -17,7 +17,7 @@
 //! | a | anchor: the point of first contact, dragged by slip | m |
 //! | ε | elastic slip, [`ELASTIC_SLIP`] | m |
 //!
-//! Limits: statics has no history of its own; the anchors are the points where the solver's path first touched the body.
+//! Limits: statics has no physical history; the anchors are the points where the path of the solver first touched the body.
 
 use std::sync::Arc;
 

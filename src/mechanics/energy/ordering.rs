@@ -8,7 +8,7 @@
 //! A separator is bisected recursively, too, so that neighbours have close numbers: the updates from both sides then consist
 //! of a few long runs.
 //!
-//! The halves run in parallel. Each reads only marks of its own cuts.
+//! The halves run in parallel. Each half reads only the marks of its cuts.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -105,7 +105,7 @@ impl VertexRing {
             }
         }
         let trace: f64 = (0..5).map(|i| normal[i][i]).sum();
-        // No ridge on the gradient, so that a flat cloth has no curvature whatever its slope.
+        // No ridge on the gradient, so that a flat cloth has no curvature at any slope.
         for (i, row) in normal.iter_mut().enumerate().skip(2) {
             row[i] += RIDGE * trace;
         }

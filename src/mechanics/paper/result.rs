@@ -49,7 +49,7 @@ pub enum PaperWarning {
     NothingCarries {
         /// PARTs in contact.
         contact_parts: usize,
-        /// Σ cos γ_q ΔV / Σ ΔV over the contact PARTs; 0 where there are none.
+        /// Σ cos γ_q ΔV / Σ ΔV over the contact PARTs; 0 without contact PARTs.
         support: f64,
     },
     /// Fᵃ_z is zero for all PARTs: the cloth is vertical, or the reading fails.

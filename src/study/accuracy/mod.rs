@@ -1,4 +1,4 @@
-//! Accuracy of a drape: its distance to a reference, and metrics of its own state.
+//! Accuracy of a drape: its distance to a reference, and metrics of its state.
 //!
 //! A garment has several equilibria of nearly the same energy, so the distance to a single reference misleads. A result is
 //! compared with its *own continuation*, refined to convergence from the result itself (`vertices`, `rms_mm`), and with

@@ -127,7 +127,7 @@ impl Metrics {
         }
     }
 
-    /// Adds the errors of an evaluation. A model without a state of its own takes energy and strain from it.
+    /// Adds the errors of an evaluation. A model without a state takes energy and strain from it.
     pub(crate) fn with_evaluation(self, evaluation: &Evaluation) -> Self {
         let Accuracy { vertices, canonical_rms_mm, canonical_spread_mm, state, .. } = evaluation.accuracy;
         Self {

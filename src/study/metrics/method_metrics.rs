@@ -93,7 +93,7 @@ impl MethodMetrics {
         let mut found = self.shared().warnings(dressing.scene);
         if self.ended == Ended::TimeOver {
             found.push(format!(
-                "the cloth does not come to rest: {:.1} cm/s RMS after {:.0} s",
+                "the cloth still moves at {:.1} cm/s RMS after {:.0} s; it has not converged",
                 100.0 * self.rms_speed_m_per_s,
                 self.simulated_s
             ));

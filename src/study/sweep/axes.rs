@@ -1,7 +1,6 @@
 //! The values of every axis of a sweep, read from its file, and their full grid.
 //!
-//! A value of an axis is an edit of a [`Point`]: what the file does not say stays as the job the sweep starts from has
-//! it.
+//! A value of an axis is an edit of a [`Point`]; keys that the file leaves out keep the value of the initial job.
 
 use toml::Value;
 
@@ -18,15 +17,15 @@ use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::Motion;
 use crate::study::job::Job;
 
-/// Points a plan may have: a larger grid is a slip of the pen (at a tenth of a second a point it takes three hours, and
-/// its points take 200 MB of memory).
-const LIMIT: usize = 100_000;
+/// Largest number of points of a plan; more are probably a mistake. At 0.1 s per point, this many take three hours, and their
+/// list takes 200 MB.
+const MAX_POINTS: usize = 100_000;
 
 /// The values of every axis, in the order in which a grid is nested.
 pub(super) struct Axes(Vec<Vec<Edit>>);
 
 impl Axes {
-    /// Reads the axes of a grid; an axis it lacks has the one value of `base`, or none.
+    /// Reads the axes of a grid. An axis that the grid lacks has the value of `base`, if any.
     pub(super) fn read(source: Source<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Self, PlanError> {
         let axis = Axis { source, base, grid };
         Ok(Self(vec![
@@ -75,21 +74,21 @@ impl Axes {
         ]))
     }
 
-    /// How many points the grid has.
+    /// Number of points of the grid.
     pub(super) fn count(&self) -> usize {
         self.0.iter().fold(1, |n: usize, axis| n.saturating_mul(axis.len()))
     }
 
-    /// Appends every combination, the last axis fastest.
+    /// Appends all combinations, the last axis fastest.
     pub(super) fn expand(&self, points: &mut Vec<Point>, start: &Job, name: &str) -> Result<(), PlanError> {
         let count = self.count();
         let found = count.saturating_add(points.len());
-        if found > LIMIT {
-            return Err(PlanError::TooMany { name: name.to_owned(), found, limit: LIMIT });
+        if found > MAX_POINTS {
+            return Err(PlanError::TooMany { name: name.to_owned(), found, limit: MAX_POINTS });
         }
         for number in 0..count {
             let mut point = Point::of(start.clone());
-            // The number's digits, one base an axis.
+            // Mixed-radix digits of the number, one per axis.
             let mut block = count;
             for axis in &self.0 {
                 block /= axis.len();
@@ -116,7 +115,7 @@ fn fabric(source: Source<'_>, value: &At, inputs: &Inputs) -> Result<Vec<Edit>, 
     Ok(one(move |point| point.job.settings.fabric = fabric.clone()))
 }
 
-/// No extent, one, or a cascade from coarse to fine.
+/// No extent, one extent, or a cascade from coarse to fine.
 fn extents(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
     let wrong =
         || source.wrong(value, "extent_cm", "centimetres, 0 or \"none\" for not cut, or a falling list of them");
@@ -158,6 +157,6 @@ fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
         Ok(())
     };
     set(&mut Point::of(Job::default())).map_err(|e| wrong(&format!("; {e}")))?;
-    // Tried above: what fits one point fits any.
+    // The edit succeeded above, and it does not depend on the point.
     Ok(one(move |point| set(point).unwrap_or_default()))
 }

@@ -1,4 +1,4 @@
-//! Runs the points of a sweep: loads each scene once, times the passes, measures the result. Failures become rows.
+//! Runs the points of a sweep: loads each scene once, times the passes and measures the result. A failure becomes a row.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -25,21 +25,21 @@ use crate::study::metrics::Metrics;
 /// Why a point has no result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PointError {
-    /// It failed: a row says so, and the sweep goes on.
+    /// The point failed: its row has the error, and the sweep continues.
     #[error("{0}")]
     Failed(String),
-    /// The user stopped it half-way: no row; it is computed again on resume.
+    /// The user interrupted it. It has no row and is computed again on resume.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl PointError {
-    /// A failure in the words of an error and of all that caused it.
+    /// A failure with the texts of an error and its causes.
     pub(crate) fn failed(error: &(dyn Error + 'static)) -> Self {
         Self::Failed(with_causes(error, ": "))
     }
 
-    /// A garment of which nothing keeps some or all on the body.
+    /// A garment that has fallen off the body, in part or as a whole.
     fn fallen(what: Option<String>) -> Self {
         let what = what.unwrap_or_else(|| "the garment has fallen off the body".to_owned());
         Self::Failed(format!("{what}; in a sweep file it is `hold` that holds an edge"))
@@ -51,7 +51,7 @@ impl PointError {
 pub(crate) struct Pass<T> {
     /// Data for the measurement, which is not timed.
     pub value: T,
-    /// How long the stages took.
+    /// Times of the stages.
     pub times: StageTimes,
     /// [`result_hash`] of the displaced positions.
     pub result_hash: String,
@@ -95,7 +95,7 @@ pub(crate) fn row_of<T>(
         let Pass { value, result_hash, .. } = last;
         Ok(Row::solved(point, &measure(value)?, &result_hash, &Timing::of(&times)))
     };
-    // A panic may leave shared data inconsistent; a failure of the next point would be a row, too.
+    // A panic may leave shared data inconsistent; a failure of a later point would become a row too.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(row)) => Some(row),
         Ok(Err(PointError::Failed(text))) => Some(Row::failed(point, text)),
@@ -112,7 +112,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .unwrap_or("without a message")
 }
 
-/// Drapes and measures points. Called from several threads at once where there are several jobs.
+/// Drapes and measures points; with several jobs, from several threads at the same time.
 pub struct Bench<'a> {
     cache: Option<ReferenceCache>,
     meshes: MeshCache,
@@ -121,18 +121,18 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// A bench that keeps references in `cache`, if there is one, and leaves its work once `stop` is set.
+    /// A bench that stores references in `cache`, if there is one, and interrupts its work once `stop` is set.
     #[must_use]
     pub fn new(cache: Option<ReferenceCache>, stop: &'a AtomicBool) -> Self {
         Self { cache, meshes: MeshCache::default(), stop, scenes: Mutex::default() }
     }
 
-    /// The same, with made meshes in `meshes`.
+    /// The same with a cache of built-in meshes.
     pub(crate) fn with_meshes(self, meshes: MeshCache) -> Self {
         Self { meshes, ..self }
     }
 
-    /// The scene of a point. Others wait while one is made: they most likely want the same.
+    /// The scene of a point. Other threads wait while a scene is loaded, since they usually need the same one.
     pub(crate) fn scene(&self, point: &Point) -> Result<Arc<Loaded>, PointError> {
         let mut made = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
         let id = point.scene_id();
@@ -170,7 +170,7 @@ impl<'a> Bench<'a> {
             Ok(measured.metrics)
         };
         let row = row_of(point, passes, || self.pass(point), measure)?;
-        // Of what has fabrics of its own, these.
+        // A garment with its own fabrics reports those.
         let fabric = cut_from.take().unwrap_or(row.fabric);
         Some(Row { fabric, ..row })
     }
@@ -183,7 +183,7 @@ impl<'a> Bench<'a> {
         let drape = point.job.drape(&loaded.scene, &mut |_: &Step<'_>| self.listen());
         let drape = drape.map_err(|e| PointError::failed(&e))?;
         if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
-            // A garment that falls past the feet ends its own steps, not the sweep.
+            // A garment that falls past the feet ends its own solve, not the sweep.
             return Err(if self.listen().is_break() {
                 PointError::Interrupted
             } else {

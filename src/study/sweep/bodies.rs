@@ -1,4 +1,4 @@
-//! The bodies of a sweep: the built-in form, to measure or as it comes, or a mesh.
+//! The bodies of a sweep: the dress form with default or given measurements, or a mesh.
 
 use toml::Value;
 
@@ -42,7 +42,7 @@ fn chosen(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<(Input,
     Ok((input, measurements))
 }
 
-/// The form, as it comes or from a file of measurements, or a mesh.
+/// The dress form with default measurements or those of a file, or a mesh.
 fn named_body(
     source: Source<'_>,
     value: &At,

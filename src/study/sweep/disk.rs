@@ -1,5 +1,4 @@
-//! Files that survive a crash: replaced whole or not at all, or grown line by line with nothing half-written kept; and the lock that keeps
-//! others off them.
+//! Crash-safe files of a sweep: atomic replacement, a journal that grows by whole lines, and the lock against concurrent writers.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -9,15 +8,15 @@ use super::error::StoreError;
 use crate::base::atomic_file::AtomicFile;
 use crate::base::files::read_own;
 
-/// Where lines are appended: a file, or what a test puts in its place.
+/// The target of a journal: a file, or a simulated disk in tests.
 pub(crate) trait Append: Send {
-    /// Appends and returns once the bytes are on the disk, not before.
+    /// Appends the bytes and returns once they are on disk.
     ///
     /// # Errors
-    /// Errors of the system; a part of the bytes may have been written.
+    /// An error of the file system; some of the bytes may have been written.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Cuts back to this length, bytes.
+    /// Truncates to this length, bytes.
     fn cut(&mut self, length: u64) -> io::Result<()>;
 }
 
@@ -33,10 +32,10 @@ impl Append for File {
     }
 }
 
-/// Opens a file to append to, made if it is not there.
+/// Opens a file at its end for appending; creates it if it does not exist.
 #[allow(
     clippy::disallowed_methods,
-    reason = "to read and write: that blocks on no pipe, and a pipe has no end to seek"
+    reason = "opening to read and write does not block on a pipe, and seeking to the end of a pipe fails"
 )]
 pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
     let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
@@ -44,7 +43,7 @@ pub(super) fn open_end(path: &Path) -> Result<File, StoreError> {
     at_end.map_err(StoreError::io(path, "cannot be opened for writing"))
 }
 
-/// The file's bytes, or nothing where there is no file.
+/// The contents of the file; `None` if it does not exist.
 pub(super) fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
     match read_own(path) {
         Ok(bytes) => Ok(Some(bytes)),
@@ -58,8 +57,8 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     AtomicFile::write(path, bytes).map_err(StoreError::io(path, "cannot be written"))
 }
 
-/// Makes the file hold `text`: left alone if it does, cut where only a torn end is too much (a full disk has room for
-/// that), replaced otherwise.
+/// Gives the file the contents `text`. If the file only has an incomplete line in excess, it is truncated, which needs no free
+/// space; otherwise it is replaced.
 pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
     let found = read_if_there(path)?;
     match found {
@@ -71,10 +70,10 @@ pub(super) fn make(path: &Path, text: &[u8]) -> Result<(), StoreError> {
     }
 }
 
-/// Makes the media rows are appended to from opened files.
+/// Wraps the opened file that rows are appended to.
 pub(crate) type Medium<'a> = dyn Fn(File) -> Box<dyn Append> + 'a;
 
-/// A file that grows by whole lines.
+/// A file that grows by whole lines only.
 pub(super) struct Journal {
     pub(super) path: PathBuf,
     medium: Box<dyn Append>,
@@ -88,10 +87,10 @@ impl Journal {
         Ok(Self { path, medium: medium(file), length })
     }
 
-    /// Appends a line after `kept` rows; what was written of it is cut off again if it fails.
+    /// Appends a line after `kept` rows. On failure the file is truncated to its previous length.
     pub(super) fn append(&mut self, line: &[u8], kept: usize) -> Result<(), StoreError> {
         if let Err(source) = self.medium.append(line) {
-            // What was written of the line is cut off again; where even that fails, resume drops it.
+            // If truncation fails too, resuming drops the incomplete line.
             let _ = self.medium.cut(self.length);
             return Err(StoreError::Write { path: self.path.clone(), kept, source });
         }
@@ -100,7 +99,7 @@ impl Journal {
     }
 }
 
-/// Takes the lock; the system lets go of it with the process.
+/// Takes the lock; the operating system releases it at the end of the process.
 pub(super) fn take_lock(path: &Path) -> Result<File, StoreError> {
     let file = open_end(path)?;
     match file.try_lock() {

@@ -1,4 +1,4 @@
-//! The sweep file as TOML: its keys, and where each value stands, for the messages.
+//! The keys of a sweep file (TOML), and the position of each value for messages.
 //!
 //! ```toml
 //! name = "extents of a skirt"
@@ -41,13 +41,13 @@ use super::error::PlanError;
 use super::point::{Edit, one};
 use crate::base::files::line_of;
 
-/// A value and where it stands.
+/// A value and its position in the text.
 pub(super) type At = Spanned<Value>;
 
-/// `[base]` and `[[points]]`: one value a key.
+/// `[base]` and `[[points]]`: one value per key.
 pub(super) type Single = BTreeMap<String, At>;
 
-/// `[grid]`: a list a key.
+/// `[grid]`: one list per key.
 pub(super) type Grid = BTreeMap<String, Spanned<Vec<At>>>;
 
 /// The keys of `[base]` and `[[points]]`, and those of `[grid]`, in the order in which a grid is nested.
@@ -82,7 +82,7 @@ pub(super) struct SweepFile {
     pub(super) points: Vec<Single>,
 }
 
-/// The text of a sweep file and its name, for the messages.
+/// The text of a sweep file and its name, for messages.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) text: &'a str,
@@ -126,7 +126,7 @@ impl Source<'_> {
         format!("{}:{}", self.name, line_of(self.text, offset))
     }
 
-    /// The error for a value that will not do.
+    /// The error for a value that is not allowed.
     pub(super) fn wrong(self, value: &At, key: &'static str, expected: impl Into<String>) -> PlanError {
         let found = value.get_ref().to_string();
         PlanError::Value { place: self.place(value), key, found, expected: expected.into() }
@@ -188,7 +188,7 @@ impl Axis<'_> {
 pub(super) fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Float(x) => Some(*x),
-        // Integers in a sweep file are small; those that a float cannot hold are no extent and no factor.
+        // Extents and factors are small; integers beyond 32 bits are refused.
         Value::Integer(n) => i32::try_from(*n).ok().map(f64::from),
         _ => None,
     }

@@ -1,4 +1,4 @@
-//! The garments of a sweep, at their sizes.
+//! The garments of a sweep and their sizes.
 
 use super::error::PlanError;
 use super::file::{At, Axis};
@@ -53,7 +53,7 @@ pub(super) fn garments(axis: Axis<'_>, inputs: &mut Inputs) -> Result<Vec<Edit>,
     Ok(all.into_iter().map(|garment| -> Edit { Box::new(move |point| point.set_garment(&garment)) }).collect())
 }
 
-/// How many vertices a garment shall have.
+/// Number of vertices of a garment.
 #[derive(Clone, Copy)]
 enum Size {
     Vertices(usize),

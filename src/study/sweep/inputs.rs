@@ -1,10 +1,10 @@
-//! The files a sweep names, read once each, and their contents' hashes.
+//! The files that a sweep names, each read once, and the hashes of their contents.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::error::PlanError;
-use crate::base::files::{MOST_MESH, MOST_TEXT, bounded, bounded_text, names_a_file};
+use crate::base::files::{MAX_MESH, MAX_TEXT, bounded, bounded_text, names_a_file};
 use crate::scene::SceneSpec;
 
 /// A body or garment, built in by name or a file.
@@ -19,7 +19,7 @@ pub(super) struct Input {
 }
 
 impl Input {
-    /// Something built in.
+    /// A built-in body or garment.
     pub(super) fn built_in(label: impl Into<String>) -> Self {
         let label = label.into();
         Self { name: label.clone(), key: label.clone(), label }
@@ -30,7 +30,7 @@ impl Input {
     }
 }
 
-/// Reader of the files a sweep names; paths count from the folder of the sweep file.
+/// Reads the files that a sweep names; paths are relative to the folder of the sweep file.
 #[derive(Debug)]
 pub(super) struct Inputs {
     folder: PathBuf,
@@ -42,32 +42,32 @@ impl Inputs {
         Self { folder: folder.to_owned(), digests: BTreeMap::new() }
     }
 
-    /// A body or garment as written.
+    /// A body or garment by its label.
     pub(super) fn input(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
         if !names_a_file(label) {
             return Ok(Input::built_in(label));
         }
         let path = self.folder.join(label);
         if !self.digests.contains_key(&path) {
-            let bytes = bounded(&path, MOST_MESH).map_err(|e| unreadable(&path, place, e))?;
+            let bytes = bounded(&path, MAX_MESH).map_err(|e| unreadable(&path, place, e))?;
             self.digests.insert(path.clone(), blake3::hash(&bytes).to_hex()[..32].to_owned());
         }
         let digest = &self.digests[&path];
         Ok(Input { label: label.to_owned(), name: path.display().to_string(), key: format!("blake3 {digest}") })
     }
 
-    /// A garment as written; what says which panel is cut from what determines a result, too.
+    /// A garment by its label. Its key includes the files that assign fabrics to panels, because they affect the result.
     pub(super) fn garment(&mut self, label: &str, place: &str) -> Result<Input, PlanError> {
         let mut input = self.input(label, place)?;
         for file in SceneSpec::new("", &input.name).files_of_fabrics() {
-            // One that cannot be read is the scene's to refuse.
-            let bytes = bounded(&file, MOST_TEXT).unwrap_or_default();
+            // Loading the scene reports a file that cannot be read.
+            let bytes = bounded(&file, MAX_TEXT).unwrap_or_default();
             input.key += &format!(" {}", &blake3::hash(&bytes).to_hex()[..32]);
         }
         Ok(input)
     }
 
-    /// A text file as written.
+    /// A text file by its label.
     pub(super) fn text(&self, label: &str, place: &str) -> Result<String, PlanError> {
         let path = self.folder.join(label);
         bounded_text(&path).map_err(|e| unreadable(&path, place, e))

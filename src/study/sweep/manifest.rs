@@ -14,7 +14,7 @@ use super::{Plan, PlanError, StoreError, disk};
 /// Name of the manifest in a sweep's folder.
 pub(super) const MANIFEST: &str = "plan.json";
 
-/// A share of a sweep: every n-th point, so that shares have similar costs independent of the slow axes.
+/// A shard of a sweep: every n-th point, so that shards have similar costs even if an axis changes the cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Shard {
@@ -23,7 +23,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Share `index` (from 1) of `count`.
+    /// Shard `index` (from 1) of `count`.
     ///
     /// # Errors
     /// [`PlanError::Shard`] unless 1 ≤ index ≤ count.
@@ -34,7 +34,7 @@ impl Shard {
         Ok(Self { index, count })
     }
 
-    /// Whether the point of this number is in the share.
+    /// Whether the point of this number is in the shard.
     pub(crate) fn holds(self, point: usize) -> bool {
         point % self.count == self.index - 1
     }
@@ -91,31 +91,31 @@ pub struct Manifest {
     pub partwise: String,
     /// Hash of the points, ids and labels, in order.
     pub plan: String,
-    /// The share of the points that belongs here; none for all of them.
+    /// The shard of this folder; `None` for all points.
     pub shard: Option<Shard>,
     /// Every point of the sweep, in order.
     pub points: Vec<Listed>,
 }
 
-/// Whether a text is a content hash as points and scenes have them: hexadecimal, hence good for a file name.
+/// Whether a text is a content hash of 32 hexadecimal digits and thus safe as a file name.
 pub(crate) fn is_id(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
 
 impl Manifest {
-    /// Of a plan, or of a share of it.
+    /// The manifest of a plan or of a shard of it.
     #[must_use]
     pub fn of(plan: &Plan, shard: Option<Shard>) -> Self {
         let points: Vec<Listed> = plan.points.iter().map(|p| Listed { id: p.id.clone(), label: p.label() }).collect();
         Self { name: plan.name.clone(), partwise: VERSION.to_owned(), plan: content_id(&points), shard, points }
     }
 
-    /// How many points belong here.
+    /// Number of points of the shard.
     pub(crate) fn share(&self) -> usize {
         (0..self.points.len()).filter(|&i| self.holds(i)).count()
     }
 
-    /// Whether the point of this number belongs here.
+    /// Whether the point of this number is in the shard.
     pub(crate) fn holds(&self, point: usize) -> bool {
         self.shard.is_none_or(|s| s.holds(point))
     }
@@ -125,7 +125,7 @@ impl Manifest {
         self.points.iter().enumerate().map(|(i, p)| (p.id.as_str(), i)).collect()
     }
 
-    /// The sweep in a few words: what two that differ are told apart by.
+    /// Name, version, number of points and hash, for messages about two different sweeps.
     pub(crate) fn identity(&self) -> String {
         let Self { name, partwise, plan, points, .. } = self;
         let shard = self.shard.map_or(String::new(), |s| format!(", shard {s}"));
@@ -136,7 +136,7 @@ impl Manifest {
         )
     }
 
-    /// Reads the manifest of a folder; `None` where there is none.
+    /// Reads the manifest of a folder; `None` if the file does not exist.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>, StoreError> {
         let path = folder.join(MANIFEST);
         let Some(bytes) = disk::read_if_there(&path)? else { return Ok(None) };
@@ -144,14 +144,14 @@ impl Manifest {
             Ok(manifest) => manifest,
             Err(e) => return Err(StoreError::Damaged { path, line: e.line(), message: e.to_string() }),
         };
-        // Ids become file names, and the manifest may be somebody else's.
+        // Ids become file names, and the manifest may come from an untrusted source.
         if let Some(wrong) = manifest.points.iter().find(|point| !is_id(&point.id)) {
             return Err(StoreError::BadId { path, found: wrong.id.clone() });
         }
         Ok(Some(manifest))
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes the manifest atomically.
     pub(super) fn write(&self, folder: &Path) -> Result<(), StoreError> {
         let path = folder.join(MANIFEST);
         let text = serde_json::to_string_pretty(self);

@@ -1,16 +1,16 @@
-//! Joins the rows of shards into what one run would have written, bit for bit but for timings.
+//! Joins the rows of shards. The result equals that of a single run bit for bit, except for timings.
 
 use std::path::{Path, PathBuf};
 
 use super::{Existing, Manifest, MergeError, Row, Store, store};
 
-/// How many missing points an error lists.
-const LISTED: usize = 10;
+/// Largest number of missing points that an error lists.
+const MAX_LISTED: usize = 10;
 
 /// Joins the sweeps of `folders` into a new one in `out`; returns its rows.
 ///
-/// Any cut of a sweep will do, shards or partial runs. A point that several have is taken from the first, provided all
-/// agree on it, timings aside.
+/// The folders may be shards or partial runs. A point with several rows takes the first; the others must agree with it except for
+/// timings.
 ///
 /// # Errors
 /// [`MergeError`]: folders of different sweeps or versions, points that are missing or on which two disagree, rows already
@@ -22,7 +22,7 @@ pub(crate) fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<Row>, MergeEr
     Ok(store.finish()?)
 }
 
-/// The joined rows in the plan's order, and whose they are.
+/// The joined rows in the order of the plan, and their manifest.
 pub fn join(folders: &[PathBuf]) -> Result<(Manifest, Vec<Row>), MergeError> {
     let (first, rest) = folders.split_first().ok_or(MergeError::Nothing)?;
     let (manifest, rows) = store::read(first)?;
@@ -50,9 +50,9 @@ pub fn join(folders: &[PathBuf]) -> Result<(Manifest, Vec<Row>), MergeError> {
     let missing: Vec<usize> = (0..joined.len()).filter(|&i| joined[i].is_none()).collect();
     if !missing.is_empty() {
         let name = |&i: &usize| format!("{i} ({})", manifest.points[i].label);
-        let mut list: Vec<String> = missing.iter().take(LISTED).map(name).collect();
-        if missing.len() > LISTED {
-            list.push(format!("and {} more", missing.len() - LISTED));
+        let mut list: Vec<String> = missing.iter().take(MAX_LISTED).map(name).collect();
+        if missing.len() > MAX_LISTED {
+            list.push(format!("and {} more", missing.len() - MAX_LISTED));
         }
         return Err(MergeError::Missing { count: missing.len(), total: joined.len(), list });
     }

@@ -1,12 +1,12 @@
-//! Sweeps: a file of range tables and other parameters run point by point, a row on disk after each.
+//! Sweeps: runs a file of range tables and other parameters point by point and writes a row to disk after each.
 //!
-//! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs those that have no row
-//! yet by a function from point to row (usually a [`Bench`]), and writes the rows to a [`Store`]; `merge` joins
-//! the stores of shards. Equal plans give equal rows, timings excepted, independent of interruptions, jobs and
+//! [`Plan::read`] turns a sweep file into points, each a [`Job`](crate::Job); [`sweep`] runs the points without a row
+//! by a function from point to row (usually a [`Bench`]), and writes the rows to a [`Store`]; `merge` joins
+//! the stores of shards. Equal plans give equal rows except for timings, independent of interruptions, jobs and
 //! shards.
 //!
-//! `tables` documents how a file names range tables, `file` all its keys, `plan` the order of points,
-//! `point` their ids, `store` the files; `sweep_file` writes one of jobs.
+//! `file` documents the keys of a sweep file, `tables` the entries of range tables, `plan` the order of points,
+//! `point` their ids, `store` the files on disk; `sweep_file` writes jobs as a sweep file.
 
 mod axes;
 mod bench;
@@ -34,7 +34,7 @@ pub(crate) use manifest::is_id;
 pub use manifest::{Listed, Manifest, Shard};
 pub use merge::join;
 pub(crate) use merge::merge;
-pub(crate) use plan::MOST_PASSES;
+pub(crate) use plan::MAX_PASSES;
 pub use plan::Plan;
 pub use point::Point;
 pub(crate) use row::cell;

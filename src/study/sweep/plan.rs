@@ -3,8 +3,7 @@
 //! # Order
 //! The grid's points come first, nested as body, garment, size, fabric, model, table, extent, motion, smallest PART,
 //! refinement, seed, options (the last fastest), each axis in the order written; then the single points as written. A
-//! point that equals an earlier one in all that determines its result (Table 3 scaled by 1, say) is left out, and
-//! [`Plan::notes`] says so.
+//! point with the same id as an earlier one (for example Table 3 scaled by 1) is left out, and [`Plan::notes`] reports it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +16,7 @@ use crate::base::files::read_text;
 use crate::study::job::Job;
 
 /// Largest number of timed passes, and of warm-up passes. Heuristic: more passes do not improve the median.
-pub(crate) const MOST_PASSES: usize = 100;
+pub(crate) const MAX_PASSES: usize = 100;
 
 /// All points of a sweep, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,23 +36,23 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Reads a sweep file; the files it names count from its folder, and what it does not say is as in `start`.
+    /// Reads a sweep file. Paths in it are relative to its folder; keys that it leaves out are as in `start`.
     pub fn read(path: &Path, start: &Job) -> Result<Self, PlanError> {
         let name = path.display().to_string();
         let text = read_text(path).map_err(PlanError::Unreadable)?;
         Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")), start)
     }
 
-    /// The plan of a sweep file's text; `name` only serves the messages, `folder` is where its paths count from.
+    /// The plan of a sweep file's text. `name` is used in messages; paths are relative to `folder`.
     pub fn parse(text: &str, name: &str, folder: &Path, start: &Job) -> Result<Self, PlanError> {
         let source = Source { text, name };
         let file = source.parse()?;
         let passes = |value: &Option<At>, key, least| match value {
             None => Ok(least),
             Some(value) => {
-                let expected = format!("a whole number of passes, at least {least} and at most {MOST_PASSES}");
+                let expected = format!("a whole number of passes, at least {least} and at most {MAX_PASSES}");
                 let found = source.count(value, key, least, &expected)?;
-                if found > MOST_PASSES { Err(source.wrong(value, key, &expected)) } else { Ok(found) }
+                if found > MAX_PASSES { Err(source.wrong(value, key, &expected)) } else { Ok(found) }
             }
         };
         let (repeats, warm_up) = (passes(&file.repeats, "repeats", 1)?, passes(&file.warm_up, "warm_up", 0)?);
@@ -79,7 +78,7 @@ impl Plan {
         Ok(Self { name: file.name, about: file.about, repeats, warm_up, points, notes })
     }
 
-    /// The plan of jobs, one timed pass each; the files they name are hashed here.
+    /// The plan of jobs with one timed pass each; hashes the files that they name.
     pub fn of_jobs(name: &str, jobs: Vec<Job>) -> Result<Self, PlanError> {
         let mut inputs = Inputs::new(Path::new(""));
         let mut point = |job: Job| {
@@ -93,7 +92,7 @@ impl Plan {
     }
 }
 
-/// Gives the points their numbers, leaving out what is there already.
+/// Removes duplicate points and numbers the others.
 fn distinct(points: Vec<Point>) -> (Vec<Point>, Vec<String>) {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let (mut kept, mut notes): (Vec<Point>, Vec<String>) = (Vec::with_capacity(points.len()), Vec::new());

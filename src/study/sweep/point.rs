@@ -1,9 +1,9 @@
-//! One point of a sweep: a job, what its body and garment are called, and its name by content.
+//! One point of a sweep: a job, the labels of its body and garment, and a content hash as its id.
 //!
-//! A point's id is the blake3 hash of the JSON of all that determines its result: the version of the program and the
-//! [`Job`]. A file counts by its contents, not by its name or place, so that a moved folder or a shard on another
-//! machine has the same ids; a range table counts by its bounds, extents and gap rule, a fabric by its constants. What
-//! changes nothing but timings (repeats, jobs, threads) is no part of it.
+//! The id is the blake3 hash of the JSON of everything that determines the result: the version of the program and the
+//! [`Job`]. Files enter by their contents, not by name or place, so that a moved folder or a shard on another
+//! machine has the same ids; a range table enters by its bounds, extents and gap rule, a fabric by its constants. Settings that
+//! only affect timings (repeats, jobs, threads) are excluded.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::drape::Settings;
 use crate::scene::SceneSpec;
 use crate::study::job::Job;
 
-/// The version that computes; rows of different versions are never mixed.
+/// The version of the program; rows of different versions are never mixed.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// One point of a sweep.
@@ -37,7 +37,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point of this job with what is built in, not named yet.
+    /// A point of this job, with the names of body and garment as their keys. Its id is not set yet.
     pub(super) fn of(job: Job) -> Self {
         let (body, garment) = (job.scene.body.clone(), job.scene.garment.clone());
         let keys = [body.clone(), garment.clone()];
@@ -56,7 +56,7 @@ impl Point {
         self.keys[1].clone_from(&garment.key);
     }
 
-    /// The extents as the rows have them: `none`, `5`, or `12>6>3` for a cascade.
+    /// The extents as in a row: `none`, `5`, or `12>6>3` for a cascade.
     pub(crate) fn extent_text(&self) -> String {
         let extents = self.job.settings.model.extents_cm();
         if extents.is_empty() {
@@ -65,12 +65,12 @@ impl Point {
         extents.iter().map(f64::to_string).collect::<Vec<_>>().join(">")
     }
 
-    /// The options as the rows have them: `a=1 b=2`, what it is measured against always among them.
+    /// The options as in a row: `a=1 b=2`; `accuracy` is always among them.
     pub(crate) fn options_text(&self) -> String {
         self.options.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
     }
 
-    /// All that tells this point from others, in one line.
+    /// All settings of the point in one line.
     pub(crate) fn label(&self) -> String {
         let Self { body, garment, job: Job { settings, seed, .. }, .. } = self;
         let Settings { model, table, min_part, refine, fabric, .. } = settings;
@@ -83,8 +83,8 @@ impl Point {
         )
     }
 
-    /// Content hash of what is made or read before any stage. Points that share it can share a scene, and with one
-    /// fabric their references.
+    /// Content hash of the inputs of the scene. Points with the same hash share a scene, and with the same fabric also their
+    /// references.
     pub(crate) fn scene_id(&self) -> String {
         content_id(&self.scene_key())
     }
@@ -94,7 +94,7 @@ impl Point {
         SceneSpec { body, garment, ..self.job.scene.clone() }
     }
 
-    /// The point with its id set from everything else.
+    /// The point with its id set.
     pub(super) fn named(mut self) -> Self {
         self.options.insert("accuracy".to_owned(), self.job.accuracy.to_string());
         let mut key = Job { scene: self.scene_key(), ..self.job.clone() };
@@ -106,18 +106,18 @@ impl Point {
     }
 }
 
-/// The change of a point by a value of an axis.
+/// The change of a point by one value of an axis.
 pub(super) type Edit = Box<dyn Fn(&mut Point)>;
 
-/// An axis value that is one edit.
+/// A list of a single edit.
 pub(super) fn one(edit: impl Fn(&mut Point) + 'static) -> Vec<Edit> {
     vec![Box::new(edit)]
 }
 
-/// Hash of a value's JSON, 128 bits in hexadecimal: enough that no two points of any sweep meet, and short in a CSV.
+/// Hash of a value's JSON, 128 bits in hexadecimal, which makes collisions negligible and is short in a CSV.
 pub(super) fn content_id(value: &impl Serialize) -> String {
-    // Structs keep their order of fields whatever features serde_json is built with; a map might not. Writing plain
-    // data to memory does not fail; if it did, the ids would collide and the plan would drop points, which it reports.
+    // Fields of structs keep their order with any features of serde_json. Serialising plain data to memory cannot fail; if it
+    // did, ids would collide and the plan would report dropped points.
     let json = serde_json::to_vec(value).unwrap_or_default();
     blake3::hash(&json).to_hex()[..32].to_owned()
 }

@@ -1,11 +1,11 @@
 //! One row of a sweep: the point, its [`Metrics`], its times; the same columns in JSON lines and in CSV.
 //!
-//! Metrics are kept to nine significant digits, and below 1e-12 as 0: far finer than any of them means, and with so few
-//! digits every reader's parser gives back the same bits, so that rows that were read and written again do not drift.
-//! The identity of results, bit for bit, is `result_hash`'s task. A point that failed has no figures and no times:
+//! Metrics are rounded to nine significant digits, and below 1e-12 to 0. This is finer than their accuracy, and with so few
+//! digits every parser gives the same bits, so that rows do not change when they are read and written again.
+//! `result_hash` identifies results bit for bit. A failed point has neither metrics nor times:
 //! empty cells in the CSV, no keys in its line.
 //!
-//! Columns that are timings, and nothing else, start with `time_`; comparisons drop them.
+//! The names of timing columns, and no others, start with `time_`; comparisons drop them.
 
 use indexmap::IndexMap;
 use serde::de::DeserializeOwned;
@@ -19,14 +19,14 @@ use crate::study::metrics::Metrics;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// It has.
+    /// It has a result.
     Ok,
-    /// It failed; the column `error` says why.
+    /// It failed; the column `error` has the cause.
     #[default]
     Error,
 }
 
-/// One point and what came of it. The fields, in order, are the columns.
+/// One point and its result. The fields, in order, are the columns.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "the names are descriptive")]
 pub struct Row {
@@ -52,7 +52,7 @@ pub struct Row {
     /// `name=value` of each.
     pub options: String,
     pub status: Status,
-    /// Why it failed; empty where it did not.
+    /// Cause of a failure; empty for a result.
     pub error: String,
     #[serde(flatten)]
     pub metrics: Option<Metrics>,
@@ -87,11 +87,11 @@ impl Row {
         }
     }
 
-    /// The row of a point with a result; a failed one where a figure is not finite.
+    /// The row of a point with a result; a failed row if a metric is not finite.
     #[must_use]
     pub fn solved(point: &Point, metrics: &Metrics, result_hash: &str, timing: &Timing) -> Self {
         if let Some((name, value)) = not_finite(metrics) {
-            return Self::failed(point, format!("{name} is {value}, expected a finite figure: the drape diverged"));
+            return Self::failed(point, format!("{name} is {value}, expected a finite number: the drape diverged"));
         }
         Self {
             status: Status::Ok,
@@ -102,7 +102,7 @@ impl Row {
         }
     }
 
-    /// The row without what differs from run to run.
+    /// The row without timings.
     pub(crate) fn without_times(&self) -> Self {
         Self { timing: None, ..self.clone() }
     }
@@ -125,7 +125,7 @@ pub(crate) fn columns() -> Vec<String> {
 pub fn csv_text(rows: &[Row]) -> Vec<u8> {
     let columns = columns();
     let mut writer = csv::Writer::from_writer(Vec::new());
-    // Plain data into memory: nothing can fail.
+    // Writing plain data to memory cannot fail.
     let _ = writer.write_record(&columns);
     for row in rows {
         let cells = cells(row);
@@ -134,7 +134,7 @@ pub fn csv_text(rows: &[Row]) -> Vec<u8> {
     writer.into_inner().unwrap_or_default()
 }
 
-/// A value of JSON as a cell of a CSV; nothing for null.
+/// A JSON value as a CSV cell; empty for null.
 pub(crate) fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
@@ -145,7 +145,7 @@ pub(crate) fn cell(value: Option<&Value>) -> String {
 
 /// The row as one line of JSON, line end included.
 pub(super) fn json_line(row: &Row) -> Vec<u8> {
-    // Plain data into memory cannot fail; an empty line would be caught as damage on reading.
+    // Serialising plain data to memory cannot fail; an empty line would be detected as damage on reading.
     let mut line = serde_json::to_vec(row).unwrap_or_default();
     line.push(b'\n');
     line
@@ -156,7 +156,7 @@ fn cells(row: &Row) -> IndexMap<String, Value> {
     serde_json::from_slice(&json_line(row)).unwrap_or_default()
 }
 
-/// The first figure that is no number, and what it is. JSON has nothing for it; a CSV says so.
+/// The first metric that is not finite, and its value. CSV can express such values, JSON cannot.
 fn not_finite(metrics: &Metrics) -> Option<(String, String)> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.serialize(metrics).ok()?;
@@ -168,7 +168,7 @@ fn not_finite(metrics: &Metrics) -> Option<(String, String)> {
     odd.map(|(name, cell)| (name.to_owned(), cell.to_owned()))
 }
 
-/// The same with every figure to nine significant digits, 0 below 1e-12.
+/// The same with every number rounded to nine significant digits, and to 0 below 1e-12.
 fn rounded<T: Serialize + DeserializeOwned>(metrics: &T) -> Option<T> {
     let mut value = serde_json::to_value(metrics).ok()?;
     for number in value.as_object_mut()?.values_mut().filter(|v| v.is_f64()) {

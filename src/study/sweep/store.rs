@@ -1,16 +1,16 @@
-//! The rows of a sweep on disk, one folder a sweep or a shard.
+//! The rows of a sweep on disk, one folder per sweep or shard.
 //!
-//! | file | what it is |
+//! | file | contents |
 //! |---|---|
-//! | `plan.json` | whose rows these are ([`Manifest`]) |
-//! | `rows.jsonl` | the truth: a line a row, appended and synced after every point |
-//! | `rows.csv` | the same as a table, made from the lines on resume and at the end |
-//! | `lock` | held by the process that writes; the system lets go of it when the process dies |
+//! | `plan.json` | identity of the sweep ([`Manifest`]) |
+//! | `rows.jsonl` | one line per row, appended and synced after every point; the other files derive from it |
+//! | `rows.csv` | the same rows as a table, written on resume and at the end |
+//! | `lock` | locked by the writing process; the operating system releases it at the end of the process |
 //!
-//! While a sweep runs, lines stand in the order in which points finished; at the end they are put into the plan's order, by
-//! one rename. A torn last line (a killed process, a full disk) is dropped on resume and its point computed
-//! again; a bad line with good ones after it is no accident of ours and is refused. On resume points that failed are tried
-//! again unless asked otherwise: what failed for want of memory or room deserves it.
+//! While a sweep runs, lines are in the order in which points finish; at the end one rename puts them into the order of the plan.
+//! An incomplete last line (killed process, full disk) is dropped on resume and its point computed again. An invalid line before
+//! valid ones cannot result from a crash and is an error. By default, a resumed sweep computes failed points again, because lack of
+//! memory or disk space may have been the cause.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -26,23 +26,23 @@ pub(crate) const JSON_LINES: &str = "rows.jsonl";
 pub(crate) const CSV: &str = "rows.csv";
 const LOCK: &str = "lock";
 
-/// How to treat rows that are there already.
+/// Treatment of existing rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Existing {
-    /// Rows there are an error.
+    /// Existing rows are an error.
     #[default]
     Refuse,
-    /// Go on: what is done is skipped. A folder without rows is started.
+    /// Points with a row are skipped. A folder without rows is allowed.
     Resume {
         /// Compute failed points again.
         retry_failed: bool,
-        /// Where the rows are another plan's, keep those of points the two have in common instead of refusing.
+        /// If the rows belong to another plan, keep the rows of the common points instead of refusing.
         adopt: bool,
     },
 }
 
 impl Existing {
-    /// `--resume`: failed points are tried again, another plan's rows refused.
+    /// `--resume`: failed points are computed again, rows of another plan are an error.
     pub const RESUME: Self = Self::Resume { retry_failed: true, adopt: false };
 }
 
@@ -63,12 +63,12 @@ impl std::fmt::Debug for Store {
 }
 
 impl Store {
-    /// Opens the folder for the rows of `manifest`, made if it is not there.
+    /// Opens the folder for the rows of `manifest`; creates it if it does not exist.
     pub fn open(folder: &Path, manifest: Manifest, existing: Existing) -> Result<Self, StoreError> {
         Self::open_on(folder, manifest, existing, &|file| Box::new(file))
     }
 
-    /// As [`open`](Self::open), on media other than plain files.
+    /// As [`open`](Self::open), with `medium` between the journal and its file.
     pub(crate) fn open_on(
         folder: &Path,
         manifest: Manifest,
@@ -85,7 +85,7 @@ impl Store {
             Some(found) => left_over(folder, &found, &manifest, existing)?,
         };
         let lines = folder.join(JSON_LINES);
-        // The rows of another plan go before its manifest does: a crash between the two leaves a plan with fewer rows.
+        // Rows are replaced before the manifest: a crash in between leaves the old plan with fewer rows.
         make(&lines, &json_text(&rows))?;
         manifest.write(folder)?;
         make(&folder.join(CSV), &csv_text(&rows))?;
@@ -97,25 +97,25 @@ impl Store {
         Ok(Self { manifest, folder: folder.to_owned(), rows, done, journal, _lock: lock })
     }
 
-    /// Whose rows these are.
+    /// The identity of the sweep.
     pub(crate) fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// The rows so far, in the order in which they were written.
+    /// The rows so far, in the order of writing.
     pub(crate) fn rows(&self) -> &[Row] {
         &self.rows
     }
 
-    /// Whether the point of this number belongs here and has no row yet.
+    /// Whether the point of this number is in the shard and has no row yet.
     pub(crate) fn lacks(&self, point: usize) -> bool {
         self.manifest.holds(point) && self.done.get(point) == Some(&false)
     }
 
-    /// Puts a row on disk; returns when it is there.
+    /// Appends a row and returns once it is on disk.
     ///
     /// # Errors
-    /// [`StoreError::Write`]; all rows before stay intact. A second row for a point is refused as damage.
+    /// [`StoreError::Write`]; all earlier rows stay intact. A second row for a point is [`StoreError::Damaged`].
     pub fn append(&mut self, row: Row) -> Result<(), StoreError> {
         if !self.lacks(row.index) || self.manifest.points[row.index].id != row.point {
             let (path, line) = (self.journal.path.clone(), self.rows.len() + 1);
@@ -127,16 +127,16 @@ impl Store {
         Ok(())
     }
 
-    /// Puts many rows at once, whole or none: what joining shards needs.
+    /// Adds many rows in one atomic write, for `merge`.
     pub(super) fn extend(&mut self, rows: Vec<Row>) -> Result<(), StoreError> {
         self.rows.extend(rows);
         disk::replace(&self.journal.path, &json_text(&self.rows))
     }
 
-    /// Puts the lines into the plan's order and makes the CSV of them. Nothing is written where both are so already.
+    /// Puts the lines into the order of the plan and writes the CSV. Files that are up to date are not written.
     ///
     /// # Errors
-    /// [`StoreError::Io`]; the rows stay as they were.
+    /// [`StoreError::Io`]; the rows are unchanged then.
     pub(crate) fn finish(mut self) -> Result<Vec<Row>, StoreError> {
         self.rows.sort_by_key(|r| r.index);
         make(&self.journal.path, &json_text(&self.rows))?;
@@ -167,7 +167,7 @@ fn left_over(folder: &Path, found: &Manifest, wanted: &Manifest, how: Existing) 
             let (found, expected) = (found.identity(), wanted.identity());
             return Err(StoreError::OtherPlan { path: folder.join(MANIFEST), found, expected });
         }
-        // A point under another label is another row: it is computed again rather than kept under its old name.
+        // A point with another label is computed again, because its row would keep the old label.
         let places = wanted.places();
         rows.retain_mut(|row| {
             let place = places.get(row.point.as_str()).copied().filter(|&i| wanted.holds(i));
@@ -185,7 +185,7 @@ fn json_text(rows: &[Row]) -> Vec<u8> {
     rows.iter().flat_map(json_line).collect()
 }
 
-/// The rows of a sweep. A bad last line was torn and is left out; the id counts, not the number, so that rows find their place.
+/// The rows of a sweep without an incomplete last line. Rows are assigned to points by id.
 fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
     let bytes = disk::read_if_there(path)?.unwrap_or_default();
     let places = manifest.places();
@@ -194,7 +194,7 @@ fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
     let mut seen = vec![false; manifest.points.len()];
     let mut bad: Option<(usize, String)> = None;
     for (i, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
-        // Only the last line can lack its end, and only the last may be bad: then it was torn.
+        // Only the last line may be incomplete or invalid.
         if let Some((line, message)) = bad {
             return Err(damaged(line, message));
         }
@@ -208,11 +208,11 @@ fn read_rows(path: &Path, manifest: &Manifest) -> Result<Vec<Row>, StoreError> {
         match parsed {
             Err(message) => bad = Some((i + 1, message)),
             Ok(mut row) => {
-                // The id counts, not the number: a crash while rows are adopted leaves new numbers beside the old plan.
+                // The id decides, not the number: a crash during adoption leaves new numbers beside the old plan.
                 let place = places.get(row.point.as_str());
                 let Some(&place) = place.filter(|&&i| !std::mem::replace(&mut seen[i], true)) else {
                     let message =
-                        if place.is_some() { "its point has a row before" } else { "its point is not in plan.json" };
+                        if place.is_some() { "its point has an earlier row" } else { "its point is not in plan.json" };
                     return Err(damaged(i + 1, message.to_owned()));
                 };
                 row.index = place;

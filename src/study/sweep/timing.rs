@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::base::quantiles::interpolated;
 use crate::drape::StageTimes;
 
-/// Median of each stage, and spread where there is more than one repeat: the columns that differ from run to run.
+/// Median of each stage, and spread for more than one repeat. These columns differ from run to run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)] // Stages as in `StageTimes`.
 pub struct Timing {
@@ -36,7 +36,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Of the repeats, warm-up passes left out.
+    /// Median and spread over the timed passes.
     #[must_use]
     pub fn of(passes: &[StageTimes]) -> Self {
         type Stage = fn(StageTimes) -> Duration;
@@ -61,7 +61,7 @@ impl Timing {
         }
     }
 
-    /// The stages, what is beside them and the whole: medians, ms.
+    /// Medians of the stages, of the time between them, and of the total, ms.
     pub(crate) fn stages(&self) -> [(&'static str, f64); 6] {
         [
             ("distance", self.time_distance_ms),

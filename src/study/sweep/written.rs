@@ -1,8 +1,8 @@
-//! Jobs written as a sweep file: what was tried by hand, to be run again and varied.
+//! Writes jobs as a sweep file, so that pinned states can be run again and varied.
 //!
-//! Every job is one of the `[[points]]`; what all share stands in `[base]`. The text is read back before it is handed out: its
-//! points are these jobs, or an error names the one that a sweep file cannot say (readings of the paper's model, a
-//! rest shape from a file of its own).
+//! Every job becomes one of the `[[points]]`; keys that are equal in all jobs are in `[base]`. The text is parsed again before it is
+//! returned: its points equal the jobs, or an error names the first job that a sweep file cannot express (readings of the paper's
+//! model, a rest shape from a separate file).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,15 +18,15 @@ use crate::parts::range_table::{RangeTable, TABLE_3, TableRule};
 use crate::scene::{DRESS_FORM, SceneSpec};
 use crate::study::job::Job;
 
-/// The sweep file of these jobs, each with what it is called; jobs that are equal become one point.
+/// The sweep file of labelled jobs; equal jobs become one point.
 ///
 /// # Errors
-/// [`PlanError`] naming the first job that a sweep file cannot say.
+/// [`PlanError`] for the first job that a sweep file cannot express.
 pub(crate) fn sweep_file(name: &str, jobs: &[(String, Job)]) -> Result<String, PlanError> {
     let mut written: Vec<(&str, BTreeMap<&str, Value>)> = Vec::with_capacity(jobs.len());
     let mut tables: Vec<&TableRule> = Vec::new();
     for (label, job) in jobs {
-        // Two tables of one name would be one in the figures.
+        // Different tables of the same name get different names, because reports group rows by name.
         let known = tables.iter().any(|t| t.name() == job.settings.table.name() && **t != job.settings.table);
         tables.push(&job.settings.table);
         let table = if known { format!("{}, {label}", job.settings.table.name()) } else { String::new() };
@@ -47,7 +47,7 @@ fn cannot(label: &str, why: impl std::fmt::Display) -> PlanError {
     PlanError::Unsayable { label: label.to_owned(), why: why.to_string() }
 }
 
-/// Whether the text's points are these jobs.
+/// Checks that the points of the text are these jobs.
 fn read_back(text: &str, jobs: &[Job]) -> Result<(), String> {
     let Some(first) = jobs.first() else { return Ok(()) };
     let start = Job { accuracy: first.accuracy, spread_starts: first.spread_starts, ..Job::preview() };
@@ -92,7 +92,7 @@ fn keys(job: &Job, table: &str) -> Result<BTreeMap<&'static str, Value>, String>
     Ok(keys)
 }
 
-/// Files by where they are, since the sweep file's own folder is not known.
+/// Files as absolute paths, since the folder of the sweep file is not known.
 fn path(name: &str) -> Result<String, String> {
     if !names_a_file(name) {
         return Ok(name.to_owned());
@@ -103,7 +103,7 @@ fn path(name: &str) -> Result<String, String> {
 
 fn body(scene: &SceneSpec) -> Result<Value, String> {
     let of = path(&scene.body)?;
-    let measured = unusual(&scene.measurements)?;
+    let measured = non_default(&scene.measurements)?;
     let mut table: Table = measured.map(|(key, value)| (key.trim_end_matches("_cm").to_owned(), value)).collect();
     if table.is_empty() {
         return Ok(Value::String(of));
@@ -148,14 +148,14 @@ fn rows(rule: &TableRule, name: &str) -> Result<Value, String> {
 
 /// Fields of the scene without a key of their own that differ from their defaults.
 fn options(scene: &SceneSpec) -> Result<Table, String> {
-    Ok(unusual(scene)?.filter(|(key, _)| !matches!(key.as_str(), "body" | "garment" | "measurements")).collect())
+    Ok(non_default(scene)?.filter(|(key, _)| !matches!(key.as_str(), "body" | "garment" | "measurements")).collect())
 }
 
 /// Fields that differ from their defaults.
-fn unusual<T: Serialize + Default>(given: &T) -> Result<impl Iterator<Item = (String, Value)>, String> {
+fn non_default<T: Serialize + Default>(given: &T) -> Result<impl Iterator<Item = (String, Value)>, String> {
     let given = Table::try_from(given).map_err(|e| e.to_string())?;
-    let usual = Table::try_from(T::default()).map_err(|e| e.to_string())?;
-    Ok(given.into_iter().filter(move |(key, value)| usual.get(key) != Some(value)))
+    let defaults = Table::try_from(T::default()).map_err(|e| e.to_string())?;
+    Ok(given.into_iter().filter(move |(key, value)| defaults.get(key) != Some(value)))
 }
 
 fn text(name: &str, base: &BTreeMap<&str, Value>, points: &[(&str, BTreeMap<&str, Value>)]) -> String {

@@ -54,7 +54,7 @@ pub(super) struct CollisionFilter {
     list: VerletList,
     /// Pairs of triangles that intersect where the last step ended; `None` before the first.
     crossing: Option<Vec<[u32; 2]>>,
-    /// Whether each vertex is near one of these pairs; empty if there is none.
+    /// Whether each vertex is near one of these pairs; empty without pairs.
     tangled: Vec<bool>,
 }
 

@@ -25,7 +25,10 @@ fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
         let run = Run { jobs, stop: &stop, progress: &progress };
         let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(solve)).unwrap();
         assert!(outcome.stopped && outcome.rows.len() >= stop_at && outcome.rows.len() < 200);
-        assert!(outcome.rows.len() < stop_at + jobs, "points in hand are finished, no others begun");
+        assert!(
+            outcome.rows.len() < stop_at + jobs,
+            "points that are being computed are finished, no others are started"
+        );
     }
     let outcome = run_all(folder.path(), 4);
     assert!(!outcome.stopped && outcome.skipped >= 150);
@@ -46,7 +49,7 @@ fn finished_points_are_not_computed_again() {
     for _ in 0..2 {
         sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(&counting)).unwrap();
     }
-    // Two repeats a point; 20 rows, then only the failed one of them again before the flag is seen at 20 rows.
+    // Two repeats per point. The second run computes only the failed point again, because the flag stops it at 20 rows.
     let mut twice = solved.into_inner().unwrap();
     twice.dedup();
     assert_eq!(twice, (0..20).chain([7]).collect::<Vec<_>>());
@@ -55,7 +58,7 @@ fn finished_points_are_not_computed_again() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// A killed process leaves any prefix of what it appended, in either file.
+    /// A killed process may leave any prefix of its output in either file.
     #[test]
     fn cut_anywhere_and_resumed_it_equals_the_uninterrupted_one(json in 0.0..1.0_f64, csv in 0.0..1.0_f64, jobs in 1..4_usize) {
         let (kept, whole) = shared();
@@ -70,7 +73,7 @@ proptest! {
         prop_assert_eq!(&files(folder.path()), whole);
     }
 
-    /// The disk takes `room` bytes of rows and then no more.
+    /// The disk is full after `room` bytes of rows.
     #[test]
     fn a_full_disk_loses_the_current_point_and_is_reported(room in 0..90_000_usize, jobs in 1..4_usize, cuts in any::<bool>()) {
         let (_, whole) = shared();
@@ -90,7 +93,7 @@ proptest! {
 }
 
 #[test]
-fn a_crash_at_any_time_would_lose_only_the_points_in_hand() {
+fn a_crash_loses_at_most_one_point_per_job() {
     for jobs in [1, 3] {
         let folder = tempfile::tempdir().unwrap();
         let begun = Mutex::new(BTreeSet::new());
@@ -109,7 +112,7 @@ fn a_crash_at_any_time_would_lose_only_the_points_in_hand() {
 }
 
 #[test]
-fn failed_points_are_rows_and_are_tried_again() {
+fn failed_points_are_rows_and_are_computed_again() {
     let folder = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(false);
     let run = Run { jobs: 2, stop: &stop, progress: &|_| {} };
@@ -200,14 +203,14 @@ fn damage_in_the_middle_is_refused_with_its_line() {
     assert!(error.contains("rows.jsonl:5: not a row"), "{error}");
     lines[4] = lines[3];
     fs::write(&path, lines.join("\n")).unwrap();
-    assert!(store::read(folder.path()).unwrap_err().to_string().contains("its point has a row before"));
+    assert!(store::read(folder.path()).unwrap_err().to_string().contains("its point has an earlier row"));
     fs::remove_file(folder.path().join("plan.json")).unwrap();
     let error = Store::open(folder.path(), Manifest::of(&plan(), None), Existing::RESUME).unwrap_err();
     assert!(matches!(error, StoreError::Orphans { .. }), "{error}");
     assert!(matches!(store::read(folder.path()), Err(StoreError::Missing { .. })));
 }
 
-/// One finished sweep for all that only copy it.
+/// One finished sweep, shared by the tests that copy it.
 fn shared() -> &'static (tempfile::TempDir, Vec<(&'static str, String)>) {
     static WHOLE: std::sync::OnceLock<(tempfile::TempDir, Vec<(&'static str, String)>)> = std::sync::OnceLock::new();
     WHOLE.get_or_init(uninterrupted)
@@ -219,7 +222,7 @@ fn copy(from: &tempfile::TempDir, to: &Path) {
     }
 }
 
-/// Bytes left on a disk both files share.
+/// Free bytes of a disk that both files share.
 type Room = Arc<AtomicUsize>;
 
 struct Full {

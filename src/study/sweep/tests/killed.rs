@@ -1,4 +1,4 @@
-//! A process that is really killed, with no chance to tidy up.
+//! A process that is killed without a chance to clean up.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -36,8 +36,8 @@ fn killed_three_times_and_resumed_it_equals_the_uninterrupted_one() {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        let patience = Instant::now() + Duration::from_secs(60);
-        while rows() < least && Instant::now() < patience {
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while rows() < least && Instant::now() < deadline {
             sleep(Duration::from_millis(5));
         }
         assert!(child.try_wait().unwrap().is_none(), "the process ended before it was killed");

@@ -1,4 +1,4 @@
-//! The rows as others read them.
+//! The rows in CSV and JSON.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -23,7 +23,7 @@ fn csv_and_json_lines_have_the_same_columns_and_cells() {
         let object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(line).unwrap();
         let (named, all): (BTreeSet<_>, BTreeSet<_>) =
             (object.keys().cloned().collect(), columns().into_iter().collect());
-        // A point that failed has no figures.
+        // A failed point has no metrics.
         assert!(if object["status"] == "ok" { named == all } else { named.is_subset(&all) && named.len() < 20 });
         for (name, cell) in columns().iter().zip(record) {
             let same = match object.get(name) {
@@ -62,9 +62,9 @@ fn only_timings_are_dropped_for_comparison() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Rows that are read and written again do not drift.
+    /// Rows do not change when they are read and written again.
     #[test]
-    fn figures_survive_reading(value in any::<f64>().prop_filter("finite", |v| v.is_finite()), small in -1e3..1e3_f64) {
+    fn metrics_survive_a_round_trip(value in any::<f64>().prop_filter("finite", |v| v.is_finite()), small in -1e3..1e3_f64) {
         let (value, point) = (value.clamp(-1e25, 1e25), &plan().points[0]);
         let measures = Metrics { displacement_rms_mm: small, rms_mm: Some(value), strain_p95: Some(small * 1e-12), ..Metrics::default() };
         let row = Row::solved(point, &measures, "", &Timing::default());

@@ -40,7 +40,7 @@ fn plan() -> Plan {
     plan
 }
 
-/// A drape made of nothing but the point's id: any point as good as any other, the same on every machine.
+/// A synthetic drape computed from the id of the point alone, the same on every machine.
 fn solve(point: &Point) -> Result<Pass<Metrics>, PointError> {
     let byte = |i: usize| u8::from_str_radix(&point.id[2 * i..2 * i + 2], 16).unwrap();
     let x = |i: usize| (f64::from(byte(i)) + 0.1) / f64::from(byte(i + 1)).mul_add(3.0, 7.0);
@@ -74,7 +74,7 @@ fn run_all(folder: &Path, jobs: usize) -> Outcome {
     sweep(&plan(), None, folder, Existing::RESUME, &run, &rows_by(solve)).unwrap()
 }
 
-/// The files of a finished sweep. The synthetic times are made of the id too, so whole files can be compared.
+/// The files of a finished sweep. Synthetic times also depend on the id alone, so complete files can be compared.
 fn files(folder: &Path) -> Vec<(&'static str, String)> {
     ["plan.json", "rows.jsonl", "rows.csv"].map(|name| (name, fs::read_to_string(folder.join(name)).unwrap())).to_vec()
 }

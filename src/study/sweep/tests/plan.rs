@@ -104,9 +104,9 @@ fn parts_follow_the_table_and_move_by_affine_maps_by_default() {
     );
     let ids: BTreeSet<_> = plan.points.iter().map(|p| &p.id).collect();
     assert_eq!(ids.len(), 4);
-    // What a file leaves out is the first of these.
+    // Keys that a file leaves out have the first of these values.
     assert_eq!(parse("name = \"n\"\n[grid]").points[0].id, plan.points[0].id);
-    // The paper's PARTs have one displacement each, whatever is asked.
+    // The paper's PARTs have one displacement each, independent of `motion`.
     let paper = parse("name = \"n\"\n[base]\nmodel = \"paper\"\n[grid]\nmotions = [\"affine\", \"translation\"]");
     assert_eq!((paper.points.len(), paper.points[0].job.settings.model.motion().name()), (1, "translation"));
 }
@@ -278,7 +278,7 @@ fn jobs_written_as_a_sweep_file_are_its_points() {
     let names: Vec<&str> = found.points.iter().map(|p| p.job.settings.table.name()).collect();
     assert_eq!(names, ["table-3", "mine", "mine, state 2", "quantile 9"], "one name, one table");
     assert!(text.contains("[base]\nbody = ") || text.contains("[base]\nmin_part = 1"), "{text}");
-    // What has no key is not left out in silence.
+    // A setting without a key is an error and is not dropped silently.
     let mut odd = jobs[0].clone();
     odd.scene.rest = obj.to_str().unwrap().to_owned();
     let message = sweep_file("pinned", &[("state 9".to_owned(), odd)]).unwrap_err().to_string();

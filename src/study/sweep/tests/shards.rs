@@ -32,7 +32,7 @@ fn three_shards_in_any_order_merge_into_the_single_run() {
     let out = folder.path().join("joined");
     assert_eq!(merge(&parts, &out).unwrap().len(), 200);
     assert_eq!(files(&out), whole);
-    // What is joined can be resumed and joined again, alone or with its parts.
+    // A joined sweep can be resumed and joined again, alone or with its shards.
     assert_eq!(run_all(&out, 1).skipped, 195);
     let again = folder.path().join("again");
     parts.push(out);
