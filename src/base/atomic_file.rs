@@ -159,7 +159,6 @@ impl Write for AtomicFile {
 }
 
 /// Whether two paths, after following links, name the same file; writing one would replace the other.
-#[must_use]
 pub(crate) fn same_place(a: &Path, b: &Path) -> bool {
     let resolved = |path: &Path| {
         let path = follow_links(path).ok()?;
@@ -189,7 +188,6 @@ fn follow_links(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// The folder that contains `path`.
-#[must_use]
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -109,37 +109,31 @@ fn same_file(a: &Path, b: &Path) -> bool {
 
 /// A folder in the user's cache (`$XDG_CACHE_HOME/partwise`, or under `~/.cache`, on Linux; where the system keeps caches
 /// elsewhere); `None` where the user has no home.
-#[must_use]
 pub(crate) fn user_cache(folder: &str) -> Option<PathBuf> {
     Some(directories::ProjectDirs::from("", "", "partwise")?.cache_dir().join(folder))
 }
 
 /// Whether a name is that of a file rather than of something built in.
-#[must_use]
 pub(crate) fn names_a_file(name: &str) -> bool {
     name.contains(['/', '\\', '.'])
 }
 
 /// Whether the extension of a file is `ending`, ignoring case.
-#[must_use]
 pub(crate) fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 /// A file's name without folder and ending; any other name as it is.
-#[must_use]
 pub(crate) fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
 /// Names in a sentence, the first twenty of many.
-#[must_use]
 pub(crate) fn listed(names: &[String]) -> String {
     first_of(names, 20)
 }
 
 /// Names in a sentence: the first `limit`, and the number of the others.
-#[must_use]
 pub(crate) fn first_of(names: &[String], limit: usize) -> String {
     let shown: Vec<Cow<'_, str>> = names.iter().take(limit).map(|name| shortened(name, [60, 20])).collect();
     let shown = shown.join(", ");
@@ -150,7 +144,6 @@ pub(crate) fn first_of(names: &[String], limit: usize) -> String {
 }
 
 /// Line number, from 1, of a byte offset in a text.
-#[must_use]
 pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|&b| b == b'\n').count()
 }

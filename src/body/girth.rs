@@ -28,7 +28,6 @@ impl Plane {
     }
 
     /// Two unit vectors that span the plane.
-    #[must_use]
     pub(crate) fn axes(&self) -> [DVec3; 2] {
         let (u, v) = self.normal.any_orthonormal_pair();
         [u, v]
@@ -48,7 +47,6 @@ pub struct SectionLoop {
 
 impl SectionLoop {
     /// Length along the surface, m.
-    #[must_use]
     pub(crate) fn length(&self) -> f64 {
         let inner: f64 = self.points.windows(2).map(|w| w[0].distance(w[1])).sum();
         match (self.closed, self.points.first(), self.points.last()) {
@@ -72,7 +70,6 @@ impl SectionLoop {
 }
 
 /// Perimeter of the convex hull of points in a plane, m.
-#[must_use]
 pub(crate) fn hull_length(points: Vec<DVec2>) -> f64 {
     let [lower, upper] = chains(points);
     let length = |chain: &[DVec2]| chain.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
@@ -80,7 +77,6 @@ pub(crate) fn hull_length(points: Vec<DVec2>) -> f64 {
 }
 
 /// Corners of the convex hull of points in a plane, counter-clockwise.
-#[must_use]
 pub(crate) fn hull(points: Vec<DVec2>) -> Vec<DVec2> {
     // Each chain ends where the other begins.
     let without_last = |chain: &Vec<DVec2>| chain[..chain.len().saturating_sub(1)].to_vec();

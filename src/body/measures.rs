@@ -170,7 +170,6 @@ impl BodySpec {
 
 impl Measures {
     /// Stature relative to the default body's 1.68 m; scales head, hands and feet.
-    #[must_use]
     pub(crate) fn scale(&self) -> f64 {
         self.stature / 1.68
     }

@@ -140,7 +140,6 @@ impl Fabric {
     }
 
     /// Warnings of constants that can be used but that no cloth has: most often they are in another unit.
-    #[must_use]
     pub(crate) fn warnings(&self) -> Vec<String> {
         // Four numbers each: the range without a warning, at least ten times as wide at each end as that of the built-in fabrics, and
         // the latter.

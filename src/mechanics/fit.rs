@@ -68,7 +68,6 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
 }
 
 /// Largest singular value of the deformation gradient with these columns, minus one.
-#[must_use]
 pub(crate) fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
     (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt() - 1.0

@@ -30,7 +30,6 @@ pub struct Folds {
 }
 
 /// The folds of `cloth` at `x` (m).
-#[must_use]
 pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
     let mut sum = vec![DMat3::ZERO; x.len()];
     let mut area = vec![0.0; x.len()];

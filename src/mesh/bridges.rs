@@ -41,7 +41,6 @@ pub(crate) struct Bridges {
 
 impl Bridges {
     /// The bridges of `mesh`; `None` if it has none.
-    #[must_use]
     pub(crate) fn of(mesh: &TriMesh) -> Option<Self> {
         let all: Vec<[f64; 3]> = (0..mesh.triangles.len()).map(|t| sides(mesh.corners(t))).collect();
         let usual_m = nearest_rank(all.as_flattened(), 0.5);

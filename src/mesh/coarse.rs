@@ -111,7 +111,6 @@ impl Coarse {
     }
 
     /// The entries of the coarse vertices in a list over the fine ones.
-    #[must_use]
     pub(crate) fn restrict<T: Copy>(&self, fine: &[T]) -> Vec<T> {
         self.vertices.iter().map(|&v| fine[v as usize]).collect()
     }

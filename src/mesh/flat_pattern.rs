@@ -34,7 +34,6 @@ pub struct FlatPattern {
 
 impl FlatPattern {
     /// The pattern in the texture coordinates of a mesh; `None` if a triangle has none or they are no pattern.
-    #[must_use]
     pub(crate) fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
         let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
         let mut whole = 0.0;

@@ -46,7 +46,6 @@ pub enum Unit {
 
 impl Unit {
     /// Metres in one unit.
-    #[must_use]
     pub(crate) fn metres(self) -> f64 {
         [1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048][self as usize]
     }
@@ -126,7 +125,6 @@ impl Frame {
     }
 
     /// A point of the file in metres, z up; a rotation and a scaling, so that winding keeps its meaning.
-    #[must_use]
     pub(crate) fn to_metres(&self, p: DVec3) -> DVec3 {
         let turned = match self.up {
             Axis::X => DVec3::new(-p.z, p.y, p.x),
@@ -137,7 +135,6 @@ impl Frame {
     }
 
     /// The inverse of [`to_metres`](Self::to_metres): a point in metres, z up, in the file's own frame.
-    #[must_use]
     pub(crate) fn to_file(&self, p: DVec3) -> DVec3 {
         // Divided, not multiplied by the inverse: 0.17 m is 1.7 dm, not 1.7000000000000002.
         let p = p / self.unit.metres();

@@ -38,16 +38,6 @@ pub enum RestError {
         first + 1
     )]
     NoArea { count: usize, first: usize },
-    /// The second mesh has other vertices.
-    #[error("the rest mesh has {found} vertices, expected the garment's {expected}; give the garment in another shape")]
-    Vertices { found: usize, expected: usize },
-    /// The second mesh has other triangles.
-    #[error(
-        "the rest mesh has other triangles than the garment, from number {} on; expected the same faces in the same \
-         order; give the garment in another shape",
-        first + 1
-    )]
-    Triangles { first: usize },
     /// Corners without texture coordinates.
     #[error(
         "{count} of {of} triangles have no texture coordinates, so they hold no pattern; expected one at every corner; \
@@ -73,7 +63,6 @@ pub struct RestShape {
 
 impl RestShape {
     /// Triangles of these corners (m), all cut from one fabric.
-    #[must_use]
     pub(crate) fn new(corners: Vec<[DVec2; 3]>) -> Self {
         Self { corners, cut_from: Vec::new() }
     }
@@ -92,21 +81,6 @@ impl RestShape {
     /// [`from_edges`](Self::from_edges) without the check for area.
     pub(crate) fn edges_of(mesh: &TriMesh) -> Self {
         Self::new((0..mesh.triangles.len()).map(|t| flatten(mesh.corners(t))).collect())
-    }
-
-    /// A second mesh of the same vertices and triangles, at rest; warp along gravity in that mesh.
-    ///
-    /// # Errors
-    /// [`RestError::Vertices`], [`RestError::Triangles`] where the two do not correspond, [`RestError::NoArea`].
-    pub fn from_mesh(mesh: &TriMesh, rest: &TriMesh) -> Result<Self, RestError> {
-        if rest.vertex_count() != mesh.vertex_count() {
-            return Err(RestError::Vertices { found: rest.vertex_count(), expected: mesh.vertex_count() });
-        }
-        let same = mesh.triangles.iter().zip(&rest.triangles).take_while(|(a, b)| a == b).count();
-        if same < mesh.triangles.len().max(rest.triangles.len()) {
-            return Err(RestError::Triangles { first: same });
-        }
-        Self::from_edges(rest)
     }
 
     /// The pattern in the texture coordinates of each triangle corner, u along the weft and v along the warp;
@@ -231,17 +205,6 @@ mod tests {
         assert!((b - a).perp_dot(c - a) > 0.0);
         let lying = TriMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]);
         assert_eq!(RestShape::from_edges(&lying).unwrap().corners[0], [DVec2::ZERO, DVec2::X, DVec2::Y]);
-    }
-
-    #[test]
-    fn a_second_mesh_must_correspond() {
-        let rest = RestShape::from_mesh(&square(1.0), &square(1.5)).unwrap();
-        assert_eq!(rest.areas(), [1.125, 1.125]);
-        let mut other = square(1.0);
-        other.triangles[1] = [0, 3, 2];
-        assert_eq!(RestShape::from_mesh(&square(1.0), &other), Err(RestError::Triangles { first: 1 }));
-        other.positions.pop();
-        assert_eq!(RestShape::from_mesh(&square(1.0), &other), Err(RestError::Vertices { found: 3, expected: 4 }));
     }
 
     #[test]

@@ -71,7 +71,6 @@ impl Topology {
     }
 
     /// Index of the edge between two vertices.
-    #[must_use]
     pub(crate) fn edge_between(&self, a: u32, b: u32) -> Option<usize> {
         self.edges.binary_search(&[a.min(b), a.max(b)]).ok()
     }

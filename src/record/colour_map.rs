@@ -83,7 +83,6 @@ pub(crate) struct Range {
 impl Range {
     /// From zero to a round number at or above the `share` quantile of the finite values (1.0 = the largest). With a few outliers
     /// above it, such as a PART of one vertex, the others still have different colours.
-    #[must_use]
     pub(crate) fn to_quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Self {
         let finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
         Self { low: 0.0, high: round_up(nearest_rank(&finite, share)) }

@@ -53,7 +53,6 @@ pub struct RecordSummary {
 
 impl RecordSummary {
     /// A line that names the file, if there is one.
-    #[must_use]
     pub(crate) fn file_line(&self) -> Option<String> {
         self.path.as_ref().map(|path| format!("recording: {}", path.display()))
     }

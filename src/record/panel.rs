@@ -28,7 +28,6 @@ pub struct Panel {
 
 impl Panel {
     /// The panel as Markdown.
-    #[must_use]
     pub(crate) fn markdown(&self) -> String {
         let mut text = String::new();
         if !self.title.is_empty() {

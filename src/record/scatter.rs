@@ -30,13 +30,11 @@ pub(crate) struct Picture<'a> {
 
 impl<'a> Picture<'a> {
     /// Error over cost.
-    #[must_use]
     pub(crate) fn of_error(cost: &'a str) -> Self {
         Self { path: paths::SCATTER, x: cost, y: "error, mm" }
     }
 
     /// Time over number of vertices.
-    #[must_use]
     pub(crate) fn of_growth() -> Self {
         Self { path: paths::GROWTH, x: "vertices", y: "time, ms" }
     }

@@ -55,7 +55,6 @@ impl WebViewer {
     }
 
     /// Set where the recording is incomplete.
-    #[must_use]
     pub(crate) fn warning(&self) -> Option<&str> {
         self.warning.as_deref()
     }

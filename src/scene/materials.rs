@@ -60,7 +60,6 @@ pub struct Swatch {
 
 impl Swatch {
     /// The same with the name of its fabric; the fabric is `of_settings` if none is assigned.
-    #[must_use]
     pub(crate) fn cut_from(&self, of_settings: &Fabric) -> Self {
         Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
     }

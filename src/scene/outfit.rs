@@ -155,7 +155,6 @@ impl Scene {
     }
 
     /// Whether each garment vertex is held.
-    #[must_use]
     pub(crate) fn is_held(&self) -> Vec<bool> {
         let mut held = vec![false; self.garment.vertex_count()];
         for &v in &self.held {
@@ -223,7 +222,6 @@ impl Scene {
     }
 
     /// The positions at which each garment, at `positions` (m), is lifted off those below it where it crossed them.
-    #[must_use]
     pub(crate) fn lift_layers(&self, mut positions: Vec<DVec3>) -> Vec<DVec3> {
         for k in 1..self.layers.len() {
             let mut outer = self.layers[k].cut_out(&self.garment.triangles, &positions);
@@ -246,7 +244,6 @@ impl Scene {
     }
 
     /// The number of the fabric of each vertex; between several, the highest.
-    #[must_use]
     pub(crate) fn fabric_of_vertices(&self) -> Vec<u16> {
         let mut fabric = vec![0; self.garment.vertex_count()];
         for (t, triangle) in self.garment.triangles.iter().enumerate() {
@@ -339,7 +336,6 @@ impl Scene {
 
     /// A warning about connected parts that have fallen off the body at `positions` (m): nothing of them is held, and every
     /// vertex is below the body. They touch nothing any more and would fall for ever.
-    #[must_use]
     pub(crate) fn fallen(&self, positions: &[DVec3]) -> Option<String> {
         let fallen = self.fallen_parts(positions);
         (!fallen.is_empty()).then(|| {

@@ -39,7 +39,6 @@ impl Placement {
     }
 
     /// Name and value of each metric, as rows of a table.
-    #[must_use]
     pub(crate) fn rows(&self) -> Vec<(&'static str, String)> {
         let inside = match self.penetrating_vertices {
             0 => "none".to_owned(),

@@ -163,7 +163,6 @@ impl SceneSpec {
     }
 
     /// All files that assign fabrics to the garments.
-    #[must_use]
     pub(crate) fn files_of_fabrics(&self) -> Vec<PathBuf> {
         let mut files: Vec<PathBuf> =
             self.fabrics.iter().filter(|name| names_a_file(name)).map(PathBuf::from).collect();
@@ -175,7 +174,6 @@ impl SceneSpec {
     }
 
     /// The file that names the fabrics of the garment's panels: the one that is given, or one beside the garment's.
-    #[must_use]
     pub(crate) fn names_of_fabrics(&self) -> Option<PathBuf> {
         if self.fabrics_file.is_some() || !names_a_file(&self.garment) {
             return self.fabrics_file.as_ref().map(PathBuf::from);
@@ -187,7 +185,6 @@ impl SceneSpec {
     }
 
     /// One name for all garments, for example of a recording.
-    #[must_use]
     pub(crate) fn garment_name(&self) -> String {
         self.layers().map(|layer| layer.layer_name()).collect::<Vec<_>>().join("-under-")
     }

@@ -162,7 +162,6 @@ pub struct Edit {
 
 impl Edit {
     /// Every value that is opened as a file, with its field. A new field does not compile until it is listed here.
-    #[must_use]
     pub(crate) fn file_names(&self) -> Vec<(FileRole, &str)> {
         let Self {
             body,

@@ -108,7 +108,6 @@ impl Session {
     }
 
     /// Whether the session was closed.
-    #[must_use]
     pub(crate) fn is_closed(&self) -> bool {
         self.0.closed.load(Ordering::SeqCst)
     }

@@ -38,7 +38,6 @@ pub struct LoadedScene {
 
 impl LoadedScene {
     /// Unsigned distance of each garment vertex to the body before draping, m.
-    #[must_use]
     pub(crate) fn distance_m(&self) -> &[f64] {
         &self.distances.unsigned_m
     }

@@ -8,7 +8,7 @@ use partwise::body::distance::{Body, SurfacePoint};
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::paper::{
     BodyForce, Clearance, Contactless, Cosine, LineForce, PaperError, PaperOptions, PaperResult, PaperWarning,
-    Untouched, Volume, solve,
+    PartForces, Untouched, Volume, solve,
 };
 use partwise::mesh::{Topology, TriMesh};
 use partwise::parts::range_table::RangeTable;

@@ -33,7 +33,6 @@ pub enum Curve {
 impl Curve {
     /// The arc from `a` to `b` of this radius, as in SVG but with y up: the longer one if `large`, counter-clockwise (bulging to
     /// the right of a → b) if `right`. `None` where the radius is shorter than half the distance.
-    #[must_use]
     pub(crate) fn arc(a: DVec2, b: DVec2, radius: f64, large: bool, right: bool) -> Option<Self> {
         let half = 0.5 * (b - a);
         // Files round the radius of a half circle.
@@ -56,7 +55,6 @@ impl Curve {
     }
 
     /// Its first point.
-    #[must_use]
     pub(crate) fn start(&self) -> DVec2 {
         match *self {
             Self::Line { a, .. } | Self::Quadratic { a, .. } | Self::Cubic { a, .. } | Self::Arc { a, .. } => a,
@@ -64,7 +62,6 @@ impl Curve {
     }
 
     /// Its last point.
-    #[must_use]
     pub(crate) fn end(&self) -> DVec2 {
         match *self {
             Self::Line { b, .. } | Self::Quadratic { b, .. } | Self::Cubic { b, .. } | Self::Arc { b, .. } => b,
@@ -72,7 +69,6 @@ impl Curve {
     }
 
     /// p(t); the ends are exact.
-    #[must_use]
     pub(crate) fn at(&self, t: f64) -> DVec2 {
         match *self {
             _ if t <= 0.0 => self.start(),
@@ -92,7 +88,6 @@ impl Curve {
     }
 
     /// Length, m.
-    #[must_use]
     pub(crate) fn length(&self) -> f64 {
         match *self {
             Self::Line { a, b } => a.distance(b),
@@ -102,7 +97,6 @@ impl Curve {
     }
 
     /// `count` + 1 points at equal arc lengths, both ends included.
-    #[must_use]
     pub(crate) fn divided(&self, count: usize) -> Vec<DVec2> {
         let length = self.length();
         let parameter = |share: f64| match self {
@@ -114,7 +108,6 @@ impl Curve {
     }
 
     /// ½ ∫ p × dp along it. The edges of a loop add up to its area, m², positive counter-clockwise.
-    #[must_use]
     pub(crate) fn area(&self) -> f64 {
         match *self {
             Self::Arc { centre, radius, turn, a, b, .. } => 0.5 * (centre.perp_dot(b - a) + radius * radius * turn),

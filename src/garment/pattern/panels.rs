@@ -83,7 +83,6 @@ impl SewingPattern {
     pub(crate) const GATHERED: f64 = 0.02;
 
     /// The edge at these indices.
-    #[must_use]
     pub(crate) fn edge(&self, at: EdgeAt) -> &PanelEdge {
         &self.panels[at.panel].edges[at.edge]
     }
@@ -102,7 +101,6 @@ impl SewingPattern {
     }
 
     /// An edge as messages name it.
-    #[must_use]
     pub(crate) fn edge_name(&self, at: EdgeAt) -> String {
         format!("{}.{}", self.panels[at.panel].name, at.edge)
     }

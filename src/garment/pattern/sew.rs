@@ -191,12 +191,6 @@ impl SewnPanel {
         (self.starts[edge]..=self.starts[edge + 1]).map(|i| self.vertices[i % n]).collect()
     }
 
-    /// Number of its vertices on the outline.
-    #[must_use]
-    pub fn outline_len(&self) -> usize {
-        self.starts.last().copied().unwrap_or(0)
-    }
-
     /// The edge that an outline vertex lies on, and its share of the edge's length, 0 to 1.
     fn on_edge(&self, vertex: usize) -> Option<(usize, f64)> {
         let edge = self.starts.partition_point(|&s| s <= vertex).checked_sub(1)?;
@@ -243,7 +237,6 @@ impl SewnGarment {
     }
 
     /// The panels laid out and not sewn, m, x to the right and z up, and for each of their vertices the garment's.
-    #[must_use]
     pub(crate) fn unsewn(&self, pattern: &SewingPattern) -> (TriMesh, Vec<u32>) {
         let (mut mesh, mut of) = (TriMesh::default(), Vec::new());
         for (panel, offset) in self.panels.iter().zip(laid_out(pattern)) {
@@ -257,7 +250,6 @@ impl SewnGarment {
 
     /// Positions of this garment interpolated from `coarse`, the same pattern in longer edges with its vertices at `positions`
     /// (m).
-    #[must_use]
     pub(crate) fn over(&self, coarse: &Self, positions: &[DVec3]) -> Vec<DVec3> {
         let mut placed = vec![None; self.mesh.vertex_count()];
         for (fine, coarse) in self.panels.iter().zip(&coarse.panels) {

@@ -189,7 +189,6 @@ pub(super) fn close(
 
 /// A surface flattened as isometrically as possible: E without contacts, from positions in the plane z = 0 (m), with the nearest
 /// rotations in the plane for R, which unfold triangles that the start has inverted.
-#[must_use]
 pub(crate) fn laid_flat(mesh: &TriMesh, rest: &RestShape, start: &[DVec3]) -> Vec<DVec3> {
     let system = System::new(mesh, rest, &[]);
     let mut x = start.to_vec();

@@ -153,7 +153,6 @@ fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Opti
 
 impl PutOn {
     /// Notes for the user.
-    #[must_use]
     pub(crate) fn notes(&self) -> Vec<String> {
         let mesh = &self.garment.mesh;
         let mut moved = String::new();

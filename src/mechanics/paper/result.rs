@@ -106,20 +106,6 @@ pub struct PartForces {
     pub degenerate: [bool; 3],
 }
 
-impl PartForces {
-    /// |F| as coloured in Figure 6, N.
-    #[must_use]
-    pub fn magnitude(&self) -> f64 {
-        self.resultant.length()
-    }
-
-    /// F¹ − F⁰ − F², N: zero by (5) along axes with a stiffness.
-    #[must_use]
-    pub fn imbalance(&self) -> DVec3 {
-        self.anti_force - self.gravity - self.adjacent
-    }
-}
-
 /// The result of [`solve`](super::solve).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperResult {

@@ -71,9 +71,9 @@ pub fn sweep(
     row: &Maker<'_>,
 ) -> Result<Outcome, StoreError> {
     let mut store = Store::open(folder, Manifest::of(plan, shard), existing)?;
-    let skipped = store.rows().len();
+    let skipped = store.rows.len();
     run_missing(plan, &mut store, run, row)?;
-    let total = store.manifest().share();
+    let total = store.manifest.share();
     let rows = store.finish()?;
     let failed = count_failed(&rows);
     Ok(Outcome { total, skipped, failed, stopped: rows.len() < total, rows })
@@ -86,8 +86,8 @@ pub fn sweep(
 /// [`StoreError::Write`] if a row cannot be written. The points that are being computed are lost then, earlier rows are not.
 pub(crate) fn run_missing(plan: &Plan, store: &mut Store, run: &Run<'_>, row: &Maker<'_>) -> Result<(), StoreError> {
     let todo: Vec<_> = plan.points.iter().filter(|p| store.lacks(p.index)).collect();
-    let (total, done) = (store.manifest().share(), store.rows().len());
-    let progress = SweepProgress { total, done, failed: count_failed(store.rows()), row: None };
+    let (total, done) = (store.manifest.share(), store.rows.len());
+    let progress = SweepProgress { total, done, failed: count_failed(&store.rows), row: None };
     (run.progress)(progress);
     let next = AtomicUsize::new(0);
     let broken = AtomicBool::new(false);
@@ -127,7 +127,7 @@ impl RowWriter<'_> {
             if self.written.is_ok() {
                 self.progress.done += 1;
                 self.progress.failed += failed;
-                (run.progress)(SweepProgress { row: self.store.rows().last(), ..self.progress });
+                (run.progress)(SweepProgress { row: self.store.rows.last(), ..self.progress });
             }
         }
         self.written.is_ok()

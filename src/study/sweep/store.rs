@@ -41,16 +41,13 @@ pub enum Existing {
     },
 }
 
-impl Existing {
-    /// `--resume`: failed points are computed again, rows of another plan are an error.
-    pub const RESUME: Self = Self::Resume { retry_failed: true, adopt: false };
-}
-
 /// The rows of one sweep, open for writing.
 pub struct Store {
-    manifest: Manifest,
+    /// The identity of the sweep.
+    pub(crate) manifest: Manifest,
     folder: PathBuf,
-    rows: Vec<Row>,
+    /// The rows so far, in the order of writing.
+    pub(crate) rows: Vec<Row>,
     done: Vec<bool>,
     journal: Journal,
     _lock: File,
@@ -95,16 +92,6 @@ impl Store {
         }
         let journal = Journal::open(lines, medium)?;
         Ok(Self { manifest, folder: folder.to_owned(), rows, done, journal, _lock: lock })
-    }
-
-    /// The identity of the sweep.
-    pub(crate) fn manifest(&self) -> &Manifest {
-        &self.manifest
-    }
-
-    /// The rows so far, in the order of writing.
-    pub(crate) fn rows(&self) -> &[Row] {
-        &self.rows
     }
 
     /// Whether the point of this number is in the shard and has no row yet.

@@ -15,7 +15,8 @@ pub(super) struct Shape {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ExtentGrid {
     extents: Vec<Extent>,
-    shapes: Vec<Shape>,
+    /// The extents that cut, by shape.
+    pub(super) shapes: Vec<Shape>,
 }
 
 impl ExtentGrid {
@@ -66,11 +67,6 @@ impl ExtentGrid {
         !self.shapes.is_empty()
     }
 
-    /// The extents that cut, by shape.
-    pub(super) fn shapes(&self) -> &[Shape] {
-        &self.shapes
-    }
-
     /// The extent at an index.
     pub(super) fn extent(&self, index: usize) -> Extent {
         self.extents.get(index).copied().unwrap_or(Extent::UNCUT)
@@ -92,13 +88,13 @@ mod tests {
     #[test]
     fn a_fine_grid_covers_the_range_and_shares_its_seeds() {
         let coarse = ExtentGrid::new(&[10.0, 40.0, 10.0, f64::NAN, -1.0], &[1.0, 4.0]);
-        assert_eq!((coarse.len(), coarse.shapes().len()), (5, 2));
+        assert_eq!((coarse.len(), coarse.shapes.len()), (5, 2));
         assert_eq!(coarse.extent(0), Extent::UNCUT);
         assert_eq!(coarse.extent(1), Extent { width_cm: 40.0, height_cm: 160.0 });
         let fine = ExtentGrid::fine(&[10.0, 40.0], &[1.0, 4.0]);
         // Ratios of height to width: 1, 1.5, 2, 3, 4, with one sequence of seeds each.
-        assert_eq!(fine.shapes().len(), 5);
-        assert!(fine.shapes().iter().all(|s| s.extents_m.windows(2).all(|w| w[1] < w[0] && w[0] < 1.03 * w[1])));
+        assert_eq!(fine.shapes.len(), 5);
+        assert!(fine.shapes.iter().all(|s| s.extents_m.windows(2).all(|w| w[1] < w[0] && w[0] < 1.03 * w[1])));
         let extents: Vec<Extent> = (0..fine.len()).map(|i| fine.extent(i)).collect();
         assert!((1..coarse.len()).all(|i| extents.contains(&coarse.extent(i))));
         let one = ExtentGrid::fine(&[30.0], &[1.0]);

@@ -201,7 +201,7 @@ fn cut_costs(of: &Intervals<'_>, vertices: &mut [u32], place: &mut [u32]) -> Vec
     // Moments about the centroid of the piece keep cancellation small when vertices are subtracted.
     let each = Moments::of_each(vertices, &sample.mesh.positions, sample.displacement);
     let mut all = Vec::with_capacity(extents.len() - 1);
-    for shape in extents.shapes() {
+    for shape in &extents.shapes {
         let mut left = &shape.extents_m[..];
         let ruler =
             Ruler { mesh: sample.mesh, topology: sample.topology, grain: shape.factors.map(|f| (sample.grain, f)) };

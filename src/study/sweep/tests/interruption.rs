@@ -13,7 +13,7 @@ use crate::study::sweep::{
 };
 use proptest::prelude::*;
 
-use super::{Unsynced, files, plan, rows_by, run_all, run_on, solve, uninterrupted};
+use super::{RESUME, Unsynced, files, plan, rows_by, run_all, run_on, solve, uninterrupted};
 
 #[test]
 fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
@@ -23,7 +23,7 @@ fn stopped_three_times_and_resumed_it_equals_the_uninterrupted_one() {
         let stop = AtomicBool::new(false);
         let progress = |p: SweepProgress<'_>| stop.store(p.done >= stop_at, Ordering::SeqCst);
         let run = Run { jobs, stop: &stop, progress: &progress };
-        let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(solve)).unwrap();
+        let outcome = sweep(&plan(), None, folder.path(), RESUME, &run, &rows_by(solve)).unwrap();
         assert!(outcome.stopped && outcome.rows.len() >= stop_at && outcome.rows.len() < 200);
         assert!(
             outcome.rows.len() < stop_at + jobs,
@@ -47,7 +47,7 @@ fn finished_points_are_not_computed_again() {
     let progress = |p: SweepProgress<'_>| stop.store(p.done == 20, Ordering::SeqCst);
     let run = Run { jobs: 1, stop: &stop, progress: &progress };
     for _ in 0..2 {
-        sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(&counting)).unwrap();
+        sweep(&plan(), None, folder.path(), RESUME, &run, &rows_by(&counting)).unwrap();
     }
     // Two repeats per point. The second run computes only the failed point again, because the flag stops it at 20 rows.
     let mut twice = solved.into_inner().unwrap();
@@ -127,7 +127,7 @@ fn failed_points_are_rows_and_are_computed_again() {
 
     let kept = Existing::Resume { retry_failed: false, adopt: false };
     assert_eq!(sweep(&plan(), None, folder.path(), kept, &run, &rows_by(solve)).unwrap().failed, 6);
-    assert_eq!(sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(solve)).unwrap().failed, 5);
+    assert_eq!(sweep(&plan(), None, folder.path(), RESUME, &run, &rows_by(solve)).unwrap().failed, 5);
     assert_eq!(files(folder.path()), uninterrupted().1);
 }
 
@@ -155,7 +155,7 @@ fn an_interrupted_point_leaves_no_row_and_a_failed_point_has_its_cause() {
         }
         Ok(solved)
     };
-    let outcome = sweep(&plan(), None, folder.path(), Existing::RESUME, &run, &rows_by(odd)).unwrap();
+    let outcome = sweep(&plan(), None, folder.path(), RESUME, &run, &rows_by(odd)).unwrap();
     assert_eq!(outcome.rows[5].error, "not deterministic: repeat 2 gave 2, the first 1");
     assert!(outcome.rows[6].error.starts_with("displacement_rms_mm is NaN"), "{}", outcome.rows[6].error);
 }
@@ -166,7 +166,7 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
     let open = |plan: &Plan, how| Store::open(folder.path(), Manifest::of(plan, None), how);
     let whole = plan();
     let mut held = open(&whole, Existing::Refuse).unwrap();
-    assert!(matches!(open(&whole, Existing::RESUME), Err(StoreError::Locked { .. })));
+    assert!(matches!(open(&whole, RESUME), Err(StoreError::Locked { .. })));
     for point in &whole.points[..10] {
         held.append(crate::study::sweep::Row::failed(point, "x")).unwrap();
     }
@@ -179,13 +179,13 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
     // Another plan that has the first four tables of this one, in another order, and two more.
     let text = super::PLAN.replace("\"table-3\", { scale = [0.5, 2] }", "{ scale = [2, 3, 4] }, \"table-3\"");
     let other = Plan::parse(&text, "other.toml", Path::new(""), &crate::Job::preview()).unwrap();
-    let error = open(&other, Existing::RESUME).unwrap_err();
+    let error = open(&other, RESUME).unwrap_err();
     assert!(matches!(error, StoreError::OtherPlan { .. }), "{error}");
     let adopted = open(&other, Existing::Resume { retry_failed: false, adopt: true }).unwrap();
-    let kept: Vec<_> = adopted.rows().iter().map(|r| (r.index, r.table.clone())).collect();
+    let kept: Vec<_> = adopted.rows.iter().map(|r| (r.index, r.table.clone())).collect();
     assert_eq!(kept, (0..10).map(|i| (i + 60, "table-3".to_owned())).collect::<Vec<_>>());
     assert!(
-        adopted.rows().iter().all(|r| other.points[r.index].id == r.point) && !adopted.lacks(60) && adopted.lacks(70)
+        adopted.rows.iter().all(|r| other.points[r.index].id == r.point) && !adopted.lacks(60) && adopted.lacks(70)
     );
 }
 
@@ -205,7 +205,7 @@ fn damage_in_the_middle_is_refused_with_its_line() {
     fs::write(&path, lines.join("\n")).unwrap();
     assert!(store::read(folder.path()).unwrap_err().to_string().contains("its point has an earlier row"));
     fs::remove_file(folder.path().join("plan.json")).unwrap();
-    let error = Store::open(folder.path(), Manifest::of(&plan(), None), Existing::RESUME).unwrap_err();
+    let error = Store::open(folder.path(), Manifest::of(&plan(), None), RESUME).unwrap_err();
     assert!(matches!(error, StoreError::Orphans { .. }), "{error}");
     assert!(matches!(store::read(folder.path()), Err(StoreError::Missing { .. })));
 }

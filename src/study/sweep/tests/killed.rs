@@ -5,9 +5,9 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::study::sweep::{Existing, Point, Run, store, sweep};
+use crate::study::sweep::{Point, Run, store, sweep};
 
-use super::{files, plan, rows_by, run_all, solve, uninterrupted};
+use super::{RESUME, files, plan, rows_by, run_all, solve, uninterrupted};
 
 const FOLDER: &str = "PARTWISE_TEST_SWEEP_FOLDER";
 
@@ -21,7 +21,7 @@ fn child() {
     };
     let stop = false.into();
     let run = Run { jobs: 2, stop: &stop, progress: &|_| {} };
-    sweep(&plan(), None, &folder, Existing::RESUME, &run, &rows_by(slow)).unwrap();
+    sweep(&plan(), None, &folder, RESUME, &run, &rows_by(slow)).unwrap();
 }
 
 #[test]

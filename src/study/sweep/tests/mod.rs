@@ -24,6 +24,9 @@ use crate::study::sweep::{
 };
 use glam::DVec3;
 
+/// Resumes a sweep as `--resume` does.
+const RESUME: Existing = Existing::Resume { retry_failed: true, adopt: false };
+
 /// 200 points.
 const PLAN: &str = r#"
 name = "synthetic"
@@ -71,7 +74,7 @@ fn rows_by(
 fn run_all(folder: &Path, jobs: usize) -> Outcome {
     let stop = AtomicBool::new(false);
     let run = Run { jobs, stop: &stop, progress: &|_| {} };
-    sweep(&plan(), None, folder, Existing::RESUME, &run, &rows_by(solve)).unwrap()
+    sweep(&plan(), None, folder, RESUME, &run, &rows_by(solve)).unwrap()
 }
 
 /// The files of a finished sweep. Synthetic times also depend on the id alone, so complete files can be compared.
@@ -92,7 +95,7 @@ fn uninterrupted() -> (tempfile::TempDir, Vec<(&'static str, String)>) {
 fn run_on(folder: &Path, jobs: usize, medium: &Medium<'_>) -> Result<(usize, usize), StoreError> {
     let plan = plan();
     let (stop, failed) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let mut store = Store::open_on(folder, Manifest::of(&plan, None), Existing::RESUME, medium)?;
+    let mut store = Store::open_on(folder, Manifest::of(&plan, None), RESUME, medium)?;
     let progress = |p: SweepProgress<'_>| failed.store(p.failed, Ordering::SeqCst);
     run_missing(&plan, &mut store, &Run { jobs, stop: &stop, progress: &progress }, &rows_by(solve))?;
     Ok((store.finish()?.len(), failed.into_inner()))
