@@ -1,8 +1,8 @@
 //! A scatter plot of one number over another, both axes logarithmic, a dot for each table or method.
 //!
-//! The viewer has no such plot, so axes, numbers and names are lines and points of a 2D view. Each name covers no dot and no
-//! other name; a line leads to its dot if they are apart. Places are tried from near to far, below and above, right and left; the first free one
-//! is taken. Lengths are in units of the picture, y upwards.
+//! The viewer has no such plot, so axes, numbers and names are lines and points of a 2D view. A name overlaps neither dots nor other
+//! names; a leader line joins it to its dot if they are apart. Places around the dot are tried from near to far, and the first free
+//! one is taken. Lengths are in units of the picture, y upwards.
 //!
 //! Limits: the viewer's texts have a fixed size on screen, so that names may overlap after zooming out. Widths are estimated from the
 //! number of letters.
@@ -95,7 +95,7 @@ impl Axis {
     }
 }
 
-/// The nearest of 1, 2, 5 × 10ⁿ at or beyond `value`.
+/// The nearest of 1, 2, 5 × 10ⁿ not below `value`, or not above it unless `up`.
 fn round(value: f64, up: bool) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     let mut steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter();
@@ -245,8 +245,7 @@ impl Labels {
         Self { frame, dots, names: Vec::new(), lines: Vec::new(), radius }
     }
 
-    /// Finds a place for the name of a dot, if there is one. Leader lines cross nothing while there is room; beyond that they run
-    /// below names.
+    /// Finds a place for the name of a dot, if there is one. Leader lines avoid names and other lines as long as there is room.
     fn place(&mut self, dot: [f64; 2], name: &str) -> Option<Spot> {
         let size = [LETTER * name.chars().count() as f64 + PADDING, LINE];
         let free = |rect: &Rect| !self.dots.iter().chain(&self.names).any(|other| rect.overlaps(other));
@@ -282,7 +281,7 @@ impl Labels {
         })
     }
 
-    /// Samples of the line from a dot to its name, without those on either.
+    /// Samples of the line between a dot and its name.
     fn leader(&self, dot: [f64; 2], name: &Rect) -> Vec<Rect> {
         let end = name.nearest(dot);
         let length = (end[0] - dot[0]).hypot(end[1] - dot[1]);

@@ -1,7 +1,7 @@
-//! The sink of a recording's file.
+//! The sink that writes a recording to a file.
 //!
 //! Rerun's own file sink opens its file by name, ends its thread silently when the disk is full, and then blocks its callers.
-//! This one keeps the first failure, writes no more, and reports it at the end.
+//! This sink stores the first error, stops writing, and reports the error at the end.
 
 use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,7 +22,7 @@ impl<W: Write> Clone for RrdWriter<W> {
 
 enum State<W: Write> {
     Open(Box<Encoder<W>>),
-    /// Writing failed, for this reason.
+    /// Writing failed with this error.
     Broken(String),
     Ended,
 }
@@ -34,7 +34,7 @@ impl<W: Write> RrdWriter<W> {
         Ok(Self(Arc::new(Mutex::new(State::Open(Box::new(encoder.map_err(text)?))))))
     }
 
-    /// Fails if writing has failed.
+    /// The stored error, if writing has failed.
     pub(super) fn check(&self) -> Result<(), String> {
         match &*self.state() {
             State::Broken(reason) => Err(reason.clone()),
@@ -47,7 +47,7 @@ impl<W: Write> RrdWriter<W> {
         match std::mem::replace(&mut *self.state(), State::Ended) {
             State::Open(mut encoder) => {
                 let finished = encoder.finish().map_err(text);
-                // Taken out in any case: an encoder that is dropped tries to write its end again.
+                // The encoder is consumed even after an error, because dropping it would write the end again.
                 let mut to = encoder.into_inner().map_err(text)?;
                 finished.and_then(|()| to.flush().map_err(text)).map(|()| to)
             }
@@ -89,7 +89,7 @@ fn text(error: impl std::fmt::Display) -> String {
 
 impl<W: Write + Send + 'static> LogSink for RrdWriter<W> {
     fn send(&self, message: LogMsg) {
-        // A failure is kept, and reported by the next flush and at the end.
+        // An error is stored and reported by the next flush and at the end.
         let _ = self.attempt(|encoder| encoder.append(&message).map(|_| ()));
     }
 

@@ -22,23 +22,23 @@ use crate::mesh::{RestShape, TriMesh};
 /// Ending of the file beside a garment's that names the fabrics of its panels.
 pub(super) const BESIDE: &str = "fabrics.toml";
 
-/// Fabrics that cannot be assigned to a garment.
+/// Why fabrics cannot be assigned to a garment.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum CutError {
-    /// A file that cannot be read.
+    /// A file cannot be read.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// A file with other contents.
+    /// A file does not have the expected contents.
     #[error("{file}: {reason}\nexpected default = \"FABRIC\", and under [panels] lines such as left_cuff = \"FABRIC\"")]
     Syntax { file: String, reason: String },
-    /// A line whose fabric does not exist or cannot be read.
+    /// The fabric of a line does not exist or cannot be read.
     #[error("{file}, line {line}, {key}: {source}")]
     Fabric { file: String, line: usize, key: String, source: FabricError },
-    /// The same on the command line.
+    /// A fabric of the command line does not exist or cannot be read.
     #[error(transparent)]
     Given(#[from] FabricError),
-    /// Lines that do not fit the garment, or fabrics that do not fit each other: place, found, expected and remedy.
+    /// Lines do not match the garment, or several assignments conflict: place, found, expected and remedy.
     #[error("{0}")]
     Unfit(String),
 }
@@ -159,7 +159,7 @@ impl Cut {
     }
 }
 
-/// The file as written.
+/// The contents of the file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -208,10 +208,10 @@ impl PanelFabrics {
         Ok(Self { file, default, panels })
     }
 
-    /// The fabric of a panel; `None` where neither a line nor a default assigns one.
+    /// The fabric of a panel; `None` if neither a line nor a default assigns one.
     ///
     /// # Errors
-    /// [`CutError::Unfit`] where it matches two lines of different fabrics.
+    /// [`CutError::Unfit`] if the panel matches two lines of different fabrics.
     pub fn of(&self, panel: &str) -> Result<Option<&Fabric>, CutError> {
         if let Some((.., fabric)) = self.panels.iter().find(|(name, ..)| name == panel) {
             return Ok(Some(fabric));
@@ -226,7 +226,7 @@ impl PanelFabrics {
     }
 }
 
-/// Whether a name matches a pattern in which each `*` stands for any letters or none.
+/// Whether a name matches a pattern in which each `*` stands for any number of letters.
 fn matches(pattern: &str, name: &str) -> bool {
     let mut parts: Vec<&str> = pattern.split('*').collect();
     let Some(mut left) = name.strip_prefix(parts.remove(0)) else { return false };
@@ -238,7 +238,7 @@ fn matches(pattern: &str, name: &str) -> bool {
     left.ends_with(last)
 }
 
-/// The fabric files named in the file at `path`; none where it cannot be parsed.
+/// The fabric files named in the file at `path`; empty if it cannot be parsed.
 pub(super) fn files_named_in(path: &Path) -> Vec<PathBuf> {
     let written = read_text(path).ok().and_then(|text| toml::from_str::<Written>(&text).ok());
     let names = written.iter().flat_map(|w| w.panels.values().chain(&w.default));

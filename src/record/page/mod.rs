@@ -29,8 +29,8 @@ pub(super) use recording::Recording;
 pub use server::Limits;
 pub(crate) use server::{Connection, Server};
 
-/// Permissions of a browser on a page with the viewer. WebAssembly is compiled code, which needs a separate permission; the
-/// viewer sets styles and draws pictures it made.
+/// Content-Security-Policy of a page with the viewer. WebAssembly needs a separate permission; the viewer sets inline styles and
+/// draws images from blobs.
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; \
     style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; font-src 'self' data:; worker-src 'self' blob:; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -57,7 +57,7 @@ async fn check(Extension(connection): Extension<Arc<Connection>>, request: Reque
     if let Err(refused) = Hosts::default().check(request.headers(), request.uri()) {
         return refusal(refused);
     }
-    // Other sites' pages load pictures and scripts without an `Origin`, but never post without one.
+    // Pages of other sites load images and scripts without `Origin`, but their POST requests have one.
     if request.method() == Method::POST {
         connection.authorise();
     }
@@ -68,7 +68,7 @@ fn refusal((status, sentence): Refused) -> Response {
     whole(status, "text/plain", sentence + "\n")
 }
 
-/// A file of the viewer, for a page around it; these hold nothing of a recording or session.
+/// A file of the viewer; it contains no data of a recording or session.
 pub(crate) fn file(request: &Request) -> Result<Response, Refused> {
     let (method, path) = (request.method(), request.uri().path());
     if ![Method::GET, Method::HEAD].contains(method) {
@@ -86,7 +86,7 @@ pub(crate) fn file(request: &Request) -> Result<Response, Refused> {
     Ok(whole(StatusCode::OK, kind, bytes))
 }
 
-/// The viewer's program. The page shows how much has arrived, and sees unpacked bytes only, so their number is sent too.
+/// The program of the viewer. The page shows the progress of its download in uncompressed bytes, so their number is sent too.
 fn program(wasm: &'static [u8], takes_gzip: bool) -> Response {
     let packed = PACKED.get().filter(|_| takes_gzip).cloned();
     let is_packed = packed.is_some();
@@ -99,7 +99,7 @@ fn program(wasm: &'static [u8], takes_gzip: bool) -> Response {
     response
 }
 
-/// A response with this body, which a browser neither caches nor lets do more than the policy says.
+/// A complete response with the headers of the security policy; browsers do not cache it.
 pub(crate) fn whole(status: StatusCode, kind: &'static str, body: impl Into<Body>) -> Response {
     let mut response = Response::new(body.into());
     *response.status_mut() = status;
@@ -109,7 +109,7 @@ pub(crate) fn whole(status: StatusCode, kind: &'static str, body: impl Into<Body
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::REFERRER_POLICY, "no-referrer"),
         (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-        // The next run may be of another version on the same port.
+        // The next server on this port may have another version.
         (header::CACHE_CONTROL, "no-cache"),
     ] {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
@@ -141,14 +141,14 @@ fn viewer() -> Result<&'static WebViewerData, String> {
     }
     let loaded = WebViewerData::load(None).map_err(|e| e.to_string())?;
     let viewer = VIEWER.get_or_init(|| loaded);
-    // Packing takes a second, for which a fast connection need not wait: until it is done the program goes out unpacked.
+    // Compression takes a second. Until it is done, the program is sent uncompressed.
     std::thread::spawn(|| pack(viewer.viewer_wasm()));
     Ok(viewer)
 }
 
 static PACKED: OnceLock<Bytes> = OnceLock::new();
 
-/// Packs the viewer's program, 42 MB to a third, once in the life of this process.
+/// Compresses the program of the viewer once per process, from 42 MB to a third.
 fn pack(wasm: &[u8]) {
     PACKED.get_or_init(|| {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());

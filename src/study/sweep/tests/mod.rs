@@ -63,14 +63,14 @@ fn solve(point: &Point) -> Result<Pass<Metrics>, PointError> {
     Ok(Pass { value, times, result_hash: result_hash(&positions) })
 }
 
-/// Rows made by a function in place of a drape, in two passes each as the plan has it.
+/// Rows from a function instead of a drape, with the two passes of the plan.
 fn rows_by(
     solve: impl Fn(&Point) -> Result<Pass<Metrics>, PointError> + Sync,
 ) -> impl Fn(&Point) -> Option<Row> + Sync {
     move |point| row_of(point, (0, 2), || solve(point), Ok)
 }
 
-/// Runs without a stop.
+/// Runs all points.
 fn run_all(folder: &Path, jobs: usize) -> Outcome {
     let stop = AtomicBool::new(false);
     let run = Run { jobs, stop: &stop, progress: &|_| {} };
@@ -82,7 +82,7 @@ fn files(folder: &Path) -> Vec<(&'static str, String)> {
     ["plan.json", "rows.jsonl", "rows.csv"].map(|name| (name, fs::read_to_string(folder.join(name)).unwrap())).to_vec()
 }
 
-/// A finished sweep nobody interrupted.
+/// A sweep that finished without interruption.
 fn uninterrupted() -> (tempfile::TempDir, Vec<(&'static str, String)>) {
     let folder = tempfile::tempdir().unwrap();
     let outcome = run_on(folder.path(), 1, &|file| Box::new(Unsynced(file))).unwrap();
@@ -91,7 +91,7 @@ fn uninterrupted() -> (tempfile::TempDir, Vec<(&'static str, String)>) {
     (folder, written)
 }
 
-/// Runs to the end on other media than plain files; rows and failures.
+/// Runs all points with `medium` between journal and file.
 fn run_on(folder: &Path, jobs: usize, medium: &Medium<'_>) -> Result<(usize, usize), StoreError> {
     let plan = plan();
     let (stop, failed) = (AtomicBool::new(false), AtomicUsize::new(0));
@@ -101,7 +101,7 @@ fn run_on(folder: &Path, jobs: usize, medium: &Medium<'_>) -> Result<(usize, usi
     Ok((store.finish()?.len(), failed.into_inner()))
 }
 
-/// A file whose appends are not synced: what is not about power cuts need not wait for the disk.
+/// A file whose appends are not synced, to keep tests without power cuts short.
 struct Unsynced(File);
 
 impl Append for Unsynced {

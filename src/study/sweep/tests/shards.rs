@@ -1,4 +1,4 @@
-//! Shards joined equal one run; what does not belong together is not joined.
+//! Joined shards equal a single run; shards of different sweeps are not joined.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,7 @@ fn a_manifest_made_by_somebody_else_is_taken_for_no_path_and_does_no_harm() {
         assert!(error.to_string().contains("plan.json") && error.to_string().contains("32 hexadecimal"), "{error}");
         fs::write(parts[0].join("rows.jsonl"), rows).unwrap();
     }
-    // Eight letters of the plan's hash are shown, and these are of two bytes.
+    // The identity shows eight letters of the hash; these letters have two bytes each.
     let hash = text.split("\"plan\": \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
     fs::write(&manifest, text.replace(&hash, "xéééééééééé")).unwrap();
     let error = merge(&parts, &out).unwrap_err().to_string();
@@ -102,7 +102,7 @@ fn overlapping_shards_agree_or_are_refused() {
     parts.extend(run_shards(&folder.path().join("thirds"), &plan(), 3));
     let rows = parts[4].join("rows.jsonl");
     let text = fs::read_to_string(&rows).unwrap();
-    // Other timings are no disagreement; other figures are.
+    // Different timings are accepted, different metrics are not.
     let slower = text.replace("\"time_total_ms\":0.", "\"time_total_ms\":10.");
     assert_ne!(slower, text);
     fs::write(&rows, slower).unwrap();
