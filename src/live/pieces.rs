@@ -15,10 +15,10 @@ use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
 use crate::session::{Session, Snapshot};
 use crate::study::metrics::LevelCount;
 
-/// Between two checks for a first viewer.
-const GLANCE: Duration = Duration::from_millis(50);
-/// Between two encodings.
-const PACE: Duration = Duration::from_millis(33);
+/// Interval of the checks for a first viewer.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Shortest interval between two encodings.
+const ENCODE_INTERVAL: Duration = Duration::from_millis(33);
 
 /// The newest piece of each kind: layout and triangles, PARTs, preview, rest.
 type Slots = [Option<(u64, Bytes)>; 4];
@@ -30,7 +30,7 @@ pub(super) struct Pieces {
     /// Cloned by each viewer.
     viewers: Arc<()>,
     stopped: AtomicBool,
-    broken: Mutex<Option<String>>,
+    error: Mutex<Option<String>>,
 }
 
 /// The inputs of the last encoding. They are held, so that equal pointers mean equal inputs.
@@ -48,7 +48,7 @@ impl Pieces {
         Arc::clone(&self.viewers)
     }
 
-    fn is_seen(&self) -> bool {
+    fn has_viewers(&self) -> bool {
         Arc::strong_count(&self.viewers) > 1
     }
 
@@ -61,8 +61,8 @@ impl Pieces {
     }
 
     /// The error that ended the encoding, if any.
-    pub(super) fn broken(&self) -> Option<String> {
-        self.broken.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    pub(super) fn error(&self) -> Option<String> {
+        self.error.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The pieces that are newer than those `known`; all of them after a new layout.
@@ -89,7 +89,7 @@ impl Pieces {
     /// Encodes changes until the server stops.
     pub(super) fn encode(&self, session: &Session, name: &str, front: DVec3) {
         let made = self.keep_encoding(session, name, front);
-        *self.broken.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
+        *self.error.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
     }
 
     fn keep_encoding(&self, session: &Session, name: &str, front: DVec3) -> Result<(), RecordError> {
@@ -99,11 +99,11 @@ impl Pieces {
         let mut encoded = Encoded::default();
         let (mut serial, mut number) = (0, 0);
         while !self.stopped.load(Ordering::SeqCst) {
-            let wait = if self.is_seen() { GLANCE } else { Duration::ZERO };
+            let wait = if self.has_viewers() { POLL_INTERVAL } else { Duration::ZERO };
             let now = session.newer_than(serial, wait);
-            if !self.is_seen() {
+            if !self.has_viewers() {
                 // The slots keep what they hold until there is a viewer.
-                std::thread::sleep(GLANCE);
+                std::thread::sleep(POLL_INTERVAL);
                 continue;
             }
             serial = now.serial;
@@ -123,7 +123,7 @@ impl Pieces {
             }
             drop(slots);
             self.newest.send_replace(number);
-            std::thread::sleep(PACE);
+            std::thread::sleep(ENCODE_INTERVAL);
         }
         Ok(())
     }

@@ -130,7 +130,7 @@ async fn state(State(site): State<Arc<Site>>, Extension(right): Extension<Right>
 }
 
 async fn pieces(State(site): State<Arc<Site>>) -> Answer {
-    match site.pieces.broken() {
+    match site.pieces.error() {
         None => flow(&site, "application/octet-stream", stream),
         Some(why) => Err(Refusal(StatusCode::INTERNAL_SERVER_ERROR, format!("nothing to show: {why}"))),
     }

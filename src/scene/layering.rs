@@ -40,9 +40,9 @@ const OWN_SHARE: f64 = 0.8;
 /// Offset behind a sheet at which the search for the next one starts, m.
 const RAY_OFFSET: f64 = 1e-6;
 
-/// Rounds of moving outward and smoothing, and averages in each; heuristics.
-const ROUNDS: usize = 12;
-const SWEEPS: usize = 3;
+/// Rounds of moving outward and smoothing, and averaging passes in each round. Heuristics.
+const PUSH_ROUNDS: usize = 12;
+const SMOOTHING_PASSES: usize = 3;
 
 /// Distance, m, by which crossing triangles are lifted at a time, and the most times.
 const LIFT: f64 = 1.5e-3;
@@ -54,7 +54,7 @@ pub(super) fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Res
         .map_err(|e| DistanceError::Refused(format!("{e:?}")))?;
     let topology = Topology::new(outer);
     let mut displacement = vec![DVec3::ZERO; outer.vertex_count()];
-    for _ in 0..ROUNDS {
+    for _ in 0..PUSH_ROUNDS {
         let moved: Vec<DVec3> = outer.positions.iter().zip(&displacement).map(|(x, d)| *x + *d).collect();
         let missing_of = |nearest: &SurfacePoint| {
             let left = last_sheet(nearest.point, nearest.normal, inner, &below, body);
@@ -66,7 +66,7 @@ pub(super) fn put_over(outer: &mut TriMesh, inner: &TriMesh, body: &Body) -> Res
         }
         let bound: Vec<DVec3> = displacement.iter().zip(&missing).map(|(d, more)| *d + *more).collect();
         displacement.clone_from(&bound);
-        for _ in 0..SWEEPS {
+        for _ in 0..SMOOTHING_PASSES {
             let averaged = |v| 0.5 * (displacement[v] + neighbour_mean(&topology, &displacement, v as u32));
             displacement = (0..displacement.len()).map(averaged).collect();
         }

@@ -72,7 +72,7 @@ impl Loaded {
         }
         notes.extend(self.hold_notes.iter().cloned());
         notes.extend(self.swatches.iter().map(|swatch| format!("cut: {swatch}")));
-        if self.pushed_out.is_clean() && (self.pushed_out.found_inside > 0 || self.pushed_out.off_ends_m > 0.0) {
+        if self.pushed_out.is_clean() && (self.pushed_out.found_inside > 0 || self.pushed_out.protrusion_move_m > 0.0) {
             notes.push(self.pushed_out.to_string());
         }
         notes

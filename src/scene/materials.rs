@@ -20,7 +20,7 @@ use crate::garment::fabric::{Fabric, FabricError};
 use crate::mesh::{RestShape, TriMesh};
 
 /// Ending of the file beside a garment's that names the fabrics of its panels.
-pub(super) const BESIDE: &str = "fabrics.toml";
+pub(super) const FABRICS_ENDING: &str = "fabrics.toml";
 
 /// Why fabrics cannot be assigned to a garment.
 #[derive(Debug, thiserror::Error)]

@@ -10,7 +10,7 @@ use crate::mesh::{Topology, TriMesh};
 
 /// Largest distance, m, from the body to the nearest vertex of a garment that is worn: the loosest gown hangs from a
 /// shoulder or a waist.
-pub const FARTHEST: f64 = 1.0;
+const MAX_BODY_DISTANCE: f64 = 1.0;
 
 /// Metrics of a garment around its body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -52,11 +52,11 @@ impl Placement {
     }
 }
 
-/// Rejects a garment of which every vertex is farther than [`FARTHEST`] from the body.
+/// Rejects a garment of which every vertex is farther than [`MAX_BODY_DISTANCE`] from the body.
 pub(super) fn check_near(garment: &TriMesh, body: &Body) -> Result<(), SceneError> {
     let distances = body.nearest_all(&garment.positions);
     let nearest = distances.iter().map(|near| near.signed_distance.abs()).fold(f64::INFINITY, f64::min);
-    if nearest > FARTHEST { Err(SceneError::NotNear { nearest, limit: FARTHEST }) } else { Ok(()) }
+    if nearest > MAX_BODY_DISTANCE { Err(SceneError::NotNear { nearest, limit: MAX_BODY_DISTANCE }) } else { Ok(()) }
 }
 
 /// Whether each triangle belongs to a connected part whose normals point towards the body and whose winding must be

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layering::coincident;
 use super::loaded::{Loaded, Tailored, Unplaced};
-use super::materials::{BESIDE, Cut, CutError, files_named_in};
+use super::materials::{Cut, CutError, FABRICS_ENDING, files_named_in};
 use super::placement::facing_body;
 use super::{DistanceTo, Scene, SceneError};
 use crate::base::files::{has_ending, names_a_file, read_text, stem};
@@ -180,7 +180,7 @@ impl SceneSpec {
         }
         let stems = [stem(&self.garment), self.layer_name()].into_iter();
         stems
-            .map(|stem| Path::new(&self.garment).with_file_name(format!("{stem}.{BESIDE}")))
+            .map(|stem| Path::new(&self.garment).with_file_name(format!("{stem}.{FABRICS_ENDING}")))
             .find(|path| path.is_file())
     }
 
@@ -217,7 +217,7 @@ impl SceneSpec {
         let (fabrics, garments) = (self.fabrics.len(), 1 + self.over.len());
         if let Some(file) = self.fabrics_file.as_ref().filter(|_| garments > 1) {
             return Err(SceneError::from(CutError::Unfit(format!(
-                "--fabrics {file}: found {garments} garments, expected one; put a file beside each garment's own, GARMENT.{BESIDE}"
+                "--fabrics {file}: found {garments} garments, expected one; put a file beside each garment's own, GARMENT.{FABRICS_ENDING}"
             ))));
         }
         if fabrics != 0 && fabrics != garments {
@@ -310,7 +310,7 @@ impl SceneSpec {
         };
         // Built-in garments have no protrusions in them.
         if self.push_out && self.layers().any(|spec| spec.is_a_mesh() || spec.is_a_pattern()) {
-            pushed_out.off_ends_m = scene.pull_off_protrusions();
+            pushed_out.protrusion_move_m = scene.pull_off_protrusions();
         }
         let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
         let reports = imported_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();

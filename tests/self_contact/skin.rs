@@ -78,7 +78,7 @@ fn a_foot_through_a_trouser_leg_is_reported_and_moved_inside() {
     assert!(message.contains("stuck through the garment") && loaded.warnings().is_empty(), "{message}");
     // Without the repair at loading, the solve moves the foot inside.
     let as_it_is = SceneSpec { push_out: false, ..spec }.load().unwrap();
-    assert_eq!(as_it_is.pushed_out.off_ends_m, 0.0);
+    assert_eq!(as_it_is.pushed_out.protrusion_move_m, 0.0);
     for scene in [loaded.scene, as_it_is.scene] {
         let end = drape(&scene, &Settings::default(), &mut unobserved).unwrap();
         let skin = crossing_pairs(&scene.garment.with_positions(end.positions.clone()), scene.body.mesh()).len();

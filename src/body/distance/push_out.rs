@@ -44,7 +44,7 @@ const FIRST_RINGS: usize = 3;
 /// Attempts with doubled rings: up to 3 · 2⁴ = 48 rings, half a garment.
 const ATTEMPTS: usize = 5;
 /// Rounds of smoothing and restoring the constraint in one attempt. More rounds smooth wider; a heuristic.
-const ROUNDS: usize = 24;
+const SMOOTHING_ROUNDS: usize = 24;
 /// Umbrella averages in one round; a heuristic.
 const SWEEPS: usize = 4;
 /// Least clearance, m: a micrometre is far above the rounding of distances at body size.
@@ -76,7 +76,7 @@ pub struct PushOutReport {
     pub found_inside: usize,
     /// Depth of the deepest of them, m.
     pub deepest_m: f64,
-    /// Vertices so deep that they may have come out on the wrong side.
+    /// Vertices so deep that they may have been pushed out on the wrong side.
     pub too_deep: usize,
     /// Vertices moved, smoothed neighbours included.
     pub moved: usize,
@@ -86,8 +86,9 @@ pub struct PushOutReport {
     pub left_inside: usize,
     /// Triangles turned by more than a right angle.
     pub turned_over: usize,
-    /// Longest displacement by which cloth was pulled off protrusions of the body (toes, a thumb), m; zero where there were none.
-    pub off_ends_m: f64,
+    /// Longest displacement that pulled cloth off protrusions of the body (toes, a thumb), m; zero without protrusions.
+    #[serde(rename = "off_ends_m")]
+    pub protrusion_move_m: f64,
 }
 
 impl PushOutReport {
@@ -101,7 +102,7 @@ impl PushOutReport {
 impl fmt::Display for PushOutReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { found_inside, too_deep, moved, left_inside, turned_over, .. } = self;
-        let [deepest, farthest, ends] = [self.deepest_m, self.farthest_m, self.off_ends_m].map(|m| 1e3 * m);
+        let [deepest, farthest, ends] = [self.deepest_m, self.farthest_m, self.protrusion_move_m].map(|m| 1e3 * m);
         if ends > 0.0 {
             f.write_str("the body stuck through the garment (a foot, a hand?); ")?;
             write!(f, "the garment was pulled off that end by up to {ends:.0} mm; ")?;
@@ -190,12 +191,12 @@ fn push_attempt(
         holds
     };
     restore(&mut displacement);
-    for _ in 0..ROUNDS {
+    for _ in 0..SMOOTHING_ROUNDS {
         smooth(topology, region, &mut displacement);
         restore(&mut displacement);
     }
     // Out of one of two surfaces that are close may be into the other: restore until the floor holds, or for as many rounds.
-    let _ = (0..ROUNDS).any(|_| restore(&mut displacement));
+    let _ = (0..SMOOTHING_ROUNDS).any(|_| restore(&mut displacement));
     garment.with_positions(garment.positions.iter().zip(&displacement).map(|(p, d)| p + d).collect())
 }
 
@@ -325,7 +326,7 @@ fn pull_attempt(body: &Body, mesh: &TriMesh, topology: &Topology, held: &[bool],
         }
     };
     restore(&mut displacement);
-    for _ in 0..ROUNDS {
+    for _ in 0..SMOOTHING_ROUNDS {
         smooth(topology, &region, &mut displacement);
         restore(&mut displacement);
     }

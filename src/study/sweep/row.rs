@@ -164,8 +164,8 @@ fn not_finite(metrics: &Metrics) -> Option<(String, String)> {
     let mut reader = csv::Reader::from_reader(text.as_slice());
     let names = reader.headers().ok()?.clone();
     let record = reader.records().next()?.ok()?;
-    let odd = names.iter().zip(&record).find(|(_, cell)| cell.parse::<f64>().is_ok_and(|x| !x.is_finite()));
-    odd.map(|(name, cell)| (name.to_owned(), cell.to_owned()))
+    let wrong = names.iter().zip(&record).find(|(_, cell)| cell.parse::<f64>().is_ok_and(|x| !x.is_finite()));
+    wrong.map(|(name, cell)| (name.to_owned(), cell.to_owned()))
 }
 
 /// The same with every number rounded to nine significant digits, and to 0 below 1e-12.
