@@ -77,7 +77,7 @@ impl ModelArgs {
 }
 
 impl StageArgs {
-    /// The given flags that act on the two stages or the refinement; the reference methods have none of them.
+    /// The given flags of the two stages and the refinement, which the reference methods do not support.
     pub(crate) fn two_stage_flags(&self) -> Vec<&'static str> {
         let ModelArgs { min_part, model, max_extent, motion, readings, no_self_contact, .. } = &self.model;
         let all = [

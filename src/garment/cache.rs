@@ -144,7 +144,7 @@ mod tests {
     fn an_unwritable_folder_is_ignored_and_old_entries_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let made = skirt(&MeshCache::default());
-        // A file where the folder should be: nothing can be made in it, by nobody.
+        // A file in the place of the folder, so that no entry can be written.
         std::fs::write(folder.path().join("file"), "").unwrap();
         assert_eq!(skirt(&MeshCache::new(folder.path().join("file"))), made);
         assert_eq!(skirt(&MeshCache::new(folder.path().join("file/below"))), made);

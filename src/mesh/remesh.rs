@@ -54,7 +54,7 @@ const FINAL_PASSES: usize = 4;
 /// Number of vertices from which on they are renumbered along a curve; smaller meshes fit into the caches in any order.
 const MIN_RENUMBERED: usize = 32_768;
 
-/// Remeshes `mesh`, whose boundary vertices carry tags, to the wanted density. `None` where it is not a manifold, before or
+/// Remeshes `mesh`, whose boundary vertices carry tags, to the given density. `None` where it is not a manifold, before or
 /// after: a surface folded onto itself loses triangles whose vertices others still name.
 pub(crate) fn remesh(
     mesh: &TriMesh,

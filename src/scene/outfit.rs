@@ -115,7 +115,7 @@ impl Scene {
         Ok(Self::place(body, garment, rest, true)?.0)
     }
 
-    /// One garment as it is, where it is, nothing held.
+    /// A scene of one garment at its current positions, with nothing held.
     #[must_use]
     pub fn new(body: Body, garment: TriMesh, rest: RestShape) -> Self {
         let name = "garment".to_owned();

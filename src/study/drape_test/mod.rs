@@ -76,7 +76,7 @@ pub(crate) struct CusickResult {
 /// Drapes `fabric` with `rows` rows of cells from the plates' edge to the rim.
 ///
 /// # Errors
-/// [`CusickError`] says what could not be set up.
+/// [`CusickError`] if the specimen is too coarse, or cloth or solver cannot be set up.
 pub(crate) fn run(fabric: &Fabric, rows: usize) -> Result<CusickResult, CusickError> {
     if rows < 4 {
         return Err(CusickError::TooCoarse { rows });

@@ -1,4 +1,4 @@
-//! The drape test on a coarse specimen: in order of stiffness, in folds, and inside the published bands where it is.
+//! The drape test on a coarse specimen: order by stiffness, number of folds, published bands.
 
 use super::{Target, maxima, results_csv, run, targets};
 use crate::garment::fabric::Fabric;

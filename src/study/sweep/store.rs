@@ -132,14 +132,14 @@ impl Store {
     }
 }
 
-/// The manifest and rows of a folder nobody need be writing; a torn last line is left out.
+/// The manifest and rows of a folder, without taking its lock; an incomplete last line is left out.
 pub(crate) fn read(folder: &Path) -> Result<(Manifest, Vec<Row>), StoreError> {
     let manifest = Manifest::read(folder)?.ok_or_else(|| StoreError::Missing { path: folder.join(MANIFEST) })?;
     let rows = read_rows(&folder.join(JSON_LINES), &manifest)?;
     Ok((manifest, rows))
 }
 
-/// The rows to go on from.
+/// The rows that a resumed sweep keeps.
 fn left_over(folder: &Path, found: &Manifest, wanted: &Manifest, how: Existing) -> Result<Vec<Row>, StoreError> {
     let path = folder.join(JSON_LINES);
     let mut rows = read_rows(&path, found)?;

@@ -11,7 +11,7 @@
 //! | `{ quantile = [10, 20] }` | this number of levels, each with equally many vertices of the garment |
 //! | `{ geometric = [10, 20], first_cm = 0.1, last_cm = 11 }` | bounds in geometric progression between the two |
 //!
-//! A single number may stand for a list of one; `name` names a single table.
+//! A list of one number may be written as the number; `name` names a single table.
 
 use serde::Deserialize;
 use toml::Value;

@@ -6,30 +6,30 @@ use crate::parts::range_table::RangeTable;
 /// Options of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SearchOptions {
-    /// How a PART moves: by an affine map, as the coupled model moves it, or as in the paper by a translation.
+    /// Motion of a PART: an affine map as in the coupled model, or a translation as in the paper.
     pub motion: Motion,
-    /// Candidate bounds per round. Default 400, with extents 120: a level between each two of them is evaluated, which with
-    /// extents means cut.
+    /// Candidate bounds per round. Default 400, with extents 120, because every level between two candidates is evaluated and, with
+    /// extents, cut.
     pub candidates: usize,
-    /// Up to this number of distinct distances of one garment every bound is a candidate, and one round is exact. Default 12,000
-    /// for levels alone, 0 with extents.
+    /// Largest number of distinct distances of a single garment at which every bound is a candidate, so that one round is exact.
+    /// Default 12,000 for levels alone, 0 with extents.
     pub exact_up_to: usize,
-    /// Widths each level may be cut to, cm; not to be cut is always open to it. Empty for levels alone.
+    /// Widths to which a level may be cut, cm; a level may also stay uncut. Empty for levels alone.
     pub widths_cm: Vec<f64>,
-    /// Heights over widths of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, which lets one run of seeds serve
+    /// Ratios of height to width of the pieces. Default 1/2, 1, 2 and 4: powers of two are exact, so that one sequence of seeds serves
     /// all widths.
     pub shapes: Vec<f64>,
     /// Candidate bounds in each round after the first. Default 400, with extents 40.
     pub candidates_around: usize,
-    /// Rounds: the first over quantiles, the others around the best table so far, with extents finely between the widths and
-    /// shapes given. They end early when two in a row bring less than a thousandth. Default 3, with extents 12.
+    /// Rounds: the first over quantiles, the others around the best table so far and, with extents, over a finer grid of widths and
+    /// shapes. The search ends early if two rounds reduce the error by less than a thousandth. Default 3, with extents 12.
     pub rounds: usize,
-    /// Least thickness of a level, cm. A sliver only isolates single vertices of the garments searched on, which another
-    /// garment has elsewhere. Default 0 for levels alone, 0.1 with extents.
+    /// Least thickness of a level, cm. A thinner level isolates single vertices of these garments and does not carry over to others.
+    /// Default 0 for levels alone, 0.1 with extents.
     pub thinnest_cm: f64,
-    /// Whether a level may stay whole. Default yes.
+    /// Whether a level may stay uncut. Default yes.
     pub uncut: bool,
-    /// Tables whose bounds are candidates too, so that the front is never worse than those are without extents.
+    /// Tables whose bounds are candidates too, so that the front is never worse than these tables without extents.
     pub include: Vec<RangeTable>,
 }
 
