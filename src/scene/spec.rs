@@ -291,7 +291,7 @@ impl SceneSpec {
         for spec in self.layers().skip(1) {
             let outer = spec.unplaced(&body, imported_body.as_ref(), spec.make_garment(meshes))?;
             let (coincident, vertices) = (coincident(&unplaced.mesh, &outer.mesh), outer.mesh.vertex_count());
-            // Contact cannot determine which of the two is outside, and the solve does not converge.
+            // Contact cannot determine which of the two is outside, and the solve takes minutes.
             if 2 * coincident > vertices {
                 return Err(SceneError::about(&spec.garment)(SceneError::Coincident { coincident, vertices }));
             }
