@@ -105,7 +105,7 @@ impl Solved {
         scalars.retain(|(name, _)| name.starts_with("error/"));
         recorder.step(&StepView {
             index,
-            distance_m: &drape.distance,
+            distances_m: &drape.distance,
             part_of_vertex: &drape.parts.part_of_vertex,
             part_force_n: &forces,
             draped,

@@ -20,7 +20,7 @@ pub(super) fn state(snapshot: &Snapshot) -> Value {
     let mut all = event(snapshot);
     all["trail"] = json!(*snapshot.trail);
     all["histogram"] =
-        snapshot.loaded_scene.as_ref().map_or(Value::Null, |loaded_scene| histogram(loaded_scene.distance_m()));
+        snapshot.loaded_scene.as_ref().map_or(Value::Null, |loaded_scene| histogram(loaded_scene.distances_m()));
     all
 }
 
@@ -162,12 +162,12 @@ fn pin(pin: &Pin) -> Value {
 }
 
 /// Vertices by their distance, in bars of equal width over the root of the distance: levels are thin near the body.
-fn histogram(distance_m: &[f64]) -> Value {
-    let farthest_cm = 100.0 * distance_m.iter().fold(1e-6_f64, |a, &b| a.max(b));
+fn histogram(distances_m: &[f64]) -> Value {
+    let farthest_cm = 100.0 * distances_m.iter().fold(1e-6_f64, |a, &b| a.max(b));
     let bars = BARS as f64;
     let edges_cm: Vec<f64> = (0..=BARS).map(|i| farthest_cm * (i as f64 / bars).powi(2)).collect();
     let mut counts = vec![0_usize; BARS];
-    for d in distance_m {
+    for d in distances_m {
         counts[((100.0 * d / farthest_cm).sqrt() * bars).min(bars - 1.0) as usize] += 1;
     }
     json!({ "edges_cm": edges_cm, "counts": counts })

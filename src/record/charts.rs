@@ -27,14 +27,14 @@ struct Bar {
 
 /// The bars of one level, at most `widest` wide. They tile the level's own range, so that no bar counts vertices of two levels. The
 /// last level ends at `end`; its last bar counts the vertices beyond. Empty bars are left out.
-fn bars(level: &LevelCount, distance_m: &[f64], widest: f64, end: f64) -> Vec<Bar> {
+fn bars(level: &LevelCount, distances_m: &[f64], widest: f64, end: f64) -> Vec<Bar> {
     let upper = level.upper_m().min(end.max(level.lower_m() + widest));
     let count = ((upper - level.lower_m()) / widest).ceil().max(1.0);
     let width = (upper - level.lower_m()) / count;
     let left = |i: usize| level.lower_m() + i as f64 * width;
     let mut bars: Vec<Bar> = (0..count as usize).map(|i| Bar { height: 0.0, left: left(i), width }).collect();
     let last = bars.len() - 1;
-    for &d in distance_m.iter().filter(|d| (level.lower_m()..level.upper_m()).contains(*d)) {
+    for &d in distances_m.iter().filter(|d| (level.lower_m()..level.upper_m()).contains(*d)) {
         bars[(((d - level.lower_m()) / width) as usize).min(last)].height += 1.0;
     }
     bars.retain(|bar| bar.height > 0.0);
@@ -45,12 +45,12 @@ fn bars(level: &LevelCount, distance_m: &[f64], widest: f64, end: f64) -> Vec<Ba
 pub(super) fn log_levels(
     recording: &mut OpenRecording,
     levels: &[LevelCount],
-    distance_m: &[f64],
+    distances_m: &[f64],
 ) -> Result<(), RecordError> {
-    let end = Range::to_quantile(distance_m.iter().copied(), 0.995).high;
+    let end = Range::to_quantile(distances_m.iter().copied(), 0.995).high;
     let positions = colours::level_positions(levels);
     let widest = end / BINS as f64;
-    let all: Vec<Vec<Bar>> = levels.iter().map(|level| bars(level, distance_m, widest, end)).collect();
+    let all: Vec<Vec<Bar>> = levels.iter().map(|level| bars(level, distances_m, widest, end)).collect();
     let highest = all.iter().flatten().map(|bar| bar.height).fold(0.0, f64::max);
     for (index, (level, mut bars)) in levels.iter().zip(all).enumerate() {
         let upper = level.upper_m().min(end);

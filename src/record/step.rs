@@ -26,7 +26,7 @@ pub struct StepView<'a> {
     /// Step of the timeline `table`.
     pub index: i64,
     /// Distance to the body, m.
-    pub distance_m: &'a [f64],
+    pub distances_m: &'a [f64],
     /// PART of each vertex, or [`UNASSIGNED`].
     pub part_of_vertex: &'a [u32],
     /// Resultant force of each PART, N.
@@ -44,7 +44,7 @@ pub struct StepView<'a> {
 impl StepView<'_> {
     fn check(&self, recording: &OpenRecording) -> Result<(), RecordError> {
         let mut lists = vec![
-            ("distances", self.distance_m.len()),
+            ("distances", self.distances_m.len()),
             ("PART numbers", self.part_of_vertex.len()),
             ("displaced positions", self.draped.len()),
         ];
@@ -73,19 +73,19 @@ pub(super) fn log(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<
     log_parts(recording, step, &tooltips)?;
     log_force(recording, step, tooltips)?;
     log_drape(recording, step)?;
-    charts::log_levels(recording, &step.panel.levels, step.distance_m)?;
+    charts::log_levels(recording, &step.panel.levels, step.distances_m)?;
     let panel = step.panel;
     charts::log_numbers(recording, &panel.table, step.part_force_n.len(), &panel.timings_ms, step.scalars)?;
     recording.log_report(panel.markdown())
 }
 
 fn log_distance(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<(), RecordError> {
-    if recording.distance == step.distance_m {
+    if recording.distance == step.distances_m {
         return Ok(());
     }
-    step.distance_m.clone_into(&mut recording.distance);
+    step.distances_m.clone_into(&mut recording.distance);
     recording.at(step.index, 2);
-    let cm: Vec<f64> = step.distance_m.iter().map(|d| 100.0 * d).collect();
+    let cm: Vec<f64> = step.distances_m.iter().map(|d| 100.0 * d).collect();
     let range = recording.range("distance", || Range::to_quantile(cm.iter().copied(), QUANTILE));
     let map = ColourMap::DISTANCE;
     recording.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;

@@ -59,9 +59,9 @@ pub struct Swatch {
 }
 
 impl Swatch {
-    /// The same with the name of its fabric; the fabric is `of_settings` if none is assigned.
-    pub(crate) fn cut_from(&self, of_settings: &Fabric) -> Self {
-        Self { fabric: self.fabric.clone().or(Some(of_settings.name.clone())), ..self.clone() }
+    /// The same with the name of its fabric; `default_fabric` if none is assigned.
+    pub(crate) fn cut_from(&self, default_fabric: &Fabric) -> Self {
+        Self { fabric: self.fabric.clone().or(Some(default_fabric.name.clone())), ..self.clone() }
     }
 }
 

@@ -237,10 +237,10 @@ impl Scene {
         TriMesh::new(positions[..vertices].to_vec(), self.garment.triangles[..triangles].to_vec())
     }
 
-    /// The fabrics that the rest shape numbers; `of_settings` replaces those that are not named.
+    /// The fabrics that the rest shape numbers; `default_fabric` stands in for those that are not assigned.
     #[must_use]
-    pub fn fabrics(&self, of_settings: &Fabric) -> Vec<Fabric> {
-        self.own_fabrics.iter().map(|own| own.as_ref().unwrap_or(of_settings).clone()).collect()
+    pub fn fabrics(&self, default_fabric: &Fabric) -> Vec<Fabric> {
+        self.own_fabrics.iter().map(|own| own.as_ref().unwrap_or(default_fabric).clone()).collect()
     }
 
     /// The number of the fabric of each vertex; between several, the highest.
@@ -255,8 +255,8 @@ impl Scene {
 
     /// The names of the fabrics in one line.
     #[must_use]
-    pub fn fabric_names(&self, of_settings: &Fabric) -> String {
-        self.fabrics(of_settings).iter().map(|fabric| fabric.name.as_str()).collect::<Vec<_>>().join(" + ")
+    pub fn fabric_names(&self, default_fabric: &Fabric) -> String {
+        self.fabrics(default_fabric).iter().map(|fabric| fabric.name.as_str()).collect::<Vec<_>>().join(" + ")
     }
 
     /// Whether any of it is cut from the fabric of the settings.

@@ -38,7 +38,7 @@ pub struct LoadedScene {
 
 impl LoadedScene {
     /// Unsigned distance of each garment vertex to the body before draping, m.
-    pub(crate) fn distance_m(&self) -> &[f64] {
+    pub(crate) fn distances_m(&self) -> &[f64] {
         &self.distances.unsigned_m
     }
 }

@@ -170,14 +170,14 @@ impl SessionState {
     fn segment(&self, scene: &Arc<LoadedScene>, job: &Job, state: u64, since: Instant) -> Result<Segmented, EditError> {
         let began = Instant::now();
         let settings = &job.settings;
-        let table = settings.table.resolve(scene.distance_m())?;
+        let table = settings.table.resolve(scene.distances_m())?;
         let kept = self.snapshot.segmented.as_ref().filter(|old| {
             old.loaded_scene.generation == scene.generation && *old.table == table && old.min_part == settings.min_part
         });
         let (table, parts) = match kept {
             Some(old) => (Arc::clone(&old.table), Arc::clone(&old.parts)),
             None => {
-                let parts = stage_one(&scene.input.scene, settings.min_part, &table, scene.distance_m());
+                let parts = stage_one(&scene.input.scene, settings.min_part, &table, scene.distances_m());
                 (Arc::new(table), Arc::new(parts))
             }
         };

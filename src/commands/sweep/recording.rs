@@ -187,7 +187,7 @@ pub(crate) fn record(
         let overlays = if point.error_mm.is_empty() { &[][..] } else { std::slice::from_ref(&error) };
         recorder.step(&StepView {
             index,
-            distance_m: &scene.distance_m,
+            distances_m: &scene.distances_m,
             part_of_vertex: &point.part_of_vertex,
             part_force_n: &point.force_n,
             draped: &point.positions,

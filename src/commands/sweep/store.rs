@@ -44,7 +44,7 @@ pub(crate) struct StoredScene {
     pub(crate) garment: TriMesh,
     /// Unsigned distance of each garment vertex to the body, m.
     #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
-    pub(crate) distance_m: Vec<f64>,
+    pub(crate) distances_m: Vec<f64>,
 }
 
 /// A point of a recording.
@@ -70,13 +70,13 @@ pub(crate) struct StoredPoint {
 impl StoredScene {
     fn of(scene: &Scene) -> io::Result<Self> {
         let (body, garment) = (scene.body.mesh().clone(), scene.garment.clone());
-        Ok(Self { body, garment, distance_m: scene.distances_m().map_err(io::Error::other)? })
+        Ok(Self { body, garment, distances_m: scene.distances_m().map_err(io::Error::other)? })
     }
 
     /// Whether every index is in range; a file may come from another program.
     fn is_valid(&self) -> bool {
         let whole = |mesh: &TriMesh| mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.vertex_count());
-        whole(&self.body) && whole(&self.garment) && self.distance_m.len() == self.garment.vertex_count()
+        whole(&self.body) && whole(&self.garment) && self.distances_m.len() == self.garment.vertex_count()
     }
 }
 
@@ -307,7 +307,7 @@ mod tests {
 
     fn scene() -> StoredScene {
         let mesh = TriMesh::new(vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.25], vec![[0, 1, 2]]);
-        StoredScene { body: mesh.clone(), garment: mesh, distance_m: vec![0.5, 0.25, 0.125] }
+        StoredScene { body: mesh.clone(), garment: mesh, distances_m: vec![0.5, 0.25, 0.125] }
     }
 
     fn point() -> StoredPoint {

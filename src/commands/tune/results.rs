@@ -302,7 +302,7 @@ fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow
     };
     recorder.step(&StepView {
         index: shown.index,
-        distance_m: &garment.distances_m,
+        distances_m: &garment.distances_m,
         part_of_vertex: &parts.part_of_vertex,
         part_force_n: &vec![DVec3::ZERO; parts.len()],
         draped: &positions,

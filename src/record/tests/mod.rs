@@ -46,7 +46,7 @@ fn options(path: &Path, layout: Layout) -> RecordOptions {
 fn step<'a>(index: i64, scene: &'a Scene, solved: &'a Solved, overlays: &'a [Overlay<'a>]) -> StepView<'a> {
     StepView {
         index,
-        distance_m: &scene.distance_m,
+        distances_m: &scene.distances_m,
         part_of_vertex: &solved.part_of_vertex,
         part_force_n: &solved.part_force_n,
         draped: &scene.draped,
@@ -135,7 +135,7 @@ fn a_sweep_logs_the_triangles_once_and_has_all_tables() {
             let mut solved = scene.solve(name, bounds);
             let ms = 1.0 + 0.9 * i as f64;
             solved.panel.timings_ms[3].1 = ms;
-            let error: Vec<f64> = scene.distance_m.iter().map(|d| 1e3 * d / ms).collect();
+            let error: Vec<f64> = scene.distances_m.iter().map(|d| 1e3 * d / ms).collect();
             let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len() as f64).sqrt();
             let overlays = [Overlay { name: "error", unit: "mm", values: &error }];
             let scalars = [("error/rms_mm", rms)];
@@ -203,7 +203,7 @@ fn all_stages_are_on_the_solvers_timeline_and_overlays_have_legends() {
         recorder.iteration(i.into(), 2.0 + left, left, (i % 4 == 0).then_some(at.as_slice())).unwrap();
     }
     let strain: Vec<f64> = scene.draped.iter().map(|p| 8.0 * (1.4 - p.z).max(0.0)).collect();
-    let pressure: Vec<f64> = scene.distance_m.iter().map(|d| (0.02 - d).max(0.0) * 60.0).collect();
+    let pressure: Vec<f64> = scene.distances_m.iter().map(|d| (0.02 - d).max(0.0) * 60.0).collect();
     let overlays = [
         Overlay { name: "strain", unit: "%", values: &strain },
         Overlay { name: "pressure", unit: "kPa", values: &pressure },

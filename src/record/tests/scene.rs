@@ -76,7 +76,7 @@ fn tube(around: u32, along: u32, closed: bool, at: impl Fn(f64, f64) -> DVec3) -
 pub(crate) struct Scene {
     pub(crate) body: TriMesh,
     pub(crate) garment: TriMesh,
-    pub(crate) distance_m: Vec<f64>,
+    pub(crate) distances_m: Vec<f64>,
     pub(crate) draped: Vec<DVec3>,
 }
 
@@ -107,15 +107,15 @@ impl Scene {
         let garment = tube(around, along, false, |u, angle| dress(u, angle, 0.02, 0.0));
         let draped = tube(around, along, false, |u, angle| dress(u, angle, 0.10, 0.05)).positions;
         let surface = Body::new(&body).expect("the form is closed");
-        let distance_m = garment.positions.iter().map(|&p| surface.nearest(p).signed_distance.abs()).collect();
-        Self { body, garment, distance_m, draped }
+        let distances_m = garment.positions.iter().map(|&p| surface.nearest(p).signed_distance.abs()).collect();
+        Self { body, garment, distances_m, draped }
     }
 
     /// PARTs of a table given by its upper values in cm (the last level is open), with forces that grow with area and
     /// distance.
     pub(crate) fn solve(&self, name: &str, bounds_cm: &[f64]) -> Solved {
         let level = |d: f64| bounds_cm.iter().filter(|&&b| 100.0 * d >= b).count();
-        let levels: Vec<usize> = self.distance_m.iter().map(|&d| level(d)).collect();
+        let levels: Vec<usize> = self.distances_m.iter().map(|&d| level(d)).collect();
         let topology = Topology::new(&self.garment);
         let mut part_of_vertex = vec![u32::MAX; levels.len()];
         let mut part_level = Vec::new();
@@ -148,7 +148,7 @@ impl Scene {
         let mut part_force_n = vec![DVec3::ZERO; part_level.len()];
         for (v, &part) in part_of_vertex.iter().enumerate() {
             let weight = 0.2 * 9.8 * areas[v];
-            part_force_n[part as usize] += weight * (DVec3::NEG_Z + 12.0 * self.distance_m[v] * normals[v]);
+            part_force_n[part as usize] += weight * (DVec3::NEG_Z + 12.0 * self.distances_m[v] * normals[v]);
         }
         let rows = (0..=bounds_cm.len()).map(|k| LevelCount {
             level: k + 1,
@@ -165,7 +165,7 @@ impl Scene {
             levels: rows.collect(),
             facts: vec![
                 ("model".into(), "closed form".into()),
-                ("vertices".into(), self.distance_m.len().to_string()),
+                ("vertices".into(), self.distances_m.len().to_string()),
                 ("PARTs".into(), part_level.len().to_string()),
             ],
             fabric: text(&[("mass", "200 g/m²"), ("stiffness", "60 N/m")]),
