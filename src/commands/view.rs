@@ -109,7 +109,8 @@ fn start(words: &[OsString]) -> std::io::Result<Child> {
     Command::new(&words[0]).args(&words[1..]).stdin(null()).stdout(null()).stderr(null()).spawn()
 }
 
-/// Opens `address` in a browser. A failure is a warning, because the page is served anyway.
+/// Opens `address` in a browser. A failure is a warning, because the page is served anyway. The crate `webbrowser` reports neither the
+/// program that failed nor its exit status, so the browser is started here.
 pub(super) fn open_browser(address: &str) {
     let warn = |reason: &str| {
         console::warning(&format!(

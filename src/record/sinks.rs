@@ -62,7 +62,7 @@ impl Sink {
 /// A file that is being written.
 pub(crate) struct Target {
     /// Its encoder.
-    pub(super) writer: RrdWriter<AtomicFile>,
+    pub(super) writer: RrdWriter,
     /// Path of the complete file.
     pub(super) path: PathBuf,
 }

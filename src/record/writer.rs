@@ -3,7 +3,7 @@
 //! Rerun's own file sink opens its file by name, ends its thread silently when the disk is full, and then blocks its callers.
 //! This sink stores the first error, stops writing, and reports the error at the end.
 
-use std::io::Write;
+use std::io::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -11,24 +11,21 @@ use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
+use crate::base::atomic_file::AtomicFile;
+
 /// A writer of `.rrd` bytes; clones write to the same file.
-pub(super) struct RrdWriter<W: Write>(Arc<Mutex<State<W>>>);
+#[derive(Clone)]
+pub(super) struct RrdWriter(Arc<Mutex<State>>);
 
-impl<W: Write> Clone for RrdWriter<W> {
-    fn clone(&self) -> Self {
-        Self(self.0.clone())
-    }
-}
-
-enum State<W: Write> {
-    Open(Box<Encoder<W>>),
+enum State {
+    Open(Box<Encoder<AtomicFile>>),
     /// Writing failed with this error.
     Broken(String),
     Ended,
 }
 
-impl<W: Write> RrdWriter<W> {
-    pub(super) fn new(to: W) -> Result<Self, String> {
+impl RrdWriter {
+    pub(super) fn new(to: AtomicFile) -> Result<Self, String> {
         let version = rerun::build_info().version;
         let encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, to);
         Ok(Self(Arc::new(Mutex::new(State::Open(Box::new(encoder.map_err(text)?))))))
@@ -43,7 +40,7 @@ impl<W: Write> RrdWriter<W> {
     }
 
     /// Ends the recording and returns its file.
-    pub(super) fn end(&self) -> Result<W, String> {
+    pub(super) fn end(&self) -> Result<AtomicFile, String> {
         match std::mem::replace(&mut *self.state(), State::Ended) {
             State::Open(mut encoder) => {
                 let finished = encoder.finish().map_err(text);
@@ -63,11 +60,14 @@ impl<W: Write> RrdWriter<W> {
         }
     }
 
-    fn state(&self) -> MutexGuard<'_, State<W>> {
+    fn state(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn attempt<E: std::fmt::Display>(&self, act: impl FnOnce(&mut Encoder<W>) -> Result<(), E>) -> Result<(), String> {
+    fn attempt<E: std::fmt::Display>(
+        &self,
+        act: impl FnOnce(&mut Encoder<AtomicFile>) -> Result<(), E>,
+    ) -> Result<(), String> {
         let mut state = self.state();
         match &mut *state {
             State::Open(encoder) => {
@@ -87,7 +87,7 @@ fn text(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-impl<W: Write + Send + 'static> LogSink for RrdWriter<W> {
+impl LogSink for RrdWriter {
     fn send(&self, message: LogMsg) {
         // An error is stored and reported by the next flush and at the end.
         let _ = self.attempt(|encoder| encoder.append(&message).map(|_| ()));

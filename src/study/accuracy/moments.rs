@@ -33,14 +33,8 @@ const RIDGE: f64 = 1e-9;
 const SMALL: f64 = 3.0;
 
 /// Sums over the vertices of a piece: 1, x, u, |u|², x xᵀ (its upper half), u xᵀ.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Moments([f64; 23]);
-
-impl Default for Moments {
-    fn default() -> Self {
-        Self([0.0; 23])
-    }
-}
 
 impl AddAssign<&Moments> for Moments {
     fn add_assign(&mut self, other: &Moments) {

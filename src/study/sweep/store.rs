@@ -53,12 +53,6 @@ pub struct Store {
     _lock: File,
 }
 
-impl std::fmt::Debug for Store {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Store").field("folder", &self.folder).field("rows", &self.rows.len()).finish_non_exhaustive()
-    }
-}
-
 impl Store {
     /// Opens the folder for the rows of `manifest`; creates it if it does not exist.
     pub fn open(folder: &Path, manifest: Manifest, existing: Existing) -> Result<Self, StoreError> {

@@ -173,13 +173,13 @@ fn a_store_is_not_mixed_shared_or_overwritten() {
     let twice = held.append(crate::study::sweep::Row::failed(&whole.points[3], "x"));
     assert!(matches!(twice, Err(StoreError::Damaged { .. })));
     drop(held);
-    let error = open(&whole, Existing::Refuse).unwrap_err().to_string();
+    let error = open(&whole, Existing::Refuse).err().unwrap().to_string();
     assert!(error.contains("found 10 rows") && error.contains("--resume"), "{error}");
 
     // Another plan that has the first four tables of this one, in another order, and two more.
     let text = super::PLAN.replace("\"table-3\", { scale = [0.5, 2] }", "{ scale = [2, 3, 4] }, \"table-3\"");
     let other = Plan::parse(&text, "other.toml", Path::new(""), &crate::Job::preview()).unwrap();
-    let error = open(&other, RESUME).unwrap_err();
+    let error = open(&other, RESUME).err().unwrap();
     assert!(matches!(error, StoreError::OtherPlan { .. }), "{error}");
     let adopted = open(&other, Existing::Resume { retry_failed: false, adopt: true }).unwrap();
     let kept: Vec<_> = adopted.rows.iter().map(|r| (r.index, r.table.clone())).collect();
@@ -205,7 +205,7 @@ fn damage_in_the_middle_is_refused_with_its_line() {
     fs::write(&path, lines.join("\n")).unwrap();
     assert!(store::read(folder.path()).unwrap_err().to_string().contains("its point has an earlier row"));
     fs::remove_file(folder.path().join("plan.json")).unwrap();
-    let error = Store::open(folder.path(), Manifest::of(&plan(), None), RESUME).unwrap_err();
+    let error = Store::open(folder.path(), Manifest::of(&plan(), None), RESUME).err().unwrap();
     assert!(matches!(error, StoreError::Orphans { .. }), "{error}");
     assert!(matches!(store::read(folder.path()), Err(StoreError::Missing { .. })));
 }
