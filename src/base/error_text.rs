@@ -10,13 +10,16 @@ use std::error::Error;
 /// mistake, so both ends matter. A heuristic: the two fill one screen.
 const KEPT_BYTES: [usize; 2] = [1200, 800];
 
+/// Least Jaro-Winkler likeness of a mistyped name. A heuristic, a little above the one that clap has for options.
+const ALIKE: f64 = 0.8;
+
 /// The messages of an error and of its causes, joined by `separator`. A cause that an outer message already contains is left out.
 #[must_use]
 pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
     let mut causes: Vec<String> = Vec::new();
     let mut next = Some(error);
     while let Some(error) = next {
-        let cause = error.to_string();
+        let cause = with_suggestion(error.to_string());
         // Compared before shortening: a shortened message no longer contains the whole cause.
         if !causes.iter().any(|outer| outer.contains(&cause)) {
             causes.push(cause);
@@ -24,6 +27,30 @@ pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
         next = error.source();
     }
     causes.iter().map(|cause| short(cause)).collect::<Vec<_>>().join(separator)
+}
+
+/// ", did you mean `table-3`?" for the known name that is most like a mistyped one; empty where none is alike.
+#[must_use]
+pub(crate) fn did_you_mean<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let likeness = |name: &'a str| (strsim::jaro_winkler(&found.to_lowercase(), name), name);
+    let best = known.into_iter().map(likeness).max_by(|a, b| a.0.total_cmp(&b.0));
+    best.filter(|best| best.0 > ALIKE).map_or_else(String::new, |(_, name)| format!(", did you mean `{name}`?"))
+}
+
+/// A message with the known key that is like the unknown one which it reports, as serde and sweep files word it.
+fn with_suggestion(message: String) -> String {
+    let suggested = || {
+        let start = ["unknown field `", "unknown key `", "unknown variant `"]
+            .iter()
+            .find_map(|before| Some(message.find(before)? + before.len()))?;
+        let (found, after) = message[start..].split_once('`')?;
+        let (_, known) = after.split_once("expected one of ")?;
+        let known = known.lines().next()?.split(';').next()?;
+        let meant = did_you_mean(found, known.split(", ").map(|name| name.trim_matches('`')));
+        let (before, rest) = message.split_at(start + found.len() + 1);
+        Some(format!("{before}{meant}{}", if meant.is_empty() { rest } else { rest.trim_start_matches(',') }))
+    };
+    suggested().unwrap_or(message)
 }
 
 /// A text with control characters escaped and, above [`KEPT_BYTES`], its middle left out.
@@ -70,6 +97,44 @@ mod tests {
         let short = with_causes(&long, ": ");
         assert!(short.starts_with("a\\u{1b}]0;title\\u{7}b\\ré") && short.ends_with("éwrong"), "{short}");
         assert!(short.contains("(18018 bytes in all)") && short.len() < 2_200, "{short}");
+    }
+
+    #[test]
+    fn a_mistyped_name_is_answered_by_the_one_that_is_like_it() {
+        let garments = ["pullover-1", "pullover-2", "flared-skirt", "low-cut-dress", "long-sleeved-dress"];
+        for (found, meant) in [
+            ("pulover-1", "pullover-1"),
+            ("Pullover_2", "pullover-2"),
+            ("flaredskirt", "flared-skirt"),
+            ("lowcut-dress", "low-cut-dress"),
+        ] {
+            assert_eq!(did_you_mean(found, garments), format!(", did you mean `{meant}`?"));
+        }
+        assert_eq!(did_you_mean("table3", ["table-3"]), ", did you mean `table-3`?");
+        for other in ["", "trousers", "xyz"] {
+            assert_eq!(did_you_mean(other, garments), "");
+        }
+    }
+
+    #[test]
+    fn a_mistyped_key_is_answered_by_the_one_that_is_like_it() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[allow(dead_code, reason = "only parsed")]
+        struct Lengths {
+            bust_cm: Option<f64>,
+            underbust_cm: Option<f64>,
+            waist_cm: Option<f64>,
+        }
+        let text = |key: &str| with_causes(&toml::from_str::<Lengths>(&format!("{key} = 3")).unwrap_err(), ": ");
+        assert!(
+            text("wast_cm").contains("unknown field `wast_cm`, did you mean `waist_cm`? expected one of"),
+            "{}",
+            text("wast_cm")
+        );
+        assert!(text("colour").contains("unknown field `colour`, expected one of"), "{}", text("colour"));
+        let sweep = std::io::Error::other("a.toml:3: unknown key `tabels`, expected one of bodies, tables, sizes");
+        assert!(with_causes(&sweep, ": ").contains("`tabels`, did you mean `tables`? expected"));
     }
 
     #[test]

@@ -9,6 +9,8 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
+use crate::base::error_text::did_you_mean;
+
 /// Invalid measurements of a body or lengths of a garment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message says what each field is")]
@@ -34,7 +36,7 @@ pub enum ShapeError {
     #[error("{found} {what} are too many; ask for {most} or fewer")]
     TooMany { what: &'static str, found: usize, most: usize },
     /// An unknown name of a garment.
-    #[error("there is no garment called {found:?}; the built-in ones are {known}")]
+    #[error("no garment is called `{found}`{}; expected one of {known}, or a file", did_you_mean(found, known.split(", ")))]
     Unknown { found: String, known: String },
     /// A surface that is not a manifold, which the ranges above should exclude.
     #[error("the {what} has no manifold surface at these measurements; bring them nearer to each other")]

@@ -2,7 +2,7 @@
 //! certificate of a draped garment.
 
 use crate::mesh::health::{Health, health};
-use crate::scene::Placement;
+use crate::scene::{Loaded, Placement};
 use crate::study::certificate::{Certificate, CertifyError, certify};
 use crate::{Scene, SceneSpec};
 use clap::Args;
@@ -87,7 +87,7 @@ impl CheckArgs {
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
         let verdict = verdict(&body, &garment, &fit);
-        let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, scene, draped)).transpose()?;
+        let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, &loaded, draped)).transpose()?;
         let (certificate, notes) = (certificate.as_ref(), loaded.notes());
         if self.format == Format::Json {
             let mut report =
@@ -111,9 +111,13 @@ impl CheckArgs {
     }
 
     /// The certificate of a file with the vertices of the garment in the same order.
-    fn certify(&self, spec: &SceneSpec, scene: &Scene, draped: &str) -> anyhow::Result<Certificate> {
+    fn certify(&self, spec: &SceneSpec, loaded: &Loaded, draped: &str) -> anyhow::Result<Certificate> {
+        // An export is in the frame of the garment's file.
+        let frame = loaded.garment_frame();
         let spec = SceneSpec {
             garment: draped.to_owned(),
+            garment_unit: frame.map(|frame| frame.unit).or(spec.garment_unit),
+            garment_up: frame.map(|frame| frame.up).or(spec.garment_up),
             rest: "own".to_owned(),
             hold: None,
             over: Vec::new(),
@@ -122,7 +126,7 @@ impl CheckArgs {
             ..spec.clone()
         };
         let positions = self.input.load(&spec)?.scene.garment.positions;
-        certify(scene, &self.fabric.first()?, &positions).map_err(|error| match error {
+        certify(&loaded.scene, &self.fabric.first()?, &positions).map_err(|error| match error {
             CertifyError::Count { .. } | CertifyError::NotFinite { .. } => {
                 UserError(format!("{draped}: {error}")).into()
             }

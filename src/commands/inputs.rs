@@ -7,7 +7,7 @@ use crate::base::files::{has_ending, read_text};
 use crate::body::BodySpec;
 use crate::garment::MeshCache;
 use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
-use crate::mesh::{Axis, Unit};
+use crate::mesh::{Axis, Front, Unit};
 use crate::scene::{CutError, DistanceTo, Loaded, SceneError};
 use anyhow::Context as _;
 use clap::Args;
@@ -44,12 +44,29 @@ pub(crate) struct InputArgs {
     /// Use only this group or object of the garment's file
     #[arg(long, value_name = "GROUP")]
     garment_group: Option<String>,
-    /// Unit of the files: m, dm, cm, mm, in, ft [default: guessed from the body's height]
+    /// Unit of both files: m, dm, cm, mm, in, ft [default: guessed for each file, the body's from its height and the garment's from how
+    /// it lies about the body]
     #[arg(long)]
     unit: Option<Unit>,
-    /// Up axis of the files: x, y, z [default: guessed from the body]
+    /// Up axis of both files: x, y, z [default: guessed for each file]
     #[arg(long, value_name = "AXIS")]
     up: Option<Axis>,
+    /// Unit of the body's file, if it is not --unit
+    #[arg(long, value_name = "UNIT")]
+    body_unit: Option<Unit>,
+    /// Up axis of the body's file, if it is not --up
+    #[arg(long, value_name = "AXIS")]
+    body_up: Option<Axis>,
+    /// Unit of the garments' files, if it is not --unit
+    #[arg(long, value_name = "UNIT")]
+    garment_unit: Option<Unit>,
+    /// Up axis of the garments' files, if it is not --up
+    #[arg(long, value_name = "AXIS")]
+    garment_up: Option<Axis>,
+    /// Axis of the body's file that its front points along, such as z or -y; a sewing pattern is turned to it [default: found from
+    /// trunk and feet]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    front: Option<Front>,
     /// Accept a body mesh that is not closed; its normals then separate inside from outside
     #[arg(long)]
     open_body: bool,
@@ -89,6 +106,11 @@ impl InputArgs {
             garment_group: self.garment_group.clone(),
             unit: self.unit,
             up: self.up,
+            body_unit: self.body_unit,
+            body_up: self.body_up,
+            garment_unit: self.garment_unit,
+            garment_up: self.garment_up,
+            front: self.front,
             open_body: self.open_body,
             weld: self.weld,
             rest: self.rest.clone(),

@@ -20,6 +20,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::base::error_text::did_you_mean;
 use crate::base::files::{Unreadable, names_a_file, read_text};
 use crate::mesh::{RestShape, TriMesh};
 
@@ -84,7 +85,7 @@ const FILES: [&str; BUILT_IN.len()] = [
 #[allow(missing_docs, reason = "the message says what each field is")]
 pub enum FabricError {
     /// An unknown name.
-    #[error("no fabric is called `{found}`; expected one of {known}, or a TOML file")]
+    #[error("no fabric is called `{found}`{}; expected one of {known}, or a TOML file", did_you_mean(found, BUILT_IN))]
     Unknown { found: String, known: String },
     /// A file that cannot be read.
     #[error(transparent)]

@@ -44,15 +44,17 @@ pub enum MeshError {
     /// No unit makes this a body.
     #[error(
         "{file}: the unit cannot be guessed: the body is {height} units tall, which is between 0.5 and 2.5 m in none of \
-         m, dm, cm and mm; name it with --unit (and --up)"
+         m, dm, cm and mm; name it with --body-unit (and --body-up)"
     )]
     UnknownScale { file: PathBuf, height: f64 },
     /// No frame puts the garment near the body.
     #[error(
-        "{file}: no unit and up axis puts this garment around the body; name them with --unit and --up, or place the \
-         garment around the body"
+        "{file}: found no unit (m, dm, cm, mm) and up axis in which this garment lies about the body: it measures {} units, the \
+         body {} m (with z up); name them with --garment-unit and --garment-up, or place the garment around the body",
+        by(*garment),
+        by(*body_m)
     )]
-    NoFrame { file: PathBuf },
+    NoFrame { file: PathBuf, garment: DVec3, body_m: DVec3 },
     /// The body has holes.
     #[error(
         "{file}: the body is not closed: {edges} boundary edges in {loops} loops, the first at vertices {a} and {b} of \
@@ -71,6 +73,11 @@ pub enum MeshError {
     /// Positions for another mesh.
     #[error("{found} positions for a mesh of {expected} vertices; pass one position a vertex")]
     WrongCount { found: usize, expected: usize },
+}
+
+/// "0.4 × 0.3 × 1.7".
+fn by(extent: DVec3) -> String {
+    extent.to_array().map(|length| format!("{length:.3}")).join(" × ")
 }
 
 fn there_are(groups: &[String]) -> String {

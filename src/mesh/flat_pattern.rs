@@ -6,13 +6,14 @@
 //!
 //! s is the median of √(σ₁ σ₂), weighted by area in the pattern, or the unit (m, dm, cm, mm, in) within `UNIT_TOLERANCE` of it.
 //! The coordinates are a pattern if triangles of `MIN_SHARE` of the area are within `SCALE_TOLERANCE` of s, and if the area
-//! fits into the box around the coordinates: a tiled texture overlaps itself.
+//! fits into the box around the coordinates: a tiled texture overlaps itself. Panels may lie over one another, each drawn from its own
+//! origin, if s is a unit, each fits into its own box, and they have [`MIN_PANEL`] triangles in the mean.
 //!
 //! Limits: a garment modelled as a cylinder and unrolled counts as a pattern, which it is.
 
 use glam::DVec2;
 
-use super::{TriMesh, Unit};
+use super::{Topology, TriMesh, Unit};
 
 /// Largest deviation of σ/s from 1 in undraped cloth. A heuristic.
 const SCALE_TOLERANCE: f64 = 0.03;
@@ -20,6 +21,9 @@ const SCALE_TOLERANCE: f64 = 0.03;
 const MIN_SHARE: f64 = 0.6;
 /// Largest deviation of s from a unit that replaces it. A heuristic.
 const UNIT_TOLERANCE: f64 = 0.03;
+
+/// Least mean number of triangles of panels that lie over one another; the tiles of a texture have one or two. A heuristic.
+const MIN_PANEL: usize = 16;
 
 /// A flat pattern found in texture coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,10 +63,7 @@ impl FlatPattern {
                 found.push((product.sqrt(), area, sigma));
             }
         }
-        let room = (high - low).element_product();
-        if whole > (1.0 + SCALE_TOLERANCE) * room {
-            return None;
-        }
+        let overlaps = whole > (1.0 + SCALE_TOLERANCE) * (high - low).element_product();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         let half: f64 = 0.5 * found.iter().map(|f| f.1).sum::<f64>();
         let mut below = 0.0;
@@ -72,11 +73,41 @@ impl FlatPattern {
         })?;
         let units = [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm, Unit::In];
         let unit = units.into_iter().find(|unit| (median.0 / unit.metres() - 1.0).abs() < UNIT_TOLERANCE);
+        if overlaps && (unit.is_none() || whole > (1.0 + SCALE_TOLERANCE) * room_of_panels(texture, &mesh.triangles)?) {
+            return None;
+        }
         let scale = unit.map_or(median.0, Unit::metres);
         let near = |f: &&(f64, f64, [f64; 2])| f.2.iter().all(|sigma| (sigma / scale - 1.0).abs() < SCALE_TOLERANCE);
         let share = found.iter().filter(near).map(|f| f.1).sum::<f64>() / whole;
         (share >= MIN_SHARE).then_some(Self { metres_per_unit: scale, unit, share })
     }
+}
+
+/// Total area of the boxes around the panels: triangles joined by corners of one vertex at one place. `None` if the panels are small.
+fn room_of_panels(texture: &[Option<[DVec2; 3]>], triangles: &[[u32; 3]]) -> Option<f64> {
+    let corner = |(vertex, place): (u32, DVec2)| (vertex, place.to_array().map(f64::to_bits), place);
+    let corners: Vec<_> = (texture.iter().flatten().zip(triangles))
+        .flat_map(|(places, vertices)| std::array::from_fn::<_, 3, _>(|k| corner((vertices[k], places[k]))))
+        .collect();
+    let key = |i: &u32| (corners[*i as usize].0, corners[*i as usize].1);
+    let mut order: Vec<u32> = (0..corners.len() as u32).collect();
+    order.sort_unstable_by_key(key);
+    let mut node = vec![0; corners.len()];
+    let mut nodes = 0;
+    for same in order.chunk_by(|a, b| key(a) == key(b)) {
+        same.iter().for_each(|&i| node[i as usize] = nodes);
+        nodes += 1;
+    }
+    let (panel, panels) = Topology::of(node.as_chunks().0, nodes as usize).components();
+    if corners.len() < 3 * MIN_PANEL * panels {
+        return None;
+    }
+    let mut boxes = vec![(DVec2::INFINITY, DVec2::NEG_INFINITY); panels];
+    for (node, (.., place)) in node.iter().zip(&corners) {
+        let (low, high) = &mut boxes[panel[*node as usize] as usize];
+        (*low, *high) = (low.min(*place), high.max(*place));
+    }
+    Some(boxes.iter().map(|(low, high)| (*high - *low).element_product()).sum())
 }
 
 impl std::fmt::Display for FlatPattern {
@@ -135,6 +166,24 @@ mod tests {
             })
         };
         assert_eq!(FlatPattern::find(&mesh, &texture.iter().map(tiled).collect::<Vec<_>>()), None);
+    }
+
+    #[test]
+    fn panels_that_lie_over_one_another_are_a_pattern_and_tiles_are_none() {
+        // Two panels of the quarter cylinder, sewn along the column in the middle, each drawn from its own origin in centimetres.
+        let (mesh, texture) = rolled(0.01, 1.0);
+        let second = |corners: &[DVec2; 3]| corners.iter().all(|p| p.x > 14.9);
+        let shifted = |corners: &[DVec2; 3]| corners.map(|p| p - DVec2::X * if second(corners) { 15.0 } else { 0.0 });
+        let over: Vec<_> = texture.iter().flatten().map(|corners| Some(shifted(corners))).collect();
+        let found = FlatPattern::find(&mesh, &over).unwrap();
+        assert_eq!(found.unit, Some(Unit::Cm));
+        assert!(found.share > 0.99, "{found:?}");
+        // In no unit, panels over one another are not distinguishable from an atlas.
+        let odd = |corners: &Option<[DVec2; 3]>| corners.map(|corners| corners.map(|p| 1.37 * p));
+        assert_eq!(FlatPattern::find(&mesh, &over.iter().map(odd).collect::<Vec<_>>()), None);
+        // Each triangle a tile of its own, in centimetres.
+        let tile = |corners: &Option<[DVec2; 3]>| corners.map(|c| c.map(|p| p - c[0].min(c[1]).min(c[2])));
+        assert_eq!(FlatPattern::find(&mesh, &texture.iter().map(tile).collect::<Vec<_>>()), None);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The unit and the up axis of a mesh file: how its numbers become metres with z up.
 //!
-//! An OBJ file states neither. Both are options, or guessed from the body and applied to body and garment alike, which
-//! fit each other in one frame only. A body is taken to be 0.5 to 2.5 m tall, which leaves at most one of metre,
+//! An OBJ file states neither. Both are options, or guessed for each file by itself. A body is taken to be 0.5 to 2.5 m tall, which leaves at most one of metre,
 //! decimetre, centimetre and millimetre; inch and foot overlap with these and are never guessed. Up is the axis along
 //! which a body is tall and its upper and lower half differ. The left and the right of a body are alike, so a T pose as
-//! wide as it is tall is recognised.
+//! wide as it is tall is recognised. A garment is in the frame in which it lies about the body, with a preference for the
+//! body's own frame.
 
 use std::fmt;
 use std::str::FromStr;
@@ -24,6 +24,21 @@ const GUESSED_UNITS: [Unit; 4] = [Unit::M, Unit::Dm, Unit::Cm, Unit::Mm];
 /// An axis may be up if the body is at least this share as long along it as along its longest: an arm span is rarely
 /// more than 1.1 of the stature.
 const TALL_ENOUGH: f64 = 0.8;
+
+/// Least and greatest length of a garment in the lengths of its body: in the body's own frame (a bracelet, a train) and in any
+/// other (a sock, a wide skirt laid flat).
+const OWN_LENGTHS: std::ops::RangeInclusive<f64> = 0.03..=3.0;
+const OTHER_LENGTHS: std::ops::RangeInclusive<f64> = 0.1..=1.3;
+/// Weights of a frame with the body's unit and with its up axis; heavier ones keep more garments in the body's frame. Heuristics:
+/// with these, `tests/import/frames.rs` finds five garments in all of twelve frames about four bodies.
+const SAME_UNIT: f64 = 4.0;
+const SAME_UP: f64 = 1.5;
+/// A garment in the body's frame with a box nearer than this to the body's, m, counts as overlapping it by [`LEAST_OVERLAP`]: a
+/// cloth above the head.
+const NEAR_BOX: f64 = 0.3;
+const LEAST_OVERLAP: f64 = 1e-3;
+/// Vertices that are tried in a frame.
+const TRIED: usize = 400;
 
 /// Length of one unit in the file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,6 +116,52 @@ impl FromStr for Axis {
 
     fn from_str(text: &str) -> Result<Self, MeshError> {
         named(text, "up axis", "x, y or z")
+    }
+}
+
+/// The horizontal direction that a body faces, as an axis of its file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "each is named as its axis")]
+pub enum Front {
+    #[serde(rename = "x")]
+    X,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "y")]
+    Y,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "z")]
+    Z,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl Front {
+    /// The direction in the file.
+    pub(crate) fn direction(self) -> DVec3 {
+        match self {
+            Self::X => DVec3::X,
+            Self::MinusX => DVec3::NEG_X,
+            Self::Y => DVec3::Y,
+            Self::MinusY => DVec3::NEG_Y,
+            Self::Z => DVec3::Z,
+            Self::MinusZ => DVec3::NEG_Z,
+        }
+    }
+}
+
+impl fmt::Display for Front {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
+impl FromStr for Front {
+    type Err = MeshError;
+
+    fn from_str(text: &str) -> Result<Self, MeshError> {
+        named(text, "front", "x, -x, y, -y, z or -z, an axis of the body's file")
     }
 }
 
@@ -213,6 +274,69 @@ pub(super) fn guess_frame_around(
         frame.unit, frame.up
     );
     Some(Frame { guessed: true, reason, ..frame })
+}
+
+/// Unit and up axis of a garment from its vertices `raw` in the file's frame, for a body of the frame `own` within the bounds
+/// `body` (m, z up). `closeness` of points (m, z up) about the body is 1 where they lie on it, and near 0 where they are far from it
+/// or deep inside.
+///
+/// A frame scores the shared volume of both boxes times that closeness, weighted by [`SAME_UNIT`] and [`SAME_UP`]. Without a score in
+/// any frame the garment is in the body's, if it is of a garment's size there. `None` where it is not.
+pub(super) fn guess_frame_worn(
+    raw: &[DVec3],
+    own: &Frame,
+    body: (DVec3, DVec3),
+    closeness: &dyn Fn(&[DVec3]) -> f64,
+    (unit, up): (Option<Unit>, Option<Axis>),
+) -> Option<Frame> {
+    if let (Some(unit), Some(up)) = (unit, up) {
+        return Some(Frame::given(unit, up));
+    }
+    let (low, high) = box_about(raw.iter().copied());
+    let tried: Vec<DVec3> = raw.iter().step_by(raw.len().div_ceil(TRIED).max(1)).copied().collect();
+    let (mut best, mut in_own) = ((0.0, None), (0.0, None));
+    let units = unit.map_or_else(|| GUESSED_UNITS.iter().copied().chain([own.unit]).collect(), |unit| vec![unit]);
+    let ups = up.map_or_else(|| vec![own.up, Axis::Y, Axis::Z, Axis::X], |up| vec![up]);
+    for frame in ups.iter().flat_map(|&up| units.iter().map(move |&unit| Frame::given(unit, up))) {
+        let corners = box_about([low, high].map(|p| frame.to_metres(p)));
+        let length = (corners.1 - corners.0).max_element() / (body.1 - body.0).max_element();
+        let is_own = frame.unit == unit.unwrap_or(own.unit) && frame.up == up.unwrap_or(own.up);
+        if !(if is_own { OWN_LENGTHS } else { OTHER_LENGTHS }).contains(&length) {
+            continue;
+        }
+        let gap = (corners.0 - body.1).max(body.0 - corners.1).max(DVec3::ZERO).length();
+        let least = if is_own && gap < NEAR_BOX { LEAST_OVERLAP } else { 0.0 };
+        let mut score = overlap(corners, body).max(least);
+        let mut close = 0.0;
+        if score > 0.0 {
+            close = closeness(&tried.iter().map(|&p| frame.to_metres(p)).collect::<Vec<_>>());
+            score *= close;
+        }
+        score *= if frame.unit == own.unit { SAME_UNIT } else { 1.0 };
+        score *= if frame.up == own.up { SAME_UP } else { 1.0 };
+        if is_own {
+            in_own = (close, Some(frame.clone()));
+        }
+        if score > best.0 {
+            best = (score, Some((frame, close)));
+        }
+    }
+    match (best.1, in_own) {
+        (Some((frame, close)), (own_close, _)) if (frame.unit, frame.up) != (own.unit, own.up) => {
+            let reason = format!(
+                "in {}, {} up, the garment lies closest about the body ({:.0} of 100; {:.0} in the body's own frame)",
+                frame.unit,
+                frame.up,
+                100.0 * close,
+                100.0 * own_close
+            );
+            Some(Frame { guessed: true, reason, ..frame })
+        }
+        (best, (_, in_own)) => {
+            let frame = best.map(|(frame, _)| frame).or(in_own)?;
+            Some(Frame { guessed: own.guessed, reason: "as the body".to_owned(), ..frame })
+        }
+    }
 }
 
 fn guess_up(raw: &[DVec3], lo: DVec3, hi: DVec3) -> Axis {

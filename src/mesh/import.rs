@@ -12,13 +12,13 @@ use glam::{DVec2, DVec3};
 use super::bridges::Bridges;
 use super::duplicates::{duplicate_parts, first_triangles, same_place};
 use super::error::MeshError;
-use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around};
+use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around, guess_frame_worn};
 use super::health::Findings;
 use super::obj_source::{Corner, ObjSource};
 use super::report::{MeshReport, Remark, Repair};
 use super::rest::RestShape;
 use super::topology::{NONE, Topology};
-use super::{TriMesh, longest_side, polygon, renumbered, retain, winding};
+use super::{TriMesh, box_about, longest_side, polygon, renumbered, retain, winding};
 
 /// Ratio of a triangle's longest sides at rest and as worn, either way, from which a remark is made. A heuristic:
 /// stretched or gathered cloth is off by tens of percent, a triangle of a torn pattern by more than this.
@@ -49,10 +49,20 @@ pub struct ImportOptions {
 }
 
 /// The body that a garment is imported for.
-#[derive(Debug, Clone)]
+#[derive(Clone, Copy)]
 pub enum Beside<'a> {
-    /// A body from a file of this frame, which the garment shares.
+    /// A file of this frame, which the garment shares.
     File(&'a Frame),
+    /// A body from a file of this frame, within these bounds (m, z up). The garment's frame is the one in which it lies about the
+    /// body.
+    Body {
+        /// Frame of the body's file.
+        frame: &'a Frame,
+        /// Corners of the body's box, m, z up.
+        bounds: (DVec3, DVec3),
+        /// How closely points (m, z up) lie about the body: 1 where on it, near 0 where far from it or deep inside.
+        closeness: &'a dyn Fn(&[DVec3]) -> f64,
+    },
     /// A body within these bounds (m, z up); the garment's frame is the one that fits it best.
     Bounds(DVec3, DVec3),
 }
@@ -95,9 +105,18 @@ pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -
             guessed: frame.guessed,
             reason: "as the body".to_owned(),
         }),
+        (&Beside::Body { frame, bounds, closeness }, unit, up) => {
+            guess_frame_worn(&source.used_positions(), frame, bounds, closeness, (unit, up))
+                .ok_or_else(|| no_frame(file, source, bounds))
+        }
         (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&source.used_positions(), (lo, hi), unit, up)
-            .ok_or_else(|| MeshError::NoFrame { file: file.to_owned() }),
+            .ok_or_else(|| no_frame(file, source, (lo, hi))),
     })
+}
+
+fn no_frame(file: &Path, source: &ObjSource, (low, high): (DVec3, DVec3)) -> MeshError {
+    let own = box_about(source.used_positions());
+    MeshError::NoFrame { file: file.to_owned(), garment: own.1 - own.0, body_m: high - low }
 }
 
 /// Suggests a remedy for an open body: welding, or choosing the body's group.

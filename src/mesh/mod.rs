@@ -31,7 +31,7 @@ use glam::{DMat3, DVec3};
 
 pub(crate) use csr::Csr;
 pub use error::MeshError;
-pub use frame::{Axis, Frame, Unit};
+pub use frame::{Axis, Frame, Front, Unit};
 pub use obj_source::{Corner, Face, ObjSource};
 pub use remesh::Density;
 pub use rest::RestShape;

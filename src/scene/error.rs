@@ -5,8 +5,8 @@ use crate::base::files::{Unreadable, listed};
 use crate::body::ShapeError;
 use crate::body::distance::DistanceError;
 use crate::garment::pattern::PatternError;
-use crate::mesh::MeshError;
 use crate::mesh::rest::RestError;
+use crate::mesh::{Axis, Front, MeshError};
 
 /// A body or garment that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -47,10 +47,13 @@ pub enum SceneError {
     /// Measurements on the command line from which no body can be made.
     #[error("the dress form's measurements make no body: {0}")]
     Measurements(#[source] ShapeError),
+    /// A front along the vertical.
+    #[error("--front {front}: found the vertical of the body's file, where {up} is up, expected one of its other axes")]
+    FrontIsUp { front: Front, up: Axis },
     /// A garment that is not near the body.
     #[error(
         "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
-         the same unit, up axis and place (--unit, --up)?"
+         the same place, and are unit and up axis right (--body-unit, --garment-unit, --body-up, --garment-up)?"
     )]
     NotNear { nearest: f64, limit: f64 },
     /// A garment worn over itself.

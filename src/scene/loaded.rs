@@ -15,7 +15,7 @@ use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::glb::write_glb;
 use crate::mesh::import::Imported;
 use crate::mesh::report::MeshReport;
-use crate::mesh::{MeshError, RestShape, TriMesh};
+use crate::mesh::{Frame, MeshError, RestShape, TriMesh};
 
 /// A scene with its origin.
 #[derive(Debug, Clone)]
@@ -53,6 +53,12 @@ pub struct Tailored {
 }
 
 impl Loaded {
+    /// The frame of the garment's file, if it is a mesh.
+    #[must_use]
+    pub(crate) fn garment_frame(&self) -> Option<&Frame> {
+        self.imported.as_ref().map(|imported| &imported.report.frame)
+    }
+
     /// Findings that the user should act on.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {

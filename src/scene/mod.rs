@@ -17,5 +17,5 @@ pub use error::SceneError;
 pub use loaded::{Loaded, Tailored};
 pub use materials::{CutError, PanelFabrics, Swatch};
 pub use outfit::{DistanceTo, Layer, Scene};
-pub use placement::{Placement, facing_body};
+pub use placement::{Placement, closeness, facing_body};
 pub use spec::{DRESS_FORM, FileRole, SceneSpec};

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::layering::coincident;
 use super::loaded::{Loaded, Tailored, Unplaced};
 use super::materials::{Cut, CutError, FABRICS_ENDING, files_named_in};
-use super::placement::facing_body;
+use super::placement::{closeness, facing_body};
 use super::{DistanceTo, Scene, SceneError};
 use crate::base::files::{has_ending, names_a_file, read_text, stem};
 use crate::body::BodySpec;
@@ -18,7 +19,7 @@ use crate::garment::sewing::{draw_shut, put_on};
 use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::{Axis, RestShape, Unit, retain};
+use crate::mesh::{Axis, Frame, Front, RestShape, Unit, retain};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";
@@ -66,10 +67,25 @@ pub struct SceneSpec {
     pub garment_group: Option<String>,
     /// Edge length of the mesh of a sewing pattern, cm.
     pub edge_cm: f64,
-    /// Unit of the files; by default guessed from the body.
+    /// Unit of both files, where `body_unit` and `garment_unit` name no other; by default guessed for each file.
     pub unit: Option<Unit>,
-    /// Up axis of the files; by default guessed from the body.
+    /// Up axis of both files, where `body_up` and `garment_up` name no other; by default guessed for each file.
     pub up: Option<Axis>,
+    /// Unit of the body's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_unit: Option<Unit>,
+    /// Up axis of the body's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_up: Option<Axis>,
+    /// Unit of the garments' files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub garment_unit: Option<Unit>,
+    /// Up axis of the garments' files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub garment_up: Option<Axis>,
+    /// Axis of the body's file that its front points along, for sewing patterns; by default found from the body's shape.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub front: Option<Front>,
     /// Whether a body that is not closed is accepted; its normals then separate inside from outside.
     pub open_body: bool,
     /// Whether vertices at exactly the same position are merged.
@@ -100,6 +116,11 @@ impl Default for SceneSpec {
             edge_cm: 100.0 * DEFAULT_EDGE_M,
             unit: None,
             up: None,
+            body_unit: None,
+            body_up: None,
+            garment_unit: None,
+            garment_up: None,
+            front: None,
             open_body: false,
             weld: false,
             rest: REST_AUTO.to_owned(),
@@ -147,6 +168,11 @@ impl SceneSpec {
             edge_cm: _,
             unit: _,
             up: _,
+            body_unit: _,
+            body_up: _,
+            garment_unit: _,
+            garment_up: _,
+            front: _,
             open_body: _,
             weld: _,
             push_out: _,
@@ -264,9 +290,26 @@ impl SceneSpec {
         BodySpec::from_toml(&read_text(self.body.as_ref())?).map_err(SceneError::in_file(&self.body))
     }
 
-    fn import_options(&self, group: Option<&String>) -> ImportOptions {
-        let Self { unit, up, weld, open_body, .. } = *self;
-        ImportOptions { group: group.cloned(), unit, up, weld, open_body }
+    /// The options of the body's file.
+    fn body_options(&self) -> ImportOptions {
+        ImportOptions {
+            group: self.body_group.clone(),
+            unit: self.body_unit.or(self.unit),
+            up: self.body_up.or(self.up),
+            weld: self.weld,
+            open_body: self.open_body,
+        }
+    }
+
+    /// The options of the garment's file.
+    fn garment_options(&self) -> ImportOptions {
+        ImportOptions {
+            group: self.garment_group.clone(),
+            unit: self.garment_unit.or(self.unit),
+            up: self.garment_up.or(self.up),
+            weld: self.weld,
+            open_body: self.open_body,
+        }
     }
 
     /// Reads or makes body and garments.
@@ -339,7 +382,7 @@ impl SceneSpec {
     ) -> Result<Unplaced, SceneError> {
         let mut unplaced = match made {
             Some(made) => made,
-            None if self.is_a_pattern() => self.tailor(body),
+            None if self.is_a_pattern() => self.tailor(body, imported_body),
             None => self.load_garment(body, imported_body),
         }?;
         let given = self.fabrics.first().map(|name| Fabric::by_name(name)).transpose().map_err(CutError::from)?;
@@ -351,7 +394,7 @@ impl SceneSpec {
     fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
         let new = if self.open_body { Body::new_open } else { Body::new };
         if self.body_is_a_mesh() {
-            let imported = import_body(self.body.as_ref(), &self.import_options(self.body_group.as_ref()))?;
+            let imported = import_body(self.body.as_ref(), &self.body_options())?;
             return Ok((new(&imported.mesh)?, Some(imported)));
         }
         let form = meshes.dress_form(&self.form()?).map_err(|source| match names_a_file(&self.body) {
@@ -376,13 +419,13 @@ impl SceneSpec {
 
     /// A garment mesh from a file.
     fn load_garment(&self, body: &Body, imported_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
-        let beside = match (imported_body, body.mesh().bounds()) {
-            (Some(body), _) => Beside::File(&body.report.frame),
-            (None, Some((low, high))) => Beside::Bounds(low, high),
-            (None, None) => return Err(DistanceError::Empty.into()),
+        let bounds = body.mesh().bounds().ok_or(DistanceError::Empty)?;
+        let closeness = |points: &[DVec3]| closeness(body, points);
+        let beside = match imported_body {
+            Some(body) => Beside::Body { frame: &body.report.frame, bounds, closeness: &closeness },
+            None => Beside::Bounds(bounds.0, bounds.1),
         };
-        let options = self.import_options(self.garment_group.as_ref());
-        let mut imported = import_garment(self.garment.as_ref(), &options, &beside)?;
+        let mut imported = import_garment(self.garment.as_ref(), &self.garment_options(), &beside)?;
         imported.turn_outward(&facing_body(&imported.mesh, body));
         let auto = self.rest == REST_AUTO;
         let flat_pattern = if auto { FlatPattern::find(&imported.mesh, &imported.texture) } else { None };
@@ -395,9 +438,10 @@ impl SceneSpec {
     }
 
     /// A sewing pattern, sewn and put on the body.
-    fn tailor(&self, body: &Body) -> Result<Unplaced, SceneError> {
+    fn tailor(&self, body: &Body, imported_body: Option<&Imported>) -> Result<Unplaced, SceneError> {
+        let front = self.front.map(|front| front_of(front, imported_body)).transpose()?;
         let pattern = pattern::read(self.garment.as_ref())?;
-        let put_on = put_on(&pattern, body, 0.01 * self.edge_cm).map_err(SceneError::about(&self.garment))?;
+        let put_on = put_on(&pattern, body, 0.01 * self.edge_cm, front).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
         Ok(Unplaced { held, tailored: Some(Tailored { pattern, put_on }), ..Unplaced::new(mesh, rest) })
@@ -419,11 +463,7 @@ impl SceneSpec {
             ("texture", _) => of_texture(1.0)?,
             (file, _) => {
                 let frame = &imported.report.frame;
-                let options = ImportOptions {
-                    unit: Some(frame.unit),
-                    up: Some(frame.up),
-                    ..self.import_options(self.garment_group.as_ref())
-                };
+                let options = ImportOptions { unit: Some(frame.unit), up: Some(frame.up), ..self.garment_options() };
                 let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
                 let shape = imported.in_the_shape_of(&other)?;
                 name = file;
@@ -439,6 +479,13 @@ impl SceneSpec {
         imported.remark_on(&rest);
         Ok(rest)
     }
+}
+
+/// The horizontal direction of an axis of the body's file.
+fn front_of(front: Front, body: Option<&Imported>) -> Result<DVec2, SceneError> {
+    let frame = body.map_or_else(Frame::default, |body| body.report.frame.clone());
+    let ahead = frame.to_metres(front.direction()).normalize_or_zero();
+    if ahead.z == 0.0 { Ok(ahead.truncate()) } else { Err(SceneError::FrontIsUp { front, up: frame.up }) }
 }
 
 fn is_toml(name: &str) -> bool {

@@ -1,6 +1,7 @@
 //! Other people's OBJ files: everything that was met in the wild, from texts made here.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
+mod frames;
 mod repairs;
 
 use std::fs;

@@ -7,7 +7,7 @@ use partwise::garment::pattern::{SewingPattern, read, sew, to_svg};
 use partwise::garment::sewing::Landmarks;
 use partwise::mesh::import::{Beside, ImportOptions, import_garment};
 use partwise::mesh::self_intersection::self_intersecting_pairs;
-use partwise::mesh::{Axis, Unit};
+use partwise::mesh::{Axis, Front, Unit};
 use partwise::scene::Loaded;
 use partwise::{DVec3, SceneSpec};
 
@@ -39,6 +39,45 @@ fn landmarks_of_the_dress_form_are_found() {
     // A body as large as a mountain is not cut into a thousand million slices.
     let mountain = Landmarks::of(&form.with_positions(form.positions.iter().map(|&p| 1e7 * p).collect()));
     assert_eq!((mountain.waist_z, mountain.hip_z, mountain.bust_z, mountain.shoulder_z), (None, None, None, None));
+}
+
+#[test]
+fn the_front_of_a_body_in_mid_step_is_where_each_foot_points() {
+    let form = dress_form(&BodySpec::default()).unwrap();
+    let quarter = std::f64::consts::FRAC_PI_2;
+    // The left leg ahead, on its heel; the right one behind, on its toes; and the other way round.
+    for left in [1.0, -1.0] {
+        let step = |p: &DVec3| {
+            let ahead = if p.x * left > 0.0 { 1.0 } else { -1.0 };
+            let below_hip = (0.8 - p.z).max(0.0);
+            // Along the foot from its ankle, forward.
+            let along = -p.y - 0.02;
+            let pitch = if p.z < 0.15 { 0.4 * ahead * along } else { 0.0 };
+            DVec3::new(p.x, p.y - 0.35 * ahead * below_hip, p.z + pitch)
+        };
+        let stepping = form.with_positions(form.positions.iter().map(step).collect());
+        for turn in 0..4 {
+            let angle = f64::from(turn) * quarter;
+            let by = glam::DMat3::from_rotation_z(angle);
+            let body = stepping.with_positions(stepping.positions.iter().map(|&p| by * p).collect());
+            let off = (Landmarks::of(&body).facing - angle).rem_euclid(4.0 * quarter);
+            assert!(off.min(4.0 * quarter - off) < 1e-9, "left {left}, turned {angle}: off by {off}");
+        }
+    }
+}
+
+#[test]
+fn a_pattern_turns_to_the_front_that_is_given() {
+    let turned = |front| {
+        let loaded = SceneSpec { edge_cm: 3.0, front, ..SceneSpec::new("form", asset("skirt")) }.load()?;
+        Ok::<f64, partwise::scene::SceneError>(loaded.tailored.unwrap().put_on.arranged.turned)
+    };
+    assert_eq!(turned(None).unwrap(), 0.0);
+    assert_eq!(turned(Some(Front::MinusY)).unwrap(), 0.0);
+    assert!((turned(Some(Front::Y)).unwrap().abs() - std::f64::consts::PI).abs() < 1e-9);
+    assert!((turned(Some(Front::X)).unwrap() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+    let refusal = turned(Some(Front::Z)).unwrap_err().to_string();
+    assert!(refusal.contains("--front z") && refusal.contains("z is up"), "{refusal}");
 }
 
 #[test]

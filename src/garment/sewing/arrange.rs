@@ -1,7 +1,7 @@
 //! Panels moved from the placement in the file to this body.
 //!
 //! A pattern is placed for one body. For another one the garment moves up or down until its shoulder seams (or its waist, where
-//! it has none) are at the body's, sleeves turn to the slope of the arms, and all panels turn to the direction of the toes.
+//! it has none) are at the body's, sleeves turn to the slope of the arms, and all panels turn to the body's front.
 
 use glam::{DMat3, DVec2, DVec3};
 

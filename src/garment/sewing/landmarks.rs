@@ -3,10 +3,14 @@
 //! The body is cut by horizontal planes a centimetre apart. The curve around the middle is the trunk (or the neck, or the head);
 //! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck end the first
 //! height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between crotch and armpit, hip and
-//! bust the largest below and above it. Arms are straight lines through the centres of their curves. The toes give the front.
+//! bust the largest below and above it. Arms are straight lines through the centres of their curves. The front is perpendicular to the
+//! trunk's wider direction, on the side to which each foot is longer ahead of its own ankle: a foot that steps ahead of the other
+//! decides nothing.
 //!
 //! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk. A landmark that is
 //! not found is `None`, and nothing is moved to it.
+
+use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
@@ -27,12 +31,21 @@ const MIN_BESIDE: f64 = 0.01;
 /// Least number of curves of an arm.
 const MIN_CURVES: usize = 6;
 
+/// Height of a leg's curve above the ankle, and heights of the trunk's curves, as shares of the body's.
+const ANKLE: f64 = 0.1;
+const TRUNK: [f64; 2] = [0.52, 0.7];
+/// Least excess of the trunk's extents in one direction over those in the other, both curves together, that excludes a front, and
+/// least excess of a foot before its ankle over that behind it, as shares of the height. Heuristics: a trunk is 8 to 14 cm wider
+/// than deep at each height, and a foot 8 to 12 cm longer before the ankle.
+const MIN_FLATNESS: f64 = 0.03;
+const MIN_TOES: f64 = 0.015;
+
 /// Landmarks of a standing body, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Landmarks {
     /// Middle of the trunk in x and y.
     pub middle: DVec2,
-    /// Angle from −y to the direction of the toes, radians, a multiple of a right angle.
+    /// Angle from −y to the front, radians, a multiple of a right angle.
     pub facing: f64,
     /// Height of the shoulder's neck end.
     pub shoulder_z: Option<f64>,
@@ -63,10 +76,15 @@ impl Landmarks {
     /// Finds the landmarks of a body.
     #[must_use]
     pub fn of(body: &TriMesh) -> Self {
+        Self::of_facing(body, None)
+    }
+
+    /// Finds the landmarks of a body that faces along `front`, found from its shape where it is not given.
+    pub(super) fn of_facing(body: &TriMesh, front: Option<DVec2>) -> Self {
         let (low, high) = body.bounds().unwrap_or_default();
         let height = high.z - low.z;
         let middle = middle(body, low.z, height);
-        let facing = facing(body, low.z, height);
+        let facing = front.map_or_else(|| facing(body, low.z, height), quarter_turn);
         // From the body's right to its left.
         let across = DVec2::from_angle(facing);
         let count = if height <= MAX_HEIGHT { (height / STEP) as usize } else { 0 };
@@ -129,20 +147,47 @@ fn middle(body: &TriMesh, low: f64, height: f64) -> DVec2 {
     largest.map_or(DVec2::ZERO, box_of)
 }
 
-/// Direction from the ankles to the feet as the nearest quarter turn from −y, radians.
+/// Angle from −y to the front, as the nearest quarter turn, radians.
+///
+/// A leg's axis is the centre of its curve above the ankle. A foot reaches some 17 cm ahead of it and 6 cm behind, in any stance.
 fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
-    let mean = |from: f64, to: f64| {
-        let inside = |p: &&DVec3| p.z >= low + from * height && p.z <= low + to * height;
-        let (sum, count) = body.positions.iter().filter(inside).fold((DVec3::ZERO, 0.0), |(s, n), p| (s + p, n + 1.0));
-        (count > 0.0).then(|| (sum / count).truncate())
-    };
-    let (Some(feet), Some(ankles)) = (mean(0.0, 0.025), mean(0.05, 0.08)) else { return 0.0 };
-    let ahead = feet - ankles;
-    if ahead.length() < 0.005 * height {
-        return 0.0;
+    let at = |share: f64| section(body, Plane::horizontal(low + share * height)).into_iter().filter(|c| c.closed);
+    let legs: Vec<DVec2> = at(ANKLE).filter(|c| c.length() > MIN_ARM_GIRTH).map(|c| c.centre().truncate()).collect();
+    let below: Vec<DVec2> =
+        body.positions.iter().filter(|p| p.z < low + ANKLE * height).map(|p| p.truncate()).collect();
+    // Of the trunk, at the chest and at the hips, twice the excess of its extent along y over that along x.
+    let trunk = TRUNK.iter().filter_map(|&share| at(share).max_by(|a, b| a.length().total_cmp(&b.length())));
+    let deeper: f64 = trunk.map(|c| extent(&c, DVec2::Y) - extent(&c, DVec2::X)).sum();
+    let mut best = (MIN_TOES * height, 0.0);
+    for quarter in 0..4 {
+        let angle = FRAC_PI_2 * f64::from(quarter);
+        let ahead = DVec2::from_angle(angle).rotate(DVec2::NEG_Y);
+        let across = ahead.perp();
+        // Along its wider direction the trunk does not face.
+        if deeper * (ahead.y.abs() - ahead.x.abs()) > MIN_FLATNESS * height {
+            continue;
+        }
+        // Ends of each foot before and behind its leg; the leg is the one nearest across the body.
+        let mut ends = vec![[0.0_f64; 2]; legs.len()];
+        for p in &below {
+            let side = |leg: &DVec2| (*p - *leg).dot(across).abs();
+            let own = (0..legs.len()).min_by(|&i, &j| side(&legs[i]).total_cmp(&side(&legs[j])));
+            if let Some(own) = own {
+                let along = (*p - legs[own]).dot(ahead);
+                ends[own] = [ends[own][0].max(along), ends[own][1].max(-along)];
+            }
+        }
+        let longer = ends.iter().map(|[before, behind]| before - behind).sum::<f64>() / legs.len().max(1) as f64;
+        if longer > best.0 {
+            best = (longer, angle);
+        }
     }
-    let angle = DVec2::NEG_Y.angle_to(ahead);
-    (angle / std::f64::consts::FRAC_PI_2).round() * std::f64::consts::FRAC_PI_2
+    quarter_turn(DVec2::from_angle(best.1).rotate(DVec2::NEG_Y))
+}
+
+/// The angle from −y to a direction, as the nearest quarter turn, radians.
+fn quarter_turn(ahead: DVec2) -> f64 {
+    (DVec2::NEG_Y.angle_to(ahead) / FRAC_PI_2).round() * FRAC_PI_2
 }
 
 /// Width of a curve, m.

@@ -12,7 +12,7 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::arap::{Closing, close, faired};
 use super::arrange::{Arranged, arrange};
@@ -84,13 +84,18 @@ pub struct PutOn {
     pub time: Duration,
 }
 
-/// Puts a pattern on a body, with edges of about `edge_m` (m).
+/// Puts a pattern on a body, with edges of about `edge_m` (m). The body faces along `front`, found from its shape where it is not given.
 ///
 /// # Errors
 /// As [`sew`].
-pub(crate) fn put_on(pattern: &SewingPattern, body: &Body, edge_m: f64) -> Result<PutOn, PatternError> {
+pub(crate) fn put_on(
+    pattern: &SewingPattern,
+    body: &Body,
+    edge_m: f64,
+    front: Option<DVec2>,
+) -> Result<PutOn, PatternError> {
     let began = Instant::now();
-    let landmarks = Landmarks::of(body.mesh());
+    let landmarks = Landmarks::of_facing(body.mesh(), front);
     let mut pattern = pattern.clone();
     let (arranged, has_shoulders) = arrange(&mut pattern, &landmarks);
     // Without shoulders, the garment is closed and hangs between the arms.
@@ -165,7 +170,8 @@ impl PutOn {
             let _ = write!(moved, ", sleeves turned {:.0} degrees to its arms", sleeves.to_degrees());
         }
         if turned != 0.0 {
-            let _ = write!(moved, ", turned {:.0} degrees to where its toes point", turned.to_degrees());
+            let _ =
+                write!(moved, ", turned {:.0} degrees to its front (--front turns it otherwise)", turned.to_degrees());
         }
         let mut notes = vec![format!(
             "{} panels sewn along {} seams, {} vertices; seams closed in {} steps{moved}",
