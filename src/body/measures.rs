@@ -36,7 +36,7 @@ pub enum ShapeError {
     #[error("{found} {what} are too many; ask for {most} or fewer")]
     TooMany { what: &'static str, found: usize, most: usize },
     /// An unknown name of a garment.
-    #[error("no garment is called `{found}`{}; expected one of {known}, or a file", did_you_mean(found, known.split(", ")))]
+    #[error("no garment is called `{found}`{}; expected a file, or one of the built-in ones: {known}", did_you_mean(found, known.split(", ")))]
     Unknown { found: String, known: String },
     /// A surface that is not a manifold, which the ranges above should exclude.
     #[error("the {what} has no manifold surface at these measurements; bring them nearer to each other")]

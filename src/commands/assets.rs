@@ -23,6 +23,49 @@ const PATTERNS: [(&str, &str); 2] = [
     ("tshirt", include_str!("../../assets/patterns/tshirt.json")),
 ];
 
+/// Files of `assets/` that are written as they are, by path.
+macro_rules! kept {
+    ($($path:literal)*) => { &[$(($path, include_str!(concat!("../../assets/", $path)))),*] };
+}
+
+/// Tables cut to extents, tuned tables, and sweep files, which name the tables by their places.
+const KEPT: &[(&str, &str)] = kept![
+    "sweeps/dial.toml"
+    "sweeps/extents-and-refinement.toml"
+    "sweeps/figure-8.toml"
+    "sweeps/held-out.toml"
+    "sweeps/table-3-variations.toml"
+    "sweeps/tables-by-kind.toml"
+    "tables/table-3-12cm.toml"
+    "tables/table-3-24cm.toml"
+    "tables/table-3-6cm.toml"
+    "tuned/all-but-flared-skirt/pullover-1+pullover-2+low-cut-dress+long-sleeved-dress-levels-and-extents.toml"
+    "tuned/all-but-flared-skirt/pullover-1+pullover-2+low-cut-dress+long-sleeved-dress-levels.toml"
+    "tuned/all-but-long-sleeved-dress/pullover-1+pullover-2+flared-skirt+low-cut-dress-levels-and-extents.toml"
+    "tuned/all-but-long-sleeved-dress/pullover-1+pullover-2+flared-skirt+low-cut-dress-levels.toml"
+    "tuned/all-but-low-cut-dress/pullover-1+pullover-2+flared-skirt+long-sleeved-dress-levels-and-extents.toml"
+    "tuned/all-but-low-cut-dress/pullover-1+pullover-2+flared-skirt+long-sleeved-dress-levels.toml"
+    "tuned/all-but-pullover-1/pullover-2+flared-skirt+low-cut-dress+long-sleeved-dress-levels-and-extents.toml"
+    "tuned/all-but-pullover-1/pullover-2+flared-skirt+low-cut-dress+long-sleeved-dress-levels.toml"
+    "tuned/all-but-pullover-2/pullover-1+flared-skirt+low-cut-dress+long-sleeved-dress-levels-and-extents.toml"
+    "tuned/all-but-pullover-2/pullover-1+flared-skirt+low-cut-dress+long-sleeved-dress-levels.toml"
+    "tuned/flared-skirt-levels-and-extents.toml"
+    "tuned/flared-skirt-levels.toml"
+    "tuned/long-sleeved-dress-levels-and-extents.toml"
+    "tuned/long-sleeved-dress-levels.toml"
+    "tuned/low-cut-dress-levels-and-extents.toml"
+    "tuned/low-cut-dress-levels.toml"
+    "tuned/pullover-1-levels-and-extents.toml"
+    "tuned/pullover-1-levels.toml"
+    "tuned/pullover-2-levels-and-extents.toml"
+    "tuned/pullover-2-levels.toml"
+    "tuned/translations/flared-skirt-levels.toml"
+    "tuned/translations/long-sleeved-dress-levels.toml"
+    "tuned/translations/low-cut-dress-levels.toml"
+    "tuned/translations/pullover-1-levels.toml"
+    "tuned/translations/pullover-2-levels.toml"
+];
+
 /// Arguments of `assets`.
 #[derive(Debug, Args)]
 pub(crate) struct AssetsArgs {
@@ -37,7 +80,7 @@ pub(crate) struct AssetsArgs {
 }
 
 impl AssetsArgs {
-    /// Writes body and garments as OBJ; range table, fabrics, measurements and garment specifications as TOML; sewing patterns as
+    /// Writes body and garments as OBJ; range tables, sweeps, fabrics, measurements and garment specifications as TOML; sewing patterns as
     /// JSON. Without `force`, nothing is written if any file exists with other contents.
     pub(crate) fn execute(&self, force: bool) -> anyhow::Result<()> {
         let files = self.files()?;
@@ -84,7 +127,40 @@ impl AssetsArgs {
         for name in fabric::BUILT_IN {
             files.push((format!("fabrics/{name}.toml"), toml::to_string(&fabric::Fabric::by_name(name)?)?));
         }
+        files.extend(KEPT.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())));
         files.extend(PATTERNS.map(|(name, text)| (format!("patterns/{name}.json"), text.to_owned())));
         Ok(files)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+
+    /// The TOML files below a folder, by their path from `root`.
+    fn toml_files(root: &Path, folder: &Path, found: &mut Vec<String>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                toml_files(root, &path, found);
+            } else if path.extension().is_some_and(|ending| ending == "toml") {
+                found.push(path.strip_prefix(root).unwrap().to_str().unwrap().to_owned());
+            }
+        }
+    }
+
+    #[test]
+    fn every_table_and_sweep_of_the_repository_is_written() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+        let mut found = Vec::new();
+        for folder in ["tables", "tuned", "sweeps"] {
+            toml_files(&root, &root.join(folder), &mut found);
+        }
+        found.retain(|path| path != "tables/table-3.toml");
+        found.sort();
+        assert_eq!(KEPT.iter().map(|(path, _)| *path).collect::<Vec<_>>(), found);
     }
 }

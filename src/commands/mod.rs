@@ -102,7 +102,7 @@ enum Command {
     ///
     /// `partwise --pattern FILE` drapes it, on the dress form or on --body.
     Pattern(pattern::PatternArgs),
-    /// Write the built-in inputs as files: body and garments as OBJ, tables, fabrics and measurements as TOML
+    /// Write the built-in inputs as files: body and garments as OBJ, tables, sweeps, fabrics and measurements as TOML
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
     View(view::ViewArgs),

@@ -69,6 +69,9 @@ pub(crate) struct RunArgs {
     /// a criterion fails
     #[arg(long, help_heading = "Stages", conflicts_with = "watch")]
     certify: bool,
+    /// Certify as --certify does, and exit with code 3 unless the verdict is that the garment rests and every criterion passes
+    #[arg(long, help_heading = "Stages", conflicts_with = "watch")]
+    strict: bool,
     /// Export the draped garment: as OBJ with its original faces, groups and texture coordinates (of a sewing pattern: panels and flat
     /// positions), or as glTF in metres, y up
     #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
@@ -112,6 +115,9 @@ impl RunArgs {
             );
         }
         if self.method != TWO_STAGE {
+            if self.strict {
+                refuse!("--strict: found --method {}, expected {TWO_STAGE}, the method that is certified", self.method);
+            }
             return self.run_method();
         }
         if self.watch {
@@ -132,6 +138,9 @@ impl RunArgs {
             solved.summary.outputs.extend(recorder.finish()?.file_line());
             solved.summary.add_time("record", finished.elapsed());
             self.print(&solved)?;
+        }
+        if self.strict {
+            return solved.summary.require_good();
         }
         require_pass(solved.summary.certificate.as_ref())
     }
@@ -214,7 +223,7 @@ impl RunArgs {
             summary.add_time("sew", sew);
         }
         summary.add_time("measure", draped.elapsed());
-        if self.certify {
+        if self.certify || self.strict {
             let began = Instant::now();
             let mut scene = loaded.scene.clone();
             if matches!(drape.let_go, Some(LetGo::Stays { .. })) {

@@ -24,6 +24,11 @@ use super::console;
 #[error("{0}")]
 pub(crate) struct UserError(pub(crate) String);
 
+/// A drape that `--strict` does not accept.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct BadVerdict(pub(crate) String);
+
 /// Returns a [`UserError`] with a formatted message from the enclosing function.
 macro_rules! refuse {
     ($($message:tt)*) => {
@@ -32,8 +37,12 @@ macro_rules! refuse {
 }
 pub(crate) use refuse;
 
-/// The exit code of an error: 2 where the user can remedy it, by another input or more disk space, and 1 otherwise.
+/// The exit code of an error: 2 where the user can remedy it, by another input or more disk space, 3 for a drape that `--strict` does
+/// not accept, and 1 otherwise.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.is::<BadVerdict>() {
+        return ExitCode::from(3);
+    }
     if error.chain().any(is_users) { ExitCode::from(2) } else { ExitCode::FAILURE }
 }
 

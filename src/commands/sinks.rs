@@ -8,6 +8,7 @@ use crate::record::Sink;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
+use super::console;
 use super::runtime::{check, refuse};
 
 /// Direction from which the views of a recording show the body.
@@ -107,9 +108,20 @@ impl SinkArgs {
         outputs.iter().filter_map(|(flag, path)| Some((flag, (*path)?))).try_for_each(|(flag, path)| check(path, flag))
     }
 
-    /// Refuses a recording that cannot be written, before anything is computed.
+    /// Refuses a recording that cannot be written, before anything is computed, and notes one of an earlier run that will be replaced.
     pub(crate) fn refuse_unwritable(&self, name: &str) -> anyhow::Result<()> {
-        Ok(self.sinks(name).iter().try_for_each(Sink::check)?)
+        for sink in self.sinks(name) {
+            sink.check()?;
+            if let (Sink::File(path), None) = (&sink, &self.save)
+                && path.is_file()
+            {
+                console::note(&format!(
+                    "{}: replaces the recording of an earlier run; --save FILE.rrd writes another file, --no-save none",
+                    path.display()
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The sinks; `name` is the default name of the file, in `recordings/`.

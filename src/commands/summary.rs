@@ -14,12 +14,13 @@ use crate::scene::{Loaded, Swatch};
 use crate::study::accuracy::Accuracy;
 use crate::study::certificate::Certificate;
 use crate::study::job::Measured;
-use crate::study::metrics::{GirthEase, LevelCount, Metrics};
+use crate::study::metrics::{GirthEase, LevelCount, Metrics, RESTS};
 use comfy_table::Table;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::console;
+use super::runtime::BadVerdict;
 
 /// The summary of one draped garment. Field names are the keys of `--format json`.
 #[derive(Debug, Clone, Serialize)]
@@ -113,6 +114,22 @@ impl Summary {
         Ok(summary)
     }
 
+    /// Fails, for exit code 3, unless the verdict and every criterion of the certificate are good.
+    pub(crate) fn require_good(&self) -> anyhow::Result<()> {
+        let failing = self.certificate.iter().flat_map(|c| &c.findings).filter(|f| !f.passes).map(|f| f.name);
+        let failing: Vec<&str> = failing.collect();
+        let certified =
+            if failing.is_empty() { String::new() } else { format!("; not certified: {}", failing.join(", ")) };
+        if self.metrics.verdict == RESTS && failing.is_empty() {
+            return Ok(());
+        }
+        Err(BadVerdict(format!(
+            "--strict: found \"{}\"{certified}, expected a garment that rests",
+            self.metrics.verdict
+        ))
+        .into())
+    }
+
     /// Adds time to a stage and to the total, which is the sum of all.
     pub(crate) fn add_time(&mut self, stage: &'static str, time: Duration) {
         for name in [stage, "total"] {
@@ -136,7 +153,7 @@ impl Summary {
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        out + &ending(self.times(), &self.outputs)
+        out + &ending(self.times(), &self.outputs) + &self.metrics.verdict_line() + "\n"
     }
 
     fn since_last(&self) -> impl Iterator<Item = (&'static str, String)> {

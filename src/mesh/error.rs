@@ -44,7 +44,7 @@ pub enum MeshError {
     /// No unit makes this a body.
     #[error(
         "{file}: the unit cannot be guessed: the body is {height} units tall, which is between 0.5 and 2.5 m in none of \
-         m, dm, cm and mm; name it with --body-unit (and --body-up)"
+         m, dm, cm and mm; name it with --unit (and --up), or for the body alone with --body-unit and --body-up"
     )]
     UnknownScale { file: PathBuf, height: f64 },
     /// No frame puts the garment near the body.

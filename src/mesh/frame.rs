@@ -33,8 +33,7 @@ const OTHER_LENGTHS: std::ops::RangeInclusive<f64> = 0.1..=1.3;
 /// with these, `tests/import/frames.rs` finds five garments in all of twelve frames about four bodies.
 const SAME_UNIT: f64 = 4.0;
 const SAME_UP: f64 = 1.5;
-/// A garment in the body's frame with a box nearer than this to the body's, m, counts as overlapping it by [`LEAST_OVERLAP`]: a
-/// cloth above the head.
+/// A garment with a box nearer than this to the body's, m, counts as overlapping it by [`LEAST_OVERLAP`]: a cloth above the head.
 const NEAR_BOX: f64 = 0.3;
 const LEAST_OVERLAP: f64 = 1e-3;
 /// Vertices that are tried in a frame.
@@ -305,7 +304,7 @@ pub(super) fn guess_frame_worn(
             continue;
         }
         let gap = (corners.0 - body.1).max(body.0 - corners.1).max(DVec3::ZERO).length();
-        let least = if is_own && gap < NEAR_BOX { LEAST_OVERLAP } else { 0.0 };
+        let least = if gap < NEAR_BOX { LEAST_OVERLAP } else { 0.0 };
         let mut score = overlap(corners, body).max(least);
         let mut close = 0.0;
         if score > 0.0 {

@@ -53,7 +53,7 @@ pub enum SceneError {
     /// A garment that is not near the body.
     #[error(
         "no body near the garment: the nearest vertex is {nearest:.2} m from the body, expected less than {limit} m; are both in \
-         the same place, and are unit and up axis right (--body-unit, --garment-unit, --body-up, --garment-up)?"
+         the same place, and are unit and up axis right (--unit, --up, or of one file --body-unit, --garment-unit, --body-up, --garment-up)?"
     )]
     NotNear { nearest: f64, limit: f64 },
     /// A garment worn over itself.

@@ -5,6 +5,7 @@
 mod beside;
 mod exported;
 mod fabrics;
+mod verdict;
 
 use std::fs;
 use std::path::Path;

@@ -1,12 +1,14 @@
 //! How garments are placed and held: garments given twice, and held edges by the thousand.
 
 use glam::DVec3;
+use partwise::Job;
 use partwise::SceneSpec;
-use partwise::drape::Scene;
+use partwise::drape::{Refine, Scene, Settings};
 use partwise::mesh::TriMesh;
 use partwise::mesh::export::write_mesh;
+use partwise::study::metrics::RESTS;
 
-use super::sphere;
+use super::{cone, draped, draped_by, sphere, turned};
 
 #[test]
 fn a_garment_given_twice_is_refused_with_both_remedies() {
@@ -41,4 +43,30 @@ fn the_edges_of_twenty_thousand_parts_are_held_in_time_that_grows_with_their_num
     assert!(held.iter().copied().eq(0..3 * parts), "{} held", held.len());
     assert_eq!(scene.edge("top:2").unwrap(), [3, 4, 5]);
     assert!(scene.edge("top:20001").unwrap_err().to_string().contains("`top:1` to `top:20000`"));
+}
+
+#[test]
+fn the_verdict_names_every_criterion_that_fails() {
+    let tube =
+        |radius: f64| turned(&(0..6).map(|k| (radius, 0.95 - 0.05 * f64::from(k))).collect::<Vec<_>>(), 40, None);
+    let mut scene = Scene::of_meshes(&cone(), tube(0.3)).unwrap();
+    let (slid, ..) = draped(&scene);
+    assert!(slid.verdict.starts_with("slid down by "), "{}", slid.verdict);
+    scene.held = scene.edge("top").unwrap();
+    let (rests, ..) = draped(&scene);
+    assert_eq!(rests.verdict, RESTS);
+    // Without a step at full resolution it does not rest.
+    let preview = Job { settings: Settings { refine: Refine::Steps(0), ..Settings::default() }, ..Job::default() };
+    let (metrics, ..) = draped_by(&scene, &preview);
+    assert!(metrics.verdict.contains("does not rest: residual "), "{}", metrics.verdict);
+    // Far too narrow, though at rest.
+    let mut narrow = Scene::of_meshes(&cone(), tube(0.3)).unwrap();
+    narrow.held.clone_from(&scene.held);
+    narrow.rest.corners.iter_mut().flatten().for_each(|p| *p *= 0.5);
+    let (torn, ..) = draped(&narrow);
+    assert!(torn.verdict.contains("more than fabrics bear"), "{}", torn.verdict);
+    // Off the body.
+    let ring = turned(&[(0.6, 0.9), (0.6, 0.85), (0.6, 0.8)], 24, None);
+    let (fallen, ..) = draped(&Scene::of_meshes(&cone(), ring).unwrap());
+    assert!(fallen.verdict.starts_with("fell off the body"), "{}", fallen.verdict);
 }

@@ -1,6 +1,5 @@
 //! One level of a range table: its bounds, its extent, and the errors of a table.
 
-use super::TABLE_3;
 use crate::base::error_text::did_you_mean;
 use crate::base::files::Unreadable;
 
@@ -162,7 +161,7 @@ impl std::fmt::Display for GapRule {
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum TableError {
     /// No such name.
-    #[error("no range table is called `{found}`{}; expected `table-3` or a file ending in .toml", did_you_mean(found, [TABLE_3]))]
+    #[error("no range table is called `{found}`{}; expected `table-3` or a file ending in .toml", did_you_mean(found, ["table-3"]))]
     Unknown { found: String },
     /// An unreadable file.
     #[error(transparent)]

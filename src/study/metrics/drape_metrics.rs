@@ -6,10 +6,14 @@ use super::faults::{SANK_MM, SlidPart, TightestOpening, bridges, sinking};
 use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
 use crate::mechanics::fit::TORN_PERCENT;
+use crate::mechanics::refine::Stop;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::scene::Scene;
 use crate::study::accuracy::{Accuracy, rms_mm};
 use crate::study::evaluate::Evaluation;
+
+/// The verdict on a drape without fault.
+pub const RESTS: &str = "rests";
 
 /// Metrics of one drape. The field names are the keys of `--format json` and the columns of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -87,6 +91,9 @@ pub struct Metrics {
     pub folds_p95_percent: Option<f64>,
     /// Rank correlation of the excess length with the mean curvature of the own continuation, over the vertices.
     pub fold_rank_correlation: Option<f64>,
+    /// `rests`, or the criteria that the drape fails, by the limits of the certificate.
+    #[serde(default)]
+    pub verdict: String,
 }
 
 impl Metrics {
@@ -96,7 +103,7 @@ impl Metrics {
         let (parts, state) = (&drape.parts, drape.state.as_ref());
         let (top_sank_mm, slid) = sinking(scene, &drape.positions);
         let draped = scene.garment.with_positions(drape.positions.clone());
-        Self {
+        let metrics = Self {
             vertices: scene.garment.vertex_count(),
             triangles: scene.garment.triangles.len(),
             levels: parts.parts_per_level.iter().filter(|n| **n > 0).count(),
@@ -124,7 +131,8 @@ impl Metrics {
                 .and_then(|_| TightestOpening::of(scene, &drape.positions)),
             pressure_max_kpa: state.map(|s| s.fit.pressure_max_kpa),
             ..Self::default()
-        }
+        };
+        Self { verdict: metrics.faults(scene, drape), ..metrics }
     }
 
     /// Adds the errors of an evaluation. A model without a state takes energy and strain from it.
@@ -163,6 +171,43 @@ impl Metrics {
         ];
         facts.extend(self.findings());
         facts
+    }
+
+    /// [`RESTS`], or the criteria that the drape fails, separated by semicolons.
+    fn faults(&self, scene: &Scene, drape: &Drape) -> String {
+        let mut faults = Vec::new();
+        if !scene.fallen_parts(&drape.positions).is_empty() {
+            faults.push("fell off the body".to_owned());
+        } else if !self.slid.is_empty() {
+            faults.push(format!("slid down by {:.0} cm", 0.1 * self.top_sank_mm));
+        }
+        match &drape.state {
+            None => faults.push("not solved at full resolution".to_owned()),
+            Some(state) if state.stop != Stop::Converged => {
+                faults.push(format!("does not rest: residual {:.1e} of the weight", state.residual_over_weight));
+            }
+            Some(_) => {}
+        }
+        let counts = [
+            (self.penetrating_vertices, "vertices inside the body"),
+            (self.body_crossing_pairs, "pairs of triangles with skin through cloth"),
+            (self.self_intersecting_pairs, "pairs of triangles with cloth through cloth"),
+        ];
+        faults.extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, of)| format!("{count} {of}")));
+        if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
+            faults.push(format!("strain of {:.0} %, more than fabrics bear", 1e2 * strain));
+        }
+        if faults.is_empty() { RESTS.to_owned() } else { faults.join("; ") }
+    }
+
+    /// The verdict in one line.
+    pub(crate) fn verdict_line(&self) -> String {
+        let strain =
+            self.strain_max.map(|strain| format!(", strain of {:.0} % at most", 1e2 * strain)).unwrap_or_default();
+        match self.verdict.as_str() {
+            RESTS => format!("verdict: rests, nothing inside the body, no crossing{strain}"),
+            faults => format!("verdict: {faults}"),
+        }
     }
 
     /// Solver, strain, intersections and errors as pairs of name and text.

@@ -9,7 +9,7 @@ mod faults;
 mod levels;
 mod method_metrics;
 
-pub use drape_metrics::Metrics;
+pub use drape_metrics::{Metrics, RESTS};
 pub(crate) use ease::GirthEase;
 pub use faults::{SlidPart, TightestOpening};
 pub use levels::LevelCount;

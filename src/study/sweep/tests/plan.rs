@@ -203,7 +203,7 @@ fn bad_files_are_refused_with_place_cause_and_remedy() {
         (format!("{point}table = \"no/such.toml\""), "s.toml:3: no/such.toml: cannot be read", "folder"),
         (format!("{point}garment = \"no.obj\""), "s.toml:3: no.obj: cannot be read", "folder"),
         (format!("{point}garment = \"flared-skirt@900\"\nsize = 800"), "s.toml:4: size: found 800", "skirt@900"),
-        (format!("{point}garment = \"sari\""), "s.toml:3: garment: there is no garment", "flared-skirt"),
+        (format!("{point}garment = \"sari\""), "s.toml:3: garment: no garment is called `sari`", "flared-skirt"),
         (format!("{point}garment = \"flared-skirt@many\""), "s.toml:3: garment: ", "no number of vertices"),
         (format!("{point}fabric = \"steel\""), "s.toml:3: fabric: no fabric is called `steel`", "jersey"),
         (format!("{point}fabric = \"no/steel.toml\""), "s.toml:3: no/steel.toml: cannot be read", "folder"),
