@@ -333,7 +333,9 @@ pub(super) fn guess_frame_worn(
         }
         (best, (_, in_own)) => {
             let frame = best.map(|(frame, _)| frame).or(in_own)?;
-            Some(Frame { guessed: own.guessed, reason: "as the body".to_owned(), ..frame })
+            let is_own = (frame.unit, frame.up) == (own.unit, own.up);
+            let reason = if is_own { "as the body" } else { "as given, otherwise as the body" };
+            Some(Frame { guessed: own.guessed, reason: reason.to_owned(), ..frame })
         }
     }
 }

@@ -75,6 +75,6 @@ fn body_and_garment_have_frames_of_their_own() {
     );
     bench.refuses(&["--front", "up", "--no-save"], &["--front", "x, -x, y, -y, z or -z"]);
     // A garment that fits about the body in no frame.
-    bench.write("garment.obj", &super::sheet(12, 1.51).replace(" 1.51\n", " 1e9\n"));
+    bench.write("garment.obj", &super::sheet(12, 1.51).replace(" 1.51\n", " 1e6\n"));
     bench.refuses(&["--body", "body.obj", "--garment", "garment.obj"], &["--garment-unit"]);
 }
