@@ -3,7 +3,7 @@
 //! Each level has a quarter of the vertices of the one before ([`Coarse`]). PARTs are those of the full garment, as far as they have
 //! vertices there. Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985).
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
@@ -28,64 +28,72 @@ pub(crate) struct Level {
     cloth: Cloth,
 }
 
-/// The full garment's cloth and the coarser ones, fine to coarse.
+/// The full garment's cloth and the coarser ones, fine to coarse. The coarser ones are made at the first use: stage two of wide PARTs
+/// needs none.
 #[derive(Debug)]
 pub(crate) struct Levels {
     pub(crate) cloth: Cloth,
-    pub(crate) coarser: Vec<Level>,
+    coarser: OnceLock<Vec<Level>>,
 }
 
 impl Levels {
-    /// The cloth of `scene`, `fabric` being that of what names none, and as many coarser ones as there are.
+    /// The cloth of `scene`, `fabric` being that of what names none.
     pub(crate) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
-        let fabrics = &scene.fabrics(fabric);
-        Self::beside(scene, fabrics, || {
+        let Scene { garment, topology, rest, held, .. } = scene;
+        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(fabric), held)?;
+        Ok(Self { cloth, coarser: OnceLock::new() })
+    }
+
+    /// The same garment in another fabric: how its coarser ones are meshed does not depend on it.
+    pub(crate) fn recut(&self, scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
+        let levels = Self::new(scene, fabric)?;
+        if let Some(made) = self.coarser.get() {
             let mut coarser: Vec<Level> = Vec::new();
-            while let Some(next) = Level::below(scene, coarser.last(), fabrics) {
+            for level in made {
+                let coarse = Arc::clone(&level.coarse);
+                coarser.extend(Level::of(scene, coarser.last(), coarse, &levels.cloth.fabrics));
+            }
+            return Ok(Self { coarser: OnceLock::from(coarser), ..levels });
+        }
+        Ok(levels)
+    }
+
+    /// As many coarser ones as there are; `scene` is that of the full garment.
+    pub(crate) fn coarser(&self, scene: &Scene) -> &[Level] {
+        self.coarser.get_or_init(|| {
+            let mut coarser: Vec<Level> = Vec::new();
+            while let Some(next) = Level::below(scene, coarser.last(), &self.cloth.fabrics) {
                 coarser.push(next);
             }
             coarser
         })
     }
 
-    /// The same garment in another fabric: how its coarser ones are meshed does not depend on it.
-    pub(crate) fn recut(&self, scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
-        let fabrics = &scene.fabrics(fabric);
-        Self::beside(scene, fabrics, || {
-            let mut coarser: Vec<Level> = Vec::new();
-            for level in &self.coarser {
-                let coarse = Arc::clone(&level.coarse);
-                coarser.extend(Level::of(scene, coarser.last(), coarse, fabrics));
-            }
-            coarser
-        })
-    }
-
-    fn beside(
-        scene: &Scene,
-        fabrics: &[Fabric],
-        coarser: impl FnOnce() -> Vec<Level> + Send,
-    ) -> Result<Self, EnergyError> {
-        let Scene { garment, topology, rest, held, .. } = scene;
-        let (cloth, coarser) = rayon::join(|| Cloth::new(garment, topology, rest, fabrics, held), coarser);
-        Ok(Self { cloth: cloth?, coarser })
+    /// The first of them, which have been made: there is a number for the last.
+    fn made(&self, count: usize) -> &[Level] {
+        self.coarser.get().map_or(&[], |coarser| &coarser[..count])
     }
 
     /// What the vertices of the level of this number (1: the first coarser one) have of those of the full garment.
     pub(crate) fn restrict<T: Copy>(&self, level: usize, full: &[T]) -> Vec<T> {
-        self.coarser[..level].iter().fold(full.to_vec(), |x, l| l.coarse.restrict(&x))
+        self.made(level).iter().fold(full.to_vec(), |x, l| l.coarse.restrict(&x))
     }
 
     /// Where the full garment goes from `from` when the level of this number goes to `to`.
     pub(crate) fn prolong(&self, level: usize, from: &[DVec3], to: Vec<DVec3>) -> Vec<DVec3> {
-        (1..=level).rev().fold(to, |to, l| self.coarser[l - 1].coarse.prolong(&self.restrict(l - 1, from), &to))
+        self.made(level)
+            .iter()
+            .enumerate()
+            .rev()
+            .fold(to, |to, (finer, l)| l.coarse.prolong(&self.restrict(finer, from), &to))
     }
 
     /// PARTs of the full garment on a level.
     pub(crate) fn parts(&self, level: usize, parts: &Parts) -> Parts {
-        let label = self.coarser[..level].iter().fold(parts.part_of_vertex.clone(), |p, l| l.coarse.restrict(&p));
+        let label = self.made(level).iter().fold(parts.part_of_vertex.clone(), |p, l| l.coarse.restrict(&p));
         let level_of = |label: u32| if label == UNASSIGNED { 0 } else { parts.parts[label as usize].level };
-        Parts::from_labels(&self.coarser[level - 1].coarse.topology, &label, level_of, parts.own_extent.clone(), 0)
+        let Some(coarsest) = self.made(level).last() else { return parts.clone() };
+        Parts::from_labels(&coarsest.coarse.topology, &label, level_of, parts.own_extent.clone(), 0)
     }
 }
 

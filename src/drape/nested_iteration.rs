@@ -61,12 +61,12 @@ pub(crate) fn approach(
         solved.map_or(start, |result| result.positions)
     };
     let large = |level: &&Level| level.mesh().vertex_count() >= MIN_COARSE_VERTICES;
-    let coarsest = levels.coarser.iter().take_while(large).count();
+    let coarsest = levels.coarser(scene).iter().take_while(large).count();
     let self_contact = settings.self_contact;
     let at_most = RefineOptions { max_steps: Some(COARSE_STEPS), self_contact, ..RefineOptions::default() };
     let mut reached = start.to_vec();
     for number in (1..=coarsest).rev() {
-        let garment = levels.coarser[number - 1].garment();
+        let garment = levels.coarser(scene)[number - 1].garment();
         let mut from = levels.restrict(number, &reached);
         if number == coarsest {
             from = by_parts(&garment, &levels.parts(number, &finer), &levels.restrict(number, &distance), from);
@@ -81,7 +81,7 @@ pub(crate) fn approach(
         }
         let mut prolonged = levels.prolong(number, &reached, rested.positions);
         let (next, cloth) = match number.checked_sub(2) {
-            Some(finer) => (levels.coarser[finer].mesh(), levels.coarser[finer].garment().cloth),
+            Some(finer) => (levels.coarser(scene)[finer].mesh(), levels.coarser(scene)[finer].garment().cloth),
             None => (mesh, &levels.cloth),
         };
         let there = next.with_positions(levels.restrict(number - 1, &prolonged));

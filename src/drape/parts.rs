@@ -134,17 +134,22 @@ fn through_levels(
     options: &CoupledOptions,
     asked: Asked<'_>,
 ) -> Result<CoupledResult, CoupledError> {
+    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
+    let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
+    let given = Hints { distance_m: &distance, least_share: 0.0 };
+    if coupled::splits(&scene.garment, parts, &levels.cloth, options.method) {
+        return coupled::solve_given(&garment, &scene.body, parts, start, given, options, &mut |_| asked());
+    }
     let folding = Folding::of(&scene.garment, parts, &levels.cloth);
     let enough = |(below, level): &(usize, &Level)| {
         let least = if *below == 0 { ENOUGH } else { ENOUGH_BELOW };
         level.mesh().vertex_count() >= least * parts.len()
             && (folding.share < FOLDING || EDGES_A_FOLD * level.edge_m() <= folding.width_m)
     };
-    let coarsest = levels.coarser.iter().enumerate().take_while(enough).count();
-    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
+    let coarsest = levels.coarser(scene).iter().enumerate().take_while(enough).count();
     let mut x = start.to_vec();
     for number in (1..=coarsest).rev() {
-        let level = &levels.coarser[number - 1];
+        let level = &levels.coarser(scene)[number - 1];
         let parts = levels.parts(number, parts);
         let (garment, start) = (level.garment(), levels.restrict(number, &x));
         let distance_m = &levels.restrict(number, &distance);
@@ -154,8 +159,6 @@ fn through_levels(
         let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, given, &options, &mut |_| asked())?;
         x = levels.prolong(number, &x, solved.positions);
     }
-    let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
-    let given = Hints { distance_m: &distance, least_share: 0.0 };
     if coarsest == 0 {
         return coupled::solve_given(&garment, &scene.body, parts, &x, given, options, &mut |_| asked());
     }

@@ -86,7 +86,8 @@ impl<'a> Task<'a> {
         start: &[DVec3],
         options: &CoupledOptions,
     ) -> Option<Vec<DVec3>> {
-        let level = levels.coarser.first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
+        let level =
+            levels.coarser(self.scene()).first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
         let options = CoupledOptions { max_steps: COARSE_STEPS, ..options.clone() };
         let (coarse, parts) = (levels.restrict(1, start), levels.parts(1, parts));
         let (garment, body) = (level.garment(), &self.scene().body);

@@ -152,6 +152,12 @@ impl Worker {
             (&levels, &settings.model, self.progress.warm_preview_done)
         {
             self.progress.warm_preview_done = true;
+            // From the placed garment, and before any drape at rest: this takes milliseconds, and does not depend on the last preview.
+            if options.extents_m.is_empty()
+                && coupled::splits(&task.scene().garment, &segmented.parts, &levels.cloth, options.method)
+            {
+                return self.both_stages(task, Some(&**levels));
+            }
             let Some(start) = preview else { return Ok(()) };
             let rest_follows = rest.is_some() && target.snapshot.rest.is_none();
             return self.warm_preview(task, levels, options, &start, rest_follows);

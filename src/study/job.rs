@@ -89,7 +89,10 @@ fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
         Model::Coupled(options) => {
             let CoupledOptions {
                 motion: _,
+                method: _,
                 extents_m: _,
+                max_iterations,
+                least_change_m,
                 max_steps,
                 least_move_m,
                 damping,
@@ -98,6 +101,8 @@ fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
                 relaxing_trial,
             } = options;
             vec![
+                ("max_iterations", *max_iterations as f64, 1.0..=STEP_LIMIT as f64),
+                ("least_change_m", *least_change_m, 0.0..=1.0),
                 ("max_steps", *max_steps as f64, 0.0..=STEP_LIMIT as f64),
                 ("least_move_m", *least_move_m, 0.0..=1.0),
                 ("damping", *damping, 0.0..=1e6),

@@ -53,7 +53,7 @@ pub(super) struct Place {
 impl Elements {
     /// Of all elements, whose PARTs are given, those that are sampled; `vertices` are an element's.
     fn sampled<'a>(weights: &Weights, count: usize, parts: &Csr<u32>, vertices: impl Fn(usize) -> &'a [u32]) -> Self {
-        let mut e = Self { sampled: sample(count, parts), ..Self::default() };
+        let mut e = Self { sampled: sample(count, parts, sampling_rate), ..Self::default() };
         let weight = |p: u32, v: u32| weights.of(v as usize).iter().find(|w| w.0 == p).map_or(0.0, |w| w.1);
         for &(i, _) in &e.sampled {
             let (own, vertices) = (parts.of(i as usize), vertices(i as usize));
@@ -91,7 +91,7 @@ impl Elements {
 }
 
 /// PARTs of each element, ascending, from the vertices of each.
-fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Csr<u32> {
+pub(super) fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Csr<u32> {
     let (mut parts, mut own) = (Csr::default(), Vec::new());
     for vertices in all {
         own.extend(vertices.iter().flat_map(|&v| weights.of(v as usize)).map(|w| w.0));
@@ -102,8 +102,9 @@ fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Csr<
     parts
 }
 
-/// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each PART.
-fn sample(count: usize, parts: &Csr<u32>) -> Vec<(u32, f64)> {
+/// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each of `count` PARTs, and how many
+/// elements each stands for. `rate` is the share of the elements of a PART of this size.
+pub(super) fn sample(count: usize, parts: &Csr<u32>, rate: impl Fn(f64) -> f64) -> Vec<(u32, f64)> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut size = vec![0.0; count];
     for i in 0..parts.len() {
@@ -114,7 +115,7 @@ fn sample(count: usize, parts: &Csr<u32>) -> Vec<(u32, f64)> {
     }
     let mut sampled = Vec::new();
     for i in 0..parts.len() {
-        let rate = parts.of(i).iter().map(|&p| sampling_rate(size[p as usize])).fold(0.0, f64::max).min(1.0);
+        let rate = parts.of(i).iter().map(|&p| rate(size[p as usize])).fold(0.0, f64::max).min(1.0);
         if (i as f64 * GOLDEN).fract() < rate {
             sampled.push((i as u32, rate.recip()));
         }

@@ -42,6 +42,9 @@ use crate::mechanics::energy::membrane;
 /// from 28 to 5 mm of its rest; cut to 60 cm it comes no nearer at five.
 const MAX_FOLD_WIDTHS: f64 = 2.0;
 
+/// Least width of a PART, m: one of a single vertex has none.
+const MIN_WIDTH_M: f64 = 1e-3;
+
 /// What folds there are to make, by how wide the PARTs are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Folding {
@@ -91,6 +94,18 @@ pub(super) fn compression_ratios(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -
         parts.map(|p| of_part[t.fabric as usize][p as usize]).fold(COMPRESSION_RATIO, f64::min)
     };
     cloth.triangles.iter().map(of_triangle).collect()
+}
+
+/// Buckling load π² B/ℓ² of each triangle, N/m: that of the widest PART it touches.
+pub(super) fn buckling_loads(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Vec<f64> {
+    let widths: Vec<f64> = parts.map(|_, part| width(mesh, &part.vertices));
+    let load = |t: &Triangle| {
+        let parts = t.vertices.iter().map(|&v| parts.part_of_vertex[v as usize]).filter(|&p| p != UNASSIGNED);
+        let width = parts.map(|p| widths[p as usize]).fold(MIN_WIDTH_M, f64::max);
+        let bending = cloth.fabrics[t.fabric as usize].bending_nm.into_iter().fold(0.0, f64::max);
+        PI * PI * bending / (width * width)
+    };
+    cloth.triangles.iter().map(load).collect()
 }
 
 /// λ of each fabric, m: its own bending under what the garment weighs on average.

@@ -24,7 +24,7 @@ use crate::base::simd::{Four, Lanes, Pack, Vectors};
 use crate::mechanics::energy::sparsity::Pattern;
 use crate::mechanics::linear_algebra::eigen;
 use crate::mechanics::newton::{SolveError, Solver};
-use crate::mesh::{each_once, outer};
+use crate::mesh::{Csr, each_once, outer};
 use crate::parts::Parts;
 
 /// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
@@ -153,6 +153,18 @@ impl Motions {
         let y = (x - self.centre[p as usize]) * w;
         let [a, b, c] = &self.axes[p as usize];
         [w, y.dot(*a), y.dot(*b), y.dot(*c)]
+    }
+
+    /// The unknowns that move each vertex, PART by PART, with their values at `x`.
+    pub(super) fn functions_at(&self, x: &[DVec3]) -> Csr<(u32, f64)> {
+        let mut functions = Csr::default();
+        for (v, x) in x.iter().enumerate() {
+            functions.push(self.weights.of(v).iter().flat_map(|&(p, w)| {
+                let count = self.count[p as usize] as usize;
+                (self.first[p as usize]..).zip(self.values(p, w, *x)).take(count)
+            }));
+        }
+        functions
     }
 
     /// The functions of all PARTs, by fours.

@@ -67,12 +67,31 @@ impl std::str::FromStr for Motion {
     }
 }
 
+/// How the equilibrium of the PARTs is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// ADMM where most of the garment lies in PARTs wider than two folds, Newton's method otherwise.
+    #[default]
+    Auto,
+    /// Local and global steps on sampled elements with one factor: milliseconds, and no folds.
+    Admm,
+    /// Newton's method on all elements, with vertices relaxed after every step.
+    Newton,
+}
+
 /// How PARTs are solved together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CoupledOptions {
     /// How a PART moves.
     pub motion: Motion,
+    /// How the equilibrium is found.
+    pub method: Method,
+    /// Iterations of ADMM at most.
+    pub max_iterations: usize,
+    /// A root mean square change of the maps below this, m, ends ADMM.
+    pub least_change_m: f64,
     /// Largest extents of PARTs along the cloth, m, coarse to fine: one solve each, from where the one before ended. Empty: the
     /// PARTs as the range table makes them.
     pub extents_m: Vec<f64>,
@@ -95,6 +114,9 @@ impl Default for CoupledOptions {
     fn default() -> Self {
         Self {
             motion: Motion::Affine,
+            method: Method::Auto,
+            max_iterations: 40,
+            least_change_m: 3e-4,
             extents_m: Vec::new(),
             max_steps: 40,
             least_move_m: 3e-3,

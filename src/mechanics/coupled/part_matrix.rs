@@ -1,0 +1,102 @@
+//! A symmetric matrix of the PARTs' functions, summed element by element and factored.
+
+use faer::Side;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, Triplet};
+
+use super::motions::Motions;
+use crate::mechanics::newton::SolveError;
+
+/// Share of the diagonal that is added to it, against functions that no sample sees.
+const RIDGE: f64 = 1e-9;
+
+/// Least diagonal, N/m.
+const MIN_DIAGONAL: f64 = 1e-12;
+
+/// The lower triangle by 4×4 blocks of two PARTs' functions.
+pub(super) struct PartMatrix {
+    first: Vec<u32>,
+    count: Vec<u8>,
+    part_of_unknown: Vec<u32>,
+    /// Of each PART: the PARTs whose unknowns do not come after its own, with the entries of both.
+    rows: Vec<Vec<(u32, [f64; 16])>>,
+}
+
+impl PartMatrix {
+    pub(super) fn new(motions: &Motions) -> Self {
+        let Motions { first, count, .. } = motions;
+        let mut part_of_unknown = vec![0; motions.unknowns()];
+        for (p, (&first, &count)) in (0..).zip(first.iter().zip(count)) {
+            part_of_unknown[first as usize..first as usize + usize::from(count)].fill(p);
+        }
+        Self { first: first.clone(), count: count.clone(), part_of_unknown, rows: vec![Vec::new(); first.len()] }
+    }
+
+    /// Adds `value(i, j)` for every pair of an element's unknowns, listed PART by PART.
+    pub(super) fn add(&mut self, unknowns: &[u32], value: impl Fn(usize, usize) -> f64) {
+        let mut i = 0;
+        while i < unknowns.len() {
+            let p = self.part_of_unknown[unknowns[i] as usize] as usize;
+            let rows = usize::from(self.count[p]);
+            let mut j = 0;
+            while j < unknowns.len() {
+                let q = self.part_of_unknown[unknowns[j] as usize];
+                let columns = usize::from(self.count[q as usize]);
+                if self.first[q as usize] <= self.first[p] {
+                    let row = &mut self.rows[p];
+                    let at = row.iter().position(|e| e.0 == q).unwrap_or_else(|| {
+                        row.push((q, [0.0; 16]));
+                        row.len() - 1
+                    });
+                    for a in 0..rows {
+                        for b in 0..columns {
+                            row[at].1[4 * a + b] += value(i + a, j + b);
+                        }
+                    }
+                }
+                j += columns;
+            }
+            i += rows;
+        }
+    }
+
+    /// Calls `entry` with row, column and value of the lower triangle.
+    fn each(&self, mut entry: impl FnMut(u32, u32, f64)) {
+        for (p, row) in self.rows.iter().enumerate() {
+            for (q, block) in row {
+                for a in 0..u32::from(self.count[p]) {
+                    for b in 0..u32::from(self.count[*q as usize]) {
+                        let (i, j) = (self.first[p] + a, self.first[*q as usize] + b);
+                        if i >= j {
+                            entry(i, j, block[(4 * a + b) as usize]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A factor of the matrix with `diagonal` (N/m) added.
+    ///
+    /// # Errors
+    /// [`SolveError`] where it is not positive definite, as with numbers that are not finite.
+    pub(super) fn factor(&self, diagonal: &[f64]) -> Result<Llt<u32, f64>, SolveError> {
+        let n = diagonal.len();
+        let mut entries = Vec::new();
+        let mut sums = diagonal.to_vec();
+        self.each(|i, j, value| {
+            if i == j {
+                sums[i as usize] += value;
+            } else {
+                entries.push(Triplet::new(i, j, value));
+            }
+        });
+        entries.extend((0..).zip(&sums).map(|(i, sum)| Triplet::new(i, i, sum * (1.0 + RIDGE) + MIN_DIAGONAL)));
+        let index = sums.iter().position(|sum| !(sum.is_finite() && *sum >= 0.0)).unwrap_or(0);
+        let factored = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &entries).ok().and_then(|matrix| {
+            let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok()?;
+            Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower).ok()
+        });
+        factored.ok_or(SolveError::NotPositive { index })
+    }
+}
