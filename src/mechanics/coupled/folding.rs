@@ -42,6 +42,9 @@ use crate::mechanics::energy::membrane;
 /// from 28 to 5 mm of its rest; cut to 60 cm it comes no nearer at five.
 const MAX_FOLD_WIDTHS: f64 = 2.0;
 
+/// Hanging length of a garment laid flat, over its widest extent. Heuristic.
+const FLAT_HEIGHT_SHARE: f64 = 0.25;
+
 /// Least width of a PART, m: one of a single vertex has none.
 const MIN_WIDTH_M: f64 = 1e-3;
 
@@ -108,9 +111,14 @@ pub(super) fn buckling_loads(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Ve
     cloth.triangles.iter().map(load).collect()
 }
 
+/// Height of the garment, m; of one laid flat, which hangs later, a share of its extent: its cloth would have no stiffness otherwise.
+pub(super) fn hanging_height_m(mesh: &TriMesh) -> f64 {
+    mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT_HEIGHT_SHARE * (high - low).max_element()))
+}
+
 /// λ of each fabric, m: its own bending under what the garment weighs on average.
 fn fold_widths(mesh: &TriMesh, cloth: &Cloth) -> Vec<f64> {
-    let length = mesh.bounds().map_or(0.0, |(low, high)| high.z - low.z);
+    let length = hanging_height_m(mesh);
     // As the first one's and what the others have more of, so that of one fabric it is that one's to the last bit.
     let of_first = cloth.fabrics[0].density_kg_per_m2;
     let denser = |t: &Triangle| t.area * (cloth.fabrics[t.fabric as usize].density_kg_per_m2 - of_first);

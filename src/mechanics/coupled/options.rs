@@ -116,7 +116,7 @@ impl Default for CoupledOptions {
             motion: Motion::Affine,
             method: Method::Auto,
             max_iterations: 40,
-            least_change_m: 3e-4,
+            least_change_m: 1e-4,
             extents_m: Vec::new(),
             max_steps: 40,
             least_move_m: 3e-3,
