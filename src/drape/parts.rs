@@ -9,7 +9,7 @@ use super::levels::{Level, Levels};
 use super::result::PartOutcome;
 use super::settings::{Model, Settings};
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Hints};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Hints, Method};
 use crate::mechanics::paper::{self, Cut, PartForces};
 use crate::parts::range_table::RangeTable;
 use crate::parts::{Parts, segment};
@@ -137,8 +137,15 @@ fn through_levels(
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
     let given = Hints { distance_m: &distance, least_share: 0.0 };
+    let mut options = options;
+    let newton = CoupledOptions { method: Method::Newton, ..options.clone() };
     if coupled::splits(&scene.garment, parts, &levels.cloth, options.method) {
-        return coupled::solve_given(&garment, &scene.body, parts, start, given, options, &mut |_| asked());
+        let solved = coupled::solve_given(&garment, &scene.body, parts, start, given, options, &mut |_| asked())?;
+        if options.method == Method::Admm || scene.fallen(&solved.positions).is_none() {
+            return Ok(solved);
+        }
+        // A garment that slips off through steps of centimetres may hang on in steps of millimetres.
+        options = &newton;
     }
     let folding = Folding::of(&scene.garment, parts, &levels.cloth);
     let enough = |(below, level): &(usize, &Level)| {

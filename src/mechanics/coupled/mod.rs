@@ -1,10 +1,15 @@
 //! The coupled PART solve: all PARTs of a range table at once, in the energy of the whole cloth.
 //!
-//! Each PART moves by an affine map, blended over the seams ([`Motions`]): these maps are the unknowns, and the energy is the very one of
-//! [`energy`](super::energy) over all vertices, with its gravity (the paper's F⁰), its contact and friction (F¹) and the pull of the
-//! cloth (F²). What compresses a PART too wide to fold is taken up by folds finer than it (`folding.rs`), so a ring of a skirt falls as the
-//! skirt does, without the folds. Newton's method in the unknowns (`hessian.rs`) with relaxed steps (`mechanics::newton`)
-//! lowers the energy until the steps are short: then Bᵀ∇E = 0, which says that forces and moments balance on every PART.
+//! Each PART moves by an affine map, blended over the seams ([`Motions`]). These maps are the unknowns; gravity is the paper's F⁰, contact
+//! and friction are F¹, and the pull of the cloth is F². Cloth compressed within a PART wider than a fold is taken up by folds finer than
+//! the PART (`folding.rs`): a ring of a skirt falls as the skirt does, without the folds. Two methods find the equilibrium ([`Method`]):
+//!
+//! - **ADMM** (`admm.rs`) for PARTs wider than two folds: local and global steps with one constant factor on sampled elements, in
+//!   milliseconds;
+//! - **Newton's method** (`hessian.rs`, `mechanics::newton`) for narrower PARTs, which fold: the energy of [`energy`](super::energy) over all
+//!   vertices, with the vertices relaxed after each step, until the steps are short.
+//!
+//! Both end where Bᵀ∇E = 0: forces and moments balance on every PART.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -12,14 +17,13 @@
 //! | F⁰, F¹, F² | gravity, body reaction, pull of the neighbours | N |
 //! | B | from the unknowns to displacements of the vertices | – |
 //!
-//! Source: Luo, Jiang and Cong's two stages, with one displacement a PART generalised to an affine map, and "the force from the adjacent
-//! PARTs" to the energy of the cloth between them; springs or coarse triangles between PARTs were tried and left (see ARCHITECTURE.md).
-//!
-//! At the end no vertex is left inside the body: a vertex nearer than its offset moves along ∇q, again where another part of the body is then
+//! At the end no vertex is inside the body: a vertex nearer than its offset moves along ∇q, again where another part of the body is then
 //! too near.
 //!
-//! Limits: folds narrower than some two PARTs do not show. The relaxations move vertices beyond what the maps can, by as much as the seams
-//! were strained, and with fine PARTs farther: a result may be nearer to its rest than the best affine maps are.
+//! Source: Luo, Jiang and Cong's two stages, with one displacement a PART generalised to an affine map, and "the force from the adjacent
+//! PARTs" to the energy of the cloth between them. Limits: folds narrower than some two PARTs do not show. With ADMM, forces are sums over
+//! sampled elements. With Newton's method the relaxations move vertices beyond the span of the maps, so that a result can be nearer to its
+//! rest than the best affine maps.
 
 mod admm;
 mod elements;
@@ -181,10 +185,10 @@ pub(crate) fn solve_given(
 /// Share of the garment in PARTs that fold with their neighbours from which Newton's method solves them.
 const FOLDING_SHARE: f64 = 0.5;
 
-/// Whether these PARTs are solved by ADMM.
+/// Whether these PARTs are solved by ADMM. A garment laid flat is not: it has far to go, and its levels say little about where it will lie.
 pub(crate) fn splits(mesh: &TriMesh, parts: &Parts, cloth: &Cloth, method: Method) -> bool {
     match method {
-        Method::Auto => Folding::of(mesh, parts, cloth).share < FOLDING_SHARE,
+        Method::Auto => !folding::is_flat(mesh) && Folding::of(mesh, parts, cloth).share < FOLDING_SHARE,
         Method::Admm => true,
         Method::Newton => false,
     }
