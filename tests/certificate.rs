@@ -65,7 +65,7 @@ fn a_cloth_on_a_table_passes_every_line() {
     let (scene, x) = lying();
     let certificate = certified(&scene, &x);
     assert!(certificate.passes, "{:#?}", certificate.findings);
-    assert_eq!(certificate.findings.len(), 10);
+    assert_eq!(certificate.findings.len(), 11);
     let carried = &certificate.finding("forces add up").unwrap().remark;
     assert!(carried.contains("the body carries 100.0 %"), "{carried}");
 }
@@ -121,6 +121,7 @@ fn hanging(holds: impl Fn(DVec3) -> bool) -> (Scene, Vec<DVec3>) {
     let (mut scene, _) = lying();
     let upright = |x: &DVec3| DVec3::new(x.x, 0.0, x.y + 0.2);
     let x: Vec<DVec3> = scene.garment.positions.iter().map(upright).collect();
+    scene.garment = scene.garment.with_positions(x.clone());
     scene.held = (0u32..).zip(&x).filter(|(_, x)| holds(**x)).map(|(v, _)| v).collect();
     (scene, x)
 }
@@ -138,9 +139,11 @@ fn rests(scene: &Scene, start: &[DVec3], lasting: bool) -> Refined {
 #[test]
 fn a_strip_pressed_along_its_plane_stands_straight_until_it_is_looked_at() {
     let half = 0.5 * f64::from(SQUARES) * SIDE;
-    let (scene, flat) = hanging(|x| x.x.abs() > half - 1e-9);
+    let (mut scene, flat) = hanging(|x| x.x.abs() > half - 1e-9);
     let by = 0.05;
     let start: Vec<DVec3> = flat.iter().map(|x| DVec3::new(x.x * (1.0 - by), x.y, x.z)).collect();
+    // Placed with its held edges together, and cut as it was before: the rest shape stays.
+    scene.garment = scene.garment.with_positions(start.clone());
     let deepest = |x: &[DVec3]| x.iter().map(|x| x.y.abs()).fold(0.0, f64::max);
     let (straight, buckled) = (rests(&scene, &start, false), rests(&scene, &start, true));
     assert!(deepest(&straight.positions) < 1e-9, "{}", deepest(&straight.positions));
@@ -176,6 +179,31 @@ fn a_cloth_that_leans_by_half_a_degree_still_swings() {
     let swung = rests(&scene, &leaning, true);
     assert!(swung.steps > 0 && tip(&swung.positions) < 2e-4, "{} steps, {} m", swung.steps, tip(&swung.positions));
     assert!(certified(&scene, &swung.positions).passes);
+}
+
+/// A curtain that hangs from its upper edge passes where it was hung, and nowhere else.
+#[test]
+fn a_curtain_moved_as_a_whole_fails_by_its_held_edge() {
+    let top = 0.2 + 0.5 * f64::from(SQUARES) * SIDE;
+    let (scene, flat) = hanging(|x| x.z > top - 1e-9);
+    let hung = rests(&scene, &flat, true).positions;
+    assert!(certified(&scene, &hung).passes);
+    let turn = DMat3::from_rotation_z(40f64.to_radians());
+    let moves: [(&str, DMat3, DVec3); 4] = [
+        ("up", DMat3::IDENTITY, DVec3::Z * 0.3),
+        ("down", DMat3::IDENTITY, DVec3::Z * -0.1),
+        ("aside", DMat3::IDENTITY, DVec3::X * 0.1),
+        ("turned", turn, DVec3::ZERO),
+    ];
+    for (name, turn, by) in moves {
+        let moved: Vec<DVec3> = hung.iter().map(|x| turn * *x + by).collect();
+        let certificate = certified(&scene, &moved);
+        fails(&certificate, "held edges");
+        let others = certificate.findings.iter().filter(|f| !f.passes && f.name != "held edges").count();
+        assert_eq!(others, 0, "{name}: {:#?}", certificate.findings);
+        let remark = &certificate.finding("held edges").unwrap().remark;
+        assert!(remark.contains("of 9 held"), "{remark}");
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! certificate of a draped garment.
 
 use crate::mesh::health::{Health, health};
-use crate::scene::{Loaded, Placement};
+use crate::scene::Placement;
 use crate::study::certificate::{Certificate, CertifyError, certify};
 use crate::{Scene, SceneSpec};
 use clap::Args;
@@ -87,7 +87,7 @@ impl CheckArgs {
         let (body, garment) = (health(scene.body.mesh()), health(&scene.garment));
         let fit = Placement::new(&scene.garment, &scene.body);
         let verdict = verdict(&body, &garment, &fit);
-        let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, &loaded, draped)).transpose()?;
+        let certificate = self.certificate.as_ref().map(|draped| self.certify(&spec, draped)).transpose()?;
         let (certificate, notes) = (certificate.as_ref(), loaded.notes());
         if self.format == Format::Json {
             let mut report =
@@ -110,10 +110,12 @@ impl CheckArgs {
         require_pass(certificate)
     }
 
-    /// The certificate of a file with the vertices of the garment in the same order.
-    fn certify(&self, spec: &SceneSpec, loaded: &Loaded, draped: &str) -> anyhow::Result<Certificate> {
+    /// The certificate of a file with the faces of the garment in the same order.
+    fn certify(&self, spec: &SceneSpec, draped: &str) -> anyhow::Result<Certificate> {
+        // Held edges stay where `run` places them.
+        let placed = self.input.load(&SceneSpec { push_out: self.input.pushes_out(), ..spec.clone() })?;
         // An export is in the frame of the garment's file.
-        let frame = loaded.garment_frame();
+        let frame = placed.garment_frame();
         let spec = SceneSpec {
             garment: draped.to_owned(),
             garment_unit: frame.map(|frame| frame.unit).or(spec.garment_unit),
@@ -125,8 +127,21 @@ impl CheckArgs {
             fabrics_file: None,
             ..spec.clone()
         };
-        let positions = self.input.load(&spec)?.scene.garment.positions;
-        certify(&loaded.scene, &self.fabric.first()?, &positions).map_err(|error| match error {
+        let positions = placed.positions_in(&self.input.load(&spec)?)?;
+        let mut scene = placed.scene;
+        if !scene.held.is_empty() && positions == scene.garment.positions {
+            return Err(UserError(format!(
+                "{draped}: the held edges cannot be judged: found the positions of the garment itself, expected a drape of it; give \
+                 the garment as it was placed before the drape"
+            ))
+            .into());
+        }
+        // Held vertices that `run` releases at rest have moved if the garment stays up without them.
+        let moved = |&v: &u32| positions[v as usize] != scene.garment.positions[v as usize];
+        if scene.let_go && scene.held.iter().any(moved) {
+            scene.held.clear();
+        }
+        certify(&scene, &self.fabric.first()?, &positions).map_err(|error| match error {
             CertifyError::Count { .. } | CertifyError::NotFinite { .. } => {
                 UserError(format!("{draped}: {error}")).into()
             }

@@ -115,9 +115,14 @@ impl InputArgs {
             weld: self.weld,
             rest: self.rest.clone(),
             hold: self.hold.clone(),
-            push_out: !self.no_push_out,
+            push_out: self.pushes_out(),
             measurements: self.measurements.spec()?,
         })
+    }
+
+    /// Whether vertices that start inside the body are moved out of it.
+    pub(crate) fn pushes_out(&self) -> bool {
+        !self.no_push_out
     }
 
     /// The cache of built-in meshes.

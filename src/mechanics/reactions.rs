@@ -110,8 +110,12 @@ impl Forces {
         let (mut carried, mut insufficient) = (DVec3::ZERO, 0);
         let mut touches = vec![false; x.len()];
         for reaction in &reactions {
-            for (v, _) in &reaction.shares {
+            for (v, w) in &reaction.shares {
                 touches[*v as usize] = true;
+                // The hold bears what the contact puts on a held corner.
+                if cloth.held[*v as usize] {
+                    held -= reaction.force * *w;
+                }
             }
             if reaction.of_body {
                 carried += reaction.force;

@@ -272,15 +272,44 @@ impl Imported {
         if ours.faces.len() != theirs.faces.len() {
             return Err(differs(format!("{} faces, expected {}", theirs.faces.len(), ours.faces.len())));
         }
-        let vertices = |source: &ObjSource, face| source.corners_of(face).iter().map(|c| c.vertex).collect::<Vec<_>>();
+        // An export leaves out the vertices that no face uses, so vertices are compared by their rank among the others.
+        let ranks = [ours, theirs].map(|source| {
+            let used = source.used_vertices();
+            renumbered(used.len(), |v| used[v])
+        });
+        let vertices = |source: &ObjSource, face, rank: &[u32]| -> Vec<u32> {
+            source.corners_of(face).iter().map(|c| rank[c.vertex as usize]).collect()
+        };
         let mut pairs = ours.faces.iter().zip(&theirs.faces);
-        if let Some(i) = pairs.position(|(a, b)| vertices(ours, a) != vertices(theirs, b)) {
+        if let Some(i) = pairs.position(|(a, b)| vertices(ours, a, &ranks[0]) != vertices(theirs, b, &ranks[1])) {
             return Err(differs(format!("face {} has other vertices", i + 1)));
         }
         // The polygons agree. The triangles are those of `self`: another shape may cut its quads along other diagonals.
-        let place = |&v: &u32| other.mesh.positions.get(*other.mesh_vertex.get(v as usize)? as usize).copied();
+        let ranked: Vec<u32> =
+            other.mesh_vertex.iter().zip(&ranks[1]).filter(|(_, r)| **r != NONE).map(|(v, _)| *v).collect();
+        let place = |&v: &u32| other.mesh.positions.get(*ranked.get(ranks[0][v as usize] as usize)? as usize).copied();
         let positions: Option<Vec<DVec3>> = self.file_vertices().iter().map(place).collect();
         Ok(self.mesh.with_positions(positions.ok_or_else(|| differs("vertices are missing".to_owned()))?))
+    }
+
+    /// The positions (m) of the file's vertices, if its faces are these triangles of the mesh `name`, in this order.
+    ///
+    /// # Errors
+    /// [`MeshError::OtherTopology`] names the first face that differs.
+    pub(crate) fn positions_of(&self, triangles: &[[u32; 3]], name: &str) -> Result<Vec<DVec3>, MeshError> {
+        let source = &self.source;
+        let differs =
+            |difference| MeshError::OtherTopology { file: source.file.clone(), other: name.into(), difference };
+        if source.faces.len() != triangles.len() {
+            return Err(differs(format!("{} faces, expected {}", source.faces.len(), triangles.len())));
+        }
+        let same = |(face, triangle): (_, &[u32; 3])| source.corners_of(face).iter().map(|c| c.vertex).eq(*triangle);
+        if let Some(i) = source.faces.iter().zip(triangles).position(|pair| !same(pair)) {
+            return Err(differs(format!("face {} has other vertices", i + 1)));
+        }
+        let place = |&v: &u32| self.mesh.positions.get(v as usize).copied();
+        let positions: Option<Vec<DVec3>> = self.mesh_vertex.iter().map(place).collect();
+        positions.ok_or_else(|| differs("vertices are missing".to_owned()))
     }
 
     /// The mesh itself as rest shape. If `shut`, the triangles that bridge open seams get the size of the others.

@@ -84,6 +84,19 @@ impl Loaded {
         notes
     }
 
+    /// The positions (m) of this garment's vertices in `draped`, a file with the faces that [`write`](Self::write) gives it.
+    ///
+    /// # Errors
+    /// [`MeshError::OtherTopology`] names the first face that differs.
+    pub fn positions_in(&self, draped: &Self) -> Result<Vec<DVec3>, MeshError> {
+        let Some(theirs) = &draped.imported else { return Ok(draped.scene.garment.positions.clone()) };
+        match &self.imported {
+            // Triangles of the scene: its polygons may be cut along other diagonals in another shape.
+            Some(ours) => Ok(ours.in_the_shape_of(theirs)?.positions),
+            None => theirs.positions_of(&self.scene.garment.triangles, &self.garment_name),
+        }
+    }
+
     /// Writes the garment at `positions` (m) as glTF where the path ends in `.glb`, else as OBJ. In OBJ, a garment from a file
     /// keeps its faces, groups and texture coordinates; one of a pattern has its panels as groups and the flat pattern as
     /// texture coordinates.

@@ -92,7 +92,69 @@ fn an_exported_drape_is_certified_and_the_undraped_garment_is_not() {
     bench.write("other.obj", &sheet(11, 1.51));
     let other = certified("other.obj");
     let message = String::from_utf8_lossy(&other.stderr);
-    assert!(other.status.code() == Some(2) && message.contains("other.obj") && message.contains("169"), "{message}");
+    assert!(
+        other.status.code() == Some(2) && message.contains("other.obj") && message.contains("121 faces, expected 144"),
+        "{message}"
+    );
+    // Two faces replaced by others: the vertices and the number of faces stay the same.
+    let draped = fs::read_to_string(bench.path("draped.obj")).unwrap();
+    let faces: Vec<&str> = draped.lines().filter(|line| line.starts_with("f ")).collect();
+    for (out, by) in [(10, 40), (30, 90)] {
+        bench.write("faked.obj", &draped.replacen(faces[out], faces[by], 1));
+        let faked = certified("faked.obj");
+        let stderr = String::from_utf8_lossy(&faked.stderr);
+        let place = format!("face {} has other vertices", out + 1);
+        assert!(faked.status.code() == Some(2) && stderr.contains("faked.obj") && stderr.contains(&place), "{stderr}");
+    }
+}
+
+#[test]
+fn a_curtain_is_certified_where_it_was_hung_and_nowhere_else() {
+    let bench = Bench::new();
+    let curtain = || {
+        let mut obj = String::new();
+        for (i, j) in (0..9).flat_map(|j| (0..16).map(move |i| (i, j))) {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 16.0).sin_cos();
+            obj += &format!("v {} {} {}\n", 0.6 + 0.1 * cos, 0.1 * sin, 1.2 + 0.03 * f64::from(j));
+        }
+        for (i, j) in (0..8).flat_map(|j| (0..16).map(move |i| (i, j))) {
+            let [a, b] = [16 * j + i + 1, 16 * j + (i + 1) % 16 + 1];
+            obj += &format!("f {a} {b} {}\nf {a} {} {}\n", b + 16, b + 16, a + 16);
+        }
+        obj
+    };
+    bench.write("garment.obj", &curtain());
+    let hold = ["--hold", "top"];
+    json(&bench.drape(&[&hold[..], &["--no-save", "--export", "hung.obj", "--format", "json"]].concat()));
+    let hung = fs::read_to_string(bench.path("hung.obj")).unwrap();
+    let numbers = |line: &str| -> Vec<f64> { line.split(' ').skip(1).map(|n| n.parse().unwrap()).collect() };
+    let certified = |place: &dyn Fn([f64; 3]) -> [f64; 3]| {
+        let moved = hung.lines().map(|line| match line.starts_with("v ") {
+            true => {
+                let [x, y, z] = place(numbers(line).try_into().unwrap());
+                format!("v {x} {y} {z}\n")
+            }
+            false => format!("{line}\n"),
+        });
+        bench.write("moved.obj", &moved.collect::<String>());
+        let check = ["check", "body.obj", "garment.obj", "--unit", "m", "--up", "z", "--certificate", "moved.obj"];
+        bench.run(&[&check[..], &hold].concat())
+    };
+    let here = certified(&|p| p);
+    assert!(here.status.success(), "{}", String::from_utf8_lossy(&here.stdout));
+    let (sin, cos) = 40f64.to_radians().sin_cos();
+    let moves: [&dyn Fn([f64; 3]) -> [f64; 3]; 4] =
+        [&|[x, y, z]| [x, y, z + 0.3], &|[x, y, z]| [x, y, z - 0.4], &|[x, y, z]| [x + 0.1, y, z], &|[x, y, z]| {
+            [0.6 + (x - 0.6) * cos - y * sin, (x - 0.6) * sin + y * cos, z]
+        }];
+    for place in moves {
+        let there = certified(place);
+        let stdout = String::from_utf8_lossy(&there.stdout);
+        assert!(there.status.code() == Some(1) && stdout.contains("held edges"), "{stdout}");
+    }
+    // The same file as garment and as drape says nothing about where the edge was held.
+    let check = ["check", "body.obj", "moved.obj", "--unit", "m", "--up", "z", "--certificate", "moved.obj"];
+    bench.refuses(&[&check[..], &hold].concat(), &["moved.obj", "held edges cannot be judged"]);
 }
 
 #[test]

@@ -17,6 +17,9 @@
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
 //! | largest strain | principal strain of a triangle, % | `TORN_PERCENT`: more than fabrics bear |
+//! | held edges | largest distance of a held vertex from its placement, mm | digits of an exported file |
+//!
+//! A held vertex admits any reaction, so the forces cannot tell where it was held: the placement decides that.
 //!
 //! Limits: an admissible reaction need not be the one that the history left; the curvature keeps the contacts fixed.
 
@@ -53,6 +56,9 @@ const NEAR_REST_MM: f64 = 1.0;
 /// Least ω² of a stable equilibrium, 1/s². Modes between this value and zero need more than ten seconds to grow by a factor e and are
 /// not distinguishable from rounding.
 const LASTS: f64 = -1e-2;
+
+/// Largest distance of a held vertex from its placement, mm. Files written with two decimals of a centimetre pass.
+const HELD_MM: f64 = 0.1;
 
 /// Why a drape cannot be certified.
 #[derive(Debug, thiserror::Error)]
@@ -108,7 +114,7 @@ impl Certificate {
     }
 }
 
-/// Certifies the garment of `scene` with its vertices at `x` (m). Rest shape and held vertices are those of the scene.
+/// Certifies the garment of `scene` with its vertices at `x` (m). Rest shape, held vertices and their placement are those of the scene.
 ///
 /// # Errors
 /// [`CertifyError`] if the positions do not fit the scene or are not finite.
@@ -127,6 +133,7 @@ pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificat
     findings.extend(of_motion(&curvature));
     findings.extend(of_surfaces(scene, x));
     findings.push(of_strain(&cloth, x));
+    findings.push(of_held(scene, x));
     Ok(Certificate { passes: findings.iter().all(|f| f.passes), findings })
 }
 
@@ -213,4 +220,16 @@ fn of_strain(cloth: &Cloth, x: &[DVec3]) -> Finding {
     let (t, most) =
         strains.enumerate().fold((0, f64::NEG_INFINITY), |most, (t, s)| if s > most.1 { (t, s) } else { most });
     at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}", t + 1))
+}
+
+fn of_held(scene: &Scene, x: &[DVec3]) -> Finding {
+    let moved = |&v: &u32| (v, 1e3 * x[v as usize].distance(scene.garment.positions[v as usize]));
+    let moves = scene.held.iter().map(moved);
+    let (v, most) = moves.fold((0, 0.0), |most: (u32, f64), (v, mm)| if mm > most.1 { (v, mm) } else { most });
+    let remark = match scene.held.len() {
+        0 => "nothing is held".to_owned(),
+        held if most > HELD_MM => format!("vertex {} of {held} held is this far from its placement", v + 1),
+        held => format!("{held} vertices from their placement"),
+    };
+    at_most("held edges", most, "mm", HELD_MM, remark)
 }
