@@ -173,13 +173,16 @@ fn depths(scene: &Scene, ground: &Distances, x: &[DVec3]) -> Vec<f64> {
 }
 
 fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
-    let unsettled = asked == Refine::Converged && matches!(state.stop, Stop::Stalled | Stop::StepsDone);
-    unsettled.then(|| {
-        format!(
-            "the drape has not settled: after {} steps the residual is {:.1e} of the weight, expected under 1e-3",
-            state.steps, state.residual_over_weight
-        )
-    })
+    let reason = match state.stop {
+        Stop::Unsettled(criterion) => {
+            format!("it is not at rest by the criterion `{criterion}` (--certify shows its value)")
+        }
+        Stop::Stalled | Stop::StepsDone => {
+            format!("the residual is {:.1e} of the weight, expected under 1e-3", state.residual_over_weight)
+        }
+        Stop::Converged | Stop::Interrupted => return None,
+    };
+    (asked == Refine::Converged).then(|| format!("the drape has not settled: after {} steps {reason}", state.steps))
 }
 
 fn unassigned_warning(parts: &Parts) -> Vec<String> {

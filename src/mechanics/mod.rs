@@ -10,3 +10,4 @@ pub(crate) mod newton;
 pub mod paper;
 pub mod reactions;
 pub mod refine;
+pub mod rest;

@@ -31,10 +31,17 @@ const TOUCH_MARGIN_M: f64 = 2e-4;
 const PLACE_MARGIN_M: f64 = 5e-4;
 
 /// Most sweeps over all cones. Heuristic.
-const MAX_SWEEPS: usize = 3000;
+const MAX_SWEEPS: usize = 20_000;
 
 /// Total change of all reactions in a sweep, over the weight, that ends the iteration. Heuristic.
-const SWEEP_TOLERANCE: f64 = 1e-7;
+const SWEEP_TOLERANCE: f64 = 1e-9;
+
+/// Residual over weight that ends the iteration: a hundredth of the largest at rest.
+const BALANCED: f64 = 1e-5;
+
+/// Sweeps between two checks of the decrease, and the ratio of two residuals above which the iteration ends. Heuristic.
+const CHECK_INTERVAL: usize = 200;
+const MIN_DECREASE: f64 = 0.999;
 
 /// Share of μN below which a reaction sticks.
 const STICKING_SHARE: f64 = 0.999;
@@ -96,6 +103,11 @@ impl Forces {
     /// The forces of `cloth` on `body` at `x` (m).
     #[must_use]
     pub fn new(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Self {
+        Self::on(cloth, Some(body), x)
+    }
+
+    /// The same, without a body if there is none.
+    pub(crate) fn on(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Self {
         // The gradient of a cloth is zero at held vertices; their reactions are the gradient with nothing held.
         let mut free = cloth.clone();
         free.held = vec![false; x.len()];
@@ -132,13 +144,20 @@ impl Forces {
     }
 }
 
-/// Minimises the residual forces (N) over the reactions, by sweeps over their cones. One sweep suffices if no two share a vertex.
+/// Minimises the residual forces (N) over the reactions, by accelerated sweeps over their cones. One sweep suffices if no two share a vertex.
 fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cloth: &Cloth) {
+    let act = |shares: &[(u32, f64)], force: DVec3, residual_forces: &mut [DVec3]| {
+        for (v, w) in shares.iter().filter(|(v, _)| !cloth.held[*v as usize]) {
+            residual_forces[*v as usize] -= force * *w;
+        }
+    };
     for reaction in &*reactions {
-        let free = reaction.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
-        free.for_each(|(v, w)| residual_forces[*v as usize] -= reaction.force * *w);
+        act(&reaction.shares, reaction.force, residual_forces);
     }
-    for _ in 0..MAX_SWEEPS {
+    let mut before: Vec<DVec3> = reactions.iter().map(|reaction| reaction.force).collect();
+    let mut momentum = 1.0_f64;
+    let (mut last, mut at_check) = (f64::INFINITY, f64::INFINITY);
+    for sweep in 1..=MAX_SWEEPS {
         let mut changed = 0.0;
         for reaction in &mut *reactions {
             let free = || reaction.shares.iter().filter(|(v, _)| !cloth.held[*v as usize]);
@@ -149,14 +168,34 @@ fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cl
             let left: DVec3 = free().map(|(v, w)| residual_forces[*v as usize] * *w).sum();
             let force = project_on_cone(reaction.force + left / squares, reaction.normal, reaction.friction);
             let change = force - reaction.force;
-            for (v, w) in free() {
-                residual_forces[*v as usize] -= change * *w;
-            }
+            act(&reaction.shares, change, residual_forces);
             reaction.force = force;
             changed += change.length();
         }
-        if changed <= SWEEP_TOLERANCE * cloth.weight {
+        let residual = norm(residual_forces);
+        if changed <= SWEEP_TOLERANCE * cloth.weight || residual <= BALANCED * cloth.weight {
             break;
+        }
+        if sweep % CHECK_INTERVAL == 0 {
+            if residual > MIN_DECREASE * at_check {
+                break;
+            }
+            at_check = residual;
+        }
+        // Nesterov's momentum, restarted where the residual grows (O'Donoghue, Candès: "Adaptive restart for accelerated gradient
+        // schemes", 2015).
+        if residual > last {
+            momentum = 1.0;
+        }
+        last = residual;
+        let next = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum).sqrt());
+        let ahead = if sweep < MAX_SWEEPS { (momentum - 1.0) / next } else { 0.0 };
+        momentum = next;
+        for (reaction, before) in reactions.iter_mut().zip(&mut before) {
+            let further = (reaction.force - *before) * ahead;
+            *before = reaction.force;
+            reaction.force += further;
+            act(&reaction.shares, further, residual_forces);
         }
     }
     for reaction in reactions {
@@ -177,13 +216,27 @@ pub(crate) fn solve_remaining_reactions(
 ) {
     let mut pushed = vec![false; x.len()];
     contacts.touches().iter().for_each(|t| pushed[t.vertex as usize] = true);
-    let mut reactions = contacts_at(cloth, body, x);
+    let mut reactions = contacts_at(cloth, Some(body), x);
     reactions.retain(|r| !r.of_body || r.shares.len() > 1 || !pushed[r.shares[0].0 as usize]);
     solve_reactions(&mut reactions, residual_forces, cloth);
 }
 
 /// Contacts of the cloth with the body at `x`, then with itself, before their reactions are solved.
-fn contacts_at(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
+fn contacts_at(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Vec<Reaction> {
+    let mut all = body.map(|body| contacts_with_body(cloth, body, x)).unwrap_or_default();
+    let mut proximity = cloth.proximity();
+    proximity.refresh_with(x, Vec::new());
+    let gaps = proximity.gaps().filter(|gap| gap.depth(x) > -TOUCH_MARGIN_M);
+    // The force of the penalty is a good start.
+    all.extend(gaps.map(|gap| Reaction {
+        force: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
+        ..Reaction::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction), false)
+    }));
+    all
+}
+
+/// Contacts of the cloth with the body at `x`.
+fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
     let mut contacts = cloth.new_contacts(body).with_margin(TOUCH_MARGIN_M);
     contacts.update(x);
     let of_vertex = |t: &Touch| {
@@ -197,14 +250,6 @@ fn contacts_at(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
         let (stiffness, friction) = (contacts.stiffness() * mean(&cloth.areas), mean(&cloth.friction));
         all.push(Reaction::at(shares().filter(|(_, w)| *w > 0.0).collect(), place.normal, stiffness, friction, true));
     }
-    let mut proximity = cloth.proximity();
-    proximity.refresh_with(x, Vec::new());
-    let gaps = proximity.gaps().filter(|gap| gap.depth(x) > -TOUCH_MARGIN_M);
-    // The force of the penalty is a good start.
-    all.extend(gaps.map(|gap| Reaction {
-        force: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
-        ..Reaction::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction), false)
-    }));
     all
 }
 

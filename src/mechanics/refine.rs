@@ -143,8 +143,10 @@ pub struct Step<'a> {
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The residual is under the tolerance.
+    /// The residual is under the tolerance, and the cloth rests by every criterion of [`rest`](super::rest).
     Converged,
+    /// The residual is under the tolerance, but this criterion of rest keeps failing.
+    Unsettled(&'static str),
     /// The steps asked for are done.
     StepsDone,
     /// The observer said so.
@@ -247,6 +249,8 @@ fn settle(
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let mut rest_checks = 0;
+    // The criterion of rest that failed at the last check.
+    let mut failed = "";
     // The step at which the contact places changed, until the cloth has come to rest with them.
     let mut face_contacts_since: Option<usize> = None;
     let mut cycles = CycleDamping::default();
@@ -266,20 +270,22 @@ fn settle(
                         cycles.reset(&mut descent);
                         descent.damping = options.damping;
                     }
-                    FaceUpdate::Unchanged
-                        if !options.lasting || rest_checks == MAX_REST_CHECKS || iteration >= limit =>
-                    {
+                    FaceUpdate::Unchanged if !options.lasting || iteration >= limit => {
                         break Stop::Converged;
                     }
+                    FaceUpdate::Unchanged if rest_checks == MAX_REST_CHECKS => break Stop::Unsettled(failed),
                     FaceUpdate::Unchanged => {
                         rest_checks += 1;
                         if rest_checks == 1 && observer(&seen(&descent, iteration, true)).is_break() {
                             break Stop::Interrupted;
                         }
-                        match check_rest(&mut descent, &mut tangent, rest_checks > 1, RELAX_ITERATIONS)? {
-                            RestCheck::Stable => break Stop::Converged,
-                            RestCheck::Moving => {}
-                            RestCheck::Escaped => cycles.reset(&mut descent),
+                        match check_rest(&mut descent, rest_checks > 1, RELAX_ITERATIONS)? {
+                            RestCheck::Rests => break Stop::Converged,
+                            RestCheck::Fails(criterion) => failed = criterion.name,
+                            RestCheck::Escaped => {
+                                failed = "lowest curvature";
+                                cycles.reset(&mut descent);
+                            }
                         }
                         descent.damping = MIN_DAMPING;
                     }

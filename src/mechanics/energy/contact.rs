@@ -185,7 +185,8 @@ impl<'b> Contacts<'b> {
         &self.touches
     }
 
-    fn body(&self) -> Option<&'b Body> {
+    /// The body.
+    pub(crate) fn body(&self) -> Option<&'b Body> {
         match &self.obstacle {
             Obstacle::Nothing => None,
             Obstacle::Planes(body) => Some(body),

@@ -19,7 +19,8 @@ use glam::DVec3;
 use super::membrane::Triangle;
 use super::proximity::gap::{Gap, Key, Kind};
 use crate::body::distance::{Body, OUTWARD, SurfacePoint};
-use crate::mesh::{NONE, lattice};
+use crate::mesh::self_intersection::crossing_pairs;
+use crate::mesh::{NONE, TriMesh, lattice};
 
 /// Amount by which the offset of a place is raised at a time, m. Heuristic.
 const OFFSET_STEP_M: f64 = 3e-4;
@@ -100,8 +101,10 @@ pub(crate) struct TouchingPlace {
     pub(crate) normal: DVec3,
 }
 
-/// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. The distance to the body is Lipschitz
-/// with constant one, so the distances of the corners exclude most points without a query.
+/// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. Where the body rises between the points,
+/// the solver raises their offset until it no longer crosses the triangle: the points of a triangle that itself is within `margin` of its
+/// offset therefore touch from up to [`MAX_OFFSET_RAISE_M`] farther. The distance to the body is Lipschitz with constant one, so the
+/// distances of the corners exclude most points without a query.
 pub(crate) fn touching_places(
     triangles: &[Triangle],
     thickness: &[f64],
@@ -110,26 +113,59 @@ pub(crate) fn touching_places(
     margin: f64,
 ) -> Vec<TouchingPlace> {
     let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
-    let mut candidates: Vec<(&Triangle, [f64; 3], DVec3)> = Vec::new();
-    for t in triangles {
-        let reach = place_offset(thickness, t) + margin;
+    let reach = |t: &Triangle| place_offset(thickness, t) + margin;
+    let mut candidates: Vec<(usize, [f64; 3], DVec3)> = Vec::new();
+    for (number, t) in triangles.iter().enumerate() {
+        let farthest = reach(t) + MAX_OFFSET_RAISE_M;
         let corners = t.vertices.map(|v| x[v as usize]);
         let clear = |at: DVec3| {
-            t.vertices.iter().zip(corners).any(|(&v, corner)| distances[v as usize] - corner.distance(at) > reach)
+            t.vertices.iter().zip(corners).any(|(&v, corner)| distances[v as usize] - corner.distance(at) > farthest)
         };
-        let all = lattice::lattice(t.longest_side_m()).map(|shares| (t, shares, lattice::place(corners, shares)));
+        let all = lattice::lattice(t.longest_side_m()).map(|shares| (number, shares, lattice::place(corners, shares)));
         candidates.extend(all.filter(|(_, _, at)| !clear(*at)));
     }
     let found = body.nearest_all(&candidates.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
-    let touches = |((t, ..), nearest): &((&Triangle, _, _), SurfacePoint)| {
-        nearest.signed_distance < place_offset(thickness, t) + margin
+    let all: Vec<_> = candidates.iter().map(|(t, shares, _)| (*t, *shares)).zip(found).collect();
+    let near = near_triangles(triangles, body, x, &all, reach);
+    let touches = |((t, _), nearest): &((usize, _), SurfacePoint)| {
+        let raise = if near[*t] { MAX_OFFSET_RAISE_M } else { 0.0 };
+        nearest.signed_distance < reach(&triangles[*t]) + raise
     };
-    let place = |((t, shares, _), nearest): ((&Triangle, [f64; 3], _), SurfacePoint)| TouchingPlace {
-        corners: t.vertices,
+    let place = |((t, shares), nearest): ((usize, _), SurfacePoint)| TouchingPlace {
+        corners: triangles[t].vertices,
         shares,
         normal: nearest.normal,
     };
-    candidates.into_iter().zip(found).filter(touches).map(place).collect()
+    all.into_iter().filter(touches).map(place).collect()
+}
+
+/// Which triangles cross the body, or would if they were moved to it by their `reach` (m) from the deepest of these places.
+fn near_triangles(
+    triangles: &[Triangle],
+    body: &Body,
+    x: &[DVec3],
+    places: &[((usize, [f64; 3]), SurfacePoint)],
+    reach: impl Fn(&Triangle) -> f64,
+) -> Vec<bool> {
+    let mut moved = TriMesh::default();
+    let mut numbers = Vec::new();
+    for of_one in places.chunk_by(|((t, _), _), ((u, _), _)| t == u) {
+        let Some(((t, _), deepest)) =
+            of_one.iter().min_by(|(_, a), (_, b)| a.signed_distance.total_cmp(&b.signed_distance))
+        else {
+            continue;
+        };
+        let corners = triangles[*t].vertices.map(|v| x[v as usize]);
+        for by in [0.0, reach(&triangles[*t])] {
+            let first = moved.positions.len() as u32;
+            moved.positions.extend(corners.map(|corner| corner - deepest.normal * by));
+            moved.triangles.push([first, first + 1, first + 2]);
+            numbers.push(*t);
+        }
+    }
+    let mut near = vec![false; triangles.len()];
+    crossing_pairs(&moved, body.mesh()).iter().for_each(|[copy, _]| near[numbers[*copy as usize]] = true);
+    near
 }
 
 /// The contact places of a cloth, and the state of the updates so far.
@@ -230,7 +266,6 @@ impl FaceContacts {
 mod tests {
     use super::*;
     use crate::mechanics::energy::{Cloth, Contacts, FaceUpdate};
-    use crate::mesh::TriMesh;
     use crate::mesh::samples::cuboid;
 
     /// A box below z = 0 with this half width and half depth.

@@ -1,83 +1,60 @@
 //! Check of an equilibrium: does the next Newton step still move the cloth, and is there a direction in which the energy decreases?
 //!
 //! The residual is also small at a saddle point, and where cloth slides slowly along a flat direction; the projected Hessian of Newton's
-//! steps contains neither. An equilibrium is therefore checked before it is accepted. The projected Hessian with little damping gives the
-//! next step. Lanczos' method with its factor ([`curvature`](crate::mechanics::curvature)) gives the directions in which the energy decreases.
-//! The cloth moves along each of them to the side with the larger decrease, as long as the energy falls, and is relaxed. The next step costs a
-//! factorisation, the directions some twenty to forty solves with it: together one to two Newton steps.
+//! steps contains neither. An equilibrium is therefore judged before it is accepted, by the criteria of a certificate
+//! ([`rest`](crate::mechanics::rest)). Where the energy has unstable modes, the cloth moves along each of them to the side with the
+//! larger decrease, as long as the energy falls, and is relaxed. The next step costs a factorisation, the modes some forty solves with
+//! it: together one to two Newton steps.
 //!
-//! Limits: contacts are constant, so a direction that lifts cloth off the body is not found; after a few checks the state is accepted.
+//! Limits: contacts are constant, so a direction that lifts cloth off the body is not found.
 
 use glam::DVec3;
 
 use super::factor::SolveError;
-use super::full_space::FullSpace;
-use super::state::{NewtonState, State};
-use crate::mechanics::curvature::{HessianOperator, LANCZOS_DAMPING, LanczosOptions, MAX_LANCZOS_STEPS};
-use crate::mechanics::energy::{HessianKind, StepCheck};
-
-/// λ below which the cloth leaves an equilibrium: over a hundred times the rounding of single precision.
-const UNSTABLE_CURVATURE: f64 = -1e-3;
-
-/// A vertex counts as moving if the next Newton step would displace it by more than this, in m.
-const MOVING_M: f64 = 1e-3;
-
-/// Largest share of moving vertices in an equilibrium: four fifths of what a certificate allows.
-const MAX_MOVING_SHARE: f64 = 0.012;
+use super::state::NewtonState;
+use crate::mechanics::energy::StepCheck;
+use crate::mechanics::reactions::Forces;
+use crate::mechanics::rest::{Criterion, Linearised};
 
 /// Shortest and longest move of a vertex along an unstable direction, m: a wrinkle buckles by tenths of a millimetre, a skirt swings by
 /// centimetres.
 const ESCAPE_RANGE_M: [f64; 2] = [2e-5, 0.03];
 
 /// Result of a check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum RestCheck {
-    /// A minimum in which hardly anything moves.
-    Stable,
-    /// The next step still moves the cloth.
-    Moving,
+    /// Every criterion of rest passes.
+    Rests,
+    /// This criterion does not.
+    Fails(Criterion),
     /// The equilibrium was unstable, and the cloth has left it.
     Escaped,
 }
 
-/// Checks the equilibrium of `state`. Unstable directions are searched if the next step is small, or in any case if `always_search`. The
-/// cloth leaves an unstable equilibrium, with this many iterations of relaxation.
+/// Checks the equilibrium of `state`. Unstable modes are searched if all else passes, or in any case if `always_search`. The cloth leaves an
+/// unstable equilibrium, with this many iterations of relaxation.
 pub(crate) fn check_rest(
     state: &mut NewtonState<'_, '_>,
-    tangent: &mut FullSpace,
     always_search: bool,
     relaxing: usize,
 ) -> Result<RestCheck, SolveError> {
-    let here = State { damping: LANCZOS_DAMPING, ..state.state() };
-    tangent.couple(&here);
-    tangent.solve(&here, HessianKind::Projected)?;
-    let moving = tangent.unknowns.iter().filter(|d| d.length() > MOVING_M).count() as f64 / here.x.len() as f64;
-    let moves = moving > MAX_MOVING_SHARE;
-    if moves && !always_search {
-        return Ok(RestCheck::Moving);
+    let first_failed = |criteria: &[Criterion]| criteria.iter().find(|criterion| !criterion.passes).copied();
+    let forces = Forces::on(state.cloth, state.contacts.body(), &state.x);
+    let unbalanced = first_failed(&Criterion::of_forces(&forces, state.cloth));
+    if let Some(unbalanced) = unbalanced.filter(|_| !always_search) {
+        return Ok(RestCheck::Fails(unbalanced));
     }
-    let directions = unstable_directions(tangent, &here);
-    Ok(if escape(state, &directions, relaxing) {
-        RestCheck::Escaped
-    } else if moves {
-        RestCheck::Moving
-    } else {
-        RestCheck::Stable
-    })
-}
-
-/// Directions in which the energy decreases, by the factor of the last solve.
-fn unstable_directions(tangent: &mut FullSpace, here: &State<'_>) -> Vec<Vec<DVec3>> {
-    let State { cloth, x, contacts, .. } = *here;
-    let Some(mut solver) = tangent.solver.take() else { return Vec::new() };
-    let layout = tangent.layout(cloth);
-    let hessian = HessianOperator { cloth, layout, x, contacts: cloth.contact_blocks(layout, x, contacts) };
-    let options = LanczosOptions { max_steps: MAX_LANCZOS_STEPS, decisive: Some(UNSTABLE_CURVATURE) };
-    let ritz = hessian.lanczos(options, &mut solver);
-    let unstable = ritz.vectors.iter().zip(&ritz.values).filter(|(_, l)| **l < UNSTABLE_CURVATURE);
-    let directions = unstable.map(|(z, _)| hessian.scatter(z)).collect();
-    tangent.solver = Some(solver);
-    directions
+    let linearised = Linearised::new(state.cloth, &forces, &state.x)?;
+    let failed = unbalanced.or(first_failed(&Criterion::of_step(&linearised.step)));
+    if let Some(failed) = failed.filter(|_| !always_search) {
+        return Ok(RestCheck::Fails(failed));
+    }
+    let curvature = linearised.curvature();
+    let stable = Criterion::of_curvature(&curvature);
+    if !stable.passes && escape(state, &curvature.modes, relaxing) {
+        return Ok(RestCheck::Escaped);
+    }
+    Ok(failed.or(first_failed(&[stable])).map_or(RestCheck::Rests, RestCheck::Fails))
 }
 
 /// Moves along each of these directions; returns whether the energy decreased along one.

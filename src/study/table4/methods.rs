@@ -98,6 +98,7 @@ impl ComparedMethod {
             (_, Some(Stop::Interrupted)) => "interrupted",
             (Self::Converged, Some(Stop::Converged)) => "converged",
             (Self::Converged, Some(Stop::Stalled)) => "stalled",
+            (Self::Converged, Some(Stop::Unsettled(_))) => "unsettled",
             (Self::Converged, _) => "steps-done",
             _ => "two-stages",
         };

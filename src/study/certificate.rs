@@ -7,12 +7,7 @@
 //!
 //! | line | quantity | source of the limit |
 //! |---|---|---|
-//! | residual | ‖r‖₂ over the weight, r the unbalanced force | the solver's own tolerance |
-//! | forces add up | \|Σ reactions − weight\| over the weight | one percent |
-//! | friction | tangential force beyond μN, and pull towards the body, over the weight | the same |
-//! | still moving | share of vertices that the next Newton step moves by over a millimetre | GarmentCode's simulator calls 1.5 % static |
-//! | distance to rest | RMS of that step, mm | thickness of a garment's cloth |
-//! | lowest curvature | ω² of the softest mode, 1/s²: negative at an unstable equilibrium | rounding |
+//! | residual to lowest curvature | the six criteria of [`rest`](crate::mechanics::rest), by which the solver itself stops | there |
 //! | inside the body | vertices, by the exact distance | none |
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
@@ -23,39 +18,19 @@
 //!
 //! Limits: an admissible reaction need not be the one that the history left; the curvature keeps the contacts fixed.
 
-mod curvature;
-
 use glam::DVec3;
 use serde::Serialize;
 
 pub use crate::mechanics::reactions::Forces;
-pub use curvature::Curvature;
+pub use crate::mechanics::rest::Curvature;
 
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mechanics::fit::{TORN_PERCENT, principal_strain};
 use crate::mechanics::refine::SolveError;
+use crate::mechanics::rest::{Criterion, RestState};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::{Placement, Scene};
-
-/// Largest residual over weight at rest: [`RefineOptions::default`](crate::mechanics::refine::RefineOptions)'s tolerance.
-const REST: f64 = 1e-3;
-
-/// Largest difference of reactions and weight, over the weight. It exceeds [`REST`], because residual forces in one direction add up.
-const BALANCE: f64 = 1e-2;
-
-/// A vertex counts as moving if the next Newton step would displace it by more than this, m.
-const MOVES: f64 = 1e-3;
-
-/// Largest share of moving vertices: the limit of GarmentCode's simulator (2024) for a static garment.
-const STILL_MOVING: f64 = 0.015;
-
-/// Largest RMS of the next Newton step, mm: the thickness of a thick cloth.
-const NEAR_REST_MM: f64 = 1.0;
-
-/// Least ω² of a stable equilibrium, 1/s². Modes between this value and zero need more than ten seconds to grow by a factor e and are
-/// not distinguishable from rounding.
-const LASTS: f64 = -1e-2;
 
 /// Largest distance of a held vertex from its placement, mm. Files written with two decimals of a centimetre pass.
 const HELD_MM: f64 = 0.1;
@@ -127,10 +102,7 @@ pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificat
         return Err(CertifyError::NotFinite { vertex });
     }
     let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(fabric), &scene.held)?;
-    let forces = Forces::new(&cloth, &scene.body, x);
-    let curvature = Curvature::new(&cloth, &forces, x)?;
-    let mut findings = of_forces(&forces, &cloth).to_vec();
-    findings.extend(of_motion(&curvature));
+    let mut findings = of_rest(&RestState::new(&cloth, Some(&scene.body), x)?, &cloth).to_vec();
     findings.extend(of_surfaces(scene, x));
     findings.push(of_strain(&cloth, x));
     findings.push(of_held(scene, x));
@@ -142,21 +114,30 @@ fn at_most(name: &'static str, value: f64, unit: &'static str, limit: f64, remar
     Finding { name, value, unit, limit, passes: value <= limit, remark }
 }
 
-fn of_forces(forces: &Forces, cloth: &Cloth) -> [Finding; 3] {
+fn of_rest(rest: &RestState, cloth: &Cloth) -> [Finding; 6] {
+    let RestState { forces, curvature, criteria } = rest;
     let of_weight = |force: DVec3| 100.0 * force.z / cloth.weight;
-    let carried = format!(
-        "the body carries {:.1} % of {:.2} N, held edges {:.1} %",
-        of_weight(forces.carried),
-        cloth.weight,
-        of_weight(forces.held)
-    );
-    let friction =
-        format!("{} of {} touching vertices slip or are pulled", forces.insufficient, forces.reactions.len());
-    [
-        at_most("residual", forces.residual / cloth.weight, "of the weight", REST, worst(forces)),
-        at_most("forces add up", forces.unbalanced.length() / cloth.weight, "of the weight", BALANCE, carried),
-        at_most("friction", forces.touching_residual / cloth.weight, "of the weight", REST, friction),
-    ]
+    let longest = curvature.step.iter().map(|d| d.length()).fold(0.0, f64::max);
+    let mut remarks = [
+        worst(forces),
+        format!(
+            "the body carries {:.1} % of {:.2} N, held edges {:.1} %",
+            of_weight(forces.carried),
+            cloth.weight,
+            of_weight(forces.held)
+        ),
+        format!("{} of {} touching vertices slip or are pulled", forces.insufficient, forces.reactions.len()),
+        format!("by up to {:.2} mm", 1e3 * longest),
+        "RMS of the next Newton step".to_owned(),
+        match curvature.unstable_modes {
+            0 => "a minimum".to_owned(),
+            n => format!("{n} unstable modes, the softest about vertex {}", curvature.at + 1),
+        },
+    ];
+    std::array::from_fn(|i| {
+        let Criterion { name, value, unit, limit, passes } = criteria[i];
+        Finding { name, value, unit, limit, passes, remark: std::mem::take(&mut remarks[i]) }
+    })
 }
 
 /// Location of the largest unbalanced force.
@@ -168,35 +149,6 @@ fn worst(forces: &Forces) -> String {
         .enumerate()
         .fold((0, 0.0), |worst, (v, f)| if f > worst.1 { (v, f) } else { worst });
     format!("most at vertex {}, {:.2} mN", vertex + 1, 1e3 * force)
-}
-
-fn of_motion(curvature: &Curvature) -> [Finding; 3] {
-    let moves = curvature.step.iter().filter(|d| d.length() > MOVES).count() as f64;
-    let n = curvature.step.len().max(1) as f64;
-    let longest = curvature.step.iter().map(|d| d.length()).fold(0.0, f64::max);
-    let rms = (curvature.step.iter().map(|d| d.length_squared()).sum::<f64>() / n).sqrt();
-    let modes = match curvature.unstable_modes {
-        0 => "a minimum".to_owned(),
-        n => format!("{n} unstable modes, the softest about vertex {}", curvature.at + 1),
-    };
-    [
-        at_most(
-            "still moving",
-            moves / n,
-            "of the vertices",
-            STILL_MOVING,
-            format!("by up to {:.2} mm", 1e3 * longest),
-        ),
-        at_most("distance to rest", 1e3 * rms, "mm", NEAR_REST_MM, "RMS of the next Newton step".to_owned()),
-        Finding {
-            name: "lowest curvature",
-            value: curvature.lowest,
-            unit: "1/s²",
-            limit: LASTS,
-            passes: curvature.lowest >= LASTS,
-            remark: modes,
-        },
-    ]
 }
 
 fn of_surfaces(scene: &Scene, x: &[DVec3]) -> [Finding; 3] {
