@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 
 use fixtures::{Diagonals, closed, tube};
 use glam::DVec3;
-use partwise::Scene;
 use partwise::body::distance::Body;
 use partwise::drape::{self, Settings};
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::refine::Stop;
 use partwise::mesh::{RestShape, TriMesh};
 use partwise::study::certificate::{Certificate, certify};
+use partwise::{Scene, SceneSpec};
 
 /// Numbers in 0..1 by a seed: SplitMix64.
 struct Random(u64);
@@ -69,6 +69,15 @@ fn lathe(random: &mut Random) -> (TriMesh, impl Fn(f64) -> f64 + use<>) {
 /// A small garment about a body whose radius is known: a tube, a skirt that flares, or a cape that hangs from the shoulder.
 fn garment(random: &mut Random, radius: impl Fn(f64) -> f64) -> TriMesh {
     let (around, rings) = (random.count(8, 20), random.count(4, 10));
+    if random.share() < 0.25 {
+        // A cape, laid flat above the shoulder.
+        let (inner, outer) = (random.between(0.02, 0.05), random.between(0.1, 0.25));
+        let diagonals = random.of(&[Diagonals::Parallel, Diagonals::Alternating]);
+        return tube(around, rings, diagonals, |share, angle| {
+            let r = outer + share * (inner - outer);
+            DVec3::new(r * angle.cos(), r * angle.sin(), HEIGHT + 0.02)
+        });
+    }
     let high = random.between(0.45, 0.97) * HEIGHT;
     let low = high - random.between(0.08, 0.3);
     let (ease, flare) = (random.between(0.003, 0.03), random.of(&[0.0, 0.02, 0.06]));
@@ -99,9 +108,17 @@ impl Verdict {
     }
 }
 
+/// Built-in garments, small ones, on the dress form.
+const ON_THE_FORM: [&str; 4] = ["pullover-1", "flared-skirt", "low-cut-dress", "pullover-2"];
+
 fn scene(seed: u64) -> (Scene, Settings) {
     let mut random = Random(seed);
     let fabric = random.of(&["jersey", "interlock", "cotton", "denim"]);
+    if seed % 5 == 4 {
+        let garment = format!("{}@{}", random.of(&ON_THE_FORM), random.count(400, 700));
+        let scene = SceneSpec::new("form", garment).load().unwrap().scene;
+        return (scene, Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() });
+    }
     let (body, radius) = lathe(&mut random);
     let garment = garment(&mut random, radius);
     let rest = RestShape::from_edges(&garment).unwrap();
@@ -133,23 +150,21 @@ const REST: [&str; 6] =
 
 #[test]
 fn run_and_certificate_agree_on_random_garments() {
-    let count: u64 = std::env::var("PARTWISE_SAMPLES").map_or(12, |n| n.parse().unwrap());
+    let count: u64 = std::env::var("PARTWISE_SAMPLES").map_or(60, |n| n.parse().unwrap());
     let first: u64 = std::env::var("PARTWISE_FIRST").map_or(0, |n| n.parse().unwrap());
     let mut differ = String::new();
-    let (mut rest, mut differing) = (0, 0);
+    let (mut rest, mut unsettled, mut differing) = (0, 0, 0);
     for seed in first..first + count {
         let (scene, settings) = scene(seed);
         let verdict = judged(seed, &scene, &settings);
         let passes = verdict.certificate.findings.iter().filter(|f| REST.contains(&f.name)).all(|f| f.passes);
         rest += usize::from(verdict.rests);
-        if !matches!(verdict.stop, Stop::Converged) {
-            println!("{}", verdict.text());
-        }
+        unsettled += usize::from(!verdict.rests && verdict.stop != Stop::Interrupted);
         if verdict.rests != passes {
             differing += 1;
             let _ = writeln!(differ, "{}", verdict.text());
         }
     }
-    println!("{count} garments, {rest} rest, {differing} differ\n{differ}");
+    println!("{count} garments, {rest} rest, {unsettled} are warned of, {differing} differ\n{differ}");
     assert_eq!(differing, 0, "{differ}");
 }

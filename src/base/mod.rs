@@ -1,9 +1,10 @@
-//! Utilities that know no domain: error text, names of enum variants, checksums, files, quantiles, SIMD.
+//! Utilities that know no domain: error text, names of enum variants, checksums, files, quantiles, elementary functions, SIMD.
 
 pub mod atomic_file;
 pub mod checksum;
 pub mod error_text;
 pub mod files;
+pub(crate) mod math;
 pub mod quantiles;
 pub mod serde_name;
 pub(crate) mod simd;

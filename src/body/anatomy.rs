@@ -15,6 +15,8 @@ use super::jet::Jet;
 use super::measures::Measures;
 use super::solid::{Ellipsoid, Section, Sided, Solid, Sweep};
 
+use crate::base::math;
+
 /// Correction factor of each girth's radius, initially 1, in the order of [`girth_marks`](super::dress_form::girth_marks): bust,
 /// underbust, waist, hip, neck, thigh, knee, calf, ankle, biceps, wrist.
 pub(crate) type Factors = [f64; 11];
@@ -69,7 +71,7 @@ impl Anatomy {
         let (trunk, chest_front) = trunk(m, f);
         // Bust less underbust, relative to the 13 cm of the default body.
         let cup = ((m.bust - m.underbust) / 0.13).clamp(0.25, 2.2);
-        let (swell, protrusion) = (cup.powf(0.35), 0.031 * cup.powf(0.8));
+        let (swell, protrusion) = (math::powf(cup, 0.35), 0.031 * math::powf(cup, 0.8));
         let breast_radii = DVec3::new(0.062, 0.060, 0.070) * swell * (bust / 0.14).sqrt();
         let breast = Ellipsoid {
             centre: DVec3::new(0.50 * bust, breast_radii.y - chest_front - protrusion, m.bust_height),
@@ -212,7 +214,8 @@ fn neck(m: &Measures, f: &Factors) -> (Sweep, f64) {
     let k = m.scale();
     let r = radius(m.neck, f[4]);
     let lean: f64 = 0.24;
-    let axes = [DVec3::X, DVec3::new(0.0, lean.cos(), lean.sin()), DVec3::new(0.0, -lean.sin(), lean.cos())];
+    let (sin, cos) = math::sin_cos(lean);
+    let axes = [DVec3::X, DVec3::new(0.0, cos, sin), DVec3::new(0.0, -sin, cos)];
     let ring = |share: f64| [0.0, 0.0, 0.97 * share * r, 1.03 * share * r, 1.03 * share * r];
     let at = 0.073 * k;
     let stations = [
@@ -246,7 +249,7 @@ fn arm(m: &Measures, f: &Factors) -> (Sweep, f64, f64) {
     let k = m.scale();
     let [.., of_biceps, of_wrist] = *f;
     let (b, w) = (radius(m.biceps, of_biceps), radius(m.wrist, of_wrist));
-    let t = DVec3::new(ARM_ANGLE.sin(), -0.07, -ARM_ANGLE.cos()).normalize();
+    let t = DVec3::new(math::sin(ARM_ANGLE), -0.07, -math::cos(ARM_ANGLE)).normalize();
     let u = t.cross(DVec3::Y).normalize();
     let v = u.cross(t);
     let origin = DVec3::new(shoulder_half(m) - 0.012 * k, 0.022, m.acromion_height - 0.038 * k);

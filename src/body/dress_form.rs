@@ -17,6 +17,7 @@ use super::girth::{Plane, hull_length, loop_around};
 use super::measures::ShapeError;
 pub use super::measures::{BodySpec, Measures};
 use super::solid::{Solid, Sweep};
+use crate::base::math;
 use crate::mesh::TriMesh;
 use crate::mesh::remesh::{Density, Surface, remesh};
 
@@ -177,7 +178,7 @@ fn solid_girth(solid: &dyn Solid, plane: Plane, guess: f64) -> f64 {
     let [u, v] = plane.axes();
     let points = (0..RAYS)
         .map(|i| {
-            let (sin, cos) = (std::f64::consts::TAU * i as f64 / RAYS as f64).sin_cos();
+            let (sin, cos) = math::sin_cos(std::f64::consts::TAU * i as f64 / RAYS as f64);
             DVec2::new(cos, sin) * ray(solid, plane.origin, cos * u + sin * v, guess)
         })
         .collect();

@@ -7,6 +7,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use glam::DVec3;
 
+use crate::base::math;
+
 /// A scalar function's value and gradient at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jet {
@@ -42,7 +44,7 @@ impl Jet {
         if size < 1e-12 {
             return Self::constant(0.0);
         }
-        let value = size.powf(n);
+        let value = math::powf(size, n);
         Self { value, gradient: self.gradient * (n * value / self.value) }
     }
 

@@ -127,6 +127,7 @@ impl Made {
             warnings.push(format!("the garment {slides}"));
         }
         warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));
+        warnings.extend(state.as_ref().and_then(|_| crushed_warning(scene, &positions)));
         let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
@@ -183,6 +184,29 @@ fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
         Stop::Converged | Stop::Interrupted => return None,
     };
     (asked == Refine::Converged).then(|| format!("the drape has not settled: after {} steps {reason}", state.steps))
+}
+
+/// Share of its area at rest below which a garment at rest is crushed: folds finer than the mesh leave more than two thirds of it, and a
+/// fabric that no cloth has a quarter.
+const CRUSHED: f64 = 0.5;
+
+/// A warning about a garment that has lost its area. Triangles bear hardly any compression, as cloth buckles before it does; a bending
+/// stiffness that does not let it buckle then shortens the cloth instead of keeping it straight, at small forces.
+fn crushed_warning(scene: &Scene, positions: &[DVec3]) -> Option<String> {
+    let garment = scene.garment.with_positions(positions.to_vec());
+    let area = |t: usize| {
+        let [a, b, c] = garment.corners(t);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let whole: f64 = scene.rest.areas().into_iter().map(f64::abs).sum();
+    let share = (0..garment.triangles.len()).map(area).sum::<f64>() / whole;
+    (share < CRUSHED).then(|| {
+        format!(
+            "the cloth is crushed to {:.0} % of its area: its fabric is too stiff in bending for its weight and its mesh; check `bending_nm`, \
+             in N·m (woven cotton has 1e-5), or take a coarser mesh",
+            1e2 * share
+        )
+    })
 }
 
 fn unassigned_warning(parts: &Parts) -> Vec<String> {

@@ -18,11 +18,10 @@
 //! Source: Lanczos' method for a pencil (Parlett: "The Symmetric Eigenvalue Problem", chapter 15), with full reorthogonalisation. Limits:
 //! contacts are constant, so a direction that lifts cloth off the body is not found; λ is an upper bound after the given number of steps.
 
-use faer::{Mat, Side};
 use glam::DVec3;
 
 use super::energy::{Cloth, ContactBlock, Contacts, HessianLayout, Scratch};
-use super::linear_algebra::{Basis, dot_flat};
+use super::linear_algebra::{Basis, dot_flat, symmetric_eigen};
 use super::newton::Solver;
 
 /// Steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ later.
@@ -40,24 +39,6 @@ pub(crate) const NEGATIVE_CURVATURE: f64 = -1e-6;
 /// Ratio of the norm of a Lanczos vector after orthogonalisation to that before below which it is rounding in single precision: the space is
 /// exhausted.
 const EXHAUSTED: f64 = 1e-6;
-
-/// Steps between two checks of the smallest λ.
-const CHECK_INTERVAL: usize = 4;
-
-/// Relative change of the smallest λ that ends a search if λ is decisive: a direction of descent need not be accurate.
-const DECISIVE_CHANGE: f64 = 0.05;
-
-/// The same if λ is not decisive. In about twenty searches, no λ that had changed by less than 0.01 became decisive later.
-const INDECISIVE_CHANGE: f64 = 0.01;
-
-/// When to end a search.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LanczosOptions {
-    /// Most steps.
-    pub(crate) max_steps: usize,
-    /// λ below which the equilibrium is unstable. If given, the search ends once it is settled on which side of it the smallest λ lies.
-    pub(crate) decisive: Option<f64>,
-}
 
 /// H over the free vertices in elimination order.
 pub(crate) struct HessianOperator<'a> {
@@ -113,18 +94,20 @@ impl HessianOperator<'_> {
     }
 
     /// Lanczos' method with the factor in `solver`; a step costs a solve and two gradients.
-    pub(crate) fn lanczos(&self, options: LanczosOptions, solver: &mut Solver) -> Ritz {
+    pub(crate) fn lanczos(&self, max_steps: usize, solver: &mut Solver) -> Ritz {
         let n = self.layout.order.len();
         let mut basis = Basis::default();
         let mut scratch = Scratch::default();
-        let mut matrix = Mat::<f64>::zeros(options.max_steps.min(3 * n), options.max_steps.min(3 * n));
+        let size = max_steps.min(3 * n);
+        // Row by row.
+        let mut matrix = vec![0.0; size * size];
         // A start without symmetry, the same on every machine: multiples of the golden section.
         let start = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let begin: Vec<DVec3> =
             (0..n).map(|i| DVec3::new(start(3 * i + 1), start(3 * i + 2), start(3 * i + 3))).collect();
         let mut y = solver.lower(&begin);
-        let (mut steps, mut before) = (0, 0.0);
-        while steps < matrix.nrows() {
+        let mut steps = 0;
+        while steps < size {
             let norm_before = dot_flat(&y, &y).sqrt();
             // First against the last two vectors, which suffices in exact arithmetic; then against all, for rounding.
             for first in [steps.saturating_sub(2), 0] {
@@ -141,30 +124,15 @@ impl HessianOperator<'_> {
             basis.push(std::mem::replace(&mut y, solver.lower(&product)));
             // The whole row instead of its two entries: H comes from differences and is only nearly symmetric.
             for (j, value) in basis.transposed_times(0, &y).into_iter().enumerate() {
-                matrix[(steps, j)] = value;
-                matrix[(j, steps)] = value;
+                matrix[steps * size + j] = value;
+                matrix[j * size + steps] = value;
             }
             steps += 1;
-            if steps % CHECK_INTERVAL == 0 {
-                let small = matrix.submatrix(0, 0, steps, steps).to_owned();
-                let smallest = small.self_adjoint_eigenvalues(Side::Lower).map_or(0.0, |values| values[0]);
-                let limit = |decisive| if smallest < decisive { DECISIVE_CHANGE } else { INDECISIVE_CHANGE };
-                if options.decisive.is_some_and(|d| (smallest - before).abs() < limit(d) * before.abs()) {
-                    break;
-                }
-                before = smallest;
-            }
         }
-        let small = matrix.submatrix(0, 0, steps, steps).to_owned();
-        let Ok(eigen) = small.self_adjoint_eigen(Side::Lower) else {
-            return Ritz { values: Vec::new(), vectors: vec![vec![DVec3::ZERO; n]] };
-        };
-        let values: Vec<f64> = (0..steps).map(|i| eigen.S()[i]).collect();
+        let small: Vec<f64> = (0..steps).flat_map(|i| matrix[i * size..][..steps].iter().copied()).collect();
+        let (values, shares) = symmetric_eigen(small, steps);
         let wanted = values.iter().filter(|l| **l < NEGATIVE_CURVATURE).count().max(1);
-        let vector = |k: usize| {
-            let shares: Vec<f64> = (0..steps).map(|i| eigen.U()[(i, k)]).collect();
-            if k < steps { solver.upper(&basis.times(&shares)) } else { vec![DVec3::ZERO; n] }
-        };
+        let vector = |k: usize| shares.get(k).map_or(vec![DVec3::ZERO; n], |shares| solver.upper(&basis.times(shares)));
         let vectors = (0..wanted).map(vector).collect();
         Ritz { values, vectors }
     }

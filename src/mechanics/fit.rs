@@ -16,6 +16,7 @@
 use glam::DVec3;
 
 use super::energy::{Cloth, Contacts};
+use crate::base::math;
 use crate::base::quantiles::nearest_rank;
 
 /// Principal strain above which a result is not a wearable garment, %: more than fabrics bear.
@@ -70,7 +71,7 @@ pub fn fit(cloth: &Cloth, mut contacts: Contacts<'_>, x: &[DVec3], contact_stiff
 /// Largest singular value of the deformation gradient with these columns, minus one.
 pub(crate) fn principal_strain([fu, fv]: [DVec3; 2]) -> f64 {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
-    (0.5 * (a + b) + (0.5 * (a - b)).hypot(c)).sqrt() - 1.0
+    (0.5 * (a + b) + math::hypot(0.5 * (a - b), c)).sqrt() - 1.0
 }
 
 #[cfg(test)]

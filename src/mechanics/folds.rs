@@ -18,6 +18,7 @@ use glam::{DMat3, DVec3};
 
 use super::energy::Cloth;
 use super::linear_algebra::eigen;
+use crate::base::math;
 use crate::mesh::outer;
 
 /// Excess length per vertex.
@@ -56,10 +57,10 @@ pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
 /// 1 − σ₂, at least zero, and its unit direction in space.
 fn excess([fu, fv]: [DVec3; 2]) -> (f64, DVec3) {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
-    let least = (0.5 * (a + b) - (0.5 * (a - b)).hypot(c)).max(0.0);
+    let least = (0.5 * (a + b) - math::hypot(0.5 * (a - b), c)).max(0.0);
     let excess = (1.0 - least.sqrt()).max(0.0);
     // (C − σ₂²) v₂ = 0 for C = [[a, c], [c, b]]; the longer of the two rows is better conditioned.
-    let (p, q) = if (a - least).hypot(c) >= c.hypot(b - least) { (-c, a - least) } else { (b - least, -c) };
+    let (p, q) = if math::hypot(a - least, c) >= math::hypot(c, b - least) { (-c, a - least) } else { (b - least, -c) };
     let across = (fu * p + fv * q).normalize_or_zero();
     // Equal compression in every direction, or compression to zero: the weft.
     (excess, if across == DVec3::ZERO { fu.normalize_or_zero() } else { across })

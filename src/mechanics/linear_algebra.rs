@@ -1,4 +1,4 @@
-//! Small linear algebra of the solvers: products of vectors, a dense basis, and the eigenvalues of 3×3 matrices.
+//! Small linear algebra of the solvers: products of vectors, a dense basis, and the eigenvalues of small symmetric matrices.
 //!
 //! A [`Basis`] stores the vectors of a method with full orthogonalisation. Its products Vᵀ w and w − V s pass over memory once: a chunk of w
 //! stays in the nearest cache, and chunks are divided among the threads. The chunks do not depend on the number of threads, and sums are
@@ -6,6 +6,14 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+
+use crate::base::math;
+
+/// Most sweeps of Jacobi rotations: twice the most observed for 40 rows.
+const MAX_JACOBI_SWEEPS: usize = 20;
+
+/// Ratio of the squares off the diagonal to those on it at which they are rounding.
+const JACOBI_TOLERANCE: f64 = 1e-28;
 
 /// Numbers in a chunk: 24 kB of w.
 const CHUNK: usize = 3072;
@@ -83,8 +91,8 @@ pub(crate) fn eigen(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
                 continue;
             }
             let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = t.hypot(1.0).recip();
+            let t = theta.signum() / (theta.abs() + math::hypot(theta, 1.0));
+            let c = math::hypot(t, 1.0).recip();
             let s = t * c;
             for row in &mut m {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
@@ -96,6 +104,42 @@ pub(crate) fn eigen(m: DMat3) -> ([f64; 3], [DVec3; 3]) {
         }
     }
     ([m[0][0], m[1][1], m[2][2]], v)
+}
+
+/// Eigenvalues, ascending, and unit eigenvectors of a symmetric matrix of `n` rows by cyclic Jacobi rotations (Golub, Van Loan: "Matrix
+/// Computations", 8.5).
+pub(super) fn symmetric_eigen(mut m: Vec<f64>, n: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+    // Row k of `v` is the k-th eigenvector.
+    let mut v: Vec<f64> = (0..n * n).map(|at| if at / n == at % n { 1.0 } else { 0.0 }).collect();
+    for _ in 0..MAX_JACOBI_SWEEPS {
+        let squares = |on: bool| (0..n * n).filter(|at| (at / n == at % n) == on).map(|at| m[at] * m[at]).sum::<f64>();
+        if squares(false) <= JACOBI_TOLERANCE * squares(true) {
+            break;
+        }
+        for (p, q) in (0..n).flat_map(|p| (p + 1..n).map(move |q| (p, q))) {
+            let off = m[p * n + q];
+            if off == 0.0 {
+                continue;
+            }
+            let theta = (m[q * n + q] - m[p * n + p]) / (2.0 * off);
+            let t = theta.signum() / (theta.abs() + math::hypot(theta, 1.0));
+            let c = math::hypot(t, 1.0).recip();
+            let s = t * c;
+            for k in 0..n {
+                let (a, b) = (m[k * n + p], m[k * n + q]);
+                (m[k * n + p], m[k * n + q]) = (c * a - s * b, s * a + c * b);
+            }
+            for of in [&mut m, &mut v] {
+                for k in 0..n {
+                    let (a, b) = (of[p * n + k], of[q * n + k]);
+                    (of[p * n + k], of[q * n + k]) = (c * a - s * b, s * a + c * b);
+                }
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| m[a * n + a].total_cmp(&m[b * n + b]));
+    (order.iter().map(|k| m[k * n + k]).collect(), order.iter().map(|k| v[k * n..][..n].to_vec()).collect())
 }
 
 #[cfg(test)]
@@ -138,5 +182,29 @@ mod tests {
             sum + outer(v, v) * values[k]
         });
         assert!((rebuilt - m).to_cols_array().iter().all(|d| d.abs() < 1e-12), "{rebuilt}");
+    }
+
+    #[test]
+    fn eigenvalues_of_a_chain_are_those_of_the_closed_form() {
+        // 2 on the diagonal, −1 beside it: 2 − 2 cos(k π / (n + 1)).
+        let n = 40;
+        let at = |i: usize, j: usize| {
+            if i == j {
+                2.0
+            } else if i.abs_diff(j) == 1 {
+                -1.0
+            } else {
+                0.0
+            }
+        };
+        let m: Vec<f64> = (0..n * n).map(|k| at(k / n, k % n)).collect();
+        let (values, vectors) = symmetric_eigen(m, n);
+        for (k, (value, vector)) in values.iter().zip(&vectors).enumerate() {
+            let exact = 2.0 - 2.0 * ((k + 1) as f64 * std::f64::consts::PI / (n + 1) as f64).cos();
+            assert!((value - exact).abs() < 1e-12, "{k}: {value} and {exact}");
+            let product = |i: usize| (0..n).map(|j| at(i, j) * vector[j]).sum::<f64>();
+            assert!((0..n).all(|i| (product(i) - value * vector[i]).abs() < 1e-12));
+        }
+        assert_eq!(symmetric_eigen(Vec::new(), 0), (Vec::new(), Vec::new()));
     }
 }

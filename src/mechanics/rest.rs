@@ -28,7 +28,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::curvature::{HessianOperator, LANCZOS_DAMPING, LanczosOptions, MAX_LANCZOS_STEPS, NEGATIVE_CURVATURE};
+use super::curvature::{HessianOperator, LANCZOS_DAMPING, MAX_LANCZOS_STEPS, NEGATIVE_CURVATURE};
 use super::energy::friction::ELASTIC_SLIP;
 use super::energy::membrane::outer;
 use super::energy::{Cloth, ContactBlock, Contacts, HessianKind, HessianLayout, Scratch};
@@ -167,7 +167,7 @@ impl<'a> Linearised<'a> {
     pub(crate) fn curvature(self) -> Curvature {
         let Self { cloth, x, layout, contacts, mut solver, step } = self;
         let hessian = HessianOperator { cloth, layout: &layout, x, contacts };
-        let ritz = hessian.lanczos(LanczosOptions { max_steps: MAX_LANCZOS_STEPS, decisive: None }, &mut solver);
+        let ritz = hessian.lanczos(MAX_LANCZOS_STEPS, &mut solver);
         let softest = &ritz.vectors[0];
         let turned = hessian.apply(softest, &mut Scratch::default());
         let mass: f64 =
@@ -205,10 +205,5 @@ impl RestState {
         let [moving, distance] = Criterion::of_step(&curvature.step);
         let lowest = Criterion::of_curvature(&curvature);
         Ok(Self { forces, curvature, criteria: [residual, balance, friction, moving, distance, lowest] })
-    }
-
-    /// The first criterion that fails.
-    pub(crate) fn failed(&self) -> Option<&Criterion> {
-        self.criteria.iter().find(|criterion| !criterion.passes)
     }
 }

@@ -42,6 +42,8 @@ use rayon::prelude::*;
 use super::half_edge::{HalfEdgeMesh, flip_to_delaunay, previous};
 use super::{Csr, NONE, RestShape, Topology, TriMesh, each_once, outer, renumbered};
 
+use crate::base::math;
+
 /// A triangle stretched or compressed by more than this factor in any direction is not undraped cloth. A heuristic.
 const MAX_STRETCH: f64 = 3.0;
 
@@ -239,8 +241,8 @@ fn rest_shape(
             }
             let area: f64 = over[t].iter().map(|&f| maps[f as usize].area).sum();
             let stretch = root(square * area.recip());
-            let half = 0.5 * warp.y.atan2(warp.x);
-            let along = (stretch * DVec2::from_angle(half)).try_normalize()?;
+            let half = 0.5 * math::atan2(warp.y, warp.x);
+            let along = (stretch * math::unit(half)).try_normalize()?;
             // Turns `along` onto y.
             let turn = DMat2::from_cols(DVec2::new(along.y, along.x), DVec2::new(-along.x, along.y));
             Some([a, b, c].map(|p| turn * stretch * DVec2::new((p - a).dot(x), (p - a).dot(y))))

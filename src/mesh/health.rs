@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::self_intersection::self_intersecting_pairs;
 use super::{Topology, TriMesh, winding};
+use crate::base::math;
 use crate::base::quantiles::Percentiles;
 
 /// A triangle lower than this share of its longest edge counts as without area: with coordinates of seven digits its normal
@@ -102,7 +103,7 @@ fn min_angle(mesh: &TriMesh, t: usize) -> f64 {
     let angle = |k: usize| {
         let (a, b) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
         // The tangent is accurate near zero, where the cosine is not.
-        a.cross(b).length().atan2(a.dot(b)).to_degrees()
+        math::atan2(a.cross(b).length(), a.dot(b)).to_degrees()
     };
     angle(0).min(angle(1)).min(angle(2))
 }

@@ -16,6 +16,8 @@ use glam::{DVec2, DVec3};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 
+use crate::base::math;
+
 /// Largest number of corners for ear clipping. Modelled faces have fewer; ear clipping of 5,000 corners took 25 s.
 const MAX_EAR_CORNERS: usize = 32;
 
@@ -132,7 +134,7 @@ fn smallest_angle(t: [DVec2; 3]) -> f64 {
     (0..3)
         .map(|k| {
             let (a, b) = (t[(k + 1) % 3] - t[k], t[(k + 2) % 3] - t[k]);
-            a.perp_dot(b).abs().atan2(a.dot(b))
+            math::atan2(a.perp_dot(b).abs(), a.dot(b))
         })
         .fold(f64::INFINITY, f64::min)
 }

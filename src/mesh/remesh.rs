@@ -26,6 +26,8 @@ use super::half_edge::{HalfEdgeMesh, flip_by_valence, flip_to_delaunay, previous
 use super::morton::mesh_along_a_curve;
 use super::{NONE, TriMesh};
 
+use crate::base::math;
+
 /// The surface that is meshed.
 pub(crate) trait Surface: Sync {
     /// The point of the surface near `p`, m; for a `tag` above 0 the point of that cut's edge near it.
@@ -75,7 +77,7 @@ pub(crate) fn remesh(
         Density::Vertices(count) => (2.0 * area / (3f64.sqrt() * count as f64)).sqrt(),
     };
     let start = (area / (work.vertex_count() as f64)).sqrt();
-    let refining = (start / edge).log2().ceil().max(0.0) as usize;
+    let refining = math::log2(start / edge).ceil().max(0.0) as usize;
     for _ in 0..FIRST_ROUNDS + refining {
         round(&mut work, surface, edge);
     }

@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use crate::base::math;
 use crate::drape::{Drape, Scene, Settings};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
@@ -172,7 +173,8 @@ pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
     let mut vector = || DVec3::new(random(), random(), random());
     let waves: [(DVec3, DVec3, DVec3); WAVES] =
         std::array::from_fn(|_| (WAVE_NUMBER * vector(), std::f64::consts::PI * vector(), vector()));
-    let field = |p: DVec3| -> DVec3 { waves.iter().map(|(k, phase, along)| *along * (k.dot(p) + phase.x).sin()).sum() };
+    let field =
+        |p: DVec3| -> DVec3 { waves.iter().map(|(k, phase, along)| *along * math::sin(k.dot(p) + phase.x)).sum() };
     let moves: Vec<DVec3> = positions.iter().map(|&p| field(p)).collect();
     let rms = (moves.iter().map(|m| m.length_squared()).sum::<f64>() / moves.len().max(1) as f64).sqrt();
     let mut moved: Vec<DVec3> =

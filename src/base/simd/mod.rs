@@ -1,4 +1,4 @@
-//! Four doubles at a time, in AVX2 registers where the processor has them, with the same bits on every machine.
+//! Four doubles at a time, in AVX2 registers where the processor has them, with the same bits on every x86-64.
 //!
 //! A plain x86-64 build may assume SSE2 only, which has two lanes. Hot loops are therefore written once over [`Lanes`], and [`run`]
 //! selects the implementation at run time: AVX2 ([`V3`](pulp::x86::V3)) or arrays. Both do the same operations in the same order,
@@ -10,6 +10,8 @@
 mod avx2;
 
 use std::ops::{Add, Div, Mul, Sub};
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Four doubles as one register holds them: four scalars, or a vector and a zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -24,6 +26,8 @@ impl Four {
 pub(crate) trait Lanes: Copy {
     /// Its register type.
     type Register: Copy;
+    /// The same for eight numbers of single precision.
+    type Singles: Copy;
 
     fn load(self, four: &Four) -> Self::Register;
     fn store(self, a: Self::Register) -> Four;
@@ -53,6 +57,12 @@ pub(crate) trait Lanes: Copy {
     fn low_high(self, a: Self::Register, b: Self::Register) -> Self::Register;
     /// [a₂ a₃ b₀ b₁].
     fn high_low(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn load_singles(self, all: [f32; 8]) -> Self::Singles;
+    fn store_singles(self, a: Self::Singles) -> [f32; 8];
+    fn splat_single(self, a: f32) -> Self::Singles;
+    fn add_singles(self, a: Self::Singles, b: Self::Singles) -> Self::Singles;
+    fn sub_singles(self, a: Self::Singles, b: Self::Singles) -> Self::Singles;
+    fn mul_singles(self, a: Self::Singles, b: Self::Singles) -> Self::Singles;
 }
 
 /// [`Lanes`] as plain arrays, for processors without AVX2.
@@ -60,9 +70,9 @@ pub(crate) trait Lanes: Copy {
 struct Arrays;
 
 macro_rules! lanewise {
-    ($($function:ident $operator:tt)*) => {
+    ($type:ty: $($function:ident $operator:tt)*) => {
         $(#[inline(always)]
-        fn $function(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        fn $function(self, a: $type, b: $type) -> $type {
             std::array::from_fn(|i| a[i] $operator b[i])
         })*
     };
@@ -81,10 +91,27 @@ macro_rules! shuffles {
 
 impl Lanes for Arrays {
     type Register = [f64; 4];
+    type Singles = [f32; 8];
 
-    lanewise!(add + sub - mul * div /);
+    lanewise!([f64; 4]: add + sub - mul * div /);
+    lanewise!([f32; 8]: add_singles + sub_singles - mul_singles *);
     shuffles!(even 0 4 2 6 odd 1 5 3 7 mixed 0 5 2 7 crossed 1 4 3 6);
     shuffles!(low 0 1 4 5 high 2 3 6 7 low_high 0 1 6 7 high_low 2 3 4 5);
+
+    #[inline(always)]
+    fn load_singles(self, all: [f32; 8]) -> [f32; 8] {
+        all
+    }
+
+    #[inline(always)]
+    fn store_singles(self, a: [f32; 8]) -> [f32; 8] {
+        a
+    }
+
+    #[inline(always)]
+    fn splat_single(self, a: f32) -> [f32; 8] {
+        [a; 8]
+    }
 
     #[inline(always)]
     fn load(self, four: &Four) -> [f64; 4] {
@@ -126,10 +153,25 @@ pub(crate) trait Work {
     fn with<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
+/// Environment variable that selects the arrays on any processor, to compare their bits with those of the registers.
+const PORTABLE: &str = "PARTWISE_PORTABLE";
+
+/// Whether the arrays are selected.
+static IS_PORTABLE: LazyLock<AtomicBool> = LazyLock::new(|| AtomicBool::new(std::env::var_os(PORTABLE).is_some()));
+
+/// Does `work` with the arrays selected in all threads: for tests, whose results do not depend on it.
+#[cfg(test)]
+pub(crate) fn portable<R>(work: impl FnOnce() -> R) -> R {
+    IS_PORTABLE.store(true, Ordering::Relaxed);
+    let done = work();
+    IS_PORTABLE.store(false, Ordering::Relaxed);
+    done
+}
+
 /// Runs `work` in the widest lanes of this processor.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
-    if let Some(v3) = pulp::x86::V3::try_new() {
+    if let Some(v3) = pulp::x86::V3::try_new().filter(|_| !IS_PORTABLE.load(Ordering::Relaxed)) {
         return v3.vectorize(Avx2 { v3, work });
     }
     work.with(Arrays)

@@ -130,7 +130,7 @@ impl Body {
         let (component, components) = topology.components();
         let volume: f64 = signed_volumes(mesh, &component, components).iter().map(|v| v.abs()).sum();
         let area: f64 = mesh.triangle_areas().iter().sum();
-        if !mesh.triangles.is_empty() && volume <= MIN_VOLUME_RATIO * area.powf(1.5) {
+        if !mesh.triangles.is_empty() && volume <= MIN_VOLUME_RATIO * area * area.sqrt() {
             return Err(DistanceError::Flat { area_m2: area, litres: 1e3 * volume });
         }
         Self::new_open(mesh)

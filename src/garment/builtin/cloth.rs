@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::spec::{GarmentSpec, Sleeves, Support};
+use crate::base::math;
 use crate::body::anatomy::{Anatomy, underbust_height};
 use crate::body::dress_form::{DressForm, ray};
 use crate::body::jet::Jet;
@@ -103,9 +104,12 @@ fn extents(anatomy: &Anatomy, z: f64, lowest: f64) -> Section {
 fn perimeter([_, _, a, front, back]: Section) -> f64 {
     let point = |i: usize| {
         let angle = std::f64::consts::TAU * i as f64 / 96.0;
-        let (s, c) = angle.sin_cos();
+        let (s, c) = math::sin_cos(angle);
         let b = if s < 0.0 { front } else { back };
-        glam::DVec2::new(a * c.signum() * c.abs().powf(2.0 / EXPONENT), b * s.signum() * s.abs().powf(2.0 / EXPONENT))
+        glam::DVec2::new(
+            a * c.signum() * math::powf(c.abs(), 2.0 / EXPONENT),
+            b * s.signum() * math::powf(s.abs(), 2.0 / EXPONENT),
+        )
     };
     (0..96).map(|i| point(i).distance(point(i + 1))).sum()
 }
@@ -131,12 +135,12 @@ fn around(section: Section, anatomy: &Anatomy, z: f64) -> Section {
     let centre = anatomy.trunk.centre(z);
     let mut scale: f64 = 1.0;
     for i in 0..24 {
-        let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 24.0).sin_cos();
+        let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(i) / 24.0);
         let r = CLEARANCE + ray(&under, centre, DVec3::new(cos, sin, 0.0), 0.11);
         let (x, y) = (r * cos - cu, centre.y + r * sin - cv);
         let b = if y < 0.0 { front } else { back };
-        let level = (x / a).abs().powf(EXPONENT) + (y / b).abs().powf(EXPONENT);
-        scale = scale.max(level.powf(1.0 / EXPONENT));
+        let level = math::powf((x / a).abs(), EXPONENT) + math::powf((y / b).abs(), EXPONENT);
+        scale = scale.max(math::powf(level, 1.0 / EXPONENT));
     }
     [cu, cv, scale * a, scale * front, scale * back]
 }

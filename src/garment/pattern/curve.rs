@@ -13,6 +13,8 @@
 use glam::DVec2;
 use kurbo::{CubicBez, Line, ParamCurve, ParamCurveArclen, ParamCurveArea, PathSeg, Point, QuadBez};
 
+use crate::base::math;
+
 /// Absolute error of lengths and of points at a length, m: a millionth of a micrometre.
 const ACCURACY: f64 = 1e-12;
 
@@ -44,8 +46,8 @@ impl Curve {
         let height = (radius * radius - half.length_squared()).max(0.0).sqrt();
         let side = if right == large { -1.0 } else { 1.0 };
         let centre = a + half + half.perp().normalize() * side * height;
-        let from = (a - centre).to_angle();
-        let mut turn = (b - centre).to_angle() - from;
+        let from = math::angle(a - centre);
+        let mut turn = math::angle(b - centre) - from;
         if right && turn <= 0.0 {
             turn += std::f64::consts::TAU;
         } else if !right && turn >= 0.0 {
@@ -73,7 +75,7 @@ impl Curve {
         match *self {
             _ if t <= 0.0 => self.start(),
             _ if t >= 1.0 => self.end(),
-            Self::Arc { centre, radius, from, turn, .. } => centre + radius * DVec2::from_angle(from + t * turn),
+            Self::Arc { centre, radius, from, turn, .. } => centre + radius * math::unit(from + t * turn),
             _ => vector(self.segment().eval(t)),
         }
     }

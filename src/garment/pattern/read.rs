@@ -17,6 +17,7 @@ use super::curve::Curve;
 use super::error::PatternError;
 use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
 use crate::base::files::{listed, read_text, stem};
+use crate::base::math;
 
 /// Longest accepted file, MB. The 115,000 patterns of the public data set have at most 60 kB.
 const MAX_MB: usize = 4;
@@ -217,7 +218,7 @@ fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, Pat
 /// The placement with z up and the front at −y.
 fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
     let [a, b, c] = degrees.to_array().map(f64::to_radians);
-    let rotation = DMat3::from_rotation_z(c) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(a);
+    let rotation = math::rotation(DVec3::Z, c) * math::rotation(DVec3::Y, b) * math::rotation(DVec3::X, a);
     let turn = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y);
     (turn * rotation, turn * translation)
 }

@@ -22,10 +22,11 @@
 //!
 //! Source: the two papers; contacts are ours. Limits: cloth may pass through cloth.
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
+use faer::{Conj, Mat, Par, Side};
 use glam::{DMat2, DVec2, DVec3};
 
 use crate::body::distance::Body;
@@ -159,7 +160,7 @@ pub(super) fn close(
         (system.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
     let own: Vec<f64> = diagonal.iter().map(|&i| system.entries[i].val).collect();
     let mut x = start.to_vec();
-    let mut symbolic: Option<SymbolicLlt<u32>> = None;
+    let mut symbolic: Option<SymbolicCholesky<u32>> = None;
     for step in 0..options.max_steps {
         let mut side = system.right_side(&x, nearest_isometry);
         options.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
@@ -230,15 +231,33 @@ fn solve(
     entries: &[Triplet<u32, u32, f64>],
     n: usize,
     side: &[DVec3],
-    symbolic: &mut Option<SymbolicLlt<u32>>,
+    symbolic: &mut Option<SymbolicCholesky<u32>>,
 ) -> Option<Vec<DVec3>> {
     let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, entries).ok()?;
-    if symbolic.is_none() {
-        *symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok();
-    }
-    let factor = Llt::try_new_with_symbolic(symbolic.clone()?, matrix.as_ref(), Side::Lower).ok()?;
-    let right = Mat::from_fn(n, 3, |i, k| side[i][k]);
-    let solved = factor.solve(&right);
+    let symbolic = match symbolic {
+        Some(symbolic) => symbolic,
+        // Column by column: the dense kernels of supernodes depend on the processor, and so do their bits.
+        None => {
+            let supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SIMPLICIAL;
+            let params = CholeskySymbolicParams { supernodal_flop_ratio_threshold, ..Default::default() };
+            let analysed =
+                factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, Default::default(), params).ok()?;
+            symbolic.insert(analysed)
+        }
+    };
+    let needs = [
+        symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+        symbolic.solve_in_place_scratch::<f64>(3, Par::Seq),
+    ];
+    let mut memory = MemBuffer::try_new(StackReq::any_of(&needs)).ok()?;
+    let memory = MemStack::new(&mut memory);
+    let mut numbers = vec![0.0; symbolic.len_val()];
+    let of = (matrix.as_ref(), Side::Lower);
+    symbolic
+        .factorize_numeric_llt(&mut numbers, of.0, of.1, Default::default(), Par::Seq, memory, Default::default())
+        .ok()?;
+    let mut solved = Mat::from_fn(n, 3, |i, k| side[i][k]);
+    LltRef::new(symbolic, &numbers).solve_in_place_with_conj(Conj::No, solved.as_mut(), Par::Seq, memory);
     Some((0..n).map(|i| DVec3::new(solved[(i, 0)], solved[(i, 1)], solved[(i, 2)])).collect())
 }
 

@@ -3,9 +3,10 @@
 //! A pattern is placed for one body. For another one the garment moves up or down until its shoulder seams (or its waist, where
 //! it has none) are at the body's, sleeves turn to the slope of the arms, and all panels turn to the body's front.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::landmarks::Landmarks;
+use crate::base::math;
 use crate::garment::pattern::{EdgeAt, PatternPanel, SewingPattern};
 
 /// Height of a waist above the body's smallest girth, m, as GarmentCode has it on its own body.
@@ -37,7 +38,7 @@ pub struct Arranged {
 fn sleeves(pattern: &SewingPattern) -> Vec<Option<f64>> {
     let of = |panel: &PatternPanel| {
         let along = panel.rotation * DVec3::X;
-        let fall = along.z.abs().atan2(along.x.hypot(along.y));
+        let fall = math::atan2(along.z.abs(), math::hypot(along.x, along.y));
         // A hood's panels are turned about the vertical, which leaves their x level.
         (fall > MIN_SLEEVE_TURN).then_some(fall)
     };
@@ -110,7 +111,7 @@ pub(super) fn arrange(pattern: &mut SewingPattern, body: &Landmarks) -> (Arrange
         turn_sleeves(pattern, turn);
     }
     done.turned = body.facing;
-    let turn = DMat3::from_rotation_z(body.facing);
+    let turn = math::rotation(DVec3::Z, body.facing);
     for panel in &mut pattern.panels {
         panel.rotation = turn * panel.rotation;
         panel.translation = turn * panel.translation + body.middle.extend(done.raised);
@@ -141,7 +142,7 @@ fn turn_sleeves(pattern: &mut SewingPattern, down: f64) {
         }
         let pivot = DVec3::new(sum.x / count, 0.0, sum.y / count);
         // About y: the left arm (+x) goes down by a positive turn.
-        let turn = DMat3::from_rotation_y(if panel.translation.x > 0.0 { down } else { -down });
+        let turn = math::rotation(DVec3::Y, if panel.translation.x > 0.0 { down } else { -down });
         panel.rotation = turn * panel.rotation;
         panel.translation = turn * (panel.translation - pivot) + pivot;
     }

@@ -14,6 +14,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
+use crate::base::math;
 use crate::base::quantiles::extremes;
 use crate::body::girth::{Plane, SectionLoop, section};
 use crate::mesh::{TriMesh, box_about};
@@ -86,7 +87,7 @@ impl Landmarks {
         let middle = middle(body, low.z, height);
         let facing = front.map_or_else(|| facing(body, low.z, height), quarter_turn);
         // From the body's right to its left.
-        let across = DVec2::from_angle(facing);
+        let across = math::unit(facing);
         let count = if height <= MAX_HEIGHT { (height / STEP) as usize } else { 0 };
         let levels: Vec<Level> = (1..count).map(|i| level(body, low.z + STEP * i as f64, middle, across)).collect();
         let between = |from: f64, to: f64| {
@@ -121,7 +122,7 @@ impl Landmarks {
     /// The body without its arms, open where they were, for garments that hang between the arms. `None` where no arms were found.
     pub(super) fn without_arms(&self, body: &TriMesh) -> Option<TriMesh> {
         let armpit = self.armpit_z?;
-        let across = DVec2::from_angle(self.facing);
+        let across = math::unit(self.facing);
         let (lowest, at_crotch) = *self.trunk.first()?;
         let hips = self.trunk.iter().fold(at_crotch, |w, (_, half)| w.max(*half));
         let of_arm = |p: &DVec3| {
@@ -161,7 +162,7 @@ fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
     let mut best = (MIN_TOES * height, 0.0);
     for quarter in 0..4 {
         let angle = FRAC_PI_2 * f64::from(quarter);
-        let ahead = DVec2::from_angle(angle).rotate(DVec2::NEG_Y);
+        let ahead = math::unit(angle).rotate(DVec2::NEG_Y);
         let across = ahead.perp();
         // Along its wider direction the trunk does not face.
         if deeper * (ahead.y.abs() - ahead.x.abs()) > MIN_FLATNESS * height {
@@ -182,12 +183,12 @@ fn facing(body: &TriMesh, low: f64, height: f64) -> f64 {
             best = (longer, angle);
         }
     }
-    quarter_turn(DVec2::from_angle(best.1).rotate(DVec2::NEG_Y))
+    quarter_turn(math::unit(best.1).rotate(DVec2::NEG_Y))
 }
 
 /// The angle from −y to a direction, as the nearest quarter turn, radians.
 fn quarter_turn(ahead: DVec2) -> f64 {
-    (DVec2::NEG_Y.angle_to(ahead) / FRAC_PI_2).round() * FRAC_PI_2
+    (math::atan2(DVec2::NEG_Y.perp_dot(ahead), DVec2::NEG_Y.dot(ahead)) / FRAC_PI_2).round() * FRAC_PI_2
 }
 
 /// Width of a curve, m.
@@ -237,5 +238,5 @@ fn arm_fall(arms: &[&Level], across: DVec2) -> Option<f64> {
         square += (z - mean.1) * (z - mean.1);
         mixed += (x - mean.0) * (z - mean.1);
     }
-    (square > 0.0).then(|| 1.0_f64.atan2(-mixed / square))
+    (square > 0.0).then(|| math::atan2(1.0, -mixed / square))
 }

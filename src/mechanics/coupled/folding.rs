@@ -131,7 +131,7 @@ fn fold_widths(mesh: &TriMesh, cloth: &Cloth) -> Vec<f64> {
     let tension = 0.5 * (of_first + more) * GRAVITY * length;
     let fold = |fabric: &Fabric| {
         let bending = fabric.bending_nm.into_iter().sum::<f64>() / 3.0;
-        if tension > 0.0 { 2.0 * PI.sqrt() * (bending / tension).powf(0.25) * length.sqrt() } else { 0.0 }
+        if tension > 0.0 { 2.0 * PI.sqrt() * (bending / tension).sqrt().sqrt() * length.sqrt() } else { 0.0 }
     };
     cloth.fabrics.iter().map(fold).collect()
 }

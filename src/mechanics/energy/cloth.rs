@@ -451,15 +451,6 @@ impl Cloth {
             }
         }
     }
-
-    /// The parts of body contact, friction and gaps in the Hessian at `x`, over the unknowns of a layout.
-    pub(crate) fn contact_blocks(&self, layout: &HessianLayout, x: &[DVec3], contacts: &Contacts) -> Vec<ContactBlock> {
-        let with_body = contacts.hessian().chain(contacts.friction.hessian(x));
-        let by_body =
-            with_body.map(|(v, block)| ContactBlock { members: layout.free(std::iter::once((v, 1.0))), block });
-        let gaps = contacts.proximity.iter().flat_map(|p| p.hessian(x));
-        by_body.chain(gaps.map(|(gap, block)| ContactBlock { members: layout.free(gap.members()), block })).collect()
-    }
 }
 
 /// Membrane and bending of half the triangles and half the bending pairs.

@@ -42,6 +42,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::base::math;
 use crate::garment::fabric::Fabric;
 pub(crate) use crate::mesh::outer;
 use crate::mesh::rest::raised;
@@ -267,7 +268,7 @@ impl Triangle {
 /// The nearest positive semi-definite matrix to [[a, t], [t, b]], as (a, b, t).
 fn positive_part(a: f64, b: f64, t: f64) -> (f64, f64, f64) {
     let (mean, half) = (0.5 * (a + b), 0.5 * (a - b));
-    let radius = half.hypot(t);
+    let radius = math::hypot(half, t);
     if mean >= radius {
         return (a, b, t);
     }

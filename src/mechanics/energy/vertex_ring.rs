@@ -14,6 +14,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use crate::base::math;
 use crate::mesh::{RestShape, TriMesh};
 
 /// Ridge of the least squares, relative to the trace. A ring of four spokes does not determine x_uv, which then stays zero; a good ring
@@ -68,7 +69,7 @@ impl VertexRing {
         let mut angle = 0.0;
         for step in 0..around.len() {
             turned.push((at, angle));
-            angle += at.spokes[0].perp_dot(at.spokes[1]).abs().atan2(at.spokes[0].dot(at.spokes[1]));
+            angle += math::atan2(at.spokes[0].perp_dot(at.spokes[1]).abs(), at.spokes[0].dot(at.spokes[1]));
             let mut next = around.iter().filter(|s| s.from == at.to);
             let (found, another) = (next.next()?, next.next());
             if another.is_some() || (found.from == first.from) != (step + 1 == around.len()) {
@@ -79,9 +80,9 @@ impl VertexRing {
         let scale = std::f64::consts::TAU / angle;
         // The mean of doubled angles is the mean of lines without a direction.
         let turn: DVec2 =
-            turned.iter().map(|(s, beta)| DVec2::from_angle(2.0 * (s.spokes[0].to_angle() - beta * scale))).sum();
-        let weft = 0.5 * turn.to_angle();
-        let spokes = turned.iter().map(|(s, beta)| DVec2::from_angle(beta * scale + weft) * s.spokes[0].length());
+            turned.iter().map(|(s, beta)| math::unit(2.0 * (math::angle(s.spokes[0]) - beta * scale))).sum();
+        let weft = 0.5 * math::angle(turn);
+        let spokes = turned.iter().map(|(s, beta)| math::unit(beta * scale + weft) * s.spokes[0].length());
         Some(Self { neighbours: turned.iter().map(|(s, _)| s.from).collect(), spokes: spokes.collect() })
     }
 

@@ -5,17 +5,13 @@
 //! and what that takes from the rows below is the front's own update. Subtrees go side by side, each with its updates on a stack; in
 //! the top above them the threads share each front's dense part. Nothing is allocated after the first time.
 
+use std::collections::TryReserveError;
 use std::ops::Range;
 
-use faer::dyn_stack::MemBuffer;
-use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::traits::math_utils::{from_f64, one, zero};
-use faer::{Accum, ColMut, ColRef, MatMut, MatRef, Par};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::dense::{Precision, factor_panel, scratch_size, subtract_product};
+use super::dense::{Precision, factor_panel, set_product, solve_down, solve_up};
 use super::symbolic::{Front, Subtree, SymbolicFactor};
 
 /// Why a linear system cannot be solved.
@@ -26,7 +22,7 @@ pub enum SolveError {
     NoRoom {
         /// Scalar unknowns.
         unknowns: usize,
-        /// The message of faer.
+        /// The message of the allocator.
         reason: String,
     },
     /// A pivot is not positive.
@@ -55,7 +51,6 @@ pub(super) struct Factor<T> {
     subtrees: Vec<SubtreeFactor<T>>,
     /// Panel and update of each front of the top.
     top: Vec<(Vec<T>, Vec<T>)>,
-    memory: Option<MemBuffer>,
     right_side: Vec<T>,
 }
 
@@ -65,7 +60,6 @@ struct SubtreeFactor<T> {
     /// Updates that no parent has taken yet, one on top of the other, and where each begins.
     stack: Vec<T>,
     live: Vec<(u32, usize)>,
-    memory: MemBuffer,
     /// Of a solve: what it adds to the top's unknowns, and a front's rows.
     above: Vec<T>,
     rows: Vec<T>,
@@ -74,39 +68,40 @@ struct SubtreeFactor<T> {
 impl<T: Precision> Factor<T> {
     /// Makes room where there is none yet: a solver seldom needs both precisions.
     fn allocate(&mut self, symbolic: &SymbolicFactor) -> Result<(), SolveError> {
-        if self.memory.is_some() {
+        let unknowns = 3 * symbolic.order.len();
+        if self.right_side.len() == unknowns {
             return Ok(());
         }
-        let unknowns = 3 * symbolic.order.len();
-        let room = || {
-            let failed = |e| SolveError::NoRoom { unknowns, reason: format!("{e:?}") };
-            MemBuffer::try_new(scratch_size::<T>()).map_err(failed)
+        let room = |numbers: usize| -> Result<Vec<T>, SolveError> {
+            let mut all = Vec::new();
+            let failed = |e: TryReserveError| SolveError::NoRoom { unknowns, reason: e.to_string() };
+            all.try_reserve_exact(numbers).map_err(failed)?;
+            all.resize(numbers, T::default());
+            Ok(all)
         };
         for subtree in &symbolic.subtrees {
             self.subtrees.push(SubtreeFactor {
-                panels: vec![zero::<T>(); subtree.panels_len],
-                stack: vec![zero::<T>(); subtree.stack_len],
+                panels: room(subtree.panels_len)?,
+                stack: room(subtree.stack_len)?,
                 live: Vec::new(),
-                memory: room()?,
-                above: vec![zero::<T>(); unknowns - 3 * symbolic.top.1],
+                above: room(unknowns - 3 * symbolic.top.1)?,
                 rows: Vec::new(),
             });
         }
-        let top = symbolic.fronts[symbolic.top.0..].iter();
-        self.top = top.map(|f| (vec![zero::<T>(); f.panel_len()], vec![zero::<T>(); f.update_len()])).collect();
-        self.right_side = vec![zero::<T>(); unknowns];
-        self.memory = Some(room()?);
+        for front in &symbolic.fronts[symbolic.top.0..] {
+            self.top.push((room(front.panel_len())?, room(front.update_len())?));
+        }
+        self.right_side = room(unknowns)?;
         Ok(())
     }
 
     pub(super) fn factorise(&mut self, symbolic: &SymbolicFactor, matrix: Matrix<'_>) -> Result<(), SolveError> {
         self.allocate(symbolic)?;
-        let Self { subtrees, top, memory, .. } = self;
+        let Self { subtrees, top, .. } = self;
         let done: Vec<Result<(), SolveError>> = (subtrees.par_iter_mut().zip(&symbolic.subtrees).with_max_len(1))
             .map(|(factor, subtree)| factor.factorise(symbolic, subtree, matrix))
             .collect();
         done.into_iter().collect::<Result<(), _>>()?;
-        let Some(memory) = memory else { return Ok(()) };
         for at in 0..top.len() {
             let (before, here) = top.split_at_mut(at);
             let Some((panel, update)) = here.first_mut() else { break };
@@ -119,7 +114,7 @@ impl<T: Precision> Factor<T> {
                 };
                 (front, &numbers[..front.update_len()])
             };
-            eliminate(symbolic, front, matrix, panel, update, memory, || front.children.iter().map(of))?;
+            eliminate(symbolic, front, matrix, panel, update, || front.children.iter().map(of))?;
         }
         Ok(())
     }
@@ -141,7 +136,7 @@ impl<T: Precision> Factor<T> {
 
     /// L⁻ᵀ y, of what is in the factor's own order.
     pub(super) fn upper(&mut self, symbolic: &SymbolicFactor, y: &[f64]) -> Vec<DVec3> {
-        self.right_side.iter_mut().zip(y).for_each(|(s, y)| *s = from_f64(*y));
+        self.right_side.iter_mut().zip(y).for_each(|(s, y)| *s = T::of(*y));
         self.backward(symbolic);
         let mut x = vec![DVec3::ZERO; symbolic.order.len()];
         self.give(symbolic, &mut x);
@@ -150,7 +145,7 @@ impl<T: Precision> Factor<T> {
 
     fn take(&mut self, symbolic: &SymbolicFactor, x: &[DVec3]) {
         for (s, &old) in self.right_side.chunks_exact_mut(3).zip(&symbolic.order) {
-            s.copy_from_slice(&x[old as usize].to_array().map(from_f64));
+            s.copy_from_slice(&x[old as usize].to_array().map(T::of));
         }
     }
 
@@ -171,7 +166,7 @@ impl<T: Precision> Factor<T> {
                 for &row in &symbolic.rows[symbolic.fronts[root as usize].rows.clone()] {
                     let at = 3 * (row as usize - symbolic.top.1);
                     for (x, more) in high[at..at + 3].iter_mut().zip(&mut factor.above[at..at + 3]) {
-                        *x -= std::mem::replace(more, zero());
+                        *x -= std::mem::replace(more, T::default());
                     }
                 }
             }
@@ -179,7 +174,7 @@ impl<T: Precision> Factor<T> {
         let mut rows = Vec::new();
         for (front, (panel, _)) in symbolic.fronts[symbolic.top.0..].iter().zip(&*top) {
             let at = 3 * (front.first - symbolic.top.1);
-            down(front, panel, &mut high[at..at + 3 * front.columns], &mut rows);
+            solve_down(panel, front.height(), &mut high[at..at + 3 * front.columns], &mut rows);
             for (&row, some) in symbolic.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
                 let at = 3 * (row as usize - symbolic.top.1);
                 take(&mut high[at..], some);
@@ -195,7 +190,7 @@ impl<T: Precision> Factor<T> {
         for (front, (panel, _)) in symbolic.fronts[symbolic.top.0..].iter().zip(&*top).rev() {
             gather(symbolic, front, &mut rows, |row| &high[3 * (row - symbolic.top.1)..]);
             let at = 3 * (front.first - symbolic.top.1);
-            up(front, panel, &mut high[at..at + 3 * front.columns], &rows);
+            solve_up(panel, front.height(), &mut high[at..at + 3 * front.columns], &rows);
         }
         let high = &*high;
         (subtrees.par_iter_mut().zip(&symbolic.subtrees).zip(&mut own).with_max_len(1))
@@ -229,7 +224,7 @@ impl<T: Precision> SubtreeFactor<T> {
         subtree: &Subtree,
         matrix: Matrix<'_>,
     ) -> Result<(), SolveError> {
-        let Self { panels, stack, live, memory, .. } = self;
+        let Self { panels, stack, live, .. } = self;
         live.clear();
         let (mut height, mut panels) = (0, &mut panels[..]);
         for (number, front) in subtree.fronts.clone().zip(&symbolic.fronts[subtree.fronts.clone()]) {
@@ -244,7 +239,7 @@ impl<T: Precision> SubtreeFactor<T> {
                     (front, &below[at..at + front.update_len()])
                 })
             };
-            eliminate(symbolic, front, matrix, panel, update, memory, children)?;
+            eliminate(symbolic, front, matrix, panel, update, children)?;
             let base = live.get(taken).map_or(height, |&(_, at)| at);
             live.truncate(taken);
             if base < height {
@@ -264,7 +259,7 @@ impl<T: Precision> SubtreeFactor<T> {
             let (panel, rest) = panels.split_at(front.panel_len());
             panels = rest;
             let at = 3 * (front.first - subtree.unknowns.start);
-            down(front, panel, &mut own[at..at + 3 * front.columns], rows);
+            solve_down(panel, front.height(), &mut own[at..at + 3 * front.columns], rows);
             for (&row, some) in symbolic.rows[front.rows.clone()].iter().zip(rows.chunks_exact(3)) {
                 match (row as usize).checked_sub(subtree.unknowns.end) {
                     None => {
@@ -293,7 +288,7 @@ impl<T: Precision> SubtreeFactor<T> {
                 Some(_) => &high[3 * (row - symbolic.top.1)..],
             });
             let at = 3 * (front.first - subtree.unknowns.start);
-            up(front, panel, &mut own[at..at + 3 * front.columns], rows);
+            solve_up(panel, front.height(), &mut own[at..at + 3 * front.columns], rows);
         }
     }
 }
@@ -305,22 +300,21 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
     matrix: Matrix<'_>,
     panel: &mut [T],
     update: &mut [T],
-    memory: &mut MemBuffer,
     children: impl Fn() -> C,
 ) -> Result<(), SolveError> {
     let height = front.height();
     let (columns, rows) = (3 * front.columns, 3 * front.rows.len());
-    panel.fill(zero());
+    panel.fill(T::default());
     for entry in &symbolic.entries[front.entries.clone()] {
         let block = matrix.blocks[entry.block as usize];
         let block = if entry.transposed { block.transpose() } else { block };
         for (c, column) in block.to_cols_array_2d().into_iter().enumerate() {
             let at = entry.at as usize + c * height;
-            panel[at..at + 3].copy_from_slice(&column.map(from_f64));
+            panel[at..at + 3].copy_from_slice(&column.map(T::of));
         }
     }
     for (k, &unknown) in symbolic.order[front.first..front.first + front.columns].iter().enumerate() {
-        let shift: T = from_f64(matrix.diagonal[unknown as usize]);
+        let shift: T = T::of(matrix.diagonal[unknown as usize]);
         for c in 3 * k..3 * k + 3 {
             panel[c * (height + 1)] += shift;
         }
@@ -329,14 +323,9 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
         extend(symbolic, child, numbers, 0..child.inner, panel, height, 0);
     }
     let lost = |index: usize| SolveError::NotPositive { index: 3 * front.first + index };
-    factor_panel(MatMut::from_column_major_slice_mut(panel, height, columns), memory).map_err(lost)?;
+    factor_panel(panel, height).map_err(lost)?;
     if rows > 0 {
-        let panel = MatRef::from_column_major_slice(&*panel, height, columns);
-        subtract_product(
-            MatMut::from_column_major_slice_mut(update, rows, rows),
-            panel.split_at_row(columns).1,
-            Accum::Replace,
-        );
+        set_product(update, panel, height, columns);
         for (child, numbers) in children() {
             extend(symbolic, child, numbers, child.inner..child.rows.len(), update, rows, front.columns);
         }
@@ -394,36 +383,4 @@ fn gather<'a, T: Precision + 'a>(
     for &row in &symbolic.rows[front.rows.clone()] {
         rows.extend_from_slice(&of(row as usize)[..3]);
     }
-}
-
-/// x ← L₁₁⁻¹ x; `rows` ← L₂₁ x.
-fn down<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &mut Vec<T>) {
-    let n = x.len();
-    let panel = MatRef::from_column_major_slice(panel, front.height(), n);
-    let (top, bottom) = panel.split_at_row(n);
-    solve_lower_triangular_in_place(top, MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
-    rows.clear();
-    rows.resize(bottom.nrows(), zero());
-    if !rows.is_empty() {
-        let (x, rows) = (ColRef::from_slice(&*x), ColMut::from_slice_mut(rows));
-        matmul(rows, Accum::Replace, bottom, x, one(), Par::Seq);
-    }
-}
-
-/// x ← L₁₁⁻ᵀ (x − L₂₁ᵀ rows).
-fn up<T: Precision>(front: &Front, panel: &[T], x: &mut [T], rows: &[T]) {
-    let n = x.len();
-    let panel = MatRef::from_column_major_slice(panel, front.height(), n);
-    let (top, bottom) = panel.split_at_row(n);
-    if !rows.is_empty() {
-        matmul(
-            ColMut::from_slice_mut(x),
-            Accum::Add,
-            bottom.transpose(),
-            ColRef::from_slice(rows),
-            -one::<T>(),
-            Par::Seq,
-        );
-    }
-    solve_upper_triangular_in_place(top.transpose(), MatMut::from_column_major_slice_mut(x, n, 1), Par::Seq);
 }

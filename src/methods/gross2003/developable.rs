@@ -17,6 +17,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::base::math;
 use crate::base::quantiles::extremes;
 use crate::body::girth::hull;
 
@@ -90,8 +91,8 @@ impl Developable {
         let around = |b: &DVec2| {
             let b = *b;
             // A polygon of 16 sides around the disc of the clearance.
-            let reach = grown / (std::f64::consts::PI / 16.0).cos();
-            (0..16).map(move |k| b + reach * DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / 16.0))
+            let reach = grown / math::cos(std::f64::consts::PI / 16.0);
+            (0..16).map(move |k| b + reach * math::unit(std::f64::consts::TAU * f64::from(k) / 16.0))
         };
         let base = hull(corners.iter().flat_map(around).collect());
         let holds_axis = (0..base.len()).all(|i| base[i].perp_dot(base[(i + 1) % base.len()]) > 0.0);
@@ -159,7 +160,7 @@ impl Developable {
         let (_, b) = self.facet_at(if p.truncate().length_squared() > 0.0 { p.truncate() } else { DVec2::X });
         let (height, s) = (1.0 / self.taper, 1.0 - self.taper * p.z);
         let r = b.extend(-height).length() * s;
-        let (sin, cos) = arc.sin_cos();
+        let (sin, cos) = math::sin_cos(arc);
         DVec2::new(r * sin, height - height.signum() * r * cos)
     }
 
@@ -168,7 +169,7 @@ impl Developable {
         let n = self.base.len();
         let height = if self.taper == 0.0 { 0.0 } else { 1.0 / self.taper };
         let from_apex = DVec2::new(flat.x, (height - flat.y) * height.signum());
-        let arc = if self.taper == 0.0 { flat.x } else { from_apex.x.atan2(from_apex.y) };
+        let arc = if self.taper == 0.0 { flat.x } else { math::atan2(from_apex.x, from_apex.y) };
         let arc = (origin + arc).rem_euclid(self.arcs[self.base.len()]);
         let i = (self.arcs.partition_point(|&a| a <= arc).max(1) - 1).min(n - 1);
         let (a, b, rest) = (self.base[i], self.base[(i + 1) % n], arc - self.arcs[i]);
@@ -178,7 +179,7 @@ impl Developable {
             let [a, b] = [a, b].map(|p| p.extend(-height));
             let along = a.normalize_or_zero();
             let across = (b - along * along.dot(b)).normalize_or_zero();
-            let (sin, cos) = rest.sin_cos();
+            let (sin, cos) = math::sin_cos(rest);
             DVec3::Z * height + (along * cos + across * sin) * from_apex.length()
         };
         self.origin + self.turn.transpose() * local
@@ -202,12 +203,12 @@ fn along(taper: f64, a: DVec2, b: DVec2) -> f64 {
         return a.distance(b);
     }
     let [a, b] = [a, b].map(|p| p.extend(-1.0 / taper));
-    a.cross(b).length().atan2(a.dot(b))
+    math::atan2(a.cross(b).length(), a.dot(b))
 }
 
 /// Angle from `a` to `b` counter-clockwise, 0 to 2π.
 fn angle_between(a: DVec2, b: DVec2) -> f64 {
-    let angle = a.perp_dot(b).atan2(a.dot(b));
+    let angle = math::atan2(a.perp_dot(b), a.dot(b));
     if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
 }
 

@@ -20,6 +20,7 @@
 use glam::DVec3;
 
 use crate::GRAVITY;
+use crate::base::math;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::methods::method::{find_velocities, rms_speed};
 use crate::methods::spring_list::Spring;
@@ -74,7 +75,7 @@ impl<'b> Sheet<'b> {
     ) {
         let h = settings.step_s;
         let from = self.x.clone();
-        let decay = (-settings.damping_per_s * h).exp();
+        let decay = math::exp(-settings.damping_per_s * h);
         let fall = if gravity { GRAVITY * h } else { 0.0 };
         for ((x, v), weight) in self.x.iter_mut().zip(&mut self.v).zip(&self.weights) {
             if *weight > 0.0 {

@@ -18,6 +18,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::base::math;
 use crate::mesh::{NONE, Topology, TriMesh};
 
 /// A combination of the garment's vertices.
@@ -142,7 +143,7 @@ fn combined(parts: &[(&Stencil, f64)]) -> Stencil {
 
 /// Loop's β for a valence.
 fn beta(n: usize) -> f64 {
-    let cosine = (std::f64::consts::TAU / n as f64).cos();
+    let cosine = math::cos(std::f64::consts::TAU / n as f64);
     (0.625 - (0.375 + 0.25 * cosine).powi(2)) / n as f64
 }
 

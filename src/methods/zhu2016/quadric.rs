@@ -13,9 +13,9 @@
 //! slice's triangles + o/min(a, b), o the cloth's offset. ρ is convex, so its maximum over a triangle is at a
 //! corner; it grows by at most 1/min(a, b) a metre, so every contact is within the quadric.
 
-use faer::linalg::solvers::Solve;
-use faer::{Col, Mat};
 use glam::DVec2;
+
+use crate::base::math;
 
 /// An ellipse in the plane of a slice, and the factor by which it must grow to bound the slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +50,7 @@ impl Quadric {
         let mean = points.iter().map(|(p, w)| *p * *w).sum::<DVec2>() / weight;
         let second = |f: fn(DVec2) -> f64| points.iter().map(|(p, w)| f(*p - mean) * w).sum::<f64>() / weight;
         let (xx, xy, yy) = (second(|p| p.x * p.x), second(|p| p.x * p.y), second(|p| p.y * p.y));
-        let axis = if round { DVec2::X } else { DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy)) };
+        let axis = if round { DVec2::X } else { math::unit(0.5 * math::atan2(2.0 * xy, xx - yy)) };
         let spread = |a: DVec2| (2.0 * (xx * a.x * a.x + 2.0 * xy * a.x * a.y + yy * a.y * a.y)).max(0.0).sqrt();
         let mut half = DVec2::new(spread(axis), spread(axis.perp()));
         if round {
@@ -90,7 +90,7 @@ impl Quadric {
     pub(crate) fn outline(&self) -> impl Iterator<Item = DVec2> + '_ {
         let grown = self.half * self.bound.sqrt();
         (0..=32).map(move |i| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 32.0).sin_cos();
+            let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(i) / 32.0);
             self.centre + self.axis * (grown.x * cos) + self.axis.perp() * (grown.y * sin)
         })
     }
@@ -98,18 +98,32 @@ impl Quadric {
 
 /// Weighted least squares of rows·c = b.
 fn least_squares<const N: usize>(rows: impl Iterator<Item = ([f64; N], f64, f64)>) -> Option<[f64; N]> {
-    let mut normal = Mat::<f64>::zeros(N, N);
-    let mut side = Col::<f64>::zeros(N);
+    let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
     for (row, b, w) in rows {
         for i in 0..N {
             side[i] += w * row[i] * b;
             for j in 0..N {
-                normal[(i, j)] += w * row[i] * row[j];
+                normal[i][j] += w * row[i] * row[j];
             }
         }
     }
-    let found = normal.partial_piv_lu().solve(&side);
-    let c: [f64; N] = std::array::from_fn(|i| found[i]);
+    // Gauss's elimination with row pivots.
+    for k in 0..N {
+        let pivot = (k..N).fold(k, |best, i| if normal[i][k].abs() > normal[best][k].abs() { i } else { best });
+        normal.swap(k, pivot);
+        side.swap(k, pivot);
+        for i in k + 1..N {
+            let share = normal[i][k] / normal[k][k];
+            let above = normal[k];
+            normal[i].iter_mut().zip(above).for_each(|(entry, above)| *entry -= share * above);
+            side[i] -= share * side[k];
+        }
+    }
+    let mut c = [0.0; N];
+    for i in (0..N).rev() {
+        let known: f64 = (i + 1..N).map(|j| normal[i][j] * c[j]).sum();
+        c[i] = (side[i] - known) / normal[i][i];
+    }
     c.iter().all(|c| c.is_finite()).then_some(c)
 }
 

@@ -8,6 +8,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::quadric::Quadric;
+use crate::base::math;
 use crate::base::quantiles::extremes;
 use crate::mesh::{TriMesh, box_about};
 use crate::methods::segment::principal_axis;
@@ -113,7 +114,7 @@ impl BodyUnit {
         let mut sectors = [self.leaves.len() as u32; SECTORS + 1];
         let reach = REACH.max(offset);
         for s in 0..SECTORS {
-            let middle = DVec2::from_angle((s as f64 + 0.5) * std::f64::consts::TAU / SECTORS as f64);
+            let middle = math::unit((s as f64 + 0.5) * std::f64::consts::TAU / SECTORS as f64);
             self.leaves.extend(
                 within.iter().filter(|&&i| in_sector(&local[i], quadric.centre, middle, reach)).map(|&i| triangles[i]),
             );
@@ -156,7 +157,7 @@ impl Slice {
     #[inline]
     pub(crate) fn leaves(&self, p: DVec2) -> std::ops::Range<usize> {
         let q = p - self.quadric.centre;
-        let turns = q.y.atan2(q.x) / std::f64::consts::TAU;
+        let turns = math::angle(q) / std::f64::consts::TAU;
         let s = ((turns - turns.floor()) * SECTORS as f64) as usize % SECTORS;
         self.sectors[s] as usize..self.sectors[s + 1] as usize
     }
@@ -170,7 +171,7 @@ fn in_sector(corners: &[DVec3; 3], centre: DVec2, middle: DVec2, reach: f64) -> 
     let radius = flat.iter().map(|p| p.distance(at)).fold(0.0, f64::max) + reach;
     let off = at - centre;
     // The sector is the intersection of two half planes; a point outside is no nearer to it than to the farther of them.
-    let half = DVec2::from_angle(std::f64::consts::PI / SECTORS as f64);
+    let half = math::unit(std::f64::consts::PI / SECTORS as f64);
     let (left, right) = (middle.rotate(half), middle.rotate(DVec2::new(half.x, -half.y)));
     left.perp_dot(off) <= radius && right.perp_dot(off) >= -radius && middle.dot(off) >= -radius
 }

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::level::{Extent, GapRule, Level, METRES_PER_CM, TableError, first_problem};
 
+use crate::base::math;
+
 /// The name of the paper's table.
 pub(crate) const TABLE_3: &str = "table-3";
 
@@ -204,10 +206,10 @@ impl RangeTable {
         }
         let steps = (count - 2) as f64;
         let ratio = last_cm / first_cm;
-        let inner: Vec<f64> = (0..count - 1).map(|i| first_cm * ratio.powf(i as f64 / steps)).collect();
+        let inner: Vec<f64> = (0..count - 1).map(|i| first_cm * math::powf(ratio, i as f64 / steps)).collect();
         let name = format!("{count} geometric levels, {first_cm} to {last_cm} cm");
         let made = Self::from_inner_bounds(name, &inner)?;
-        Ok(made.with_source(format!("bounds grow by the factor {:.4}", ratio.powf(1.0 / steps))))
+        Ok(made.with_source(format!("bounds grow by the factor {:.4}", math::powf(ratio, 1.0 / steps))))
     }
 
     /// A table from its inner bounds, from 0 to open.

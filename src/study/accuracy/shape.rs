@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::summary::MM_PER_M;
+use crate::base::math;
 use crate::body::distance::{Body, DistanceError};
 use crate::mesh::{Topology, TriMesh};
 
@@ -47,7 +48,7 @@ pub(crate) fn mean_normal_angle_deg(result: &TriMesh, reference: &TriMesh) -> f6
     for ((n, m), area) in normals.iter().zip(reference.vertex_normals()).zip(reference.vertex_areas()) {
         if *n != DVec3::ZERO && m != DVec3::ZERO {
             // atan2 is accurate near zero, where arccos is not.
-            sum += area * n.cross(m).length().atan2(n.dot(m)).to_degrees();
+            sum += area * math::atan2(n.cross(m).length(), n.dot(m)).to_degrees();
             weight += area;
         }
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::base::math;
 use crate::mesh::TriMesh;
 
 /// Radius of the specimen, m.
@@ -39,7 +40,7 @@ pub(crate) fn specimen(rows: usize) -> Specimen {
         let start = mesh.positions.len();
         let offset = 0.5 * (k % 2) as f64;
         mesh.positions.extend((0..count).map(|i| {
-            let (sin, cos) = (TAU * (i as f64 + offset) / count as f64).sin_cos();
+            let (sin, cos) = math::sin_cos(TAU * (i as f64 + offset) / count as f64);
             DVec3::new(radius * cos, radius * sin, 0.0)
         }));
         if let Some(inner) = rings.last() {
@@ -74,8 +75,8 @@ pub(super) fn waved(flat: &Specimen) -> Vec<DVec3> {
     let golden = TAU * (1.0 - 1.0 / 1.618_033_988_749_895);
     let wave = |p: &DVec3| {
         let r = (p.truncate().length() - PLATE_RADIUS).max(0.0) / (SPECIMEN_RADIUS - PLATE_RADIUS);
-        let theta = p.y.atan2(p.x);
-        let sum: f64 = (2..10).map(|n| (f64::from(n) * (theta + golden * f64::from(n))).cos()).sum();
+        let theta = math::atan2(p.y, p.x);
+        let sum: f64 = (2..10).map(|n| math::cos(f64::from(n) * (theta + golden * f64::from(n)))).sum();
         *p + DVec3::Z * (5e-4 * r * r * sum)
     };
     let (held, free) = flat.mesh.positions.split_at(flat.held.len());
