@@ -6,6 +6,7 @@ mod fixtures;
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
+use std::sync::LazyLock;
 
 use fixtures::{Diagonals, closed, tube};
 use glam::DVec3;
@@ -108,21 +109,32 @@ impl Verdict {
     }
 }
 
-/// Built-in garments, small ones, on the dress form.
-const ON_THE_FORM: [&str; 4] = ["pullover-1", "flared-skirt", "low-cut-dress", "pullover-2"];
+/// The dress form, and the heights (m) between which garments are made for it: from the knees to the waist.
+static FORM: LazyLock<Body> = LazyLock::new(|| SceneSpec::new("form", "flared-skirt@600").load().unwrap().scene.body);
+const ON_THE_FORM: [f64; 2] = [0.5, 1.1];
+
+/// The radius about the vertical axis through the form's middle that encloses it at a height, in the heights of a lathe body.
+fn radius_of_form(z: f64) -> f64 {
+    let [low, high] = ON_THE_FORM;
+    let height = low + z / HEIGHT * (high - low);
+    let near = FORM.mesh().positions.iter().filter(|x| (x.z - height).abs() < 0.03);
+    near.map(|x| x.truncate().length()).filter(|r| *r < 0.25).fold(0.0, f64::max)
+}
 
 fn scene(seed: u64) -> (Scene, Settings) {
     let mut random = Random(seed);
     let fabric = random.of(&["jersey", "interlock", "cotton", "denim"]);
-    if seed % 5 == 4 {
-        let garment = format!("{}@{}", random.of(&ON_THE_FORM), random.count(400, 700));
-        let scene = SceneSpec::new("form", garment).load().unwrap().scene;
-        return (scene, Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() });
-    }
-    let (body, radius) = lathe(&mut random);
-    let garment = garment(&mut random, radius);
+    let (body, garment) = if seed % 5 == 4 {
+        let mut garment = garment(&mut random, radius_of_form);
+        let [low, high] = ON_THE_FORM;
+        garment.positions.iter_mut().for_each(|x| x.z = low + x.z / HEIGHT * (high - low));
+        (FORM.clone(), garment)
+    } else {
+        let (body, radius) = lathe(&mut random);
+        (Body::new(&body).unwrap(), garment(&mut random, radius))
+    };
     let rest = RestShape::from_edges(&garment).unwrap();
-    let mut scene = Scene::new(Body::new(&body).unwrap(), garment, rest);
+    let mut scene = Scene::new(body, garment, rest);
     if random.share() < 0.5 {
         scene.held = scene.edges("top").unwrap();
     }

@@ -138,7 +138,7 @@ impl CheckArgs {
         }
         // Held vertices that `run` releases at rest have moved if the garment stays up without them.
         let moved = |&v: &u32| positions[v as usize] != scene.garment.positions[v as usize];
-        if scene.let_go && scene.held.iter().any(moved) {
+        if scene.releases_held && scene.held.iter().any(moved) {
             scene.held.clear();
         }
         certify(&scene, &self.fabric.first()?, &positions).map_err(|error| match error {

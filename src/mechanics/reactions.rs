@@ -20,6 +20,7 @@
 
 use glam::DVec3;
 
+use super::energy::field::SIDE;
 use super::energy::{Cloth, Contacts, Touch, touching_places};
 use super::linear_algebra::norm;
 use crate::body::distance::Body;
@@ -237,13 +238,19 @@ fn contacts_at(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Vec<Reaction>
 
 /// Contacts of the cloth with the body at `x`.
 fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
-    let mut contacts = cloth.new_contacts(body).with_margin(TOUCH_MARGIN_M);
+    // The rounded distance exceeds the exact one by less than the side of the lattice. The solver raises the offsets of vertices that are
+    // inside by the exact one alone, so the smaller of the two decides.
+    let mut contacts = cloth.new_contacts(body).with_margin(TOUCH_MARGIN_M + SIDE);
     contacts.update(x);
+    let touches = |t: &&Touch| {
+        let v = t.vertex as usize;
+        t.depth > SIDE || body.nearest(x[v]).signed_distance < cloth.offsets[v] + TOUCH_MARGIN_M
+    };
     let of_vertex = |t: &Touch| {
         let friction = cloth.friction[t.vertex as usize];
         Reaction::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, friction, true)
     };
-    let mut all: Vec<Reaction> = contacts.touches().iter().map(of_vertex).collect();
+    let mut all: Vec<Reaction> = contacts.touches().iter().filter(touches).map(of_vertex).collect();
     for place in touching_places(&cloth.triangles, &cloth.thickness, body, x, PLACE_MARGIN_M) {
         let shares = || place.corners.into_iter().zip(place.shares);
         let mean = |of: &[f64]| shares().map(|(v, w)| of[v as usize] * w).sum::<f64>();

@@ -18,7 +18,7 @@ mod bending_matrix;
 mod cloth;
 mod contact;
 mod face_contacts;
-mod field;
+pub(crate) mod field;
 pub(crate) mod friction;
 pub mod membrane;
 mod membrane_simd;
