@@ -20,7 +20,7 @@ use crate::mesh::{RestShape, TriMesh};
 
 /// First bytes of a file, and part of every key. Increment the digit with each change of the format or of the mechanics, so
 /// that a drape of an older solver does not serve as reference of a newer one.
-const KIND: &Tag = b"PWREF\x004\n";
+const KIND: &Tag = b"PWREF\x005\n";
 
 /// All inputs of a reference.
 #[derive(Debug, Clone, Copy)]

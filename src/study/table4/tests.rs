@@ -15,9 +15,9 @@ const SMALL: Table4Options = Table4Options {
 
 #[test]
 fn a_row_has_every_method_and_ratios_to_the_converged_drape() {
-    let scene = SceneSpec::new("form", "pullover-1@600").load().unwrap().scene;
+    let scene = SceneSpec::new("form", "pullover-1@700").load().unwrap().scene;
     let mut calls = Vec::new();
-    let made = row(("pullover-1", 600), &scene, &Fabric::default(), &SMALL, &mut |round, _, what| {
+    let made = row(("pullover-1", 700), &scene, &Fabric::default(), &SMALL, &mut |round, _, what| {
         calls.push((round, what.to_owned()));
         ControlFlow::Continue(())
     });
@@ -28,7 +28,7 @@ fn a_row_has_every_method_and_ratios_to_the_converged_drape() {
         let apart = crate::study::accuracy::rms_mm(x.as_ref().unwrap(), &canonical);
         assert!((apart - entry.canonical_rms_mm).abs() < 1e-9, "{}: {apart}", entry.method);
     }
-    assert_eq!((made.asked, made.vertices), (600, scene.garment.vertex_count()));
+    assert_eq!((made.asked, made.vertices), (700, scene.garment.vertex_count()));
     assert!(made.spread_mm.is_some_and(|mm| mm > 0.0));
     let names: Vec<&str> = made.entries.iter().map(|e| e.method.as_str()).collect();
     assert_eq!(names, METHODS.map(crate::study::table4::ComparedMethod::name));
