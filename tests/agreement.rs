@@ -180,3 +180,16 @@ fn run_and_certificate_agree_on_random_garments() {
     println!("{count} garments, {rest} rest, {unsettled} are warned of, {differing} differ\n{differ}");
     assert_eq!(differing, 0, "{differ}");
 }
+
+/// Triangles bear hardly any compression, so a stiffness in bending that forbids buckling shortens the cloth at small forces.
+#[test]
+fn a_garment_that_its_fabric_crushes_is_warned_of() {
+    let scene = SceneSpec::new("form", "flared-skirt@600").load().unwrap().scene;
+    let crushed = |bending_nm: [f64; 3]| {
+        let fabric = Fabric { bending_nm, ..Fabric::by_name("interlock").unwrap() };
+        let drape = scene.drape(&Settings { fabric, ..Settings::default() }).unwrap();
+        drape.warnings.iter().any(|warning| warning.contains("crushed to") && warning.contains("bending_nm"))
+    };
+    assert!(crushed([100.0; 3]));
+    assert!(!crushed(Fabric::by_name("interlock").unwrap().bending_nm));
+}
