@@ -1,6 +1,7 @@
 //! `run` and the certificate give the same verdict on random small garments, on lathe bodies and on the dress form.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::print_stdout, reason = "the counts are shown with --nocapture")]
 
 mod fixtures;
 

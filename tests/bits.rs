@@ -2,6 +2,7 @@
 //! drape is the same number by number.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::print_stdout, reason = "the lines are read by the parent process")]
 
 use std::process::Command;
 
@@ -29,7 +30,7 @@ fn drapes() -> String {
         let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", garment) }.load().unwrap();
         let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
         let drape = drape::drape(&loaded.scene, &settings, &mut drape::unobserved).unwrap();
-        let numbers = drape.preview.iter().chain(&drape.positions).flat_map(|x| x.to_array());
+        let numbers = drape.preview.iter().chain(&drape.positions).flat_map(partwise::DVec3::to_array);
         let bits = numbers.fold(0u64, |sum, x| sum.rotate_left(5).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ x.to_bits());
         let steps = drape.state.map(|state| state.steps);
         format!("bits: {garment} in {fabric}, {steps:?} steps: {bits:016x}\n")

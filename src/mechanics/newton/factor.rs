@@ -166,7 +166,7 @@ impl<T: Precision> Factor<T> {
                 for &row in &symbolic.rows[symbolic.fronts[root as usize].rows.clone()] {
                     let at = 3 * (row as usize - symbolic.top.1);
                     for (x, more) in high[at..at + 3].iter_mut().zip(&mut factor.above[at..at + 3]) {
-                        *x -= std::mem::replace(more, T::default());
+                        *x -= std::mem::take(more);
                     }
                 }
             }
