@@ -28,15 +28,12 @@
 //! Limits: triangles and vertices are sampled; forces are those of the samples. No bending: over PARTs wider than a fold it changes errors by 0.1 mm. Balancing the penalties by their residuals
 //! (Boyd, section 3.4.1) makes errors smaller for some tables and larger for as many.
 
-use faer::linalg::solvers::SolveCore;
-use faer::sparse::linalg::solvers::Llt;
-use faer::{Conj, Mat};
 use glam::DVec3;
 
 use super::elements::{parts_of, sample};
 use super::local_step::TensionField;
 use super::motions::Motions;
-use super::part_matrix::PartMatrix;
+use super::part_matrix::{PartFactor, PartMatrix};
 use crate::GRAVITY;
 use crate::body::distance::Body;
 use crate::mechanics::energy::Cloth;
@@ -131,7 +128,7 @@ pub(super) struct Admm<'a> {
     damping: Vec<f64>,
     penalty: f64,
     contact_penalty: f64,
-    factor: Llt<u32, f64>,
+    factor: PartFactor,
     splits: Vec<Split>,
     touches: Vec<Touch>,
     q: Vec<DVec3>,
@@ -277,18 +274,11 @@ impl<'a> Admm<'a> {
             || self.local_steps((membranes, split_b), (nears, touch_b)),
         );
         (self.splits, self.touches) = (splits, touches);
-        let mut right = Mat::<f64>::zeros(self.q.len(), 3);
-        for (i, load) in self.load.iter().enumerate() {
-            let side = *load + a[i] + b[i] + self.q[i] * self.damping[i];
-            (0..3).for_each(|k| right[(i, k)] = side[k]);
-        }
-        self.factor.solve_in_place_with_conj(Conj::No, right.as_mut());
-        let mut square = 0.0;
-        for (i, q) in self.q.iter_mut().enumerate() {
-            let to = DVec3::new(right[(i, 0)], right[(i, 1)], right[(i, 2)]);
-            square += to.distance_squared(*q);
-            *q = to;
-        }
+        let mut next: Vec<DVec3> =
+            (0..self.q.len()).map(|i| self.load[i] + a[i] + b[i] + self.q[i] * self.damping[i]).collect();
+        self.factor.solve(&mut next);
+        let square: f64 = next.iter().zip(&self.q).map(|(next, q)| next.distance_squared(*q)).sum();
+        self.q = next;
         (square / self.q.len() as f64).sqrt()
     }
 

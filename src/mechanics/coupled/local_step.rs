@@ -53,7 +53,7 @@ impl TensionField {
     pub(super) fn proximal(&self, [u, v]: [DVec3; 2], w: f64) -> [DVec3; 2] {
         let (a, b, c) = (u.length_squared(), u.dot(v), v.length_squared());
         let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-        let radius = half.hypot(b);
+        let radius = (half * half + b * b).sqrt();
         let (larger, smaller) = (mean + radius, (mean - radius).max(MIN_SQUARE));
         // cos² of the angle between the weft and the direction of the larger stretch.
         let along = if radius > MIN_SQUARE { 0.5 * (1.0 + half / radius) } else { 0.5 };
@@ -80,7 +80,7 @@ mod tests {
     /// Singular values by the eigenvalues of FᵀF.
     fn stretches([u, v]: [DVec3; 2]) -> [f64; 2] {
         let (a, b, c) = (u.length_squared(), u.dot(v), v.length_squared());
-        let radius = (0.5 * (a - c)).hypot(b);
+        let radius = (0.25 * (a - c) * (a - c) + b * b).sqrt();
         [1.0, -1.0].map(|sign| (0.5 * (a + c) + sign * radius).max(0.0).sqrt())
     }
 

@@ -1,8 +1,11 @@
 //! A symmetric matrix of the PARTs' functions, summed element by element and factored.
 
-use faer::Side;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMat, Triplet};
+use faer::{Conj, MatMut, Par, Side};
+use glam::DVec3;
 
 use super::motions::Motions;
 use crate::mechanics::newton::SolveError;
@@ -12,6 +15,30 @@ const RIDGE: f64 = 1e-9;
 
 /// Least diagonal, N/m.
 const MIN_DIAGONAL: f64 = 1e-12;
+
+/// The factor of a [`PartMatrix`].
+pub(super) struct PartFactor {
+    symbolic: SymbolicCholesky<u32>,
+    numbers: Vec<f64>,
+    memory: MemBuffer,
+    /// The right sides, column by column.
+    columns: Vec<f64>,
+}
+
+impl PartFactor {
+    /// Replaces the right sides, the coordinates of `b`, by the solutions.
+    pub(super) fn solve(&mut self, b: &mut [DVec3]) {
+        let n = b.len();
+        self.columns.clear();
+        (0..3).for_each(|k| self.columns.extend(b.iter().map(|b| b[k])));
+        let columns = MatMut::from_column_major_slice_mut(&mut self.columns, n, 3);
+        let memory = MemStack::new(&mut self.memory);
+        LltRef::new(&self.symbolic, &self.numbers).solve_in_place_with_conj(Conj::No, columns, Par::Seq, memory);
+        for (i, b) in b.iter_mut().enumerate() {
+            *b = DVec3::new(self.columns[i], self.columns[n + i], self.columns[2 * n + i]);
+        }
+    }
+}
 
 /// The lower triangle by 4×4 blocks of two PARTs' functions.
 pub(super) struct PartMatrix {
@@ -80,8 +107,7 @@ impl PartMatrix {
     ///
     /// # Errors
     /// [`SolveError`] where it is not positive definite, as with numbers that are not finite.
-    pub(super) fn factor(&self, diagonal: &[f64]) -> Result<Llt<u32, f64>, SolveError> {
-        let n = diagonal.len();
+    pub(super) fn factor(&self, diagonal: &[f64]) -> Result<PartFactor, SolveError> {
         let mut entries = Vec::new();
         let mut sums = diagonal.to_vec();
         self.each(|i, j, value| {
@@ -93,10 +119,35 @@ impl PartMatrix {
         });
         entries.extend((0..).zip(&sums).map(|(i, sum)| Triplet::new(i, i, sum * (1.0 + RIDGE) + MIN_DIAGONAL)));
         let index = sums.iter().position(|sum| !(sum.is_finite() && *sum >= 0.0)).unwrap_or(0);
-        let factored = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &entries).ok().and_then(|matrix| {
-            let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok()?;
-            Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower).ok()
-        });
-        factored.ok_or(SolveError::NotPositive { index })
+        factored(diagonal.len(), &entries).ok_or(SolveError::NotPositive { index })
     }
+}
+
+/// Factors a matrix given by its lower triangle; `None` where it is not positive definite.
+fn factored(n: usize, entries: &[Triplet<u32, u32, f64>]) -> Option<PartFactor> {
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, entries).ok()?;
+    // Column by column on one thread: the dense kernels of supernodes depend on the processor, and so do their bits.
+    let params = CholeskySymbolicParams {
+        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
+        ..Default::default()
+    };
+    let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, Default::default(), params).ok()?;
+    let needs = [
+        symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+        symbolic.solve_in_place_scratch::<f64>(3, Par::Seq),
+    ];
+    let mut memory = MemBuffer::try_new(StackReq::any_of(&needs)).ok()?;
+    let mut numbers = vec![0.0; symbolic.len_val()];
+    symbolic
+        .factorize_numeric_llt(
+            &mut numbers,
+            matrix.as_ref(),
+            Side::Lower,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        )
+        .ok()?;
+    Some(PartFactor { symbolic, numbers, memory, columns: Vec::new() })
 }
