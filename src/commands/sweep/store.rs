@@ -30,7 +30,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::commands::runtime::interrupt_flag;
 
-const POINT: &Tag = b"PWPOINT5";
+const POINT: &Tag = b"PWPOINT6";
 const SCENE: &Tag = b"PWSCENE3";
 
 /// Body and garment of a recording.
