@@ -7,7 +7,7 @@
 //! s is the median of √(σ₁ σ₂), weighted by area in the pattern, or the unit (m, dm, cm, mm, in) within `UNIT_TOLERANCE` of it.
 //! The coordinates are a pattern if triangles of `MIN_SHARE` of the area are within `SCALE_TOLERANCE` of s, and if the area
 //! fits into the box around the coordinates: a tiled texture overlaps itself. Panels may lie over one another, each drawn from its own
-//! origin, if s is a unit, each fits into its own box, and they have [`MIN_PANEL`] triangles in the mean.
+//! origin, if s is a unit, each fits into its own box, and they have `MIN_PANEL` triangles in the mean.
 //!
 //! Limits: a garment modelled as a cylinder and unrolled counts as a pattern, which it is.
 
