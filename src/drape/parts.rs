@@ -137,16 +137,18 @@ fn through_levels(
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
     let given = Hints { distance_m: &distance, least_share: 0.0 };
-    let mut options = options;
-    let newton = CoupledOptions { method: Method::Newton, ..options.clone() };
+    let by = |method| CoupledOptions { method, ..options.clone() };
+    let mut fallback = None;
     if coupled::splits(&scene.garment, parts, &levels.cloth, options.method) {
-        let solved = coupled::solve_given(&garment, &scene.body, parts, start, given, options, &mut |_| asked())?;
+        let admm = by(Method::Admm);
+        let solved = coupled::solve_given(&garment, &scene.body, parts, start, given, &admm, &mut |_| asked())?;
         if options.method == Method::Admm || scene.fallen(&solved.positions).is_none() {
             return Ok(solved);
         }
-        // A garment that slips off through steps of centimetres may hang on in steps of millimetres.
-        options = &newton;
+        // A garment that falls off by steps of centimetres may stay on by steps of millimetres.
+        fallback = Some(by(Method::Newton));
     }
+    let options = fallback.as_ref().unwrap_or(options);
     let folding = Folding::of(&scene.garment, parts, &levels.cloth);
     let enough = |(below, level): &(usize, &Level)| {
         let least = if *below == 0 { ENOUGH } else { ENOUGH_BELOW };

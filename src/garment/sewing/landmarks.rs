@@ -4,8 +4,8 @@
 //! curves beside it above the crotch are arms. The neck is the smallest girth of the top fifth, the shoulder's neck end the first
 //! height below it where the curve is [`SPREAD`] times as wide, the waist the smallest girth between crotch and armpit, hip and
 //! bust the largest below and above it. Arms are straight lines through the centres of their curves. The front is perpendicular to the
-//! trunk's wider direction, on the side to which each foot is longer ahead of its own ankle: a foot that steps ahead of the other
-//! decides nothing.
+//! trunk's wider direction, on the side on which each foot extends farther from its own ankle. A foot that steps ahead of the other
+//! does not change it.
 //!
 //! Limits: for a body that stands upright with its legs apart or together and its arms free of the trunk. A landmark that is
 //! not found is `None`, and nothing is moved to it.

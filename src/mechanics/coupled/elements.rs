@@ -102,8 +102,8 @@ pub(super) fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32
     parts
 }
 
-/// Chooses elements by a sequence that leaves no gaps (multiples of the golden section), so many of each of `count` PARTs, and how many
-/// elements each stands for. `rate` is the share of the elements of a PART of this size.
+/// Samples the elements of `count` PARTs by a low-discrepancy sequence (multiples of the golden section). Returns the index of each sampled
+/// element and the number of elements that it represents. `rate` gives the share that is sampled of a PART of this size.
 pub(super) fn sample(count: usize, parts: &Csr<u32>, rate: impl Fn(f64) -> f64) -> Vec<(u32, f64)> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut size = vec![0.0; count];

@@ -194,9 +194,9 @@ pub(crate) fn splits(mesh: &TriMesh, parts: &Parts, cloth: &Cloth, method: Metho
     }
 }
 
-/// Iterations of ADMM after which vertices in the body are pushed out and the maps start anew: an affine map does not follow the body, and
-/// cloth beside the few vertices that touch stays off it. Once at the end instead, pullovers end up to 5 mm farther from their rest. Each time
-/// the cloth hangs a little lower, so the number of times is limited by [`CoupledOptions::max_iterations`].
+/// Iterations of ADMM after which vertices in the body are pushed out and the maps restart from there: an affine map does not follow the
+/// body, so the few vertices that touch hold the others off it. With one push-out at the end, pullovers end up to 4 mm farther from the
+/// canonical drape. The cloth sinks at each push-out, so their number is limited by [`CoupledOptions::max_iterations`].
 const CONFORM_INTERVAL: usize = 8;
 
 /// [`solve`] by ADMM. Of the options it takes the motion, `max_iterations` and `least_change_m`.
@@ -227,7 +227,7 @@ fn solve_by_admm(
     let began = Instant::now();
     let mut positions = start.to_vec();
     let mut moves = Vec::new();
-    // What has moved by less than its distance cannot have come to the body.
+    // A vertex that moved by less than its distance from the body does not touch it.
     let clear = |x: &[DVec3]| -> Vec<bool> {
         (0..x.len()).map(|v| cloth.held[v] || distance_m[v] - x[v].distance(start[v]) > cloth.offsets[v]).collect()
     };

@@ -121,7 +121,7 @@ precision!(f64, Register, 4, load_doubles, store_doubles, splat add sub mul);
 /// Columns that are factored one by one.
 const NARROW: usize = 16;
 
-/// Products of a piece that is worth a thread of its own: 50 µs of work.
+/// Fewest products of a piece that is given to another thread: 50 µs of work.
 const PRODUCTS_PER_TASK: usize = 1 << 20;
 
 /// Registers of rows, and columns, of a tile of a product.
