@@ -192,13 +192,8 @@ const CRUSHED: f64 = 0.5;
 /// A warning about a garment that has lost its area. Triangles bear hardly any compression, as cloth buckles before it does; a bending
 /// stiffness that does not let it buckle then shortens the cloth instead of keeping it straight, at small forces.
 fn crushed_warning(scene: &Scene, positions: &[DVec3]) -> Option<String> {
-    let garment = scene.garment.with_positions(positions.to_vec());
-    let area = |t: usize| {
-        let [a, b, c] = garment.corners(t);
-        0.5 * (b - a).cross(c - a).length()
-    };
     let whole: f64 = scene.rest.areas().into_iter().map(f64::abs).sum();
-    let share = (0..garment.triangles.len()).map(area).sum::<f64>() / whole;
+    let share = scene.garment.with_positions(positions.to_vec()).triangle_areas().iter().sum::<f64>() / whole;
     (share < CRUSHED).then(|| {
         format!(
             "the cloth is crushed to {:.0} % of its area: its fabric is too stiff in bending to buckle; check `bending_nm`, in N·m (the \
