@@ -1,8 +1,10 @@
 //! `partwise compare`: compares range tables in numbers and in a recording.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use crate::base::files::names_a_file;
 use crate::drape::{Refine, Settings};
 use crate::parts::range_table::{Extent, RangeTable, TableRule};
 use crate::parts::{Parts, UNASSIGNED, segment};
@@ -118,8 +120,9 @@ impl CompareArgs {
     fn plan(&self) -> anyhow::Result<Plan> {
         self.model.fabric.check_single("compare")?;
         let settings = Settings { refine: self.refine, ..self.model.apply(Job::preview().settings)? };
-        let table = |name: &String| Ok(TableRule::from(RangeTable::by_name(name)?).named(name));
-        let tables: Vec<TableRule> = self.tables.iter().map(table).collect::<anyhow::Result<_>>()?;
+        let table = |(name, label): (&String, &String)| Ok(TableRule::from(RangeTable::by_name(name)?).named(label));
+        let labels = labels(&self.tables);
+        let tables: Vec<TableRule> = self.tables.iter().zip(&labels).map(table).collect::<anyhow::Result<_>>()?;
         let mut jobs = Vec::new();
         for garment in &self.garment {
             let scene = SceneSpec::new(&self.body, garment);
@@ -135,6 +138,16 @@ impl CompareArgs {
         console::notes(&plan.notes);
         Ok(plan)
     }
+}
+
+/// The file names without folder and ending, which leave room for the numbers; where two are equal, all tables as they were given.
+fn labels(tables: &[String]) -> Vec<String> {
+    let short = tables.iter().map(|table| {
+        let stem = Path::new(table).file_stem().filter(|_| names_a_file(table));
+        stem.map_or_else(|| table.clone(), |stem| stem.to_string_lossy().into_owned())
+    });
+    let short: Vec<String> = short.collect();
+    if short.iter().collect::<BTreeSet<_>>().len() == tables.len() { short } else { tables.to_vec() }
 }
 
 fn compared(plan: &Plan, rows: &[Row], bench: &Bench<'_>) -> anyhow::Result<Vec<Compared>> {
@@ -221,28 +234,42 @@ fn text(all: &[Compared]) -> String {
         let garment = &compared[0].row.garment;
         let changes = console::table(console::OPEN, ["table", "PARTs", "kept", "split", "merged"], 1.., changes);
         let _ = writeln!(out, "\n{garment}: PARTs by levels alone, and changes from the first table\n{changes}");
-        let level_count = compared.iter().map(|c| c.per_level.len()).max().unwrap_or(0);
-        let occupied = |level: &usize| compared.iter().any(|c| c.per_level.get(*level).is_some_and(|l| l.vertices > 0));
-        let levels = (0..level_count).filter(occupied).map(|level| {
-            let cells = compared.iter().flat_map(|c| match c.per_level.get(level) {
-                Some(l) => [range(l), l.parts.to_string()],
-                None => [String::new(), String::new()],
-            });
-            [(level + 1).to_string()].into_iter().chain(cells).collect::<Vec<_>>()
-        });
-        let tables = compared.iter().flat_map(|c| [&c.row.table, "PARTs"]);
-        let header = ["level"].into_iter().chain(tables);
-        let _ = writeln!(out, "{}", console::table(console::OPEN, header, 0.., levels));
+        let tables = compared.iter().map(|c| c.row.table.as_str());
+        let header = ["level cm"].into_iter().chain(tables);
+        let _ =
+            writeln!(out, "PARTs of each level\n{}", console::table(console::OPEN, header, 0.., level_rows(compared)));
     }
     out
 }
 
-/// The bounds and the extent of a level.
-fn range(level: &LevelCount) -> String {
+/// The occupied levels of all tables, ascending, and the PARTs that each table has in them. Levels with other bounds are other rows: their
+/// PARTs do not compare.
+fn level_rows(compared: &[Compared]) -> Vec<Vec<String>> {
+    let levels = |c: &'_ Compared| c.per_level.clone().into_iter().filter(|level| level.vertices > 0);
+    let mut bounds: Vec<[f64; 2]> = compared.iter().flat_map(levels).map(|l| [l.lower_cm, l.upper_cm]).collect();
+    bounds.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    bounds.dedup();
+    let row = |[lower, upper]: [f64; 2]| {
+        let cells = compared.iter().map(|c| {
+            let level = levels(c).find(|l| [l.lower_cm, l.upper_cm] == [lower, upper]);
+            level.map_or_else(|| "–".to_owned(), |level| parts_text(&level))
+        });
+        [range(lower, upper)].into_iter().chain(cells).collect()
+    };
+    bounds.into_iter().map(row).collect()
+}
+
+/// The PARTs of a level, and the extent that they are cut to.
+fn parts_text(level: &LevelCount) -> String {
+    let extent = level.extent.filter(Extent::cuts).map_or_else(String::new, |extent| format!(", cut to {extent} cm"));
+    format!("{}{extent}", level.parts)
+}
+
+/// The bounds of a level.
+fn range(lower_cm: f64, upper_cm: f64) -> String {
     let short = |cm: f64| format!("{cm:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    let extent = level.extent.filter(Extent::cuts).map_or_else(String::new, |extent| format!(", cut to {extent}"));
-    let upper = if level.upper_cm.is_finite() { short(level.upper_cm) } else { "∞".to_owned() };
-    format!("{}–{upper} cm{extent}", short(level.lower_cm))
+    let upper = if upper_cm.is_finite() { short(upper_cm) } else { "∞".to_owned() };
+    format!("{}–{upper}", short(lower_cm))
 }
 
 /// Columns of the CSV: those of the row and of the level.
@@ -287,6 +314,29 @@ mod tests {
         let topology = Topology::new(&TriMesh::new(positions, triangles));
         let distance: Vec<f64> = (0..n).map(|i| 0.01 * f64::from(i / 2) + 0.001).collect();
         segment(&topology, &distance, table)
+    }
+
+    #[test]
+    fn levels_with_unlike_bounds_are_rows_of_their_own() {
+        let of = |table: &RangeTable| {
+            let parts = cut_by(table);
+            Compared { row: Row::default(), changes: Changes::default(), per_level: LevelCount::all(table, &parts) }
+        };
+        let [coarse, fine] = [[2.0, 4.0].as_slice(), &[2.0, 3.0, 4.0]]
+            .map(|bounds| of(&RangeTable::from_inner_bounds("t", bounds).unwrap()));
+        let rows = level_rows(&[coarse, fine]);
+        let cells: Vec<Vec<&str>> = rows.iter().map(|row| row.iter().map(String::as_str).collect()).collect();
+        assert_eq!(
+            cells,
+            [["0–2", "1", "1"], ["2–3", "–", "1"], ["2–4", "1", "–"], ["3–4", "–", "1"], ["4–∞", "1", "1"]]
+        );
+    }
+
+    #[test]
+    fn tables_are_labelled_by_their_file_names_unless_these_are_equal() {
+        let of = |tables: [&str; 2]| labels(&tables.map(str::to_owned));
+        assert_eq!(of(["table-3", "assets/tables/table-3-12cm.toml"]), ["table-3", "table-3-12cm"]);
+        assert_eq!(of(["a/t.toml", "b/t.toml"]), ["a/t.toml", "b/t.toml"]);
     }
 
     #[test]

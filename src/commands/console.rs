@@ -59,32 +59,34 @@ pub(crate) fn all_printed() -> bool {
 pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
 
 /// A table that fits the terminal: long cells are wrapped between words. If even the longest words do not fit side by side, the longest of
-/// all are broken, such as paths. In a file or a pipe the lines have their full length. The columns listed in `numbers`, ascending, are aligned right.
+/// all are broken, such as paths, after a mark such as a slash if they have one. In a file or a pipe the lines have their full length. The
+/// columns listed in `numbers`, ascending, are aligned right.
 pub(crate) fn table<R: Into<Row>>(
     style: &str,
     header: impl IntoIterator<Item: Into<Cell>>,
     numbers: impl IntoIterator<Item = usize>,
     rows: impl IntoIterator<Item = R>,
 ) -> Table {
-    let mut table = Table::new();
-    table.load_preset(style).set_content_arrangement(ContentArrangement::Dynamic).set_header(header).add_rows(rows);
-    for column in numbers {
-        let Some(column) = table.column_mut(column) else { break };
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    let width = table.width().unwrap_or(u16::MAX);
-    fit(&mut table, width);
-    table
+    let texts = |row: Row| row.cell_iter().map(Cell::content).collect::<Vec<String>>();
+    let header = texts(Row::from(header.into_iter().map(Into::into).collect::<Vec<Cell>>()));
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|row| texts(row.into())).collect();
+    let width = Table::new().width().unwrap_or(u16::MAX);
+    fitted(style, &header, numbers, &rows, width)
 }
 
-/// Sets padding and column widths for a terminal of this width, in characters.
-fn fit(table: &mut Table, width: u16) {
-    let mut longest_word = vec![0_u16; table.column_count()];
-    for row in table.header().into_iter().chain(table.row_iter()) {
-        for (longest, cell) in longest_word.iter_mut().zip(row.cell_iter()) {
-            let content = cell.content();
-            let words = content.split_whitespace().map(|word| u16::try_from(word.chars().count()).unwrap_or(u16::MAX));
-            *longest = words.fold(*longest, u16::max);
+/// The table in a terminal of this width, in characters.
+fn fitted(
+    style: &str,
+    header: &[String],
+    numbers: impl IntoIterator<Item = usize>,
+    rows: &[Vec<String>],
+    width: u16,
+) -> Table {
+    let columns = rows.iter().map(Vec::len).fold(header.len(), usize::max);
+    let mut longest_word = vec![0_u16; columns];
+    for row in std::iter::once(header).chain(rows.iter().map(Vec::as_slice)) {
+        for (longest, text) in longest_word.iter_mut().zip(row) {
+            *longest = text.split_whitespace().map(letters).fold(*longest, u16::max);
         }
     }
     // Each column takes its padding and a separator.
@@ -98,10 +100,46 @@ fn fit(table: &mut Table, width: u16) {
     {
         *longest -= 1;
     }
+    let broken = |row: &[String]| -> Vec<String> {
+        row.iter().zip(&longest_word).map(|(text, most)| broken_after_marks(text, *most)).collect()
+    };
+    let mut table = Table::new();
+    table.load_preset(style).set_content_arrangement(ContentArrangement::Dynamic).set_header(broken(header));
+    table.add_rows(rows.iter().map(|row| broken(row)));
+    if width < u16::MAX {
+        table.set_width(width);
+    }
+    for column in numbers {
+        let Some(column) = table.column_mut(column) else { break };
+        column.set_cell_alignment(CellAlignment::Right);
+    }
     for (column, longest) in table.column_iter_mut().zip(longest_word) {
         let least = Width::Fixed(longest.saturating_add(padding.0 + padding.1));
         column.set_padding(padding).set_constraint(ColumnConstraint::LowerBoundary(least));
     }
+    table
+}
+
+fn letters(word: &str) -> u16 {
+    u16::try_from(word.chars().count()).unwrap_or(u16::MAX)
+}
+
+/// `text` with line ends in words of more than `most` letters, after the last slash, dash or the like that fits.
+fn broken_after_marks(text: &str, most: u16) -> String {
+    let most = usize::from(most);
+    let split = |word: &str| {
+        let mut pieces = Vec::new();
+        let mut rest: Vec<char> = word.chars().collect();
+        while rest.len() > most {
+            let fits = &rest[..most];
+            let Some(mark) = fits.iter().rposition(|c| "/\\-_.,:;=@".contains(*c)) else { break };
+            pieces.push(rest.drain(..=mark).collect::<String>());
+        }
+        pieces.push(rest.into_iter().collect());
+        pieces.join("\n")
+    };
+    // Lines and runs of spaces stay as they are.
+    text.split('\n').map(|line| line.split(' ').map(split).collect::<Vec<_>>().join(" ")).collect::<Vec<_>>().join("\n")
 }
 
 /// Prints information on stderr.
@@ -157,10 +195,8 @@ mod tests {
 
     fn lines(width: u16, setting: &str) -> Vec<String> {
         let header = ["garment", "setting", "canonical error mm", "translation bound mm"];
-        let mut table = table(OPEN, header, 2.., [["flared-skirt@3920", setting, "45.8", "76.9"]]);
-        table.set_width(width);
-        fit(&mut table, width);
-        table.lines().collect()
+        let row = ["flared-skirt@3920", setting, "45.8", "76.9"].map(str::to_owned);
+        fitted(OPEN, &header.map(str::to_owned), 2.., &[row.to_vec()], width).lines().collect()
     }
 
     #[test]
@@ -169,6 +205,10 @@ mod tests {
         assert!(narrow.iter().all(|line| line.chars().count() <= 52), "{narrow:#?}");
         for word in ["flared-skirt@3920", "table-3", "canonical", "translation"] {
             assert!(narrow.iter().any(|line| line.contains(word)), "{word}: {narrow:#?}");
+        }
+        let path = lines(60, "assets/tables/table-3-12cm.toml");
+        for piece in ["assets/tables/", "table-3-12cm.toml"] {
+            assert!(path.iter().any(|line| line.contains(piece)), "{piece}: {path:#?}");
         }
         let broken = lines(60, &"path/".repeat(20));
         assert!(broken.iter().all(|line| line.chars().count() <= 60), "{broken:#?}");

@@ -1,5 +1,6 @@
 //! Shared by the commands: exit codes, Ctrl-C, threads, output files, progress of the solver.
 
+use std::collections::VecDeque;
 use std::error::Error;
 use std::io;
 use std::ops::ControlFlow;
@@ -12,7 +13,7 @@ use std::time::{Duration, Instant};
 use crate::base::atomic_file::{self, AtomicFile};
 use crate::drape::DrapeError;
 use crate::live::LiveError;
-use crate::mechanics::refine::Observer;
+use crate::mechanics::refine::{Observer, RefineOptions};
 use crate::record::RecordError;
 use crate::study::accuracy::ReferenceCache;
 use crate::study::evaluate::EvaluateError;
@@ -177,10 +178,75 @@ pub(crate) fn create_folder(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn with_progress<T>(title: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
     keep_results();
     let bar = console::progress(None, title);
+    let rests_below = RefineOptions::default().tolerance;
+    let (began, mut decay) = (Instant::now(), Decay::default());
     let out = work(&mut |step| {
-        bar.set_message(format!("{title}: step {}, residual {:.1e}", step.iteration, step.residual_over_weight));
+        let (number, residual) = (step.iteration, step.residual_over_weight);
+        // Steps on a coarser mesh have no number.
+        let on = if number == 0 { "coarser mesh".to_owned() } else { format!("step {number}") };
+        let left = decay.seconds_left(began.elapsed().as_secs_f64(), residual, rests_below).filter(|_| number > 0);
+        let left = left.map_or_else(String::new, |seconds| format!(", about {seconds:.0} s left"));
+        bar.set_message(format!("{title}: {on}, residual {residual:.1e}, rests below {rests_below:.0e}{left}"));
         control_flow()
     });
     bar.finish_and_clear();
     out
+}
+
+/// The decay of a residual over the last steps, by which the remaining time is estimated.
+#[derive(Debug, Default)]
+struct Decay {
+    /// Seconds and the logarithm of the residual.
+    steps: VecDeque<(f64, f64)>,
+}
+
+impl Decay {
+    /// Steps that count. A heuristic: fewer follow single steps, more follow an earlier phase of the solver.
+    const STEPS: usize = 12;
+    /// Steps before the first estimate.
+    const LEAST: usize = 4;
+    /// Longest estimate, s; a slower decay says nothing.
+    const LONGEST: f64 = 1800.0;
+
+    /// Adds a step, and returns the seconds until the residual falls below `target` if its logarithm goes on as over the last steps.
+    fn seconds_left(&mut self, seconds: f64, residual: f64, target: f64) -> Option<f64> {
+        if residual.is_nan() || residual <= 0.0 {
+            return None;
+        }
+        self.steps.push_back((seconds, residual.ln()));
+        if self.steps.len() > Self::STEPS {
+            self.steps.pop_front();
+        }
+        if self.steps.len() < Self::LEAST {
+            return None;
+        }
+        let count = self.steps.len() as f64;
+        let (t, r) = self.steps.iter().fold((0.0, 0.0), |(t, r), step| (t + step.0 / count, r + step.1 / count));
+        let (covariance, variance) = self.steps.iter().fold((0.0, 0.0), |(covariance, variance), step| {
+            (covariance + (step.0 - t) * (step.1 - r), variance + (step.0 - t).powi(2))
+        });
+        let slope = covariance / variance;
+        let left = (r + slope * (seconds - t) - target.ln()) / -slope;
+        (slope < 0.0 && (0.5..Self::LONGEST).contains(&left)).then_some(left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_follows_the_decay_of_the_residual() {
+        let mut decay = Decay::default();
+        // A tenth every two seconds, from 1: a thousandth is reached at six.
+        let estimates: Vec<Option<f64>> =
+            (0..8).map(|i| f64::from(i) * 0.5).map(|t| decay.seconds_left(t, 10f64.powf(-0.5 * t), 1e-3)).collect();
+        assert!(estimates[..3].iter().all(Option::is_none), "{estimates:?}");
+        assert!(
+            estimates[3..].iter().enumerate().all(|(i, left)| (left.unwrap() - (4.5 - 0.5 * i as f64)).abs() < 1e-9)
+        );
+        // A residual that grows has no estimate.
+        let mut grows = Decay::default();
+        assert!((0..9).all(|i| grows.seconds_left(f64::from(i), f64::from(i + 1), 1e-3).is_none()));
+    }
 }

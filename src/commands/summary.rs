@@ -76,7 +76,16 @@ impl Summary {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.evaluation.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
-        let warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
+        let ease = GirthEase::all(&loaded.scene, loaded.girths_at_m, &drape.positions);
+        let mut warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
+        if measured.metrics.is_torn() {
+            let small = ease.iter().filter(|e| e.ease_cm.is_some_and(|cm| cm < 0.0));
+            let small: Vec<String> =
+                small.map(|e| format!("at the {} by {:.0} cm", e.at, -e.ease_cm.unwrap_or_default())).collect();
+            if !small.is_empty() {
+                warnings.push(format!("the garment is too small {}", listed(&small)));
+            }
+        }
         let mut summary = Self {
             version: env!("CARGO_PKG_VERSION"),
             command_line: command_line(),
@@ -93,7 +102,7 @@ impl Summary {
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
             levels,
-            ease: GirthEase::all(&loaded.scene, loaded.girths_at_m, &drape.positions),
+            ease,
             since_last: None,
             let_go: drape.let_go.map(|let_go| let_go.to_string()),
             accuracy,
@@ -197,15 +206,18 @@ impl Summary {
     }
 
     fn ease_table(&self) -> Table {
-        let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm"];
+        let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm", ""];
         let rows = self.covered().map(|(ease, garment_cm, ease_cm)| {
             let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
             if let Some(under) = ease.garment_height_cm.filter(|cm| cm + 0.5 < ease.height_cm) {
                 garment = format!("{garment}, under the sleeves at {under:.1}");
             }
-            [ease.at.to_owned(), height, body, garment, format!("{ease_cm:+.1}")]
+            let fit = if ease_cm < 0.0 { format!("too small by {:.1} cm", -ease_cm) } else { String::new() };
+            [ease.at.to_owned(), height, body, garment, format!("{ease_cm:+.1}"), fit]
         });
-        console::table(console::RULED, header, 1.., rows)
+        let columns = if self.covered().any(|(_, _, cm)| cm < 0.0) { 6 } else { 5 };
+        let rows = rows.map(|row| row.into_iter().take(columns).collect::<Vec<String>>());
+        console::table(console::RULED, header.into_iter().take(columns), 1..5, rows)
     }
 
     fn levels_table(&self) -> Table {

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 
 use crate::base::files::read_own;
 use crate::parts::UNASSIGNED;
-use crate::record::{Refused, query};
-use crate::session::{LoadedScene, Snapshot};
+use crate::record::{Refused, outlines, query};
+use crate::session::{LoadedScene, Segmented, Snapshot};
 
 /// The garment as OBJ: `of=rest`, `of=preview`, `pin=ID`, or by default the newest drape.
 pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
@@ -33,19 +33,52 @@ pub(super) fn obj(snapshot: &Snapshot, uri: &Uri) -> Result<Vec<u8>, Refused> {
     read_own(&path).map_err(|e| failed(&e))
 }
 
-/// A PART and its results: `number=N`, or the PART nearest the point `at=x,y,z`, m, of the garment `on=parts`, `preview` or `rest`.
+/// The outline of a PART (`number=N`) in each view, RRD; without a number, no outline.
+pub(super) fn outline(snapshot: &Snapshot, uri: &Uri, recording: (&str, &str)) -> Result<Vec<u8>, Refused> {
+    let found = part_list(snapshot)?;
+    let scene = &found.loaded_scene.input.scene;
+    let of_this = |other: &LoadedScene| other.generation == found.loaded_scene.generation;
+    let mut chosen = vec![false; scene.garment.vertex_count()];
+    if let Some(text) = query(uri, "number") {
+        let part = &found.parts.parts[numbered(found, &text)? as usize];
+        part.vertices.iter().for_each(|&v| chosen[v as usize] = true);
+    }
+    let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.loaded_scene)).map(|p| p.positions.as_slice());
+    let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.loaded_scene)).map(|r| r.positions.as_slice());
+    let shapes = [Some(scene.garment.positions.as_slice()), preview, rest];
+    let made = outlines(recording, &scene.garment, &scene.topology, &chosen, shapes);
+    made.map_err(|e| (StatusCode::INTERNAL_SERVER_ERROR, e.to_string()))
+}
+
+/// Stage one of the newest state.
+fn part_list(snapshot: &Snapshot) -> Result<&Segmented, Refused> {
+    let none = || (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned());
+    snapshot.segmented.as_deref().ok_or_else(none)
+}
+
+/// The index of the PART with this number.
+fn numbered(found: &Segmented, text: &str) -> Result<u32, Refused> {
+    let number: Result<u32, _> = text.parse();
+    let wrong = |_| (StatusCode::BAD_REQUEST, format!("found number={text}, expected a PART's number from 1"));
+    let index = number.map_err(wrong)?.wrapping_sub(1);
+    if (index as usize) < found.parts.len() { Ok(index) } else { Err(no_part(found)) }
+}
+
+fn no_part(found: &Segmented) -> Refused {
+    (StatusCode::NOT_FOUND, format!("found no PART there, expected one of 1 to {}", found.parts.len()))
+}
+
+/// A PART and its results: `number=N`, counted from 1 as levels are, or the PART nearest the point `at=x,y,z`, m, of the garment `on=parts`, `preview` or `rest`.
 pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
     let bad = |sentence: String| (StatusCode::BAD_REQUEST, sentence);
-    let found = snapshot.segmented.as_ref();
-    let found =
-        found.ok_or_else(|| (StatusCode::CONFLICT, "no PARTs yet: the garment is still being made".to_owned()))?;
+    let found = part_list(snapshot)?;
     let loaded_scene: &LoadedScene = &found.loaded_scene;
     let of_this = |other: &LoadedScene| other.generation == loaded_scene.generation;
     let placed = &loaded_scene.input.scene.garment.positions;
     let preview = snapshot.preview.as_ref().filter(|p| of_this(&p.loaded_scene));
     let rest = snapshot.rest.as_ref().filter(|r| of_this(&r.loaded_scene)).map(|r| &*r.positions);
-    let number = if let Some(text) = query(uri, "number") {
-        text.parse().map_err(|_| bad(format!("found number={text}, expected a PART's number from 0")))?
+    let index = if let Some(text) = query(uri, "number") {
+        numbered(found, &text)?
     } else {
         let text = query(uri, "at").unwrap_or_default();
         let numbers: Vec<f64> =
@@ -64,21 +97,18 @@ pub(super) fn part(snapshot: &Snapshot, uri: &Uri) -> Result<Value, Refused> {
             on.iter().enumerate().min_by(|a, b| a.1.distance_squared(point).total_cmp(&b.1.distance_squared(point)));
         nearest.map_or(UNASSIGNED, |(vertex, _)| found.parts.part_of_vertex[vertex])
     };
-    let Some(part) = found.parts.parts.get(number as usize) else {
-        let none = format!("found no PART there, expected one of 0 to {}", found.parts.len().saturating_sub(1));
-        return Err((StatusCode::NOT_FOUND, none));
-    };
+    let part = found.parts.parts.get(index as usize).ok_or_else(|| no_part(found))?;
     let mean = |to: &[DVec3]| {
         let moved = part.vertices.iter().map(|&v| to[v as usize] - placed[v as usize]).sum::<DVec3>();
         1e3 * (moved / part.vertices.len() as f64)
     };
     let areas = loaded_scene.input.scene.garment.vertex_areas();
     let level = found.table.effective_levels().get(part.level as usize).copied();
-    let force_n = found.force_n.get(number as usize);
+    let force_n = found.force_n.get(index as usize);
     Ok(json!({
         "state": found.state,
-        "part": number,
-        "level": part.level,
+        "part": index + 1,
+        "level": part.level + 1,
         "lower_cm": level.map(|l| l.lower_cm),
         "upper_cm": level.map(|l| l.upper_cm).filter(|cm| cm.is_finite()),
         "vertices": part.vertices.len(),

@@ -9,10 +9,9 @@ use glam::DVec3;
 use tokio::sync::watch;
 
 use super::access::random_token;
-use crate::mesh::TriMesh;
 use crate::parts::Parts;
 use crate::record::{LiveEncoder, LiveShape, PinnedView, RecordError};
-use crate::session::{Session, Snapshot};
+use crate::session::{Pin, Session, Snapshot};
 use crate::study::metrics::LevelCount;
 
 /// Interval of the checks for a first viewer.
@@ -23,8 +22,11 @@ const ENCODE_INTERVAL: Duration = Duration::from_millis(33);
 /// The newest piece of each kind: layout and triangles, PARTs, preview, rest.
 type Slots = [Option<(u64, Bytes)>; 4];
 
-#[derive(Default)]
 pub(super) struct Pieces {
+    /// Name of the session in the viewer.
+    name: String,
+    /// Viewers keep one recording for each identifier.
+    id: String,
     slots: Mutex<Slots>,
     newest: watch::Sender<u64>,
     /// Cloned by each viewer.
@@ -43,6 +45,24 @@ struct Encoded {
 }
 
 impl Pieces {
+    /// No pieces yet, of a session of this name.
+    pub(super) fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            id: random_token().unwrap_or_default(),
+            slots: Mutex::default(),
+            newest: watch::Sender::default(),
+            viewers: Arc::default(),
+            stopped: AtomicBool::default(),
+            error: Mutex::default(),
+        }
+    }
+
+    /// Name and identifier of the viewers' recording.
+    pub(super) fn recording(&self) -> (&str, &str) {
+        (&self.name, &self.id)
+    }
+
     /// Counts a viewer for as long as it holds the result.
     pub(super) fn attach(&self) -> Arc<()> {
         Arc::clone(&self.viewers)
@@ -87,15 +107,13 @@ impl Pieces {
     }
 
     /// Encodes changes until the server stops.
-    pub(super) fn encode(&self, session: &Session, name: &str, front: DVec3) {
-        let made = self.keep_encoding(session, name, front);
+    pub(super) fn encode(&self, session: &Session, front: DVec3) {
+        let made = self.keep_encoding(session, front);
         *self.error.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
     }
 
-    fn keep_encoding(&self, session: &Session, name: &str, front: DVec3) -> Result<(), RecordError> {
-        // Viewers keep one recording for each identifier.
-        let id = random_token().unwrap_or_default();
-        let mut encoder = LiveEncoder::new(name, &id, front)?;
+    fn keep_encoding(&self, session: &Session, front: DVec3) -> Result<(), RecordError> {
+        let mut encoder = LiveEncoder::new(&self.name, &self.id, front)?;
         let mut encoded = Encoded::default();
         let (mut serial, mut number) = (0, 0);
         while !self.stopped.load(Ordering::SeqCst) {
@@ -129,6 +147,14 @@ impl Pieces {
     }
 }
 
+/// Pins that have views: with more columns, the titles of the views do not fit in a window of 1280 pixels.
+const MAX_SHOWN_PINS: usize = 2;
+
+/// The newest pins, which have views.
+pub(super) fn shown_pins(snapshot: &Snapshot) -> &[Arc<Pin>] {
+    &snapshot.pins[snapshot.pins.len().saturating_sub(MAX_SHOWN_PINS)..]
+}
+
 /// Encodes the changes since `encoded`.
 fn encode(
     encoder: &mut LiveEncoder,
@@ -138,18 +164,18 @@ fn encode(
     let mut made = [None, None, None, None];
     let Some(loaded_scene) = &now.loaded_scene else { return Ok(made) };
     let (generation, scene) = (loaded_scene.generation, &loaded_scene.input.scene);
-    let base = Some((generation, now.pins.iter().map(|pin| pin.id).collect()));
+    let base = Some((generation, shown_pins(now).iter().map(|pin| pin.id).collect()));
     if encoded.base != base {
-        let draped: Vec<TriMesh> = now
-            .pins
-            .iter()
-            .map(|pin| pin.loaded_scene.input.scene.garment.with_positions(pin.positions.to_vec()))
-            .collect();
-        let pins: Vec<PinnedView<'_>> = (now.pins.iter().zip(&draped))
-            .map(|(pin, draped)| PinnedView {
-                label: &pin.label,
+        let pins = shown_pins(now);
+        let levels: Vec<Vec<LevelCount>> =
+            pins.iter().map(|pin| LevelCount::all(&pin.segmented.table, &pin.segmented.parts)).collect();
+        let pins: Vec<PinnedView<'_>> = (pins.iter().zip(&levels))
+            .map(|(pin, levels)| PinnedView {
                 body: pin.loaded_scene.input.scene.body.mesh(),
-                draped,
+                garment: &pin.loaded_scene.input.scene.garment,
+                parts: &pin.segmented.parts,
+                levels,
+                preview: &pin.preview,
             })
             .collect();
         made[0] = Some(encoder.base(scene.body.mesh(), &scene.garment, &pins)?);

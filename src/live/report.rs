@@ -1,7 +1,9 @@
 //! A snapshot of the session as JSON, for `GET /api/state` and events.
 
 use serde_json::{Map, Value, json};
+use std::sync::Arc;
 
+use super::pieces::shown_pins;
 use crate::base::error_text;
 use crate::drape::{Model, Settings};
 use crate::garment::builtin;
@@ -37,7 +39,7 @@ pub(super) fn event(snapshot: &Snapshot) -> Value {
         "rest": snapshot.rest.as_deref().map(rest),
         "figures": snapshot.finished.as_deref().map(figures),
         "refused": snapshot.refused.as_deref().map(refused),
-        "pins": snapshot.pins.iter().map(|p| pin(p)).collect::<Vec<_>>(),
+        "pins": snapshot.pins.iter().map(|p| pin(p, shown_pins(snapshot))).collect::<Vec<_>>(),
         "trail_end": snapshot.trail.last(),
         "undo": snapshot.undo,
         "redo": snapshot.redo,
@@ -118,6 +120,7 @@ fn segmented(found: &Segmented) -> Value {
     json!({
         "state": found.state,
         "count": found.parts.len(),
+        "table_count": found.table_parts.len(),
         "singletons": found.parts.singletons,
         "unassigned": found.parts.unassigned,
         "levels": levels,
@@ -153,11 +156,12 @@ fn figures(found: &Finished) -> Value {
     all
 }
 
-fn pin(pin: &Pin) -> Value {
+fn pin(pin: &Pin, shown: &[Arc<Pin>]) -> Value {
     json!({
+        "shown": shown.iter().any(|other| other.id == pin.id),
         "id": pin.id, "label": pin.label, "state": pin.state, "numbers": pin.numbers,
         "garment": pin.job.scene.garment, "fabric": pin.job.settings.fabric.name,
-        "table": pin.job.settings.table.name(),
+        "table": pin.job.settings.table.name(), "max_extent_cm": pin.job.settings.model.extents_cm(),
     })
 }
 

@@ -35,11 +35,12 @@ const MAX_BODY: usize = 1 << 20;
 const BODY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The page's own files.
-const FILES: [(&str, &str, &str); 7] = [
+const FILES: [(&str, &str, &str); 8] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/main.js", "text/javascript; charset=utf-8", include_str!("page/main.js")),
     ("/session.js", "text/javascript; charset=utf-8", include_str!("page/session.js")),
+    ("/fields.js", "text/javascript; charset=utf-8", include_str!("page/fields.js")),
     ("/dial.js", "text/javascript; charset=utf-8", include_str!("page/dial.js")),
     ("/numbers.js", "text/javascript; charset=utf-8", include_str!("page/numbers.js")),
     ("/viewer.js", "text/javascript; charset=utf-8", include_str!("page/viewer.js")),
@@ -78,7 +79,7 @@ pub(super) fn router(site: Arc<Site>) -> Router {
         .route("/api/redo", post(async |State(site): State<Arc<Site>>| changed(site, Session::redo).await))
         .route("/api/pins", post(pin))
         .route("/api/pins/{id}", delete(unpin));
-    for path in ["/api/drape.obj", "/api/part", "/api/job.toml", "/api/table.toml", "/api/sweep.toml"] {
+    for path in ["/api/drape.obj", "/api/part", "/api/outline", "/api/job.toml", "/api/table.toml", "/api/sweep.toml"] {
         router = router.route(path, get(read));
     }
     router = router.route_layer(from_fn_with_state(Arc::clone(&site), authorise));
@@ -165,7 +166,15 @@ async fn patch(State(site): State<Arc<Site>>, request: Request) -> Answer {
         if bytes.trim_ascii_start().first() != Some(&b'{') {
             return Err(malformed(&"expected an object such as {\"fabric\": \"denim\"}"));
         }
-        let edit: Edit = serde_json::from_slice(&bytes).map_err(|e| malformed(&e))?;
+        let edit: Edit = serde_json::from_slice(&bytes).map_err(|e| {
+            let text = e.to_string();
+            // The place in the request helps with syntax alone; the page shows the rest to readers who wrote no JSON.
+            malformed(&if e.is_data() {
+                text.rsplit_once(" at line ").map_or(&*text, |(reason, _)| reason)
+            } else {
+                &*text
+            })
+        })?;
         let named = known(&edit.file_names(), &site.files)?;
         return changed_by(site, named, move |session| session.submit(&edit, gesture)).await;
     }
@@ -229,6 +238,10 @@ async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
         match uri.path() {
             "/api/drape.obj" => Ok(whole(StatusCode::OK, "model/obj", garment::obj(&snapshot, &uri)?)),
             "/api/part" => Ok(json_of(&garment::part(&snapshot, &uri)?)),
+            "/api/outline" => {
+                let bytes = garment::outline(&snapshot, &uri, site.pieces.recording())?;
+                Ok(whole(StatusCode::OK, "application/octet-stream", bytes))
+            }
             "/api/job.toml" => Ok(toml(toml::to_string(&*snapshot.job).map_err(|e| unusable(&e))?)),
             "/api/sweep.toml" => {
                 let pins: Vec<(String, Job)> =

@@ -88,11 +88,12 @@ pub(super) fn log_numbers(
     let mut row = vec![("part_count".to_owned(), count)];
     for (i, (stage, ms)) in timings_ms.iter().enumerate() {
         log_scalar(recording, &format!("{}/{stage}", paths::STAGE_MS), stage, i, *ms)?;
-        row.push((format!("{stage}_ms"), *ms));
+        row.push((format!("time_{stage}_ms"), *ms));
     }
     for (i, (leaf, value)) in scalars.iter().enumerate() {
         log_scalar(recording, &format!("{}/{leaf}", paths::NUMBERS), &line_name(leaf), i, *value)?;
-        row.push((leaf.replace('/', "_"), *value));
+        // The columns have the names of a sweep's; see docs/columns.md.
+        row.push((leaf.rsplit('/').next().unwrap_or(leaf).to_owned(), *value));
     }
     // The viewer sorts the columns by name, capitals first.
     let mut cells = AnyValues::default().with_component::<Text>("Table", [table]);
@@ -112,8 +113,8 @@ fn line_name(leaf: &str) -> String {
     match leaf {
         "error/rms_mm" => "to its own rest".to_owned(),
         "error/canonical_rms_mm" => "to the canonical drape".to_owned(),
-        "error/representable_rms_mm" => "bound, one displacement a PART".to_owned(),
-        "error/representable_affine_rms_mm" => "bound, one affine map a PART".to_owned(),
+        "error/representable_rms_mm" => "best displacements, to the canonical drape".to_owned(),
+        "error/representable_affine_rms_mm" => "best affine maps, to the canonical drape".to_owned(),
         other => other.trim_start_matches("error/").replace('_', " "),
     }
 }

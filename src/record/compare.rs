@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::colour_map::{ColourMap, Range};
 use super::colours::{colour_parts, with_outside};
 use super::error::RecordError;
-use super::legend::{Legend, caption};
+use super::legend::{Legend, view_caption};
 use super::meshes::{self, CellMesh, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::overlay::Overlay;
@@ -79,5 +79,6 @@ pub(super) fn log(recording: &OpenRecording, compared: &Compared<'_>) -> Result<
         return Ok(());
     }
     let place = [compared.slot % columns, compared.slot / columns];
-    caption(recording, &format!("{}/{}", paths::COMPARE_CAPTIONS, compared.slot), compared.caption, place)
+    let path = format!("{}/{}", paths::COMPARE_CAPTIONS, compared.slot);
+    view_caption(recording, &path, compared.caption, place, columns)
 }

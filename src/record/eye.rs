@@ -68,6 +68,11 @@ impl Eye {
         self.position.distance(self.target) * (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan()
     }
 
+    /// The same eye, farther from its target by a factor.
+    pub(crate) fn farther(&self, factor: f64) -> Self {
+        Self { position: self.target + factor * (self.position - self.target), ..*self }
+    }
+
     /// The same eye, as near as a view of this width over height allows.
     pub(crate) fn through(&self, aspect: f64) -> Self {
         let tan = (0.5 * FIELD_OF_VIEW_DEG).to_radians().tan();

@@ -6,7 +6,7 @@ use crate::scene::Layer;
 /// Width over height of a tab in a window of 16:10, below the viewer's bars.
 pub(super) const ASPECT: f64 = 1.8;
 /// Share of the first tab's height for the stages; the levels below take the rest.
-pub(super) const STAGE_HEIGHT: f64 = 0.75;
+pub(super) const STAGE_HEIGHT: f64 = 0.72;
 /// Width of the text panel over that of a stage.
 pub(super) const REPORT_OVER_STAGE: f32 = 1.25;
 /// Share of a tab's height for a row of colour bars: its title bar, the bar and the numbers.
@@ -82,7 +82,8 @@ impl Layout {
             Tab::SideBySide => self.compare_grid(eye).aspect,
             Tab::Fit => over_bars(ASPECT / self.fit.len() as f64),
             Tab::Pattern => over_bars(PANELS_ASPECT),
-            Tab::Outfit => 0.5 * ASPECT,
+            // The tab has an eye for each of its shares.
+            Tab::Outfit => ASPECT,
             Tab::Wrinkles => over_bars(0.5 * ASPECT),
             Tab::Solver => ASPECT / 3.0,
         })

@@ -5,11 +5,13 @@
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::colour_map::{ColourMap, Range};
+use super::colour_map::{ColourMap, Range, Rgb};
+use super::colours::level_colours;
 use super::error::RecordError;
 use super::meshes::rerun_colours;
 use super::open_recording::OpenRecording;
 use super::panel::number;
+use crate::study::metrics::LevelCount;
 
 /// Colour of texts in a view: white, which is legible on the viewer's translucent boxes, dark in its dark theme and light grey in the
 /// light one, over a dark background. By default each path would have another colour.
@@ -54,26 +56,8 @@ impl<'a> Legend<'a> {
     }
 
     /// Logs `{path}/bar` and `{path}/ticks` in a cell of the drawing.
-    pub(super) fn log(&self, recording: &OpenRecording, path: &str, [column, row]: Cell) -> Result<(), RecordError> {
-        let [x, y] = [column as f64 * CELL[0], row as f64 * CELL[1]];
-        let at = |t: f64| x + BAR[0] + t * (BAR[1] - BAR[0]);
-        let middles = (0..BANDS).map(|band| (f64::from(band) + 0.5) / f64::from(BANDS));
-        let width = (BAR[1] - BAR[0]) / f64::from(BANDS);
-        let bands = middles.clone().map(|t| vec![single([at(t), y]), single([at(t), y + THICKNESS])]);
-        // Half a band and a little more, so that there are no gaps.
-        let bar = LineStrips2D::new(bands)
-            .with_colors(rerun_colours(middles.map(|t| self.map.at(t))))
-            .with_radii([(0.55 * width) as f32]);
-        recording.log(&format!("{path}/bar"), &bar)?;
-
-        // The viewer draws a text below its point.
-        let mut places = vec![single([x + 0.5 * BAR[0], y - 0.5])];
-        let mut labels = vec![format!("{}, {}", self.title, self.unit)];
-        for (t, label) in self.ticks() {
-            places.push(single([at(t), y + THICKNESS + DROP]));
-            labels.push(label);
-        }
-        recording.log(&format!("{path}/ticks"), &texts(places, labels))
+    pub(super) fn log(&self, recording: &OpenRecording, path: &str, cell: Cell) -> Result<(), RecordError> {
+        log_bar(recording, path, cell, &format!("{}, {}", self.title, self.unit), &|t| self.map.at(t), self.ticks())
     }
 
     /// The numbers, with their positions along the bar; only three if more would overlap.
@@ -92,12 +76,98 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// Digits that fit below a bar, in a window 1280 pixels wide.
-const MAX_DIGITS: f64 = 13.0;
+/// Digits that fit below a bar, in a window 1280 pixels wide, where four drawings stand side by side.
+const MAX_DIGITS: f64 = 12.0;
+
+/// Bounds that are named below the bar of the levels.
+const NAMED_LEVELS: usize = 5;
+
+/// Logs the hues of the occupied levels, from the nearest to the farthest, with the distances at which some of them begin, cm.
+pub(super) fn log_level_hues(
+    recording: &OpenRecording,
+    path: &str,
+    cell: Cell,
+    levels: &[LevelCount],
+) -> Result<(), RecordError> {
+    let colours = level_colours(levels);
+    let occupied: Vec<(&LevelCount, Rgb)> =
+        levels.iter().zip(colours).filter(|(level, _)| level.vertices > 0).collect();
+    let count = occupied.len();
+    if count == 0 {
+        return Ok(());
+    }
+    let hue = |t: f64| occupied[((t * count as f64) as usize).min(count - 1)].1;
+    log_bar(recording, path, cell, "level from, cm", &hue, level_ticks(&occupied))
+}
+
+/// Where the named levels begin along the bar, and their lower bounds. The last level is always named.
+fn level_ticks(occupied: &[(&LevelCount, Rgb)]) -> Vec<(f64, String)> {
+    let (count, named) = (occupied.len(), occupied.len().min(NAMED_LEVELS));
+    let index = |i: usize| if named < 2 { 0 } else { i * (count - 1) / (named - 1) };
+    (0..named)
+        .map(index)
+        .map(|i| {
+            // Rounded to a tenth of a millimetre: a scaled bound has many digits.
+            let cm = (100.0 * occupied[i].0.lower_cm).round() / 100.0;
+            (i as f64 / count as f64, number(cm))
+        })
+        .collect()
+}
+
+/// Logs a bar with its title and its numbers, which have positions along the bar.
+fn log_bar(
+    recording: &OpenRecording,
+    path: &str,
+    [column, row]: Cell,
+    title: &str,
+    colour_at: &dyn Fn(f64) -> Rgb,
+    ticks: Vec<(f64, String)>,
+) -> Result<(), RecordError> {
+    let [x, y] = [column as f64 * CELL[0], row as f64 * CELL[1]];
+    let at = |t: f64| x + BAR[0] + t * (BAR[1] - BAR[0]);
+    let middles = (0..BANDS).map(|band| (f64::from(band) + 0.5) / f64::from(BANDS));
+    let width = (BAR[1] - BAR[0]) / f64::from(BANDS);
+    let bands = middles.clone().map(|t| vec![single([at(t), y]), single([at(t), y + THICKNESS])]);
+    // Half a band and a little more, so that there are no gaps.
+    let bar =
+        LineStrips2D::new(bands).with_colors(rerun_colours(middles.map(colour_at))).with_radii([(0.55 * width) as f32]);
+    recording.log(&format!("{path}/bar"), &bar)?;
+
+    // The viewer draws a text below its point.
+    let mut places = vec![single([x + 0.5 * BAR[0], y - 0.5])];
+    let mut labels = vec![title.to_owned()];
+    for (t, label) in ticks {
+        places.push(single([at(t), y + THICKNESS + DROP]));
+        labels.push(label);
+    }
+    recording.log(&format!("{path}/ticks"), &texts(places, labels))
+}
 
 /// Width of a number, in digits.
 fn width(label: &str) -> f64 {
     label.chars().map(|c| if c == '.' { 0.5 } else { 1.0 }).sum()
+}
+
+/// Distance of two rows of captions, in the drawing's units for each column: some 36 pixels in a window 1280 pixels wide.
+const CAPTION_ROW: f64 = 4.2;
+
+/// The visible part of a drawing of captions alone. It is wider for its height than its view, so that the columns are as wide as those of
+/// the views above, whatever the window.
+pub(super) fn visible_captions([columns, rows]: [usize; 2]) -> [[f64; 2]; 2] {
+    let step = CAPTION_ROW * columns as f64;
+    [[0.0, columns as f64 * CELL[0]], [0.0, (rows as f64 - 0.5) * step]]
+}
+
+/// Logs a line of text for the view in this column and row of `columns`.
+pub(super) fn view_caption(
+    recording: &OpenRecording,
+    path: &str,
+    text: &str,
+    [column, row]: Cell,
+    columns: usize,
+) -> Result<(), RecordError> {
+    let place = [(column as f64 + 0.5) * CELL[0], row as f64 * CAPTION_ROW * columns as f64];
+    recording.log(path, &texts(vec![single(place)], vec![text.to_owned()]))
 }
 
 /// Logs a line of text in the middle of a cell.
@@ -165,8 +235,36 @@ mod tests {
         };
         assert_eq!(ticks(25.0, false), "0 5 10 15 20 25");
         assert_eq!(ticks(2.5, false), "0 0.5 1 1.5 2 2.5");
+        assert_eq!(ticks(25.0, true), "0 12.5 ≥25");
         assert_eq!(ticks(250.0, true), "0 125 ≥250");
         assert_eq!(ticks(300.0, true), "0 100 200 ≥300");
+    }
+
+    #[test]
+    fn hues_are_named_by_the_distances_at_which_their_levels_begin() {
+        let level =
+            |i: usize| LevelCount { level: i + 1, lower_cm: 0.5 * i as f64, vertices: 1, ..LevelCount::default() };
+        let ticks = |count: usize| {
+            let levels: Vec<LevelCount> = (0..count).map(level).collect();
+            let occupied: Vec<(&LevelCount, Rgb)> = levels.iter().map(|level| (level, [0; 3])).collect();
+            level_ticks(&occupied)
+        };
+        assert_eq!(ticks(1), [(0.0, "0".to_owned())]);
+        assert_eq!(ticks(2), [(0.0, "0".to_owned()), (0.5, "0.5".to_owned())]);
+        let many = ticks(12);
+        assert_eq!(many.len(), NAMED_LEVELS);
+        assert_eq!(many.last(), Some(&(11.0 / 12.0, "5.5".to_owned())));
+    }
+
+    #[test]
+    fn columns_of_captions_are_as_wide_as_the_views_above_them() {
+        use crate::record::layout::{ASPECT, BARS_HEIGHT};
+        for (columns, rows) in [(2, 1), (3, 1), (6, 1), (2, 2), (3, 2)] {
+            let [x, y] = visible_captions([columns, rows]);
+            // A view fits its bounds; bounds that are relatively wider than the view fill its width.
+            let view = ASPECT / (f64::from(BARS_HEIGHT) * rows as f64);
+            assert!((x[1] - x[0]) / (y[1] - y[0]) >= 0.95 * view, "{columns} columns, {rows} rows");
+        }
     }
 
     #[test]

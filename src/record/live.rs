@@ -7,17 +7,18 @@
 //! | path | contents |
 //! |---|---|
 //! | `/body` | the body |
+//! | `/parts/selected`, `/preview/selected`, `/rest/selected` | outline of the PART that a page has selected ([`outlines`]) |
 //! | `/parts/garment`, `/parts/arrows` | PARTs by colour on the garment as placed; the body's reaction on each |
 //! | `/preview/garment` | the garment after both stages |
 //! | `/rest/garment` | the garment at rest |
-//! | `/pin/<n>/body`, `/pin/<n>/garment` | a pinned state |
+//! | `/pin/<n>/body`, `/pin/<n>/parts`, `/pin/<n>/preview` | a pinned state: PARTs by colour, and the garment after both stages |
 
 use glam::DVec3;
 use rerun::sink::MemorySinkStorage;
-use rerun::{Arrows3D, RecordingStream, RecordingStreamBuilder};
+use rerun::{Arrows3D, Color, LineStrips3D, Radius, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::{self, Node, TimePanel, View};
-use super::colour_map::{Range, Rgb};
+use super::colour_map::Range;
 use super::colours::{self, colour_parts, with_outside};
 use super::error::RecordError;
 use super::eye::Eye;
@@ -25,15 +26,15 @@ use super::meshes::{self, CellMesh};
 use super::open_recording::application;
 use super::step::FORCE_QUANTILE;
 use super::{part_marks, paths};
-use crate::mesh::TriMesh;
+use crate::mesh::{Topology, TriMesh};
+use crate::parts::Parts;
 use crate::study::metrics::LevelCount;
 
 const PARTS: &str = "/parts";
+/// Distance of the outline from the cloth, m, so that the cloth does not cover half of it.
+const OUTLINE_M: f64 = 0.002;
 /// Width over height of all views together, in a page of 1280 by 800 pixels.
 const ASPECT: f64 = 1.2;
-/// Colour of pinned garments.
-const PINNED: Rgb = [214, 164, 96];
-
 /// A garment whose positions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum LiveShape {
@@ -52,15 +53,19 @@ impl LiveShape {
     }
 }
 
-/// A pinned state.
+/// A pinned state: a column of two views.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PinnedView<'a> {
-    /// Label of its view.
-    pub(crate) label: &'a str,
     /// Its body.
     pub(crate) body: &'a TriMesh,
-    /// Its draped garment.
-    pub(crate) draped: &'a TriMesh,
+    /// Its garment as placed.
+    pub(crate) garment: &'a TriMesh,
+    /// The PARTs that its model moved.
+    pub(crate) parts: &'a Parts,
+    /// Their levels.
+    pub(crate) levels: &'a [LevelCount],
+    /// The garment after both stages, m.
+    pub(crate) preview: &'a [DVec3],
 }
 
 /// Encodes the sections. Its methods fail if Rerun rejects the data, and if slices do not fit the garment.
@@ -105,17 +110,10 @@ impl LiveEncoder {
             self.cells = CellMesh::new(garment);
             self.vertex_shade.clear();
         }
-        let views = 3 + pins.len();
-        self.eye = Eye::on(garment, self.front, ASPECT / views as f64).unwrap_or_default();
         let (stream, storage) = open(&self.name, &self.id)?;
-        let stages = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")];
-        let mut row = Vec::from(stages.map(|(name, path)| View::with_body(name, path, &self.eye)));
-        for (i, pin) in pins.iter().enumerate() {
-            let (body, garment) = (format!("/pin/{i}/body"), format!("/pin/{i}/garment"));
-            row.push((1.0, View::spatial(format!("Pin: {}", pin.label), &[&body, &garment], &self.eye).into()));
-        }
         // The layout first: a slow viewer takes seconds to read the triangles, and would meanwhile lay out the views itself.
-        blueprint::send(&stream, &Node::Row("Live", row), TimePanel { timeline: paths::TABLE, follow: false })?;
+        let views = Node::Row("Live", self.views(pins.len()));
+        blueprint::send(&stream, &views, TimePanel { timeline: paths::TABLE, follow: false })?;
         stream.log_static(paths::BODY, &meshes::plain(body, colours::BODY))?;
         stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;
         for (shape, colour) in [(LiveShape::Preview, colours::CLOTH), (LiveShape::Rest, colours::DRAPED)] {
@@ -123,9 +121,41 @@ impl LiveEncoder {
         }
         for (i, pin) in pins.iter().enumerate() {
             stream.log_static(format!("/pin/{i}/body"), &meshes::plain(pin.body, colours::BODY))?;
-            stream.log_static(format!("/pin/{i}/garment"), &meshes::plain(pin.draped, PINNED))?;
+            let cells = CellMesh::new(pin.garment);
+            let part_of_vertex = with_outside(&pin.parts.part_of_vertex, pin.parts.len());
+            let all = pin.parts.len() + usize::from(part_of_vertex.contains(&(pin.parts.len() as u32)));
+            let colours = colour_parts(&part_of_vertex, all, pin.levels, &pin.garment.triangles, &[]);
+            stream.log_static(format!("/pin/{i}/parts"), &cells.shape())?;
+            stream.log_static(format!("/pin/{i}/parts"), &cells.colours(&colours.of_vertices))?;
+            let preview = pin.garment.with_positions(pin.preview.to_vec());
+            stream.log_static(format!("/pin/{i}/preview"), &meshes::plain(&preview, colours::CLOTH))?;
         }
         drain(&storage)
+    }
+
+    /// The three views of the newest state side by side. Beside pinned states, its PARTs stand over its two stages as theirs do.
+    fn views(&mut self, pins: usize) -> Vec<(f32, Node)> {
+        let seen = |aspect: f64| Eye::on(&self.garment, self.front, aspect).unwrap_or_default();
+        let [parts, preview, rest] = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")];
+        if pins == 0 {
+            self.eye = seen(ASPECT / 3.0);
+            return [parts, preview, rest].map(|(name, path)| View::with_body(name, path, &self.eye)).into();
+        }
+        let width = ASPECT / (pins + 2) as f64;
+        let eye_on_rest = seen(width);
+        // Lower views show less below the hem, to which the garment sinks.
+        self.eye = seen(2.0 * width).farther(1.1);
+        let column = |views: [(f32, Node); 2]| (1.0, Node::Column("State", views.into()));
+        let mut row = vec![column([parts, preview].map(|(name, path)| View::with_body(name, path, &self.eye)))];
+        row.extend((0..pins).map(|i| {
+            let of_pin = |name: &str, leaf: &str| {
+                let paths = ["body", leaf].map(|leaf| format!("/pin/{i}/{leaf}"));
+                (1.0, View::spatial(name, &[&paths[0], &paths[1]], &self.eye).into())
+            };
+            column([of_pin(parts.0, "parts"), of_pin(preview.0, "preview")])
+        }));
+        row.push(View::with_body(rest.0, rest.1, &eye_on_rest));
+        row
     }
 
     /// The PART of each vertex, the levels, and the body's reaction on each PART, N; an empty slice gives no arrows.
@@ -161,6 +191,46 @@ impl LiveEncoder {
         self.stream.log_static(shape.path(), &meshes::shape(&moved))?;
         drain(&self.storage)
     }
+}
+
+/// The outlines of a set of vertices on the garment as placed, after both stages, and at rest: a section of its own, drawn in addition to the
+/// newest of the session `name` and `id`. Shapes that do not exist yet, and an empty set, clear the outline.
+pub(crate) fn outlines(
+    (name, id): (&str, &str),
+    garment: &TriMesh,
+    topology: &Topology,
+    chosen: &[bool],
+    shapes: [Option<&[DVec3]>; 3],
+) -> Result<Vec<u8>, RecordError> {
+    let (stream, storage) = open(name, id)?;
+    for (branch, positions) in [PARTS, "/preview", "/rest"].into_iter().zip(shapes) {
+        let strips =
+            positions.map_or_else(Vec::new, |x| outline(&garment.with_positions(x.to_vec()), topology, chosen));
+        let lines = LineStrips3D::new(strips.iter().map(|strip| meshes::singles(strip)));
+        let lines = lines.with_radii([Radius::new_ui_points(1.5)]).with_colors([Color::from_rgb(255, 255, 255)]);
+        stream.log_static(format!("{branch}/selected"), &lines)?;
+    }
+    drain(&storage)
+}
+
+/// The border of the cells of the chosen vertices, as the colours of PARTs show it, a little outside the cloth.
+fn outline(mesh: &TriMesh, topology: &Topology, chosen: &[bool]) -> Vec<Vec<DVec3>> {
+    let normals = mesh.vertex_normals();
+    let at = |v: u32| mesh.positions[v as usize] + OUTLINE_M * normals[v as usize];
+    let is_in = |v: u32| chosen.get(v as usize) == Some(&true);
+    let between = mesh.triangles.iter().filter_map(|&[a, b, c]| {
+        // The corner that is alone on its side.
+        let (alone, p, q) = match [a, b, c].map(is_in) {
+            [x, y, z] if y == z && x != y => (a, b, c),
+            [x, y, z] if x == z && x != y => (b, c, a),
+            [x, y, z] if x == y && x != z => (c, a, b),
+            _ => return None,
+        };
+        let [alone, p, q] = [alone, p, q].map(at);
+        Some(vec![0.5 * (alone + p), (alone + p + q) / 3.0, 0.5 * (alone + q)])
+    });
+    let edges = topology.boundary_edges().filter(|&[a, b]| is_in(a) && is_in(b));
+    between.chain(edges.map(|[a, b]| vec![at(a), at(b)])).collect()
 }
 
 fn open(name: &str, id: &str) -> Result<(RecordingStream, MemorySinkStorage), RecordError> {

@@ -37,7 +37,7 @@ pub(crate) use colours::{by_parts, level_colours};
 pub(crate) use compare::{Colours, Compared};
 pub use error::RecordError;
 pub use layout::{Layout, Tab};
-pub(crate) use live::{LiveEncoder, LiveShape, PinnedView};
+pub(crate) use live::{LiveEncoder, LiveShape, PinnedView, outlines};
 pub(crate) use method::MethodView;
 pub use open_recording::{RecordOptions, RecordSummary};
 pub use overlay::Overlay;

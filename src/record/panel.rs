@@ -34,7 +34,8 @@ impl Panel {
             line(&mut text, format_args!("## {}\n", self.title));
         }
         for warning in &self.warnings {
-            line(&mut text, format_args!("> ⚠ {warning}\n"));
+            // Not a quotation, which the viewer writes in faint grey.
+            line(&mut text, format_args!("**⚠ Warning: {warning}**\n"));
         }
         // First, so that it is visible without scrolling in a window of 1280 × 800.
         if !self.levels.is_empty() {

@@ -8,7 +8,7 @@ use super::charts;
 use super::colour_map::{ColourMap, Range, Rgb};
 use super::colours::{self, colour_parts, with_outside};
 use super::error::RecordError;
-use super::legend::{Legend, caption, table_title};
+use super::legend::{Legend, caption, log_level_hues, table_title};
 use super::meshes::{self, CellMesh, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::overlay::{Overlay, QUANTILE, log_fit, log_overlay};
@@ -89,7 +89,7 @@ fn log_distance(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<()
     let range = recording.range("distance", || Range::to_quantile(cm.iter().copied(), QUANTILE));
     let map = ColourMap::DISTANCE;
     recording.log(paths::DISTANCE, &meshes::colours(map.colours(&cm, range)))?;
-    Legend::new("distance", "cm", map, range, &cm).log(recording, &format!("{}/distance", paths::STAGES_LEGEND), [0, 1])
+    Legend::new("distance", "cm", map, range, &cm).log(recording, &format!("{}/distance", paths::STAGES_LEGEND), [0, 2])
 }
 
 fn log_parts(recording: &mut OpenRecording, step: &StepView<'_>, tooltips: &[String]) -> Result<(), RecordError> {
@@ -102,6 +102,7 @@ fn log_parts(recording: &mut OpenRecording, step: &StepView<'_>, tooltips: &[Str
     let placed = &recording.garment.positions;
     let dots = part_marks::dots(&recording.eye, placed, step.part_of_vertex, tooltips.to_vec());
     recording.log(paths::PART_DOTS, &dots)?;
+    log_level_hues(recording, &format!("{}/levels", paths::STAGES_LEGEND), [0, 1], levels)?;
     caption(recording, &format!("{}/table", paths::STAGES_LEGEND), &table_title(&step.panel.table, parts), [0, 0])
 }
 
@@ -117,7 +118,7 @@ fn log_force(recording: &OpenRecording, step: &StepView<'_>, tooltips: Vec<Strin
         let range = Range { low: factor * in_n.low, high: factor * in_n.high };
         let open_end = force_n.iter().any(|&f| f > in_n.high);
         let legend = Legend { title: "|F|", unit, map, range, open_end };
-        legend.log(recording, &format!("{}/force", paths::STAGES_LEGEND), [0, 2])?;
+        legend.log(recording, &format!("{}/force", paths::STAGES_LEGEND), [0, 3])?;
     }
     let placed = &recording.garment.positions;
     let arrows = part_marks::arrows(&recording.eye, placed, step.part_of_vertex, step.part_force_n, in_n.high);
@@ -130,7 +131,7 @@ fn log_drape(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<(), R
     recording.at_table(step.index, 5);
     recording.log(paths::DRAPE, &meshes::shape(&draped))?;
     recording.at(step.index, 6);
-    let error_row = if recording.layout().without_mechanics { 2 } else { 3 };
+    let error_row = if recording.layout().without_mechanics { 3 } else { 4 };
     let mut fit = 0;
     for overlay in step.overlays {
         if overlay.name == "error" {

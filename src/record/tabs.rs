@@ -5,7 +5,7 @@
 use super::blueprint::{Node, TimePanel, View};
 use super::eye::Eye;
 use super::layout::{ASPECT, BARS_HEIGHT, Layout, REPORT_OVER_STAGE, STAGE_HEIGHT, Tab};
-use super::legend::visible;
+use super::legend::{visible, visible_captions};
 use super::paths;
 use super::scatter::VISIBLE;
 use super::step::layer_branch;
@@ -13,6 +13,8 @@ use crate::scene::Layer;
 
 /// Share of a method's tab for the plot of its speed.
 const SPEED_HEIGHT: f32 = 0.22;
+/// Shares of an outfit's tab: its garments, all of them together, the report.
+const OUTFIT_SHARES: [f32; 3] = [1.0, 0.75, 0.55];
 
 /// The time panel of a recording.
 pub(super) fn time_panel(layout: &Layout) -> TimePanel {
@@ -94,8 +96,8 @@ impl Tabs<'_> {
         if layout.several_tables {
             below.push((0.8, self.plot("All PARTs", "/numbers/part_count", false)));
         }
-        // The table's name, distance, force and error.
-        let bars = 2 + usize::from(!layout.without_mechanics) + usize::from(layout.error);
+        // The table's name, levels, distance, force and error.
+        let bars = 3 + usize::from(!layout.without_mechanics) + usize::from(layout.error);
         below.push((1.0, View::plane("Colours", &[paths::STAGES_LEGEND], visible([1, bars])).into()));
         let height = STAGE_HEIGHT as f32;
         let left = Node::Column("Stages", vec![(height, views), (1.0 - height, Node::Row("Levels", below))]);
@@ -109,8 +111,12 @@ impl Tabs<'_> {
         let view = |(slot, title): (usize, &String)| View::with_body(title, &format!("{}/{slot}", paths::COMPARE), eye);
         let views = layout.compare.iter().enumerate().map(view).collect();
         let views = in_rows("Side by side", views, layout.compare_grid(self.eye).rows);
-        let name = if layout.table4 { "Colours: distance to the canonical drape" } else { "PARTs, time and error" };
-        let below = View::plane(name, &[paths::COMPARE_CAPTIONS], visible(cells)).into();
+        let (name, seen) = if layout.table4 {
+            ("Colours: distance to the canonical drape", visible(cells))
+        } else {
+            ("PARTs, time and error", visible_captions(cells))
+        };
+        let below = View::plane(name, &[paths::COMPARE_CAPTIONS], seen).into();
         let height = BARS_HEIGHT * cells[1] as f32;
         Node::Column("Side by side", vec![(1.0 - height, views), (height, below)])
     }
@@ -167,14 +173,16 @@ impl Tabs<'_> {
         Node::Column("Pattern", rows)
     }
 
-    /// A row for each garment with its PARTs, forces and drape, beside a view of all garments.
+    /// A row for each garment with its PARTs, forces and drape, beside a view of all garments and the report.
     fn outfit(&self) -> Node {
         let layers = &self.layout.outfit;
-        let (eye_on_all, eye) = (self.eye(Tab::Outfit), self.eye.through(ASPECT / 6.0 * layers.len() as f64));
+        let width = ASPECT / OUTFIT_SHARES.iter().map(|share| f64::from(*share)).sum::<f64>();
+        let eye = self.eye.through(width / 3.0 * layers.len() as f64);
+        let eye_on_all = self.eye.through(width * f64::from(OUTFIT_SHARES[1]));
         let row = |(k, layer): (usize, &Layer)| {
             let branch = layer_branch(k, layer);
             // The drape has the garment's name; three titles with it would be cut.
-            let stages = [("PARTs", "parts"), ("Force per PART", "force"), (layer.name.as_str(), "drape")];
+            let stages = [("PARTs", "parts"), ("Force", "force"), (layer.name.as_str(), "drape")];
             let view = |(title, leaf): (&str, &str)| View::with_body(title, &format!("{branch}/{leaf}"), &eye);
             (1.0, Node::Row("Garment", stages.map(view).into()))
         };
@@ -182,7 +190,11 @@ impl Tabs<'_> {
         let drapes = layers.iter().enumerate().map(|(k, layer)| format!("{}/drape", layer_branch(k, layer)));
         let contents: Vec<String> = std::iter::once(paths::BODY.to_owned()).chain(drapes).collect();
         let contents: Vec<&str> = contents.iter().map(String::as_str).collect();
-        Node::Row("Outfit", vec![(1.0, garments), (1.0, View::spatial("Outfit", &contents, &eye_on_all).into())])
+        let all = View::spatial("Outfit", &contents, &eye_on_all).into();
+        Node::Row(
+            "Outfit",
+            vec![(OUTFIT_SHARES[0], garments), (OUTFIT_SHARES[1], all), (OUTFIT_SHARES[2], View::report().into())],
+        )
     }
 
     fn wrinkles(&self) -> Node {
@@ -196,8 +208,8 @@ impl Tabs<'_> {
 
     fn solver(&self) -> Node {
         let plots = vec![
-            (1.0, View::plot("Energy, J", &[paths::ENERGY], true).into()),
-            (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], true).into()),
+            (1.0, View::plot("Energy, J", &[paths::ENERGY], false).into()),
+            (1.0, View::plot("Residual over weight, log10", &[paths::RESIDUAL_LOG10], false).into()),
         ];
         let drape = View::with_body("Drape", "/drape", &self.eye(Tab::Solver));
         Node::Row("Solver", vec![drape, (2.0, Node::Column("Solver", plots))])

@@ -102,7 +102,9 @@ impl<'de> Deserialize<'de> for TableEdit {
                     return Ok(Self::Rule(TableRule::Quantile { name: format!("{levels} quantile levels"), levels }));
                 }
                 fields.entry("name").or_insert_with(|| "edited".into());
-                let table: RangeTable = serde_json::from_value(Value::Object(fields)).map_err(|e| wrong(&e))?;
+                let rows = fields.contains_key("levels");
+                let table: RangeTable = serde_json::from_value(Value::Object(fields))
+                    .map_err(|e| if rows { D::Error::custom(e) } else { wrong(&e) })?;
                 Ok(Self::Rule(table.into()))
             }
             other => Err(wrong(&format!("found {other}"))),

@@ -50,14 +50,18 @@ pub struct Segmented {
     pub loaded_scene: Arc<LoadedScene>,
     /// The range table, with the rows that its rule generated.
     pub table: Arc<RangeTable>,
-    /// The PARTs.
+    /// The PARTs that the model moves: those of the table, cut to the finest extent of the run.
     pub parts: Arc<Parts>,
+    /// The PARTs of the table alone; the same as `parts` if the run cuts none.
+    pub table_parts: Arc<Parts>,
     /// Reaction of the body on each PART in the current drape, N; empty before there is one.
     pub force_n: Arc<Vec<DVec3>>,
     /// Milliseconds of the segmentation.
     pub segment_ms: f64,
     pub after_ms: f64,
     pub(crate) min_part: usize,
+    /// The finest extent of the run, m, if it cuts PARTs.
+    pub(crate) extent_m: Option<f64>,
 }
 
 /// Stage two of a state.
@@ -163,6 +167,10 @@ pub struct Pin {
     pub job: Arc<Job>,
     /// The drape: at rest if there was one, else the preview.
     pub positions: Arc<Vec<DVec3>>,
+    /// Stage one, for the colours of the PARTs.
+    pub segmented: Arc<Segmented>,
+    /// The garment after both stages.
+    pub preview: Arc<Vec<DVec3>>,
     pub loaded_scene: Arc<LoadedScene>,
     /// The trail's point of the state.
     pub numbers: TrailPoint,

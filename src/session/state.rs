@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use super::edit::{Edit, EditError};
 use super::results::{AtRest, LoadedScene, Pin, Refusal, RestInputs, Segmented, Snapshot, TrailPoint};
-use crate::drape::{Refine, stage_one};
+use crate::drape::{Model, Refine, stage_one};
 use crate::parts::{Parts, UNASSIGNED};
-use crate::scene::SceneSpec;
+use crate::scene::{Scene, SceneSpec};
 use crate::study::job::Job;
 
 /// Points of the trail.
@@ -174,17 +174,29 @@ impl SessionState {
         let kept = self.snapshot.segmented.as_ref().filter(|old| {
             old.loaded_scene.generation == scene.generation && *old.table == table && old.min_part == settings.min_part
         });
-        let (table, parts) = match kept {
-            Some(old) => (Arc::clone(&old.table), Arc::clone(&old.parts)),
+        let (table, table_parts) = match kept {
+            Some(old) => (Arc::clone(&old.table), Arc::clone(&old.table_parts)),
             None => {
                 let parts = stage_one(&scene.input.scene, settings.min_part, &table, scene.distances_m());
                 (Arc::new(table), Arc::new(parts))
             }
         };
-        if parts.is_empty() {
+        if table_parts.is_empty() {
             let expected = "levels that hold some of the garment: widen its first or last row";
             return Err(EditError::value("table", "none of the garment's vertices in any level", expected));
         }
+        let extent_m = match &settings.model {
+            Model::Coupled(options) => options.extents_m.last().copied(),
+            Model::Paper(_) => None,
+        };
+        let parts = match (kept, extent_m) {
+            (Some(old), _) if old.extent_m == extent_m => Arc::clone(&old.parts),
+            (_, None) => Arc::clone(&table_parts),
+            (_, Some(extent_m)) => {
+                let Scene { garment, topology, .. } = &scene.input.scene;
+                Arc::new(table_parts.cut_to_extent(garment, topology, extent_m))
+            }
+        };
         let rest = self.snapshot.rest.as_ref().filter(|rest| rest.loaded_scene.generation == scene.generation);
         let force_n = rest.map_or_else(Vec::new, |rest| sum_by_part(&parts, &rest.reaction_n));
         Ok(Segmented {
@@ -192,10 +204,12 @@ impl SessionState {
             loaded_scene: Arc::clone(scene),
             table,
             parts,
+            table_parts,
             force_n: Arc::new(force_n),
             segment_ms: ms_since(began),
             after_ms: ms_since(since),
             min_part: settings.min_part,
+            extent_m,
         })
     }
 
@@ -272,8 +286,8 @@ impl SessionState {
         let state = snapshot.state;
         let rest = snapshot.rest.as_ref().filter(|rest| rest.state == state && rest.done);
         let preview = snapshot.preview.as_ref().filter(|preview| preview.state == state && preview.done);
-        let drape = rest.map(|rest| (&rest.positions, &rest.loaded_scene));
-        let Some((positions, scene)) = drape.or(preview.map(|p| (&p.positions, &p.loaded_scene))) else {
+        let segmented = snapshot.segmented.as_ref().filter(|segmented| segmented.state == state);
+        let (Some(preview), Some(segmented)) = (preview, segmented) else {
             return Err(EditError::value("pin", format!("no drape of state {state} yet"), "one; wait a moment"));
         };
         self.last_pin_id += 1;
@@ -282,8 +296,10 @@ impl SessionState {
             label: label.unwrap_or_else(|| format!("state {state}")),
             state,
             job: Arc::clone(&snapshot.job),
-            positions: Arc::clone(positions),
-            loaded_scene: Arc::clone(scene),
+            positions: Arc::clone(rest.map_or(&preview.positions, |rest| &rest.positions)),
+            segmented: Arc::clone(segmented),
+            preview: Arc::clone(&preview.positions),
+            loaded_scene: Arc::clone(&preview.loaded_scene),
             numbers: snapshot.trail.last().copied().filter(|point| point.state == state).unwrap_or_default(),
         };
         Arc::make_mut(&mut snapshot.pins).push(Arc::new(pin));

@@ -154,7 +154,7 @@ impl Worker {
             self.progress.warm_preview_done = true;
             // From the placed garment, and before any drape at rest: this takes milliseconds, and does not depend on the last preview.
             if options.extents_m.is_empty()
-                && coupled::splits(&task.scene().garment, &segmented.parts, &levels.cloth, options.method)
+                && coupled::splits(&task.scene().garment, &segmented.table_parts, &levels.cloth, options.method)
             {
                 return self.both_stages(task, Some(&**levels));
             }
@@ -222,11 +222,8 @@ impl Worker {
         rest_follows: bool,
     ) -> Result<(), EditError> {
         let began = Instant::now();
-        let (scene, generation, uncut) = (task.scene(), task.loaded_scene().generation, &task.segmented.parts);
-        let parts = match options.extents_m.last() {
-            None => Arc::clone(uncut),
-            Some(&finest) => Arc::new(uncut.cut_to_extent(&scene.garment, &scene.topology, finest)),
-        };
+        let (scene, generation) = (task.scene(), task.loaded_scene().generation);
+        let parts = Arc::clone(&task.segmented.parts);
         let preview = |positions: &[DVec3]| Preview {
             warm: true,
             ..task.preview(Arc::clone(&parts), positions.to_vec(), ms_since(began))
@@ -280,7 +277,7 @@ impl Worker {
     fn both_stages(&mut self, task: Task<'_>, levels: Option<&Levels>) -> Result<(), EditError> {
         let began = Instant::now();
         let surface = &task.loaded_scene().distances.surface;
-        let parts = (*task.segmented.parts).clone();
+        let parts = (*task.segmented.table_parts).clone();
         let stage = match stage_two(task.scene(), task.settings(), surface, parts, levels, &|| task.check()) {
             Ok(stage) => stage,
             Err(DrapeError::Coupled(CoupledError::Interrupted)) => return Ok(()),
@@ -396,7 +393,7 @@ impl Worker {
         let made = Made {
             ground: loaded_scene.distances.clone(),
             table: (*segmented.table).clone(),
-            level_part_count: segmented.parts.len(),
+            level_part_count: segmented.table_parts.len(),
             folds: folds_of(task.settings(), levels, &stage),
             stage,
             state,

@@ -158,13 +158,41 @@ try {
   assert.deepEqual(faults, []);
   await page.locator('input[aria-label="Level 2, from, cm"]').fill("0.5");
   await page.keyboard.press("Tab");
-  await page.waitForSelector("#alert:not([hidden])");
-  said(`a bound that overlaps is refused: ${(await page.locator("#alert").textContent()).slice(0, 90)}`);
+  await page.waitForSelector("#level-1-0-error");
+  const level = page.locator("#level-1-0");
+  assert.equal(await level.getAttribute("aria-invalid"), "true");
+  assert.equal(await level.inputValue(), "0.5", "what was typed stays, marked");
+  said(`a bound that overlaps is refused at its field: ${(await page.locator("#level-1-0-error").textContent()).slice(0, 90)}`);
   // The browser itself writes down that a request was refused.
   await page.waitForTimeout(300);
   const refusals = faults.splice(0);
   assert.ok(refusals.length === 1 && refusals[0].includes("status of 400"), String(refusals));
+  await level.focus();
+  await page.keyboard.press("Escape");
+  assert.notEqual(await level.inputValue(), "0.5", "Escape restores the bound");
+  assert.equal(await page.locator("[aria-invalid]").count(), 0);
   await page.locator("#levels-box summary").click();
+  await page.locator("#m-waist").fill("wide");
+  await page.keyboard.press("Tab");
+  assert.match(await page.locator("#m-waist-error").textContent(), /“wide”.*number of centimetres.*72/);
+  assert.deepEqual(faults, [], "letters are no request");
+  said("letters are refused as letters");
+
+  // Each stop of a walk by Tab from the first control, and back out of the viewer.
+  const focused = () => page.evaluate(() => document.activeElement.closest("aside, header, #scene, .skip")?.tagName ?? "none");
+  await page.locator("#theme").focus();
+  const stops = [];
+  for (let i = 0; i < 60 && stops.at(-1) !== "SECTION"; i += 1) {
+    await page.keyboard.press("Tab");
+    stops.push(await focused());
+  }
+  assert.ok(stops.length > 20 && stops.slice(0, -1).every((stop) => stop === "ASIDE") && stops.at(-1) === "SECTION", String(stops));
+  await page.keyboard.press("Tab");
+  assert.notEqual(await focused(), "SECTION", "Tab leaves the viewer");
+  await page.locator("#viewer").focus();
+  await page.keyboard.press("Shift+Tab");
+  assert.equal(await focused(), "ASIDE", "Shift+Tab leaves the viewer");
+  said("by keyboard alone: controls, then the viewer, and out of it");
 
   await page.locator("#m-waist").fill("76");
   await page.keyboard.press("Enter");
@@ -199,6 +227,8 @@ try {
   await page.waitForTimeout(800);
   assert.equal(await page.locator("#pins tbody tr").textContent(), pinned, "what is pinned stays");
   assert.match(await saved(page, "save-sweep"), /^\[\[points\]\]$/m);
+  assert.equal(await page.locator("#columns > div").count(), 3, "newest, pinned, at rest");
+  assert.match(await page.locator("#columns").textContent(), /pinned: .*PARTs/);
   said(`pinned: ${pinned}`);
 
   // A PART is picked where the garment is in the middle of the first view.
@@ -215,6 +245,9 @@ try {
   }
   const part = await page.locator("#part").textContent();
   assert.match(part, /level/, "a click tells of a PART");
+  const card = await page.locator("#part-card").boundingBox();
+  assert.ok(card.x >= scene.x && card.y + card.height <= 800, "the answer is in sight");
+  assert.doesNotMatch(await page.evaluate(() => document.body.innerText), /\b0\.0\d* N\b/, "small forces are millinewtons");
   said(`picked: ${part.replace(/\s+/g, " ")}`);
   if (pictures) {
     mkdirSync(pictures, { recursive: true });

@@ -64,19 +64,90 @@ fn edits_answer_with_the_state_and_results_follow() {
     let vertices = done["garment"]["vertices"].as_u64().unwrap() as usize;
     assert_eq!(obj.lines().filter(|line| line.starts_with("v ")).count(), vertices);
     assert_ne!(live.text("GET", "/api/drape.obj?of=preview", &[], "").1, obj);
-    let part = live.get("/api/part?number=0").1;
-    assert!(part["level"] == 0 && part["vertices"].as_u64().unwrap() > 0 && part["area_cm2"].as_f64().unwrap() > 0.0);
+    let part = live.get("/api/part?number=1").1;
+    assert!(
+        part["part"] == 1
+            && part["level"] == 1
+            && part["vertices"].as_u64().unwrap() > 0
+            && part["area_cm2"].as_f64().unwrap() > 0.0
+    );
     assert!(part["force_size_n"].is_number() && part["rest_displacement_mm"][2].is_number());
     let first = obj.lines().find(|line| line.starts_with("v ")).unwrap()[2..].replace(' ', ",");
     let at = live.get(&format!("/api/part?on=rest&at={first}")).1;
     let of_first = live.session.snapshot().segmented.unwrap().parts.part_of_vertex[0];
-    assert_eq!(at["part"], of_first);
+    assert_eq!(at["part"], of_first + 1);
 
     let pinned = live.ask("POST", "/api/pins", &["Content-Type: application/json"], r#"{"label": "as it was"}"#).1;
     assert_eq!(pinned["pins"][0]["label"], "as it was");
     assert_eq!(live.text("GET", "/api/drape.obj?pin=1", &[], "").1, obj);
     assert_eq!(live.ask("DELETE", "/api/pins/1", &[], "").1["pins"], json!([]));
     assert!(live.get("/api/choices").1["tables"].as_array().unwrap().contains(&json!("flared-skirt-levels")));
+}
+
+#[test]
+fn levels_and_views_show_the_parts_that_the_model_moves() {
+    let live = Live::start(&options());
+    let uncut = live.get("/api/state").1;
+    let count = |state: &Value| {
+        let levels = state["parts"]["levels"].as_array().unwrap();
+        (state["parts"]["count"].as_u64().unwrap(), levels.iter().map(|l| l["parts"].as_u64().unwrap()).sum::<u64>())
+    };
+    assert_eq!(count(&uncut), (uncut["preview"]["count"].as_u64().unwrap(), count(&uncut).0));
+    // Of a cascade the finest cut counts.
+    for extents in ["[12]", "[24, 8]"] {
+        let at_once = live.patch(&format!(r#"{{"max_extent_cm": {extents}}}"#)).1;
+        let done = live.idle();
+        assert!(count(&done).0 > count(&uncut).0, "{extents}");
+        assert_eq!(count(&at_once), (done["preview"]["count"].as_u64().unwrap(), count(&done).0), "{extents}");
+        assert_eq!(count(&done), count(&at_once));
+        assert_eq!(done["parts"]["table_count"], uncut["parts"]["count"]);
+        assert_eq!(done["figures"]["level_part_count"], done["parts"]["table_count"]);
+    }
+    let last = live.get("/api/state").1["parts"]["count"].as_u64().unwrap();
+    assert_eq!(live.get(&format!("/api/part?number={last}")).0, 200);
+    let outline = |query: &str| live.text("GET", &format!("/api/outline{query}"), &[], "");
+    let (one, none) = (outline(&format!("?number={last}")), outline(""));
+    assert!(one.0 == 200 && none.0 == 200 && one.1.len() > none.1.len());
+}
+
+#[test]
+fn the_two_newest_pins_have_views_of_their_own_stages() {
+    let live = Live::start(&options());
+    for fabric in ["interlock", "denim", "jersey"] {
+        live.patch(&format!(r#"{{"fabric": "{fabric}"}}"#));
+        live.idle();
+        live.ask("POST", "/api/pins", &[], "");
+    }
+    let state = live.get("/api/state").1;
+    let shown: Vec<&Value> = state["pins"].as_array().unwrap().iter().map(|pin| &pin["shown"]).collect();
+    assert_eq!(shown, [false, true, true]);
+    let pins = live.session.snapshot().pins.clone();
+    assert!(pins.iter().all(|pin| pin.preview != pin.positions), "the two stages, not the drape at rest");
+}
+
+#[test]
+fn tab_reaches_the_range_table_before_the_viewer_and_every_field_has_a_unit() {
+    let live = Live::start(&options());
+    let page = live.text("GET", "/", &[], "").1;
+    let place = |piece: &str| page.find(piece).unwrap_or_else(|| panic!("{piece}"));
+    for field in ["id=\"dial\"", "id=\"extent\"", "id=\"levels\"", "id=\"measurements\"", "id=\"pins\""] {
+        assert!(place(field) < place("<canvas"), "{field}");
+    }
+    for target in ["panel", "viewer"] {
+        assert!(page.contains(&format!("href=\"#{target}\"")) && page.contains(&format!("id=\"{target}\"")));
+    }
+    assert!(place("class=\"skip\"") < place("<header"));
+    assert!(page.contains("<span class=\"unit\"><input id=\"extent\"") && page.contains("cut to, cm"));
+    assert!(!live.text("GET", "/main.js", &[], "").1.contains("type: \"number\""), "letters would be read as nothing");
+}
+
+#[test]
+fn a_refusal_says_nothing_of_the_request_to_readers_of_the_page() {
+    let live = Live::start(&options());
+    let (status, answer) = live.patch(r#"{"table": {"name": "t", "levels": [[0, 0.06], [0.5, 0.085]]}}"#);
+    let sentence = answer["error"].as_str().unwrap();
+    assert_eq!(status, 400);
+    assert!(sentence.contains("row 2") && !sentence.contains("column") && !sentence.contains("quantile"), "{sentence}");
 }
 
 #[test]
@@ -135,6 +206,9 @@ fn invalid_edits_are_refused_and_the_session_continues() {
         ("DELETE", "/api/pins/7", vec![], "", 404, "pin"),
         ("POST", "/api/pins", vec![], "{\"label\": 7}", 400, "label"),
         ("GET", "/api/part?number=100000", vec![], "", 404, "PART"),
+        ("GET", "/api/part?number=0", vec![], "", 404, "expected one of 1 to"),
+        ("GET", "/api/outline?number=0", vec![], "", 404, "expected one of 1 to"),
+        ("GET", "/api/outline?number=x", vec![], "", 400, "number from 1"),
         ("GET", "/api/part?at=0,0,nan", vec![], "", 400, "metres"),
         ("GET", "/api/drape.obj?of=all", vec![], "", 400, "preview"),
         ("GET", "/api/../../etc/passwd", vec![], "", 404, ""),

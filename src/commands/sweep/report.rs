@@ -94,7 +94,7 @@ pub(crate) fn rows_text(rows: &[Row]) -> String {
         let (parts, time) = (m.part_count.to_string(), mm(total_ms(row)));
         Some([index, garment, label, parts, time].into_iter().chain(errors.map(mm)).collect())
     });
-    let errors = ["own error mm", "canonical error mm", "affine bound mm", "translation bound mm"];
+    let errors = ["own error mm", "canonical error mm", "best affine mm", "best translation mm"];
     let header = ["", "garment", "setting", "PARTs", "ms"].into_iter().chain(errors);
     let table = console::table(console::OPEN, header, [0].into_iter().chain(3..), cells);
     let measured = rows.iter().filter_map(|row| row.metrics.as_ref()).any(|metrics| metrics.canonical_rms_mm.is_some());
@@ -105,6 +105,7 @@ pub(crate) fn rows_text(rows: &[Row]) -> String {
 const ERRORS: &str = "\
 Errors are RMS over the vertices. Own error: to the equilibrium that this drape
 converges to. Canonical error: to the canonical drape of the garment, the same
-for all tables. Affine and translation bound: to the canonical drape, if each
-PART moved by its best affine map, or by its best displacement.
+for all tables. Best affine and best translation: to the canonical drape, if
+each PART moved by its best affine map, or by its best displacement. A drape can
+be nearer than these where steps of single vertices follow.
 ";

@@ -34,7 +34,7 @@ export class Dial {
   #held = null;
   #gestures = Date.now();
 
-  // `change(edit, gesture)` is called for each move.
+  // `change(edit, { gesture, field })` is called for each move; `field` is the input of a typed bound.
   constructor(svg, change) {
     this.#svg = svg;
     this.#change = change;
@@ -117,14 +117,14 @@ export class Dial {
     const to = Math.round(Math.max(bound.least, Math.min(bound.most, value)) * 1000) / 1000;
     if (to === bound.value || to < bound.least - 1e-9 || to > bound.most + 1e-9) return;
     for (const [row, end] of bound.rows) this.#levels[row][end] = to;
-    this.#tell(gesture);
+    this.#tell({ gesture });
     this.#draw();
   }
 
-  #tell(gesture) {
+  #tell(from) {
     const name = this.#name.endsWith(", edited") ? this.#name : `${this.#name}, edited`;
     this.#name = name;
-    this.#change({ table: { name, gap: this.#gap, levels: written(this.#levels) } }, gesture);
+    this.#change({ table: { name, gap: this.#gap, levels: written(this.#levels) } }, from);
   }
 
   // Cuts the level at a distance in two.
@@ -154,20 +154,20 @@ export class Dial {
     this.#draw();
   }
 
-  // Takes a typed bound or extent.
-  set(i, field, value) {
+  // Takes a typed bound (`column` 0 or 1) or extent (2) from an input.
+  set(i, column, value, field) {
     const row = [...this.#levels[i]];
-    if (field === 2) {
+    if (column === 2) {
       row.length = 2;
       row.push(...value);
     } else {
-      const old = row[field];
-      row[field] = value;
-      const beside = field === 0 ? this.#levels[i - 1] : this.#levels[i + 1];
-      if (beside && beside[1 - field] === old) beside[1 - field] = value;
+      const old = row[column];
+      row[column] = value;
+      const beside = column === 0 ? this.#levels[i - 1] : this.#levels[i + 1];
+      if (beside && beside[1 - column] === old) beside[1 - column] = value;
     }
     this.#levels[i] = row;
-    this.#tell();
+    this.#tell({ field });
     this.#draw();
   }
 

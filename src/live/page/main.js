@@ -1,13 +1,14 @@
 // The page: controls make edits, and the session's state is shown.
 
 import { Dial, cm } from "./dial.js";
+import { acceptAll, centimetres, isRefused, onTyped, refuse, several } from "./fields.js";
 import { showNumbers, showPart, showPins } from "./numbers.js";
 import { Session, ask } from "./session.js";
-import { start } from "./viewer.js";
+import { draw, start } from "./viewer.js";
 
 const at = (id) => document.getElementById(id);
 const session = new Session();
-const dial = new Dial(at("dial"), (edit, gesture) => session.edit(edit, gesture));
+const dial = new Dial(at("dial"), (edit, from) => session.edit(edit, from));
 const MEASURES = ["stature", "bust", "underbust", "waist", "hip"];
 let choices = { tables: [], fabrics: [], garments: [], sizes: [] };
 let selected = null;
@@ -21,6 +22,21 @@ function options(select, names, chosen) {
   if (document.activeElement !== select) select.value = chosen ?? "";
 }
 
+// Writes a field, unless it is being edited or holds what was refused.
+function write(field, text) {
+  if (document.activeElement !== field && !isRefused(field)) field.value = text;
+}
+
+// What a field holds while nothing wrong is typed.
+const kept = {
+  measure: (name) => cm(session.state.job.measurements[name]),
+  extent: () => session.state.job.max_extent_cm.join(", "),
+  level: (i, column) => {
+    const [lower, upper, ...extent] = dial.levels[i];
+    return [cm(lower), upper === Infinity ? "inf" : cm(upper), extent.join(" × ")][column];
+  },
+};
+
 function showChoices(state) {
   const { job } = state;
   const [garment, vertices] = job.garment.split("@");
@@ -33,10 +49,10 @@ function showChoices(state) {
   const preset = choices.tables.find((known) => known === name || (known === "table-3" && name.toLowerCase() === "table 3"));
   options(at("preset"), [...choices.tables, "5 quantile levels", "10 quantile levels", "20 quantile levels"], preset ?? name);
   if (document.activeElement !== at("gap")) at("gap").value = job.table.gap ?? "extend-lower";
-  if (document.activeElement !== at("extent")) at("extent").value = job.max_extent_cm.join(", ");
+  write(at("extent"), kept.extent());
   for (const measure of MEASURES) {
     const field = at(`m-${measure}`);
-    if (document.activeElement !== field) field.value = cm(job.measurements[measure]);
+    write(field, kept.measure(measure));
     field.disabled = job.body !== "form";
   }
 }
@@ -45,24 +61,26 @@ function showLevels(state) {
   const body = at("levels").tBodies[0];
   const counts = state.parts?.levels ?? [];
   at("levels-title").textContent = `Levels: ${dial.levels.length}, numbers and extents`;
+  const inputs = [...body.querySelectorAll("input")];
+  if (inputs.some(isRefused)) return;
   if (body.contains(document.activeElement) && body.rows.length === dial.levels.length) {
+    inputs.forEach((input, n) => write(input, kept.level(Math.floor(n / 3), n % 3)));
     dial.levels.forEach((_, i) => (body.rows[i].cells[4].textContent = counts[i]?.parts ?? "–"));
     return;
   }
-  const rows = dial.levels.map((level, i) => {
+  const rows = dial.levels.map((_, i) => {
     const row = document.createElement("tr");
     row.insertCell().textContent = i + 1;
-    const field = (value, label, take) => {
-      const input = Object.assign(document.createElement("input"), { type: "text", inputMode: "decimal", value });
+    ["from", "to", "cut to"].forEach((label, column) => {
+      const input = Object.assign(document.createElement("input"), {
+        type: "text",
+        inputMode: "decimal",
+        id: `level-${i}-${column}`,
+        value: kept.level(i, column),
+      });
       input.setAttribute("aria-label", `Level ${i + 1}, ${label}, cm`);
-      input.addEventListener("change", () => take(input.value.trim()));
+      onTyped(input, (text) => typedLevel(input, i, column, text), () => kept.level(i, column));
       row.insertCell().append(input);
-    };
-    const number = (text) => (["inf", "∞"].includes(text) ? Infinity : Number(text));
-    field(cm(level[0]), "from", (text) => dial.set(i, 0, number(text)));
-    field(level[1] === Infinity ? "inf" : cm(level[1]), "to", (text) => dial.set(i, 1, number(text)));
-    field(level.slice(2).join(" × "), "cut to", (text) => {
-      dial.set(i, 2, text === "" ? [] : text.split(/[x×,]/).map((t) => number(t.trim())).slice(0, 2));
     });
     // Levels that the gap rule adds count too, so the numbers differ from the rows.
     row.insertCell().textContent = counts.length === dial.levels.length ? counts[i].parts : "";
@@ -79,6 +97,19 @@ function showLevels(state) {
   });
   body.replaceChildren(...rows);
 }
+
+function typedLevel(input, i, column, text) {
+  if (column === 2) {
+    const extent = several(text, /[x×,;]/);
+    if (extent === null || extent.length > 2) return refuse(input, expected(text, "one or two extents in cm such as 8 × 24"), kept.level(i, 2));
+    return dial.set(i, 2, extent, input);
+  }
+  const value = centimetres(text, true);
+  if (value === null) return refuse(input, expected(text, "a number of centimetres, or inf"), kept.level(i, column));
+  dial.set(i, column, value, input);
+}
+
+const expected = (text, what) => `Found ${text === "" ? "nothing" : `“${text}”`}, expected ${what}`;
 
 function alertWith(sentence) {
   at("alert").hidden = sentence === "";
@@ -107,7 +138,13 @@ function show() {
   showLevels(state);
   showNumbers(state);
   showPins(state, (id) => session.send(`api/pins/${id}`, "DELETE"));
-  if (selected && selected.state !== state.state && parts?.state === state.state) pick(selected.query);
+  if (!selected) return;
+  // The outline lies on each shape, which moves until the state is complete.
+  const newer = selected.state !== state.state && parts?.state === state.state;
+  if (newer || (state.idle && selected.drawn !== state.serial)) {
+    selected.drawn = state.serial;
+    pick(selected.query);
+  }
 }
 
 let due = false;
@@ -120,10 +157,17 @@ session.addEventListener("state", () => {
     show();
   });
 });
-session.addEventListener("accepted", () => alertWith(""));
+session.addEventListener("accepted", () => {
+  alertWith("");
+  acceptAll();
+});
 session.addEventListener("refused", (event) => {
-  alertWith(event.detail);
+  const { sentence, field } = event.detail;
   if (session.state) dial.show(session.state);
+  if (!field?.isConnected) return alertWith(sentence);
+  const [, i, column] = /^level-(\d+)-(\d)$/.exec(field.id) ?? [];
+  const before = i !== undefined ? kept.level(Number(i), Number(column)) : field.id === "extent" ? kept.extent() : kept.measure(field.id.slice(2));
+  refuse(field, sentence, before);
 });
 session.addEventListener("lost", (event) => {
   at("status").textContent = `The session cannot be reached (${event.detail}); trying again …`;
@@ -133,15 +177,23 @@ async function pick(query) {
   const response = await ask(`api/part?${query}`);
   if (!response.ok) return;
   const part = await response.json();
-  selected = { state: part.state, query };
+  selected = { state: part.state, query, drawn: selected?.drawn };
   showPart(part);
+  await draw(`api/outline?number=${part.part}`);
 }
 
 for (const measure of MEASURES) {
   const label = document.createElement("label");
-  const input = Object.assign(document.createElement("input"), { id: `m-${measure}`, type: "number", step: "0.5" });
-  input.addEventListener("change", () => session.edit({ measurements: { [measure]: Number(input.value) } }));
-  label.append(measure, input);
+  const input = Object.assign(document.createElement("input"), { id: `m-${measure}`, type: "text", inputMode: "decimal" });
+  const take = (text) => {
+    const value = centimetres(text);
+    if (value === null) return refuse(input, expected(text, "a number of centimetres"), kept.measure(measure));
+    session.edit({ measurements: { [measure]: value } }, { field: input });
+  };
+  onTyped(input, take, () => kept.measure(measure));
+  const unit = Object.assign(document.createElement("span"), { className: "unit" });
+  unit.append(input);
+  label.append(measure, unit);
   at("measurements").append(label);
 }
 const garment = () => {
@@ -159,10 +211,12 @@ at("preset").addEventListener("change", () => {
   const quantile = /^(\d+) quantile levels$/.exec(at("preset").value);
   session.edit({ table: quantile ? { quantile: Number(quantile[1]) } : at("preset").value });
 });
-at("extent").addEventListener("change", () => {
-  const given = at("extent").value.split(/[,;\s]+/).filter((text) => text !== "");
-  session.edit({ max_extent_cm: given.map(Number) });
-});
+const extent = (text) => {
+  const given = several(text, /[,;\s]+/);
+  if (given === null) return refuse(at("extent"), expected(text, "extents in cm such as 24, 12, or nothing"), kept.extent());
+  session.edit({ max_extent_cm: given }, { field: at("extent") });
+};
+onTyped(at("extent"), extent, kept.extent);
 at("undo").addEventListener("click", () => session.send("api/undo", "POST"));
 at("redo").addEventListener("click", () => session.send("api/redo", "POST"));
 at("pin").addEventListener("click", () => session.send("api/pins", "POST"));
@@ -215,4 +269,9 @@ ask("api/choices")
   })
   .catch(() => {});
 session.follow();
+at("part-close").addEventListener("click", () => {
+  selected = null;
+  showPart(null);
+  draw("api/outline");
+});
 start(dark ? "dark" : "light", (view, position) => pick(`on=${view}&at=${position.join(",")}`));

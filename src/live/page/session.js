@@ -72,27 +72,27 @@ export class Session extends EventTarget {
     return trail.slice(-300);
   }
 
-  // Sends an edit, merged with one that still waits, so that a drag does not queue up.
-  edit(change, gesture) {
-    this.#waiting = { change: { ...this.#waiting?.change, ...change }, gesture };
+  // Sends an edit, merged with one that still waits, so that a drag does not queue up. `field` is the input that the edit comes from.
+  edit(change, { gesture, field } = {}) {
+    this.#waiting = { change: { ...this.#waiting?.change, ...change }, gesture, field };
     if (!this.#busy) this.#send();
   }
 
   async #send() {
     this.#busy = true;
     while (this.#waiting) {
-      const { change, gesture } = this.#waiting;
+      const { change, gesture, field } = this.#waiting;
       this.#waiting = null;
       const path = gesture === undefined ? "api/state" : `api/state?gesture=${gesture}`;
-      await this.send(path, "PATCH", JSON.stringify(change), "application/json");
+      await this.send(path, "PATCH", JSON.stringify(change), "application/json", field);
     }
     this.#busy = false;
   }
 
   // Sends a change; the answer is the new state or an error.
-  async send(path, method, body, kind) {
+  async send(path, method, body, kind, field) {
     if (this.state?.may_steer === false) {
-      this.#tell("refused", "This address looks on; the one with the token for control steers.");
+      this.#tell("refused", { sentence: "This address is read-only; the one with the token for control can edit.", field });
       return;
     }
     try {
@@ -100,16 +100,16 @@ export class Session extends EventTarget {
       const answer = await response.json();
       if (response.ok) {
         this.#take(answer);
-        this.#tell("accepted", "");
+        this.#tell("accepted", field);
       } else {
-        this.#tell("refused", answer.error);
+        this.#tell("refused", { sentence: answer.error, field });
       }
     } catch (error) {
       this.#tell("lost", error.message);
     }
   }
 
-  #tell(what, sentence) {
-    this.dispatchEvent(new CustomEvent(what, { detail: sentence }));
+  #tell(what, detail) {
+    this.dispatchEvent(new CustomEvent(what, { detail }));
   }
 }

@@ -3,7 +3,7 @@
 import { fail, run, show } from "./program.js";
 import { ask } from "./session.js";
 
-const message = document.getElementById("message");
+const [message, canvas, scene] = ["message", "viewer", "scene"].map((id) => document.getElementById(id));
 const CHANNEL = "session";
 // Frames drawn before the canvas is shown: until the layout arrives, the viewer shows its default layout.
 const COVERED = 3;
@@ -28,7 +28,10 @@ export async function start(theme, picked) {
       },
       failed,
     );
+    leaveByTab();
+    withoutHover();
     handle.open_channel(CHANNEL, "session");
+    viewer = handle;
     message.textContent = "Waiting for the garment …";
     await feed(handle);
   } catch (error) {
@@ -36,11 +39,101 @@ export async function start(theme, picked) {
   }
 }
 
+// The viewer takes the Tab key for its own fields and would never give the focus back; here the browser moves it on.
+function leaveByTab() {
+  // The hidden field in which the viewer takes texts is no stop of its own.
+  const texts = scene.querySelector(":scope > input");
+  if (texts) texts.tabIndex = -1;
+  const leave = (event) => {
+    if (event.key !== "Tab" || ![canvas, texts].includes(document.activeElement)) return;
+    event.stopImmediatePropagation();
+    // From the hidden field as from the canvas.
+    canvas.focus();
+  };
+  for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, leave, { capture: true });
+}
+
+// How long the pointer may rest, ms: a little later the viewer describes its own data in a box, which is of no use here.
+const RESTING = 200;
+
+// Frames in which the viewer finds what is under the pointer. A press before that would select nothing.
+const FINDING = 6;
+
+async function frames(count) {
+  for (let i = 0; i < count; i += 1) await new Promise((done) => requestAnimationFrame(done));
+}
+
+// Takes the pointer from the viewer while it rests, and gives it back when it moves, presses or turns the wheel.
+function withoutHover() {
+  let timer = null;
+  let taken = false;
+  let held = null;
+  const hold = (event) => {
+    event.stopImmediatePropagation();
+    held.push(event);
+  };
+  const press = async (event) => {
+    held = [];
+    hold(event);
+    await frames(FINDING);
+    for (const next of held) {
+      canvas.dispatchEvent(new PointerEvent(next.type, next));
+      await frames(2);
+    }
+    held = null;
+  };
+  const rest = (event) => {
+    clearTimeout(timer);
+    if (event.buttons !== 0) return;
+    timer = setTimeout(() => {
+      taken = true;
+      canvas.dispatchEvent(new MouseEvent("mouseleave"));
+    }, RESTING);
+  };
+  const back = ({ isTrusted, clientX, clientY }) => {
+    if (!isTrusted || !taken) return;
+    taken = false;
+    canvas.dispatchEvent(new MouseEvent("mousemove", { clientX, clientY, bubbles: true }));
+  };
+  const on = (kind, act) => scene.addEventListener(kind, (event) => event.target === canvas && act(event), { capture: true, passive: true });
+  on("pointerdown", (event) => {
+    if (!event.isTrusted || !taken) return;
+    clearTimeout(timer);
+    back(event);
+    press(event);
+  });
+  on("pointerup", (event) => {
+    if (event.isTrusted && held) hold(event);
+  });
+  for (const kind of ["pointermove", "pointerdown", "pointerup", "wheel"]) {
+    on(kind, (event) => {
+      back(event);
+      rest(event);
+    });
+  }
+}
+
+// Releases what the viewer has selected: it outlines the garment as a whole.
+function release() {
+  for (const kind of ["keydown", "keyup"]) canvas.dispatchEvent(new KeyboardEvent(kind, { key: "Escape", code: "Escape" }));
+}
+
+let viewer = null;
+
+// Draws what the server answers, in addition to the pieces.
+export async function draw(path) {
+  const response = await ask(path).catch(() => null);
+  if (response?.ok && viewer) viewer.send_rrd_to_channel(CHANNEL, new Uint8Array(await response.arrayBuffer()));
+}
+
 function heard(event, picked) {
   if (event.type !== "selection_change") return;
   const item = (event.items ?? []).find((i) => i.position && i.entity_path);
   const view = item?.entity_path.split("/").find((name) => name !== "");
-  if (["parts", "preview", "rest"].includes(view)) picked(view, item.position);
+  if (!["parts", "preview", "rest"].includes(view)) return;
+  picked(view, item.position);
+  // The viewer takes no keys while it tells of a selection.
+  setTimeout(release);
 }
 
 // Shows the canvas some frames after the first piece.

@@ -170,6 +170,11 @@ fn a_sweep_logs_the_triangles_once_and_has_all_tables() {
     }
     assert_eq!(contents.entities[paths::BODY].fixed_rows, 1);
     assert_eq!(contents.entities[paths::DISTANCE].rows, 1, "the distance is the same for every table");
+    let dictionary = include_str!("../../../docs/columns.md");
+    for column in &contents.entities[paths::ROWS].components {
+        let name = column.rsplit(':').next().unwrap();
+        assert!(name == "Table" || dictionary.contains(&format!("`{name}`")), "docs/columns.md lacks {name}");
+    }
     for path in ["/numbers/part_count", "/numbers/ms/mechanics", "/numbers/error/rms_mm", paths::ROWS] {
         assert!(contents.entities[path].timelines.contains(paths::TABLE), "{path}");
         let named = path == paths::ROWS || contents.entities[path].components.contains("SeriesLines:names");

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::faults::{SANK_MM, SlidPart, TightestOpening, bridges, sinking};
+use super::faults::{SANK_MM, SlidPart, TightestOpening, begins_above_the_bust, bridges, sinking};
 use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
 use crate::mechanics::fit::TORN_PERCENT;
@@ -229,19 +229,24 @@ impl Metrics {
         add(
             "error",
             match (self.rms_mm, self.canonical_rms_mm) {
-                (Some(own), canonical) => Some(format!(
-                    "{own:.2} mm RMS against its own continuation, {:.1} against the canonical drape",
-                    canonical.unwrap_or_default()
-                )),
-                (None, canonical) => canonical.map(|mm| format!("{mm:.1} mm RMS against the canonical drape")),
+                (Some(own), canonical) => {
+                    let canonical =
+                        canonical.map_or_else(String::new, |mm| format!(", {mm:.1} to the canonical drape"));
+                    Some(format!("{own:.2} mm RMS to the rest it converges to by itself{canonical}"))
+                }
+                (None, canonical) => canonical.map(|mm| format!("{mm:.1} mm RMS to the canonical drape")),
             },
         );
         let spread = |mm| format!("{mm:.1} mm RMS between drapes from perturbed starts");
         add("spread", self.canonical_spread_mm.map(spread));
+        // A drape can be nearer: the last steps move each vertex by itself.
         let best = self.representable_affine_rms_mm.zip(self.representable_rms_mm).map(|(affine, one)| {
-            format!("its PARTs could hold it to {affine:.1} mm by affine maps, {one:.1} mm by one displacement each")
+            format!(
+                "{affine:.1} mm RMS to the canonical drape by the best affine map of each PART, {one:.1} by the best displacement, \
+                 without steps of single vertices"
+            )
         });
-        let single = |mm| format!("its PARTs could hold it to {mm:.1} mm by one displacement each");
+        let single = |mm| format!("{mm:.1} mm RMS to the canonical drape by the best displacement of each PART");
         add("representable", best.or(self.representable_rms_mm.map(single)));
         add(
             "folds",
@@ -255,6 +260,11 @@ impl Metrics {
         let rank = |r| format!("rank correlation {r:.2} of PART jumps with the mean curvature");
         add("wrinkles", self.wrinkle_rank_correlation.map(rank));
         found
+    }
+
+    /// Whether the strain exceeds what fabrics bear.
+    pub(crate) fn is_torn(&self) -> bool {
+        self.strain_max.is_some_and(|strain| 1e2 * strain > TORN_PERCENT)
     }
 
     /// Metrics that a recording plots: leaf of the entity path `/numbers`, and value.
@@ -283,13 +293,21 @@ impl Metrics {
         let mut found = Vec::new();
         if let [SlidPart { sank_mm, .. }, more @ ..] = self.slid.as_slice() {
             let parts: Vec<usize> = self.slid.iter().map(|slid| slid.part).collect();
-            let [have, edge, unheld] = if more.is_empty() {
-                ["has", "its highest edge sank by", "nothing holds it; if it has a waistband"]
+            let [have, edge, it, waistband] = if more.is_empty() {
+                ["has", "its highest edge sank by", "it", "if it has a waistband,"]
             } else {
-                ["have", "their highest edges sank by up to", "nothing holds them; if they have waistbands"]
+                ["have", "their highest edges sank by up to", "them", "if they have waistbands,"]
+            };
+            let remedy = match begins_above_the_bust(scene, &parts) {
+                // A poncho has no waistband.
+                Some(true) => {
+                    "a garment without a waistband lies on the shoulders: make its neck opening narrower than they are, or"
+                }
+                Some(false) => waistband,
+                None => "if something should,",
             };
             found.push(format!(
-                "{} {have} slid down: {edge} {:.0} cm, and {unheld}, {}",
+                "{} {have} slid down: {edge} {:.0} cm, and nothing holds {it}; {remedy} {}",
                 scene.named(&parts),
                 0.1 * sank_mm,
                 scene.how_to_hold(&parts)

@@ -7,8 +7,10 @@
 //! ease = ∮ cloth at rest − tape girth of the body.
 //!
 //! With negative ease the cloth must stretch. If the curve encloses an arm, as at the bust of a pullover whose sleeves join lower, the
-//! plane is lowered until the curve encloses the trunk alone. Limits: the body's landmarks must be found; a garment that is open at the
-//! height, ends there on one side, or encloses the arms as a cape does, has no girth; of layered garments only the innermost is measured.
+//! plane is lowered until the curve encloses the trunk alone. A garment that is open at the bust, as a low neckline is, or that begins a
+//! little below the waist, as a skirt on the hips does, is measured at the highest plane below at which it is closed, against the body at
+//! that height. Limits: the body's landmarks must be found; a garment that ends at the height on one side, or encloses the arms as a cape
+//! does, has no girth; of layered garments only the innermost is measured.
 
 use glam::DVec2;
 use serde::Serialize;
@@ -23,7 +25,7 @@ use crate::scene::Scene;
 pub(crate) struct GirthEase {
     /// `bust`, `waist` or `hip`.
     pub at: &'static str,
-    /// Height above the body's lowest point, cm.
+    /// Height above the body's lowest point, cm; below bust or waist if the garment is open or begins lower.
     pub height_cm: f64,
     /// Tape girth of the body, cm.
     pub body_cm: f64,
@@ -44,33 +46,43 @@ impl GirthEase {
         let heights = heights_m.map_or([marks.bust_z, marks.waist_z, marks.hip_z], |all| all.map(Some));
         let garment = scene.garment.with_positions(positions.to_vec());
         let at = |(at, z): (&'static str, Option<f64>)| {
-            let z = z?;
-            let of_body = section(body, Plane::horizontal(z));
-            let trunk = trunk_girth(&of_body, marks.middle)?;
-            let steps = if at == "bust" { LOWER_STEPS } else { 0 };
+            let marked = z?;
+            let begins = !cuts(&garment, Plane::horizontal(marked)).is_empty();
+            let steps = match at {
+                "bust" if begins => BUST_STEPS,
+                "waist" if !begins => WAIST_STEPS,
+                _ => 0,
+            };
+            // Sleeves are passed with the body at the mark itself, which the garment covers; an opening is not covered.
+            let mut of_mark = marked;
             let girth = (0..=steps).find_map(|step| {
-                let z = z - LOWER_M * f64::from(step);
-                let arms = if step == 0 { &of_body } else { &section(body, Plane::horizontal(z)) };
-                match girth(scene, &garment, (z, marks.middle), arms) {
+                let z = marked - LOWER_M * f64::from(step);
+                match girth(scene, &garment, (z, marks.middle), &section(body, Plane::horizontal(z))) {
                     Girth::WithArm => None,
-                    Girth::None => Some(None),
-                    Girth::Trunk(cm) => Some(Some((cm, z))),
+                    Girth::None => {
+                        of_mark = z - LOWER_M;
+                        None
+                    }
+                    Girth::Trunk(cm) => Some((cm, z)),
                 }
             });
-            let girth = girth.flatten();
+            let of_mark = if girth.is_some() { of_mark } else { marked };
+            let trunk = trunk_girth(&section(body, Plane::horizontal(of_mark)), marks.middle)?;
             let (garment_cm, garment_height_cm) = (girth.map(|(cm, _)| cm), girth.map(|(_, z)| 100.0 * (z - low.z)));
             let body_cm = 100.0 * trunk;
             let ease_cm = garment_cm.map(|cm| cm - body_cm);
-            Some(Self { at, height_cm: 100.0 * (z - low.z), body_cm, garment_cm, garment_height_cm, ease_cm })
+            Some(Self { at, height_cm: 100.0 * (of_mark - low.z), body_cm, garment_cm, garment_height_cm, ease_cm })
         };
         ["bust", "waist", "hip"].into_iter().zip(heights).filter_map(at).collect()
     }
 }
 
-/// Distance by which the plane at the bust is lowered while the curve encloses an arm, m, and the number of tries: 12 cm reach the
-/// armholes of the built-in garments.
+/// Distance by which a plane is lowered, m.
 const LOWER_M: f64 = 0.01;
-const LOWER_STEPS: u32 = 12;
+/// Tries at the bust: 18 cm reach the armholes of a T-shirt with dropped shoulders, just above the waist.
+const BUST_STEPS: u32 = 18;
+/// Tries at the waist: a waistband farther down is no longer near the waist.
+const WAIST_STEPS: u32 = 8;
 
 /// Result of a search for the garment's girth.
 enum Girth {

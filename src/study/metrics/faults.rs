@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use crate::garment::sewing::Landmarks;
 use crate::mesh::TriMesh;
 use crate::mesh::bridges::Bridges;
 use crate::scene::Scene;
@@ -73,6 +74,17 @@ pub struct SlidPart {
     pub part: usize,
     /// Descent of its highest edge since placement, mm; without an edge of its highest tenth.
     pub sank_mm: f64,
+}
+
+/// Whether these connected parts, numbered from 1, are placed with their highest edges above the bust: they hang from the shoulders, not
+/// from the waist. None for a body without a bust.
+pub(super) fn begins_above_the_bust(scene: &Scene, parts: &[usize]) -> Option<bool> {
+    let bust_z = Landmarks::of(scene.body.mesh()).bust_z?;
+    let tops = scene.tops();
+    let edges = parts.iter().filter_map(|part| tops.get(part - 1)?.as_deref()).filter(|edge| !edge.is_empty());
+    let mean_z =
+        |edge: &[u32]| edge.iter().map(|&v| scene.garment.positions[v as usize].z).sum::<f64>() / edge.len() as f64;
+    edges.map(mean_z).reduce(f64::max).map(|z| z > bust_z)
 }
 
 /// Descent of the highest edge of each connected part from its placement to `positions` (m), mm; without an edge of its highest

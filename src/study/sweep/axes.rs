@@ -15,7 +15,7 @@ use crate::base::files::names_a_file;
 use crate::drape::{Model, Refine};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::Motion;
-use crate::study::job::Job;
+use crate::study::job::{Against, Job};
 
 /// Largest number of points of a plan; more are probably a mistake. At 0.1 s per point, this many take three hours, and their
 /// list takes 200 MB.
@@ -69,6 +69,12 @@ impl Axes {
             axis.edits(["seed", "seeds"], |v| {
                 let seed = source.count(v, "seed", 0, "a whole number, 0 for the undisturbed start")?;
                 Ok(one(move |point| point.job.seed = seed))
+            })?,
+            axis.edits(["accuracy", "accuracy"], |v| {
+                let expected = "\"none\", \"canonical\" or \"own\"";
+                let against: Option<Against> = v.get_ref().as_str().and_then(|text| text.parse().ok());
+                let against = against.ok_or_else(|| source.wrong(v, "accuracy", expected))?;
+                Ok(one(move |point| point.job.accuracy = against))
             })?,
             axis.edits(["options", "options"], |v| options(source, v))?,
         ]))

@@ -30,6 +30,7 @@
 //! | `min_part` | `min_parts` | vertices; PARTs of fewer are joined before any is cut | 1 |
 //! | `refine` | `refine` | steps or `converged` | 0 |
 //! | `seed` | `seeds` | 0 is the undisturbed start | 0 |
+//! | `accuracy` | `accuracy` | reference of the errors: `none`, `canonical`, `own` | as `--accuracy` |
 //! | `options` | `options` | `{ name = value, ... }`: `accuracy`, and the keys of a [`SceneSpec`](crate::SceneSpec) such as `rest` | none |
 
 use std::collections::BTreeMap;
@@ -51,7 +52,7 @@ pub(super) type Single = BTreeMap<String, At>;
 pub(super) type Grid = BTreeMap<String, Spanned<Vec<At>>>;
 
 /// The keys of `[base]` and `[[points]]`, and those of `[grid]`, in the order in which a grid is nested.
-const KEYS: [[&str; 2]; 12] = [
+const KEYS: [[&str; 2]; 13] = [
     ["body", "bodies"],
     ["garment", "garments"],
     ["size", "sizes"],
@@ -63,6 +64,7 @@ const KEYS: [[&str; 2]; 12] = [
     ["min_part", "min_parts"],
     ["refine", "refine"],
     ["seed", "seeds"],
+    ["accuracy", "accuracy"],
     ["options", "options"],
 ];
 

@@ -178,3 +178,28 @@ fn rounded<T: Serialize + DeserializeOwned>(metrics: &T) -> Option<T> {
     }
     serde_json::from_value(value).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_column_is_in_the_dictionary_once() {
+        let text = include_str!("../../../docs/columns.md");
+        let rows = text.lines().filter(|line| line.starts_with("| `"));
+        let names = rows.flat_map(|line| line.split('|').nth(1).unwrap_or_default().split(", "));
+        let names: Vec<String> = names.map(|name| name.trim().trim_matches('`').to_owned()).collect();
+        let once: BTreeSet<&String> = names.iter().collect();
+        assert_eq!(once.len(), names.len(), "a column is defined twice");
+        let columns = columns();
+        assert!(columns.len() >= 60, "{}", columns.len());
+        for column in &columns {
+            assert!(once.contains(column), "docs/columns.md lacks {column}");
+        }
+        let of_levels = ["level", "lower_cm", "upper_cm", "parts", "kept", "split", "merged"];
+        let unknown = names.iter().filter(|name| !columns.contains(name) && !of_levels.contains(&name.as_str()));
+        assert_eq!(unknown.collect::<Vec<_>>(), [""; 0], "docs/columns.md defines columns that do not exist");
+    }
+}
