@@ -104,7 +104,7 @@ impl CheckArgs {
         let of_garment = connected_parts(scene).into_iter().chain(fit);
         let rows = meshes.chain(of_garment.map(|(name, value)| [name, String::new(), value]));
         let table = console::table(console::RULED, ["", &loaded.body_name, &loaded.garment_name], [], rows);
-        console::result(&format!("{table}\nverdict: {verdict}"));
+        console::prose(&format!("{table}\nverdict: {verdict}"));
         print_certificate(certificate);
         console::notes(&notes);
         require_pass(certificate)

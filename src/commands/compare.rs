@@ -101,7 +101,7 @@ impl CompareArgs {
         let recordings = record_all(&rows, &store, "compare", &folder, &self.sinks, Tab::SideBySide)?;
         let recordings: String = recordings.iter().map(recording_line).collect();
         match self.format {
-            RowFormat::Text => console::result(&(text(&compared) + &recordings)),
+            RowFormat::Text => console::prose(&(text(&compared) + &recordings)),
             RowFormat::Json => console::json(&compared)?,
             RowFormat::Csv => console::result(&csv(&compared)?),
         }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -44,6 +45,48 @@ pub(crate) fn result(text: &str) {
         report("error: ", "31;1", &format!("standard output: the result cannot be printed: {error}"));
     }
 }
+
+/// Prints a result for people: long lines are broken between words on a terminal.
+pub(crate) fn prose(text: &str) {
+    result(&wrapped(text, terminal_width()));
+}
+
+/// Width of the terminal on stdout, in characters; `None` for a file or a pipe.
+fn terminal_width() -> Option<usize> {
+    Table::new().width().map(usize::from)
+}
+
+/// `text` with long lines broken between words, as a terminal of this width would break them within words. Tables stay as they are.
+fn wrapped(text: &str, width: Option<usize>) -> Cow<'_, str> {
+    let Some(width) = width.filter(|width| *width > 2 * INDENT) else { return text.into() };
+    let is_long = |line: &str| line.chars().count() > width && !line.starts_with(['│', '┌', '└', '╞', '├']);
+    if !text.lines().any(is_long) {
+        return text.into();
+    }
+    let wrap = |line: &str| {
+        let mut lines = String::new();
+        let mut used = 0;
+        // Runs of spaces align the values of a heading.
+        for word in line.split_inclusive(' ') {
+            let letters = word.trim_end_matches(' ').chars().count();
+            if used > INDENT && used + letters > width {
+                lines.truncate(lines.trim_end_matches(' ').len());
+                lines += &format!("\n{}", " ".repeat(INDENT));
+                used = INDENT;
+            }
+            if !(word == " " && used == INDENT && lines.contains('\n')) {
+                lines += word;
+                used += word.chars().count();
+            }
+        }
+        lines
+    };
+    let lines = text.split('\n').map(|line| if is_long(line) { wrap(line) } else { line.to_owned() });
+    lines.collect::<Vec<_>>().join("\n").into()
+}
+
+/// Indentation of the further lines of a long one.
+const INDENT: usize = 4;
 
 /// Prints a result as one line of JSON.
 pub(crate) fn json(value: &impl serde::Serialize) -> serde_json::Result<()> {
@@ -173,8 +216,14 @@ fn report(mark: &str, colour: &str, text: &str) {
     let coloured = !colour.is_empty() && stderr.is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let mark = if coloured { format!("\u{1b}[{colour}m{mark}\u{1b}[0m") } else { mark.to_owned() };
     // A closed stderr leaves no channel to report on.
-    let _ = writeln!(stderr, "{mark}{}", without_control(text));
+    let width = terminal_width().filter(|_| stderr.is_terminal());
+    let text = without_control(text);
+    // The mark has no width that counts where it is coloured, so that the text alone is measured.
+    let _ = writeln!(stderr, "{mark}{}", wrapped(&text, width.map(|width| width.saturating_sub(MARK))));
 }
+
+/// Longest mark before a text, in characters.
+const MARK: usize = 9;
 
 /// A progress bar, shown on terminals only; without `length` a spinner.
 pub(crate) fn progress(length: Option<u64>, title: &str) -> ProgressBar {
@@ -197,6 +246,18 @@ mod tests {
         let header = ["garment", "setting", "canonical error mm", "translation bound mm"];
         let row = ["flared-skirt@3920", setting, "45.8", "76.9"].map(str::to_owned);
         fitted(OPEN, &header.map(str::to_owned), 2.., &[row.to_vec()], width).lines().collect()
+    }
+
+    #[test]
+    fn long_lines_are_broken_between_words_and_tables_are_not() {
+        let text = "milliseconds: load 106.9, distance 28.8, mechanics 206.1, total 6746.2\n│ a table as it is, however long its lines │\nshort";
+        let lines = wrapped(text, Some(40)).into_owned();
+        let lines: Vec<&str> = lines.lines().collect();
+        assert_eq!(lines[..2], ["milliseconds: load 106.9, distance 28.8,", "    mechanics 206.1, total 6746.2"]);
+        assert!(lines[2].starts_with('│') && lines[3] == "short", "{lines:?}");
+        assert_eq!(wrapped(text, None), text);
+        let aligned = wrapped("refined             4 steps, residual 3.8e-4 of the weight", Some(44)).into_owned();
+        assert!(aligned.starts_with("refined             4 steps, residual 3.8e-4\n"), "{aligned}");
     }
 
     #[test]

@@ -238,7 +238,7 @@ impl RunArgs {
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
         match self.format {
             Format::Text => {
-                console::result(&solved.summary.text());
+                console::prose(&solved.summary.text());
                 print_certificate(solved.summary.certificate.as_ref());
             }
             Format::Json => console::json(&solved.summary)?,

@@ -287,8 +287,13 @@ pub(crate) fn fabric_facts(fabric: &Fabric) -> Vec<(String, String)> {
 /// Prints a certificate as a table.
 pub(crate) fn print_certificate(certificate: Option<&Certificate>) {
     let Some(certificate) = certificate else { return };
-    let number =
-        |x: f64| if x == 0.0 || (0.01..1e5).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.2e}") };
+    let number = |x: f64| {
+        if x != 0.0 && !(0.01..1e5).contains(&x.abs()) {
+            return format!("{x:.2e}");
+        }
+        let text = format!("{x:.*}", if x.abs() < 10.0 { 3 } else { 1 });
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
     let rows = certificate.findings.iter().map(|f| {
         let passes = if f.passes { "passes" } else { "FAILS" };
         let text = [f.name, passes, &number(f.value), &number(f.limit), f.unit, &f.remark];
@@ -296,7 +301,7 @@ pub(crate) fn print_certificate(certificate: Option<&Certificate>) {
     });
     let table = console::table(console::RULED, ["criterion", "", "value", "limit", "unit", "remark"], 2..4, rows);
     let verdict = if certificate.passes { "certified: the drape is in equilibrium" } else { "not certified" };
-    console::result(&format!("{table}\n{verdict}"));
+    console::prose(&format!("{table}\n{verdict}"));
 }
 
 /// Fails if a criterion of the certificate fails, so that the program exits with 1.

@@ -109,9 +109,9 @@ impl Recorder {
     pub(crate) fn notice(&mut self, index: i64, message: &str) -> Result<(), RecordError> {
         self.timed(|recording| {
             recording.at(index, 6);
-            let quoted = message.replace('\n', "\n> ");
+            let bold = message.replace('\n', "**\n\n**");
             let report = &recording.report;
-            let text = format!("> ⚠ **{quoted}**\n\nBelow: the last result that could be solved.\n\n{report}");
+            let text = format!("**⚠ {bold}**\n\nBelow: the last result that could be solved.\n\n{report}");
             recording.log(paths::REPORT, &TextDocument::from_markdown(text))?;
             recording.flush_live()
         })

@@ -264,8 +264,9 @@ fn the_representable_error_is_reported_in_words_and_numbers() {
         ["representable_affine_rms_mm", "representable_rms_mm"].map(|key| figures[key].as_f64().unwrap());
     assert!(affine < one, "{affine} {one}");
     let message = String::from_utf8(bench.drape(&measured).stdout).unwrap();
-    let words =
-        format!("its PARTs could hold it to {affine:.1} mm by affine maps, {one:.1} mm by one displacement each");
+    let words = format!(
+        "{affine:.1} mm RMS to the canonical drape by the best affine map of each PART, {one:.1} by the best displacement"
+    );
     assert!(message.contains(&words), "{words}: {message}");
 }
 

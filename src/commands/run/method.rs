@@ -166,7 +166,7 @@ impl RunArgs {
         match self.format {
             Format::Json => console::json(&report)?,
             Format::Text => {
-                console::result(&report.text());
+                console::prose(&report.text());
                 print_certificate(report.certificate.as_ref());
             }
         }

@@ -24,7 +24,7 @@ pub(crate) struct Report<'a> {
 impl Report<'_> {
     pub(crate) fn print(&self, format: RowFormat) -> anyhow::Result<()> {
         match format {
-            RowFormat::Text => console::result(&self.text()),
+            RowFormat::Text => console::prose(&self.text()),
             RowFormat::Json => console::json(&self.json())?,
             RowFormat::Csv => console::result(&String::from_utf8(csv_text(&self.outcome.rows))?),
         }

@@ -75,8 +75,8 @@ fn a_recording_has_every_documented_path_the_timelines_and_a_blueprint() {
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
     let contents = inspect::read(&path);
     assert_eq!(contents.recordings, 1);
-    let bars =
-        ["distance", "force"].map(|of| ["bar", "ticks"].map(|leaf| format!("{}/{of}/{leaf}", paths::STAGES_LEGEND)));
+    let bars = ["levels", "distance", "force"]
+        .map(|of| ["bar", "ticks"].map(|leaf| format!("{}/{of}/{leaf}", paths::STAGES_LEGEND)));
     let others = [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::FORCE_ARROWS];
     let others = others.into_iter().chain([
         paths::DRAPE,

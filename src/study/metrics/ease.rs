@@ -200,4 +200,25 @@ mod tests {
             assert!((ease.ease_cm.unwrap() - (ease.garment_cm.unwrap() - ease.body_cm)).abs() < 1e-12);
         }
     }
+
+    #[test]
+    fn a_low_neckline_and_a_skirt_below_the_waist_have_an_ease_against_the_body_there() {
+        let measures = BodySpec::default().measures().unwrap();
+        let heights = Some([measures.bust_height, measures.waist_height, measures.hip_height]);
+        let worn = |name: &str, lowered_m: f64| {
+            let scene = crate::SceneSpec::new("form", name).load().unwrap().scene;
+            let placed = scene.garment.positions.iter().map(|p| *p - lowered_m * glam::DVec3::Z).collect::<Vec<_>>();
+            GirthEase::all(&scene, heights, &placed)
+        };
+        let dress = worn("low-cut-dress@1500", 0.0);
+        let (bust, cut) = (&dress[0], crate::garment::GarmentSpec::by_name("low-cut-dress").unwrap().ease);
+        assert!(bust.height_cm < 100.0 * measures.bust_height, "{bust:?}");
+        assert!((bust.ease_cm.unwrap() - cut.bust_cm).abs() < 8.0, "{bust:?}");
+        let skirt = worn("flared-skirt@900", 0.03);
+        assert_eq!(skirt[0].garment_cm, None, "a skirt has no bust");
+        let waist = &skirt[1];
+        let below_cm = 100.0 * measures.waist_height - waist.height_cm;
+        assert!((2.0..5.0).contains(&below_cm) && waist.garment_cm.is_some(), "{waist:?}");
+        assert_eq!(worn("flared-skirt@900", 0.15)[1].garment_cm, None, "15 cm below, that is no waist");
+    }
 }

@@ -117,3 +117,16 @@ pub(super) fn sinking(scene: &Scene, positions: &[DVec3]) -> (f64, Vec<SlidPart>
     slid.sort_by(|a, b| b.sank_mm.total_cmp(&a.sank_mm));
     (tops.into_iter().fold(f64::NEG_INFINITY, f64::max), slid)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_garment_on_the_shoulders_is_told_from_one_at_the_waist() {
+        for (name, on_shoulders) in [("low-cut-dress@900", true), ("flared-skirt@900", false)] {
+            let scene = crate::SceneSpec::new("form", name).load().unwrap().scene;
+            assert_eq!(begins_above_the_bust(&scene, &[1]), Some(on_shoulders), "{name}");
+        }
+    }
+}
