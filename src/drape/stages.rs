@@ -12,7 +12,7 @@ use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
 use crate::mechanics::energy::{Cloth, Contacts};
-use crate::mechanics::fit::fit;
+use crate::mechanics::fit::{CRUSHED_SHARE, fit};
 use crate::mechanics::folds::{Folds, folds};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -127,7 +127,9 @@ impl Made {
             warnings.push(format!("the garment {slides}"));
         }
         warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));
-        warnings.extend(state.as_ref().and_then(|_| crushed_warning(scene, &positions)));
+        // PARTs alone may shorten cloth that still unfolds.
+        let rests = state.as_ref().filter(|state| state.stop == Stop::Converged);
+        warnings.extend(rests.and_then(|_| crushed_warning(scene.area_share(&positions))));
         let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
@@ -186,15 +188,10 @@ fn unsettled_warning(asked: Refine, state: &ClothState) -> Option<String> {
     (asked == Refine::Converged).then(|| format!("the drape has not settled: after {} steps {reason}", state.steps))
 }
 
-/// Share of its area at rest below which a garment at rest counts as crushed. A skirt with `bending_nm = 100` keeps 0.17. Heuristic.
-const CRUSHED: f64 = 0.5;
-
 /// A warning about a garment that has lost its area. Triangles bear hardly any compression, as cloth buckles before it does; a bending
 /// stiffness that does not let it buckle then shortens the cloth instead of keeping it straight, at small forces.
-fn crushed_warning(scene: &Scene, positions: &[DVec3]) -> Option<String> {
-    let whole: f64 = scene.rest.areas().into_iter().map(f64::abs).sum();
-    let share = scene.garment.with_positions(positions.to_vec()).triangle_areas().iter().sum::<f64>() / whole;
-    (share < CRUSHED).then(|| {
+fn crushed_warning(share: f64) -> Option<String> {
+    (share < CRUSHED_SHARE).then(|| {
         format!(
             "the cloth is crushed to {:.0} % of its area: its fabric is too stiff in bending to buckle; check `bending_nm`, in N·m (the \
              built-in fabrics have 2e-6 to 1.3e-4)",

@@ -22,6 +22,9 @@ use crate::base::quantiles::nearest_rank;
 /// Principal strain above which a result is not a wearable garment, %: more than fabrics bear.
 pub(crate) const TORN_PERCENT: f64 = 50.0;
 
+/// Share of its area at rest below which a garment at rest counts as crushed. A skirt with `bending_nm = 100` keeps 0.17. Heuristic.
+pub(crate) const CRUSHED_SHARE: f64 = 0.5;
+
 /// Strain and pressure per vertex.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {

@@ -334,6 +334,12 @@ impl Scene {
         (0..parts as u32).filter(|part| !held.contains(part)).map(|part| part as usize + 1).collect()
     }
 
+    /// Area of the garment at `positions` (m) over its area at rest.
+    pub(crate) fn area_share(&self, positions: &[DVec3]) -> f64 {
+        let at_rest: f64 = self.rest.areas().into_iter().map(f64::abs).sum();
+        self.garment.with_positions(positions.to_vec()).triangle_areas().iter().sum::<f64>() / at_rest
+    }
+
     /// A warning about connected parts that have fallen off the body at `positions` (m): nothing of them is held, and every
     /// vertex is below the body. They touch nothing any more and would fall for ever.
     pub(crate) fn fallen(&self, positions: &[DVec3]) -> Option<String> {

@@ -12,6 +12,7 @@
 //! | skin through cloth | pairs of a garment and a body triangle that cross, exactly | none |
 //! | cloth through cloth | pairs of garment triangles that cross, exactly | none |
 //! | largest strain | principal strain of a triangle, % | `TORN_PERCENT`: more than fabrics bear |
+//! | area kept | area over the area at rest, the least that passes | `CRUSHED_SHARE`: less is cloth that its bending crushed |
 //! | held edges | largest distance of a held vertex from its placement, mm | digits of an exported file |
 //!
 //! A held vertex admits any reaction, so the forces cannot tell where it was held: the placement decides that.
@@ -26,7 +27,7 @@ pub use crate::mechanics::rest::Curvature;
 
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mechanics::fit::{TORN_PERCENT, principal_strain};
+use crate::mechanics::fit::{CRUSHED_SHARE, TORN_PERCENT, principal_strain};
 use crate::mechanics::refine::SolveError;
 use crate::mechanics::rest::{Criterion, RestState};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -64,7 +65,7 @@ pub struct Finding {
     pub value: f64,
     /// Unit of the value; empty for counts.
     pub unit: &'static str,
-    /// Largest value that passes; of the curvature the least.
+    /// Largest value that passes; of the curvature and the area the least.
     pub limit: f64,
     /// Whether the value is within the limit.
     pub passes: bool,
@@ -105,6 +106,7 @@ pub fn certify(scene: &Scene, fabric: &Fabric, x: &[DVec3]) -> Result<Certificat
     let mut findings = of_rest(&RestState::new(&cloth, Some(&scene.body), x)?, &cloth).to_vec();
     findings.extend(of_surfaces(scene, x));
     findings.push(of_strain(&cloth, x));
+    findings.push(of_area(scene, x));
     findings.push(of_held(scene, x));
     Ok(Certificate { passes: findings.iter().all(|f| f.passes), findings })
 }
@@ -172,6 +174,12 @@ fn of_strain(cloth: &Cloth, x: &[DVec3]) -> Finding {
     let (t, most) =
         strains.enumerate().fold((0, f64::NEG_INFINITY), |most, (t, s)| if s > most.1 { (t, s) } else { most });
     at_most("largest strain", most, "%", TORN_PERCENT, format!("in triangle {}", t + 1))
+}
+
+fn of_area(scene: &Scene, x: &[DVec3]) -> Finding {
+    let (value, limit) = (scene.area_share(x), CRUSHED_SHARE);
+    let remark = "area over the area at rest".to_owned();
+    Finding { name: "area kept", value, unit: "", limit, passes: value >= limit, remark }
 }
 
 fn of_held(scene: &Scene, x: &[DVec3]) -> Finding {

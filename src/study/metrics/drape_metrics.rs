@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::faults::{SANK_MM, SlidPart, TightestOpening, begins_above_the_bust, bridges, sinking};
 use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
-use crate::mechanics::fit::TORN_PERCENT;
+use crate::mechanics::fit::{CRUSHED_SHARE, TORN_PERCENT};
 use crate::mechanics::refine::Stop;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::scene::Scene;
@@ -183,10 +183,18 @@ impl Metrics {
         }
         match &drape.state {
             None => faults.push("not solved at full resolution".to_owned()),
-            Some(state) if state.stop != Stop::Converged => {
-                faults.push(format!("does not rest: residual {:.1e} of the weight", state.residual_over_weight));
-            }
-            Some(_) => {}
+            Some(state) => match state.stop {
+                Stop::Converged => {
+                    let share = scene.area_share(&drape.positions);
+                    faults.extend(
+                        (share < CRUSHED_SHARE).then(|| format!("crushed to {:.0} % of its area", 1e2 * share)),
+                    );
+                }
+                Stop::Unsettled(criterion) => faults.push(format!("does not rest by the criterion `{criterion}`")),
+                Stop::StepsDone | Stop::Interrupted | Stop::Stalled => {
+                    faults.push(format!("does not rest: residual {:.1e} of the weight", state.residual_over_weight));
+                }
+            },
         }
         let counts = [
             (self.penetrating_vertices, "vertices inside the body"),
