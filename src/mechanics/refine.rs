@@ -104,6 +104,8 @@ pub struct RefineOptions {
     pub self_contact: bool,
     /// Whether a rest must last: hardly anything moves by the next step, and no way leads out on which the energy falls.
     pub lasting: bool,
+    /// Residual over weight to which a rest is continued with its own contacts; `None` ends there. For checks of a rest.
+    pub continued_to: Option<f64>,
 }
 
 /// No run takes more steps than this.
@@ -119,6 +121,7 @@ impl Default for RefineOptions {
             soft_strain: 0.005,
             self_contact: true,
             lasting: true,
+            continued_to: None,
         }
     }
 }
@@ -151,7 +154,7 @@ pub enum Stop {
     StepsDone,
     /// The observer said so.
     Interrupted,
-    /// No step lowers the energy any more: rounding is reached before the tolerance.
+    /// No step lowers the energy any more, though the residual is over the tolerance: rounding is reached before.
     Stalled,
 }
 
@@ -249,6 +252,7 @@ fn settle(
     let mut history = vec![descent.record(0, None, soft)];
     let mut iteration = 0;
     let mut rest_checks = 0;
+    let (mut tolerance, mut continued_to) = (options.tolerance, options.continued_to);
     // The criterion of rest that failed at the last check.
     let mut failed = "";
     // The step at which the contact places changed, until the cloth has come to rest with them.
@@ -258,7 +262,7 @@ fn settle(
         if observer(&seen(&descent, iteration, false)).is_break() {
             break Stop::Interrupted;
         }
-        if !soft && descent.residual < options.tolerance {
+        if !soft && descent.residual < tolerance {
             if !descent.contacts.resolve_penetrations(&descent.x) {
                 let NewtonState { contacts, x, .. } = &mut descent;
                 let update =
@@ -273,14 +277,20 @@ fn settle(
                     FaceUpdate::Unchanged if !options.lasting || iteration >= limit => {
                         break Stop::Converged;
                     }
-                    FaceUpdate::Unchanged if rest_checks == MAX_REST_CHECKS => break Stop::Unsettled(failed),
+                    FaceUpdate::Unchanged if rest_checks == MAX_REST_CHECKS => match continued_to.take() {
+                        Some(residual) => tolerance = residual,
+                        None => break Stop::Unsettled(failed),
+                    },
                     FaceUpdate::Unchanged => {
                         rest_checks += 1;
                         if rest_checks == 1 && observer(&seen(&descent, iteration, true)).is_break() {
                             break Stop::Interrupted;
                         }
                         match check_rest(&mut descent, rest_checks > 1, RELAX_ITERATIONS)? {
-                            RestCheck::Rests => break Stop::Converged,
+                            RestCheck::Rests => match continued_to.take() {
+                                Some(residual) => tolerance = residual,
+                                None => break Stop::Converged,
+                            },
                             RestCheck::Fails(criterion) => failed = criterion.name,
                             RestCheck::Escaped => {
                                 failed = "lowest curvature";
@@ -319,7 +329,11 @@ fn settle(
         // The true Hessian may give no direction of descent, and the softened cloth need not converge.
         let astray = !advance.accepted && !tangent.fall_back();
         if astray && !soft {
-            break Stop::Stalled;
+            break if descent.residual < tolerance && !failed.is_empty() {
+                Stop::Unsettled(failed)
+            } else {
+                Stop::Stalled
+            };
         }
         if soft && (astray || descent.residual < SOFT_TOLERANCE) {
             soft = false;
