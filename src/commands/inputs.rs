@@ -12,7 +12,7 @@ use crate::scene::{CutError, DistanceTo, Loaded, SceneError};
 use anyhow::Context as _;
 use clap::Args;
 
-use super::runtime::refuse;
+use super::runtime::{self, refuse};
 
 /// Body and garment.
 #[derive(Debug, Clone, Args)]
@@ -132,15 +132,17 @@ impl InputArgs {
 
     /// Loads a scene. An error about measurements names the flags and the file that they came from.
     pub(crate) fn load(&self, spec: &SceneSpec) -> anyhow::Result<Loaded> {
-        spec.load_with(&self.meshes()).map_err(|error| match error {
+        let loaded = spec.load_with(&self.meshes()).map_err(|error| match error {
             SceneError::Measurements(source) => {
                 let flags = "--bust, --waist, --measure and similar flags";
                 let file = self.measurements.measurements.as_deref();
                 let place = file.map_or(flags.to_owned(), |file| format!("{}, or {flags}", file.display()));
                 anyhow::Error::new(source).context(place)
             }
-            other => other.into(),
-        })
+            other => anyhow::Error::new(other),
+        })?;
+        runtime::check_memory(loaded.scene.garment.vertex_count())?;
+        Ok(loaded)
     }
 }
 

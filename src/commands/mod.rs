@@ -116,7 +116,8 @@ pub fn main() -> ExitCode {
     if !cli.force {
         files::protect_inputs();
     }
-    let outcome = check_clock(SystemTime::now()).and_then(|()| match cli.command {
+    let checked = check_clock(SystemTime::now()).and_then(|()| runtime::check_memory(0));
+    let outcome = checked.and_then(|()| match cli.command {
         None => cli.run.execute(),
         Some(Command::Run(args)) => args.execute(),
         Some(Command::Live(args)) => args.execute(),

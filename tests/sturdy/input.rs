@@ -171,6 +171,18 @@ fn an_input_beyond_its_bound_is_refused_before_it_fills_the_memory() {
     bench.run(&["merge", "rows", "--out", "none"]).with(2, &["rows/plan.json", "more than 2048 MB"]);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_of_memory_that_is_too_low_is_refused_with_the_memory_needed() {
+    let bench = Bench::new();
+    for (kb, vertices, needed) in [(300_000, 400, "448 MB"), (500_000, 20_000, "760 MB")] {
+        let program = env!("CARGO_BIN_EXE_partwise");
+        let script = format!("ulimit -v {kb}; exec {program} --garment flared-skirt@{vertices} --refine 0 --no-save");
+        let mut command = Command::new("sh");
+        ended(command.arg("-c").arg(script).env("XDG_CACHE_HOME", bench.0.path())).with(2, &["ulimit -v", needed]);
+    }
+}
+
 /// Puts `number` in the place of every number of a row but its index.
 fn all_numbers(row: &mut serde_json::Value, number: f64) {
     match row {
