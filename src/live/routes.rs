@@ -11,6 +11,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post};
 use axum::{Extension, Router};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::Receiver;
@@ -262,16 +263,19 @@ async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
     .await
 }
 
+/// The body of a pin.
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Pin {
+    label: Option<String>,
+}
+
 /// Pins the newest state under `{"label": "..."}`, or without a body under its number.
 async fn pin(State(site): State<Arc<Site>>, request: Request) -> Answer {
     let bytes = body(request).await?;
-    let given =
-        if bytes.is_empty() { Value::Null } else { serde_json::from_slice(&bytes).map_err(|e| malformed(&e))? };
-    let label: Option<String> = match given.get("label") {
-        None => None,
-        Some(Value::String(label)) => Some(label.chars().filter(|c| !c.is_control()).take(60).collect()),
-        Some(other) => return Err(malformed(&format!("found label = {other}, expected a text"))),
-    };
+    let Pin { label } =
+        if bytes.is_empty() { Pin::default() } else { serde_json::from_slice(&bytes).map_err(|e| malformed(&e))? };
+    let label = label.map(|label| label.chars().filter(|c| !c.is_control()).take(60).collect());
     changed(site, move |session| session.pin(label)).await
 }
 
