@@ -3,8 +3,9 @@
 //! `PARTWISE_FUZZ_CONNECTIONS` sets the number of hostile connections, and then each answer must come within a second; the
 //! default takes a few seconds and has no such limit, as the machine may be busy.
 
-use std::io::{BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use partwise::live::{Limits, LiveOptions};
@@ -37,13 +38,20 @@ fn opening(kind: usize, address: SocketAddr) -> String {
 
 /// Time that the server takes for a request on a new connection, s.
 fn seconds(address: SocketAddr, method: &str, path: &str, body: &str) -> f64 {
+    let (status, seconds) = timed(address, method, path, body);
+    assert_eq!(status, 200, "{method} {path}");
+    seconds
+}
+
+/// The status of a request on a new connection, and its time, s.
+fn timed(address: SocketAddr, method: &str, path: &str, body: &str) -> (u16, f64) {
     let began = Instant::now();
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
     let head = format!("Host: {address}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n", body.len());
     stream.write_all(format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n{head}\r\n{body}").as_bytes()).unwrap();
-    assert_eq!(answer(&mut BufReader::new(stream)).0, 200, "{method} {path}");
-    began.elapsed().as_secs_f64()
+    let (status, _) = answer(&mut BufReader::new(stream));
+    (status, began.elapsed().as_secs_f64())
 }
 
 /// Opens `count` hostile connections, which stay open on their side, and sends a byte on earlier ones now and then; returns the
@@ -131,5 +139,66 @@ fn a_client_that_does_not_read_or_write_is_cut_off() {
             bytes += read;
         }
         assert!(bytes < 30_000_000, "kind {kind}: all of the response arrived, {bytes} bytes");
+    }
+}
+
+/// An edit by a number: tables, fabrics, sizes, motions, and some that are refused.
+fn edit(i: u64) -> String {
+    let random = blake3::hash(&i.to_le_bytes());
+    let [kind, a, b] = [0, 1, 2].map(|k| f64::from(random.as_bytes()[k]) / 256.0);
+    let fabrics = ["denim", "jersey", "silk", "cotton", "no such fabric", "/dev/zero"];
+    match (kind * 8.0) as u32 {
+        0 | 1 => format!(r#"{{"table": {{"levels": [[0, {}], [{}, "inf"]]}}}}"#, 0.1 + a, 0.1 + a + 9.0 * b),
+        2 => format!(r#"{{"table": {{"quantile": {}}}}}"#, (a * 30.0) as u32),
+        3 => format!(r#"{{"fabric": "{}"}}"#, fabrics[(a * 6.0) as usize]),
+        4 => format!(r#"{{"measurements": {{"waist": {}, "hip": {}}}}}"#, 50.0 + 60.0 * a, 80.0 + 60.0 * b),
+        5 => format!(r#"{{"garment": "flared-skirt@{}"}}"#, 400 + (a * 500.0) as u32),
+        6 => format!(r#"{{"min_part": {}, "max_extent_cm": [{}]}}"#, (a * 20.0) as u32, 40.0 * b),
+        _ => format!(r#"{{"motion": "translation", "refine": {{"steps": {}}}}}"#, (a * 20.0) as u32),
+    }
+}
+
+/// Starts the program with `arguments`; returns it and the address that it prints.
+fn program(arguments: &[&str]) -> (Child, SocketAddr) {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "exec \"$0\" \"$@\" 2>&1", env!("CARGO_BIN_EXE_partwise")]).args(arguments);
+    let mut child = shell.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let address = lines.find_map(|line| line.split_once("http://")?.1.split('/').next()?.parse().ok()).unwrap();
+    // A closed pipe would end the program.
+    std::thread::spawn(move || lines.for_each(drop));
+    (child, address)
+}
+
+/// 5,000 edits and 2,000 hostile connections against the program itself, each answered within a second.
+#[test]
+#[ignore = "takes minutes, and the limit of a second needs a machine that does nothing else"]
+#[allow(clippy::print_stderr, reason = "a test that reports what it measured")]
+fn live_and_serve_answer_within_a_second_under_edits_and_hostile_connections() {
+    let garment = ["--garment", "flared-skirt@900"];
+    let cases = [
+        (&["live", "--port", "0"][..], "/api/state", [200, 403, 422]),
+        (&["--no-save", "--refine", "0", "--serve", "--web-port", "0"][..], "/run", [405, 405, 405]),
+    ];
+    for (command, control, expected) in cases {
+        let (mut child, address) = program(&[command, &garment].concat());
+        let (mut edits, mut slowest) = (0, [0.0_f64; 2]);
+        attack(address, 2000, || {
+            for _ in 0..20 {
+                let (status, edited_s) = timed(address, "PATCH", "/api/state", &edit(edits));
+                assert!(expected.contains(&status), "{}: {status}", edit(edits));
+                edits += 1;
+                slowest = [slowest[0].max(edited_s), slowest[1].max(seconds(address, "GET", control, ""))];
+            }
+            0.0
+        });
+        let alive = child.try_wait().unwrap().is_none();
+        let _ = child.kill();
+        let _ = child.wait();
+        let [edited_s, read_s] = slowest;
+        eprintln!(
+            "{command:?}: {edits} edits, the slowest answer after {edited_s:.3} s, {control} after {read_s:.3} s"
+        );
+        assert!(alive && edits == 5000 && edited_s < 1.0 && read_s < 1.0, "{command:?}");
     }
 }
