@@ -8,7 +8,7 @@ use crate::base::files::{listed, read_own};
 use crate::body::dress_form::{DEFAULT_TRIANGLES, DressForm};
 use crate::garment::builtin::{BUILT_IN, GarmentSpec, garment_on};
 use crate::garment::fabric;
-use crate::mesh::export::mesh_text;
+use crate::mesh::export::{mesh_text, textured_text};
 use crate::parts::range_table::RangeTable;
 use clap::Args;
 use rayon::prelude::*;
@@ -103,6 +103,9 @@ impl AssetsArgs {
             create_folder(folder_of(&path))?;
             write(&path, text, "--out")?;
         }
+        console::note(
+            "the garments were cut wider at the hem than they are placed: drape them with --rest texture, the shape as cut",
+        );
         console::result(&self.out.display().to_string());
         Ok(())
     }
@@ -115,7 +118,8 @@ impl AssetsArgs {
             let spec = GarmentSpec::by_name(name)?;
             let garment = garment_on(&spec, &form, self.vertices)?;
             let text = toml::to_string(&spec)?;
-            Ok([(format!("garments/{name}.obj"), mesh_text(&garment.mesh)), (format!("garments/{name}.toml"), text)])
+            let mesh = textured_text(&garment.mesh, &garment.rest.corners);
+            Ok([(format!("garments/{name}.obj"), mesh), (format!("garments/{name}.toml"), text)])
         };
         let garments: Vec<_> = BUILT_IN.par_iter().map(garment).collect::<anyhow::Result<_>>()?;
         let mut files = vec![

@@ -27,7 +27,12 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
 
 /// Writes a mesh with the texture coordinates of each triangle's corners, m; each is written once.
 pub fn write_textured(path: &Path, mesh: &TriMesh, texture: &[[DVec2; 3]]) -> Result<(), MeshError> {
-    write(path, text_of(mesh, Some(texture)))
+    write(path, textured_text(mesh, texture))
+}
+
+/// The text of [`write_textured`].
+pub(crate) fn textured_text(mesh: &TriMesh, texture: &[[DVec2; 3]]) -> String {
+    text_of(mesh, Some(texture))
 }
 
 /// The text of [`write_mesh`].
