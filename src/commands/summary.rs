@@ -41,6 +41,8 @@ pub(crate) struct Summary {
     table: String,
     #[serde(flatten)]
     pub(crate) metrics: Metrics,
+    /// Repairs of the garment's mesh, after which its PARTs are counted.
+    repairs: Vec<String>,
     parts_per_level: Vec<usize>,
     level_bounds_cm: Vec<[Option<f64>; 2]>,
     vertices_per_level: Vec<usize>,
@@ -98,6 +100,7 @@ impl Summary {
             fabrics: loaded.scene.fabrics(&settings.fabric),
             table: drape.table.name.clone(),
             metrics: measured.metrics.clone(),
+            repairs: loaded.repairs().iter().map(ToString::to_string).collect(),
             parts_per_level: levels.iter().map(|l| l.parts).collect(),
             level_bounds_cm: levels.iter().map(|l| [finite(l.lower_cm), finite(l.upper_cm)]).collect(),
             vertices_per_level: levels.iter().map(|l| l.vertices).collect(),
@@ -150,7 +153,11 @@ impl Summary {
     pub(crate) fn text(&self) -> String {
         let Self { metrics, table, model, motion, fabric, .. } = self;
         let (levels, singletons) = (metrics.levels, metrics.singletons);
-        let parts = format!("table {table}: {} in {levels} levels, {singletons} single vertices", metrics.parts_text());
+        let mut parts =
+            format!("table {table}: {} in {levels} levels, {singletons} single vertices", metrics.parts_text());
+        if !self.repairs.is_empty() {
+            let _ = write!(parts, ", counted after repairs of the mesh: {}", self.repairs.join("; "));
+        }
         let (contact, moved) = (metrics.contact_parts, metrics.displacement_rms_mm);
         let moved = format!("{contact} PARTs touch the body, displacement {moved:.1} mm RMS");
         let two = format!("model {model}, motion {motion}, fabric {fabric}: {moved}");

@@ -14,7 +14,7 @@ use crate::mesh::export::{write_imported, write_mesh, write_textured};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::glb::write_glb;
 use crate::mesh::import::Imported;
-use crate::mesh::report::MeshReport;
+use crate::mesh::report::{MeshReport, Repair};
 use crate::mesh::{Frame, MeshError, RestShape, TriMesh};
 
 /// A scene with its origin.
@@ -57,6 +57,11 @@ impl Loaded {
     #[must_use]
     pub(crate) fn garment_frame(&self) -> Option<&Frame> {
         self.imported.as_ref().map(|imported| &imported.report.frame)
+    }
+
+    /// Repairs of the garment's mesh.
+    pub(crate) fn repairs(&self) -> &[Repair] {
+        self.imported.as_ref().map_or(&[], |imported| &imported.report.repairs)
     }
 
     /// Findings that the user should act on.

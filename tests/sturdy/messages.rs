@@ -93,6 +93,29 @@ fn levels_have_the_same_numbers_in_run_and_compare() {
 }
 
 #[test]
+fn repairs_of_the_mesh_stand_beside_the_count_of_parts() {
+    let bench = Bench::new();
+    bench.write("twice.obj", &format!("{}f 1 2 5\n", super::GARMENT));
+    let mut command = bench.command();
+    command.args([
+        "--body",
+        "body.obj",
+        "--garment",
+        "twice.obj",
+        "--unit",
+        "m",
+        "--up",
+        "z",
+        "--refine",
+        "0",
+        "--no-save",
+    ]);
+    let found = String::from_utf8(command.output().unwrap().stdout).unwrap();
+    let line = found.lines().find(|line| line.starts_with("stage one")).unwrap_or_else(|| panic!("{found}"));
+    assert!(line.contains("counted after repairs of the mesh: dropped 1 triangles that were there already"), "{line}");
+}
+
+#[test]
 fn the_times_of_a_row_add_up() {
     let bench = Bench::new();
     let sweep = "name = \"s\"\nrepeats = 1\n[base]\ngarment = \"flared-skirt@400\"\n[grid]\ntables = [\"table-3\"]\n";
