@@ -13,6 +13,8 @@ fn devices_are_kept_and_a_full_device_is_reported() {
     bench.drape(&["--save", "/dev/null", "--export", "/dev/null"]).with(0, &[]);
     bench.drape(&["--save", "/dev/full"]).with(2, &["/dev/full", "No space left"]);
     bench.drape(&["--no-save", "--export", "/dev/full"]).with(2, &["/dev/full", "No space left"]);
+    let pattern = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/patterns/skirt.json");
+    bench.run(&["pattern", pattern, "--svg", "/dev/full"]).with(2, &["/dev/full", "No space left"]);
     for device in ["/dev/null", "/dev/full"] {
         assert!(fs::metadata(device).unwrap().file_type().is_char_device(), "{device}");
     }
@@ -54,6 +56,8 @@ fn a_disk_that_fills_up_leaves_nothing_half_written_and_ends_the_run() {
     recorded.with(2, &["old.rrd", "too large"]);
     assert!(recorded.took < Duration::from_secs(60), "{:?}", recorded.took);
     run(0, "cusick silk --rows 4 --csv old.rrd").with(2, &["old.rrd", "too large"]);
+    run(0, "assets --vertices 400 --out a").with(2, &["a/bodies/form.obj", "too large"]);
+    fs::remove_dir_all(bench.path("a")).unwrap();
     bench.write("old.obj", "and there");
     run(0, &format!("{} --no-save --export old.obj", SCENE.join(" "))).with(2, &["old.obj", "too large"]);
     assert_eq!(fs::read_to_string(bench.path("old.rrd")).unwrap(), "what was there");
@@ -138,6 +142,21 @@ fn assets_that_were_edited_are_kept_unless_forced() {
     assets(&["--force"]).with(0, &[]);
     assert!(fs::read_to_string(bench.path("a/fabrics/silk.toml")).unwrap().contains("bending_nm"));
     assert!(bench.path("a/bodies/form.toml").exists());
+}
+
+#[test]
+fn a_garment_of_assets_with_its_shape_as_cut_drapes_as_the_built_in_one() {
+    let bench = Bench::new();
+    bench.run(&["assets", "--vertices", "400", "--out", "a"]).with(0, &["--rest texture"]);
+    let drape = |garment: &[&str], export: &str| {
+        bench.run(&[garment, &["--refine", "3", "--no-save", "--export", export]].concat()).with(0, &[]);
+        let text = fs::read_to_string(bench.path(export)).unwrap();
+        text.lines().filter(|line| line.starts_with("v ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let built_in = drape(&["--garment", "low-cut-dress@400"], "built-in.obj");
+    let from_file = drape(&["--garment", "a/garments/low-cut-dress.obj", "--rest", "texture"], "file.obj");
+    assert_eq!(built_in.len(), 400);
+    assert_eq!(built_in, from_file);
 }
 
 #[test]
