@@ -97,7 +97,7 @@ pub(super) fn log_level_hues(
         return Ok(());
     }
     let hue = |t: f64| occupied[((t * count as f64) as usize).min(count - 1)].1;
-    log_bar(recording, path, cell, "level from, cm", &hue, level_ticks(&occupied))
+    log_bar(recording, path, cell, "level, cm", &hue, level_ticks(&occupied))
 }
 
 /// Where the named levels begin along the bar, and their lower bounds. The last level is always named.

@@ -4,13 +4,18 @@ import { cm, node } from "./dial.js";
 
 const at = (id) => document.getElementById(id);
 const digits = (value, n = 3) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(n))));
-const ms = (value) => (value === null || value === undefined ? "–" : value < 10 ? `${digits(value, 2)} ms` : `${Math.round(value)} ms`);
+const ms = (value) => {
+  if (value === null || value === undefined) return "–";
+  if (value >= 1e4) return `${digits(1e-3 * value)} s`;
+  return value < 10 ? `${digits(value, 2)} ms` : `${Math.round(value)} ms`;
+};
 
 // A force with the unit in which it has few digits.
 export function force(newtons) {
   if (newtons === null || newtons === undefined) return "–";
   if (newtons >= 0.1) return `${digits(newtons)} N`;
-  return newtons >= 1e-5 || newtons === 0 ? `${digits(1e3 * newtons)} mN` : "under 0.01 mN";
+  if (newtons === 0) return "none";
+  return newtons >= 1e-5 ? `${digits(1e3 * newtons)} mN` : "under 0.01 mN";
 }
 
 function list(id, rows) {
@@ -31,7 +36,7 @@ export function showNumbers(state) {
   const mm = (value) => (value === null || value === undefined ? "–" : `${digits(value)} mm RMS`);
   const cut = parts && parts.table_count !== undefined && parts.table_count !== parts.count;
   list("numbers", [
-    ["PARTs", parts ? `${parts.count}${cut ? `, cut from the ${parts.table_count} of the table` : ""}` : "–", old(parts)],
+    ["PARTs", parts ? `${parts.count}${cut ? `, cut from ${parts.table_count}` : ""}` : "–", old(parts)],
     ["stage one", ms(parts?.segment_ms), old(parts)],
     ["strongest force on a PART", force(parts?.force_max_n), old(parts)],
     ["two stages", preview ? `${ms(preview.ms)}${preview.warm ? " (continued)" : ""}` : "–", old(preview)],
