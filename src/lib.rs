@@ -43,6 +43,8 @@
 
 pub mod base;
 pub mod body;
+#[doc(hidden)]
+pub mod colour;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod commands;

@@ -9,11 +9,12 @@ use std::time::Instant;
 
 use crate::Job;
 use crate::base::files::has_ending;
+use crate::colour::of_drape;
 use crate::drape::{self, LetGo};
 use crate::mechanics::refine::{Observer, Step};
 use crate::mesh::glb::write_glb;
 use crate::methods::METHODS;
-use crate::record::{Overlay, Recorder, by_parts};
+use crate::record::Recorder;
 use crate::study::certificate::certify;
 use crate::study::evaluate::EvaluateError;
 use crate::study::job::Against;
@@ -156,13 +157,7 @@ impl RunArgs {
     fn write_export(&self, solved: &Solved, path: &Path) -> anyhow::Result<()> {
         let (scene, drape) = (&solved.loaded.scene, &solved.drape);
         let Some(quantity) = &self.export_colours else { return Ok(solved.loaded.write(path, &drape.positions)?) };
-        let colours = if quantity == "parts" {
-            let levels = solved.summary.panel().levels;
-            Some(by_parts(&scene.garment, &drape.parts.part_of_vertex, drape.parts.len(), &levels))
-        } else {
-            solved.overlays().iter().find(|overlay| overlay.name == *quantity).map(Overlay::vertex_colours)
-        };
-        let Some(colours) = colours else {
+        let Some(colours) = of_drape(&scene.garment, drape, quantity) else {
             refuse!(
                 "{}: found no {quantity} to colour it by, because this model does not compute it; expected --export-colours \
                  parts, or --model coupled",

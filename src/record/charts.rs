@@ -3,10 +3,11 @@
 use rerun::components::{Scalar, Text};
 use rerun::{AnyValues, BarChart, Clear, ComponentIdentifier, Scalars, SeriesLines, SeriesPoints};
 
-use super::colour_map::Range;
 use super::error::RecordError;
 use super::open_recording::OpenRecording;
-use super::{colours, meshes, paths};
+use super::{meshes, paths};
+use crate::colour::map::Range;
+use crate::colour::palette;
 use crate::study::metrics::LevelCount;
 
 /// Number of bars of the histogram, about.
@@ -48,7 +49,7 @@ pub(super) fn log_levels(
     distances_m: &[f64],
 ) -> Result<(), RecordError> {
     let end = Range::to_quantile(distances_m.iter().copied(), 0.995).high;
-    let positions = colours::level_positions(levels);
+    let positions = palette::level_positions(levels);
     let widest = end / BINS as f64;
     let all: Vec<Vec<Bar>> = levels.iter().map(|level| bars(level, distances_m, widest, end)).collect();
     let highest = all.iter().flatten().map(|bar| bar.height).fold(0.0, f64::max);
@@ -57,7 +58,7 @@ pub(super) fn log_levels(
         if upper > level.lower_m() {
             bars.push(Bar { height: -STRIP * highest, left: level.lower_m(), width: upper - level.lower_m() });
         }
-        let colour = meshes::colour(colours::shade(positions[index], 0));
+        let colour = meshes::colour(palette::shade(positions[index], 0));
         let chart = BarChart::new(bars.iter().map(|b| b.height).collect::<Vec<f64>>())
             .with_abscissa(bars.iter().map(|b| 100.0 * b.left).collect::<Vec<f64>>())
             .with_widths(bars.iter().map(|b| 100.0 * b.width as f32).collect::<Vec<f32>>())
@@ -128,7 +129,7 @@ pub(super) fn log_scalar(
     value: f64,
 ) -> Result<(), RecordError> {
     if recording.first_use(path) {
-        let colour = meshes::colour(colours::palette()[hue % colours::HUES]);
+        let colour = meshes::colour(palette::palette()[hue % palette::HUES]);
         let (lines, points) = (SeriesLines::new().with_names([name]), SeriesPoints::new().with_names([name]));
         recording.log_static(path, &lines.with_colors([colour]).with_widths([2.0]))?;
         recording.log_static(path, &points.with_colors([colour]).with_marker_sizes([4.0]))?;

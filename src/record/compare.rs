@@ -2,14 +2,15 @@
 
 use glam::DVec3;
 
-use super::colour_map::{ColourMap, Range};
-use super::colours::{colour_parts, with_outside};
 use super::error::RecordError;
 use super::legend::{Legend, view_caption};
-use super::meshes::{self, CellMesh, rerun_colours};
+use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
-use super::overlay::Overlay;
 use super::paths;
+use crate::colour::Overlay;
+use crate::colour::cells::CellMesh;
+use crate::colour::map::{ColourMap, Range};
+use crate::colour::palette::{colour_parts, with_outside};
 use crate::parts::UNASSIGNED;
 use crate::study::metrics::LevelCount;
 

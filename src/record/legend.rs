@@ -5,12 +5,12 @@
 
 use rerun::{Color, LineStrips2D, Points2D};
 
-use super::colour_map::{ColourMap, Range, Rgb};
-use super::colours::level_colours;
 use super::error::RecordError;
 use super::meshes::rerun_colours;
 use super::open_recording::OpenRecording;
 use super::panel::number;
+use crate::colour::level_colours;
+use crate::colour::map::{ColourMap, Range, Rgb};
 use crate::study::metrics::LevelCount;
 
 /// Colour of texts in a view: white, which is legible on the viewer's translucent boxes, dark in its dark theme and light grey in the

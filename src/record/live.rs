@@ -18,14 +18,15 @@ use rerun::sink::MemorySinkStorage;
 use rerun::{Arrows3D, Color, LineStrips3D, Radius, RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::{self, Node, TimePanel, View};
-use super::colour_map::Range;
-use super::colours::{self, colour_parts, with_outside};
 use super::error::RecordError;
 use super::eye::Eye;
-use super::meshes::{self, CellMesh};
+use super::meshes;
 use super::open_recording::application;
-use super::step::FORCE_QUANTILE;
 use super::{part_marks, paths};
+use crate::colour::FORCE_QUANTILE;
+use crate::colour::cells::CellMesh;
+use crate::colour::map::Range;
+use crate::colour::palette::{self, colour_parts, with_outside};
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
 use crate::study::metrics::LevelCount;
@@ -114,13 +115,13 @@ impl LiveEncoder {
         // The layout first: a slow viewer takes seconds to read the triangles, and would meanwhile lay out the views itself.
         let views = Node::Row("Live", self.views(pins.len()));
         blueprint::send(&stream, &views, TimePanel { timeline: paths::TABLE, follow: false })?;
-        stream.log_static(paths::BODY, &meshes::plain(body, colours::BODY))?;
+        stream.log_static(paths::BODY, &meshes::plain(body, palette::BODY))?;
         stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;
-        for (shape, colour) in [(LiveShape::Preview, colours::CLOTH), (LiveShape::Rest, colours::DRAPED)] {
+        for (shape, colour) in [(LiveShape::Preview, palette::CLOTH), (LiveShape::Rest, palette::DRAPED)] {
             stream.log_static(shape.path(), &meshes::plain(garment, colour))?;
         }
         for (i, pin) in pins.iter().enumerate() {
-            stream.log_static(format!("/pin/{i}/body"), &meshes::plain(pin.body, colours::BODY))?;
+            stream.log_static(format!("/pin/{i}/body"), &meshes::plain(pin.body, palette::BODY))?;
             let cells = CellMesh::new(pin.garment);
             let part_of_vertex = with_outside(&pin.parts.part_of_vertex, pin.parts.len());
             let all = pin.parts.len() + usize::from(part_of_vertex.contains(&(pin.parts.len() as u32)));
@@ -128,7 +129,7 @@ impl LiveEncoder {
             stream.log_static(format!("/pin/{i}/parts"), &cells.shape())?;
             stream.log_static(format!("/pin/{i}/parts"), &cells.colours(&colours.of_vertices))?;
             let preview = pin.garment.with_positions(pin.preview.to_vec());
-            stream.log_static(format!("/pin/{i}/preview"), &meshes::plain(&preview, colours::CLOTH))?;
+            stream.log_static(format!("/pin/{i}/preview"), &meshes::plain(&preview, palette::CLOTH))?;
         }
         drain(&storage)
     }

@@ -7,9 +7,11 @@ use super::charts::log_scalar;
 use super::error::RecordError;
 use super::meshes::{self, rerun_colours, singles};
 use super::open_recording::OpenRecording;
-use super::overlay::{Overlay, log_fit};
+use super::overlay::log_fit;
 use super::panel::Panel;
-use super::{colours, paths};
+use super::paths;
+use crate::colour::Overlay;
+use crate::colour::palette;
 use crate::methods::Exhibit;
 
 /// Thickness of lines on screen, points.
@@ -48,7 +50,7 @@ pub(super) fn log(recording: &mut OpenRecording, view: &MethodView<'_>) -> Resul
     let overlays = view.overlays.iter().map(|overlay| (overlay.name, overlay.values.len()));
     let draped = ("displaced positions", view.draped.len());
     recording.check_lengths(&overlays.chain([draped]).collect::<Vec<_>>())?;
-    let palette = colours::palette();
+    let palette = palette::palette();
     let hue = |group: usize| palette[group % palette.len()];
     for (number, (_, exhibit)) in view.exhibits.iter().enumerate() {
         let path = format!("{}/{number}", paths::METHOD);
@@ -60,9 +62,9 @@ pub(super) fn log(recording: &mut OpenRecording, view: &MethodView<'_>) -> Resul
                     .with_radii([Radius::new_ui_points(THICKNESS)]);
                 recording.log(&path, &strips)?;
             }
-            Exhibit::Surface(surface) => recording.log(&path, &meshes::plain(surface, colours::DRAPED))?,
+            Exhibit::Surface(surface) => recording.log(&path, &meshes::plain(surface, palette::DRAPED))?,
             Exhibit::Moving { mesh, frames } => {
-                let mut of_vertices = vec![colours::CLOTH; mesh.vertex_count()];
+                let mut of_vertices = vec![palette::CLOTH; mesh.vertex_count()];
                 for (triangle, group) in mesh.triangles.iter().zip(&mesh.triangle_group) {
                     triangle.iter().for_each(|&v| of_vertices[v as usize] = hue(*group as usize));
                 }

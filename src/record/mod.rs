@@ -5,8 +5,6 @@
 
 mod blueprint;
 mod charts;
-mod colour_map;
-mod colours;
 mod compare;
 mod error;
 mod eye;
@@ -32,15 +30,13 @@ pub mod web;
 mod wrinkles;
 mod writer;
 
-pub(crate) use colour_map::Range;
-pub(crate) use colours::{by_parts, level_colours};
+pub use crate::colour::Overlay;
 pub(crate) use compare::{Colours, Compared};
 pub use error::RecordError;
 pub use layout::{Layout, Tab};
 pub(crate) use live::{LiveEncoder, LiveShape, PinnedView, outlines};
 pub(crate) use method::MethodView;
 pub use open_recording::{RecordOptions, RecordSummary};
-pub use overlay::Overlay;
 pub(crate) use overlay::PatternView;
 pub use page::Limits;
 pub(crate) use page::{Connection, Hosts, Refused, Server, file, name_of_run, query, whole};

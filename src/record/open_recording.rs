@@ -8,14 +8,15 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder};
 
-use super::colour_map::{Range, Rgb};
 use super::error::RecordError;
 use super::eye::Eye;
 use super::layout::{ASPECT, Layout};
-use super::meshes::{self, CellMesh};
+use super::meshes;
 use super::paths;
 use super::sinks::{OpenSinks, Sink, Target};
 use super::web::WebViewer;
+use crate::colour::cells::CellMesh;
+use crate::colour::map::{Range, Rgb};
 use crate::mesh::TriMesh;
 
 /// Longest application id, bytes.

@@ -2,53 +2,25 @@
 
 use glam::DVec3;
 
-use super::colour_map::{ColourMap, Range};
-use super::colours::{CLOTH, opaque};
 use super::error::RecordError;
 use super::layout::{PANELS_ASPECT, Tab};
 use super::legend::{Cell, Legend};
-use super::meshes::{self, CellMesh, rerun_colours};
+use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::paths;
+use crate::colour::Overlay;
+use crate::colour::cells::CellMesh;
+use crate::colour::map::{ColourMap, Range};
+use crate::colour::palette::CLOTH;
 use crate::mesh::TriMesh;
 
-/// Values above this quantile share the last colour.
-pub(super) const QUANTILE: f64 = 0.99;
 /// Share of a view's height or width that flat panels fill.
 const PANELS_FILL: f64 = 0.95;
 
-/// A value per vertex of the draped garment.
-#[derive(Debug, Clone, Copy)]
-pub struct Overlay<'a> {
-    /// `error`, or a name of [`Layout::fit`](super::Layout::fit) (`strain`, `pressure`).
-    pub name: &'a str,
-    /// Unit of the values.
-    pub unit: &'a str,
-    /// One value per vertex.
-    pub values: &'a [f64],
-}
-
 impl Overlay<'_> {
-    /// The range of the colour map. It has a lower bound, so that a small value does not look like a large one.
-    fn own_range(&self) -> Range {
-        let least = match self.name {
-            "error" | "folds" => 10.0,
-            "strain" => 5.0,
-            "pressure" => 0.1,
-            _ => 0.0,
-        };
-        let own = Range::to_quantile(self.values.iter().copied(), QUANTILE);
-        Range { high: own.high.max(least), ..own }
-    }
-
     /// The range of the colour map in a recording, fixed by the first step.
     fn range(&self, recording: &OpenRecording) -> Range {
         recording.range(self.name, || self.own_range())
-    }
-
-    /// Colour of each vertex of an exported mesh: red, green, blue and opacity.
-    pub(crate) fn vertex_colours(&self) -> Vec<[u8; 4]> {
-        ColourMap::ALARM.colours(self.values, self.own_range()).into_iter().map(opaque).collect()
     }
 }
 

@@ -3,10 +3,10 @@
 use glam::DVec3;
 use rerun::{Arrows3D, Color, Points3D, Radius};
 
-use super::colours::level_of_part;
 use super::eye::Eye;
 use super::meshes::single;
 use super::panel::{number, range_cm};
+use crate::colour::palette::level_of_part;
 use crate::study::metrics::LevelCount;
 
 /// More dots than this would hide the PARTs.

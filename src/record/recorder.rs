@@ -6,7 +6,6 @@ use glam::DVec3;
 use rerun::{Scalars, TextDocument};
 
 use super::charts::log_scalar;
-use super::colour_map::Range;
 use super::compare::{self, Compared};
 use super::error::RecordError;
 use super::method::{self, MethodView};
@@ -16,7 +15,9 @@ use super::scatter::{self, Picture, ScatterPoint};
 use super::step::{self, OutfitView, StepView};
 use super::web::WebViewer;
 use super::wrinkles::{self, FoldView, WrinkleView};
-use super::{blueprint, colours, meshes, paths, tabs};
+use super::{blueprint, meshes, paths, tabs};
+use crate::colour::map::Range;
+use crate::colour::palette;
 use crate::mesh::TriMesh;
 
 /// A recording in progress. Its methods fail if Rerun rejects the data, and if a slice does not fit the garment. Dropping it without
@@ -51,7 +52,7 @@ impl Recorder {
             }
             body.clone_into(&mut recording.body);
             recording.at(index, 0);
-            recording.log_mesh(paths::BODY, &meshes::plain(body, colours::BODY))
+            recording.log_mesh(paths::BODY, &meshes::plain(body, palette::BODY))
         })
     }
 
@@ -68,14 +69,14 @@ impl Recorder {
                 recording.views_sent = true;
             }
             recording.at(index, 1);
-            recording.log_mesh(paths::GARMENT, &meshes::plain(garment, colours::CLOTH))?;
+            recording.log_mesh(paths::GARMENT, &meshes::plain(garment, palette::CLOTH))?;
             if recording.layout().method.is_none() && !recording.layout().table4 {
                 recording.log_mesh(paths::DISTANCE, &meshes::plain(garment, [255; 3]))?;
                 recording.log_mesh(paths::PARTS, &recording.cells.shape())?;
                 recording.log_mesh(paths::FORCE, &recording.cells.shape())?;
             }
             recording.triangles_once(paths::DRAPE)?;
-            recording.log_mesh(paths::DRAPE, &meshes::colours(colours::by_component(garment)))
+            recording.log_mesh(paths::DRAPE, &meshes::colours(palette::by_component(garment)))
         })
     }
 
@@ -84,7 +85,7 @@ impl Recorder {
         self.timed(|recording| {
             recording.check_lengths(&[("fabrics", fabric_of_vertex.len())])?;
             recording.at(index, 1);
-            let colours = fabric_of_vertex.iter().map(|&fabric| colours::of_layer(fabric.into()));
+            let colours = fabric_of_vertex.iter().map(|&fabric| palette::of_layer(fabric.into()));
             recording.log_mesh(paths::DRAPE, &meshes::colours(colours))
         })
     }

@@ -15,7 +15,8 @@ use super::error::RecordError;
 use super::legend::texts;
 use super::open_recording::OpenRecording;
 use super::panel::number;
-use super::{colours, meshes, paths};
+use super::{meshes, paths};
+use crate::colour::palette;
 
 /// Path and axis titles of a scatter plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,7 +126,7 @@ pub(super) fn log(
     let up = Axis::around(placed.iter().map(|p| p.y), PICTURE[1]);
     log_axes(recording, [&along, &up], picture)?;
     let place = |p: &ScatterPoint<'_>| [along.place(p.x), up.place(p.y)];
-    let palette = colours::palette();
+    let palette = palette::palette();
     let dots = Points2D::new(placed.iter().map(|p| plane(place(p))))
         .with_colors(meshes::rerun_colours(placed.iter().map(|p| palette[p.group % palette.len()])))
         .with_radii([DOT as f32])

@@ -5,20 +5,19 @@ use glam::DVec3;
 use rerun::Mesh3D;
 
 use super::charts;
-use super::colour_map::{ColourMap, Range, Rgb};
-use super::colours::{self, colour_parts, with_outside};
 use super::error::RecordError;
 use super::legend::{Legend, caption, log_level_hues, table_title};
-use super::meshes::{self, CellMesh, rerun_colours};
+use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
-use super::overlay::{Overlay, QUANTILE, log_fit, log_overlay};
+use super::overlay::{log_fit, log_overlay};
 use super::panel::Panel;
 use super::{part_marks, paths};
+use crate::colour::cells::CellMesh;
+use crate::colour::map::{ColourMap, Range, Rgb};
+use crate::colour::palette::{self, colour_parts, with_outside};
+use crate::colour::{FORCE_QUANTILE, Overlay, QUANTILE};
 use crate::parts::UNASSIGNED;
 use crate::scene::Layer;
-
-/// Forces above this quantile share the last colour: a PART of one vertex may have any force.
-pub(super) const FORCE_QUANTILE: f64 = 0.95;
 
 /// The result of one range table. Slices have one value per vertex of the garment unless stated otherwise.
 #[derive(Debug, Clone, Copy)]
@@ -182,7 +181,7 @@ pub(super) fn log_outfit(recording: &OpenRecording, view: &OutfitView<'_>) -> Re
         recording.at(view.index, 4);
         recording.log(&format!("{branch}/force"), &coloured(&force))?;
         recording.at(view.index, 5);
-        recording.log(&format!("{branch}/drape"), &meshes::plain(&cut_out(view.draped), colours::of_layer(k)))?;
+        recording.log(&format!("{branch}/drape"), &meshes::plain(&cut_out(view.draped), palette::of_layer(k)))?;
     }
     Ok(())
 }

@@ -7,13 +7,15 @@
 use glam::DVec3;
 use rerun::{Color, LineStrips3D, Radius};
 
-use super::colour_map::{ColourMap, Range};
 use super::error::RecordError;
 use super::legend::Legend;
 use super::meshes::{self, single};
 use super::open_recording::OpenRecording;
-use super::overlay::{Overlay, QUANTILE, log_overlay};
-use super::{colours, paths};
+use super::overlay::log_overlay;
+use super::paths;
+use crate::colour::map::{ColourMap, Range};
+use crate::colour::palette;
+use crate::colour::{Overlay, QUANTILE};
 use crate::mesh::TriMesh;
 
 /// Height of the lines above the cloth, m: lines in the cloth would be half hidden.
@@ -55,7 +57,7 @@ pub(super) fn log(recording: &OpenRecording, view: &WrinkleView<'_>) -> Result<(
     log_overlay(recording, paths::CURVATURE, &draped, &curvature, &legend("curvature"), [1, 0])?;
 
     let path = format!("{}/garment", paths::SEAMS);
-    recording.log_mesh(&path, &meshes::plain(&draped, colours::BODY))?;
+    recording.log_mesh(&path, &meshes::plain(&draped, palette::BODY))?;
     let values: Vec<f64> = view.jumps_mm.iter().map(|(_, jump)| *jump).collect();
     let range = recording.range("seams", || Range::to_quantile(values.iter().copied(), QUANTILE));
     let map = ColourMap::FORCE;

@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::base::quantiles::nearest_rank;
+use crate::colour::map::Range;
 use crate::record::{
-    Colours, Compared, Layout, Overlay, Panel, Picture, Range, RecordOptions, RecordSummary, Recorder, ScatterPoint,
-    Sink, StepView, Tab,
+    Colours, Compared, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
+    StepView, Tab,
 };
 use crate::study::metrics::Metrics;
 use crate::study::sweep::{Row, Status, Timing};

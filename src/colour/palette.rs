@@ -12,24 +12,24 @@
 
 use std::borrow::Cow;
 
-use super::colour_map::{Rgb, oklch};
+use super::map::{Rgb, oklch};
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::UNASSIGNED;
 use crate::study::metrics::LevelCount;
 
 /// The body: darker than any cloth and than the pale end of the colour maps, lighter than the background.
-pub(super) const BODY: Rgb = [118, 109, 103];
+pub(crate) const BODY: Rgb = [118, 109, 103];
 /// The garment as loaded.
-pub(super) const CLOTH: Rgb = [196, 202, 210];
+pub(crate) const CLOTH: Rgb = [196, 202, 210];
 /// The draped garment.
-pub(super) const DRAPED: Rgb = [118, 176, 228];
+pub(crate) const DRAPED: Rgb = [118, 176, 228];
 /// Further fabrics, layers and connected components of it.
 const FURTHER: [Rgb; 3] = [[226, 190, 132], [158, 196, 150], [206, 148, 172]];
 /// Vertices in no level.
 const OUTSIDE: Rgb = [128, 128, 128];
 
 /// Number of hues for the lines of a plot.
-pub(super) const HUES: usize = 12;
+pub(crate) const HUES: usize = 12;
 /// Colour difference (see `difference`) beyond which a larger one is no easier to see. A heuristic.
 const FAR_ENOUGH: u32 = 12_000;
 /// Least colour difference of two adjacent areas that look different. A heuristic.
@@ -40,25 +40,25 @@ const LEVEL_HUES: [f64; 2] = [280.0, -15.0];
 const SHADES: [(f64, f64); 5] = [(0.76, 0.125), (0.60, 0.14), (0.88, 0.08), (0.50, 0.12), (0.68, 0.07)];
 
 /// Colour of each vertex of the draped garment: one per connected component, if there are few enough.
-pub(super) fn by_component(garment: &TriMesh) -> Vec<Rgb> {
+pub(crate) fn by_component(garment: &TriMesh) -> Vec<Rgb> {
     let (component, count) = Topology::new(garment).components();
     let few = count <= 1 + FURTHER.len();
     component.into_iter().map(|k| if few { of_layer(k as usize) } else { DRAPED }).collect()
 }
 
 /// Colour of layer or fabric number `k`.
-pub(super) fn of_layer(k: usize) -> Rgb {
+pub(crate) fn of_layer(k: usize) -> Rgb {
     k.checked_sub(1).map_or(DRAPED, |further| FURTHER[further % FURTHER.len()])
 }
 
 /// Twelve hues of one lightness for the lines of a plot and the dots of a scatter; consecutive entries are far apart.
-pub(super) fn palette() -> Vec<Rgb> {
+pub(crate) fn palette() -> Vec<Rgb> {
     // 5 and 12 share no factor, so this visits every hue, 150° at a time.
     (0..HUES).map(|i| oklch(0.76, 0.14, 30.0 * ((5 * i) % HUES) as f64)).collect()
 }
 
 /// Position of each level among those that hold vertices, from 0 for the nearest to 1 for the farthest.
-pub(super) fn level_positions(levels: &[LevelCount]) -> Vec<Option<f64>> {
+pub(crate) fn level_positions(levels: &[LevelCount]) -> Vec<Option<f64>> {
     let count = levels.iter().filter(|level| level.vertices > 0).count();
     let mut ranks = 0..count;
     let position = |level: &LevelCount| {
@@ -69,13 +69,13 @@ pub(super) fn level_positions(levels: &[LevelCount]) -> Vec<Option<f64>> {
 }
 
 /// Index of the level of each PART: PARTs are numbered level by level. [`None`] beyond the last: the vertices in no level.
-pub(super) fn level_of_part(levels: &[LevelCount], parts: usize) -> Vec<Option<usize>> {
+pub(crate) fn level_of_part(levels: &[LevelCount], parts: usize) -> Vec<Option<usize>> {
     let by_level = levels.iter().enumerate().flat_map(|(index, level)| std::iter::repeat_n(Some(index), level.parts));
     by_level.chain(std::iter::repeat(None)).take(parts).collect()
 }
 
 /// A shade of the level at a position.
-pub(super) fn shade(position: Option<f64>, shade: u8) -> Rgb {
+pub(crate) fn shade(position: Option<f64>, shade: u8) -> Rgb {
     let Some(position) = position else { return OUTSIDE };
     let (lightness, chroma) = SHADES[usize::from(shade) % SHADES.len()];
     oklch(lightness, chroma, LEVEL_HUES[0] + position * (LEVEL_HUES[1] - LEVEL_HUES[0]))
@@ -87,7 +87,7 @@ pub(crate) fn level_colours(levels: &[LevelCount]) -> Vec<Rgb> {
 }
 
 /// The PART of each vertex, with one further PART, number `parts`, for the vertices in no level, if there are any.
-pub(super) fn with_outside(part_of_vertex: &[u32], parts: usize) -> Cow<'_, [u32]> {
+pub(crate) fn with_outside(part_of_vertex: &[u32], parts: usize) -> Cow<'_, [u32]> {
     if !part_of_vertex.contains(&UNASSIGNED) {
         return part_of_vertex.into();
     }
@@ -102,24 +102,24 @@ pub(crate) fn by_parts(garment: &TriMesh, part_of_vertex: &[u32], parts: usize, 
 }
 
 /// Red, green, blue and full opacity.
-pub(super) fn opaque([red, green, blue]: Rgb) -> [u8; 4] {
+pub(crate) fn opaque([red, green, blue]: Rgb) -> [u8; 4] {
     [red, green, blue, 255]
 }
 
 /// Shades and colours of PARTs.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct PartColours {
+pub(crate) struct PartColours {
     /// Shade of each vertex's PART, an index into the shades of a level.
-    pub(super) vertex_shade: Vec<u8>,
+    pub(crate) vertex_shade: Vec<u8>,
     /// Colour of each vertex's PART.
-    pub(super) of_vertices: Vec<Rgb>,
+    pub(crate) of_vertices: Vec<Rgb>,
 }
 
 /// Colours the PARTs.
 ///
 /// `part_of_vertex`: PART of each vertex. `levels`: the levels of the PARTs. `triangles`: their edges make PARTs
 /// neighbours. `before`: shade of each vertex in the previous step; ignored if its length differs.
-pub(super) fn colour_parts(
+pub(crate) fn colour_parts(
     part_of_vertex: &[u32],
     part_count: usize,
     levels: &[LevelCount],

@@ -9,16 +9,16 @@
 use crate::base::quantiles::nearest_rank;
 
 /// An sRGB colour.
-pub(super) type Rgb = [u8; 3];
+pub(crate) type Rgb = [u8; 3];
 
 /// sRGB of OKLCH: lightness 0–1, chroma (0–0.3), hue in degrees.
-pub(super) fn oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
+pub(crate) fn oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
     let (sin, cos) = hue_deg.to_radians().sin_cos();
     oklab(lightness, chroma * cos, chroma * sin)
 }
 
 /// sRGB of OKLab.
-pub(super) fn oklab(lightness: f64, a: f64, b: f64) -> Rgb {
+pub(crate) fn oklab(lightness: f64, a: f64, b: f64) -> Rgb {
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
     let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
     let s = (lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
@@ -38,7 +38,7 @@ fn gamma(linear: f64) -> u8 {
 
 /// A colour map: lightness and hue change linearly.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ColourMap {
+pub(crate) struct ColourMap {
     lightness: (f64, f64),
     hue_deg: (f64, f64),
     chroma: (f64, f64),
@@ -46,14 +46,14 @@ pub(super) struct ColourMap {
 
 impl ColourMap {
     /// Dark blue over teal to yellow: distances.
-    pub(super) const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
+    pub(crate) const DISTANCE: Self = Self { lightness: (0.34, 0.93), hue_deg: (285.0, 102.0), chroma: (0.155, 0.155) };
     /// Dark violet over red to pale yellow: forces.
-    pub(super) const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
+    pub(crate) const FORCE: Self = Self { lightness: (0.34, 0.95), hue_deg: (295.0, 460.0), chroma: (0.175, 0.175) };
     /// Pale grey over orange to dark red: errors, strains and pressures.
-    pub(super) const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
+    pub(crate) const ALARM: Self = Self { lightness: (0.96, 0.45), hue_deg: (85.0, 20.0), chroma: (0.015, 0.19) };
 
     /// The colour at `t` in 0–1; beyond them that of the end, and grey for NaN.
-    pub(super) fn at(&self, t: f64) -> Rgb {
+    pub(crate) fn at(&self, t: f64) -> Rgb {
         if t.is_nan() {
             return [128, 128, 128];
         }
@@ -66,7 +66,7 @@ impl ColourMap {
     }
 
     /// The colours of values over `range`.
-    pub(super) fn colours(&self, values: &[f64], range: Range) -> Vec<Rgb> {
+    pub(crate) fn colours(&self, values: &[f64], range: Range) -> Vec<Rgb> {
         values.iter().map(|&v| self.at(range.position(v))).collect()
     }
 }
