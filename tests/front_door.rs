@@ -9,7 +9,7 @@ use std::path::Path;
 
 use fixtures::{Diagonals, cuboid, flipped, grid};
 use partwise::drape::{Refine, unobserved};
-use partwise::mesh::TriMesh;
+use partwise::mesh::{ObjSource, TriMesh};
 use partwise::parts::range_table::TableRule;
 use partwise::scene::SceneError;
 use partwise::study::job::{Against, Job};
@@ -117,4 +117,28 @@ fn a_job_measures_against_its_reference_and_a_seed_perturbs_the_start_alone() {
     // The solver's residual is the reported one; the residual at rest excludes forces that friction can hold.
     assert!(own.rms_mm.is_some() && own.residual_at_rest_over_weight.is_some());
     assert_eq!(own.residual_over_weight, settled.state.map(|s| s.residual_over_weight));
+}
+
+#[test]
+fn meshes_in_memory_give_the_scene_of_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let [body, garment] = ["body.obj", "garment.obj"].map(|name| folder.path().join(name).display().to_string());
+    let spec =
+        SceneSpec { unit: Some(partwise::mesh::Unit::M), up: Some(partwise::mesh::Axis::Z), ..SceneSpec::default() };
+    let mut in_memory = SceneSpec { body: "arrays/body".into(), garment: "arrays/garment".into(), ..spec.clone() };
+    for (file, name, mesh) in [(&body, "arrays/body", block()), (&garment, "arrays/garment", sheet())] {
+        write(Path::new(file), &mesh);
+        let faces: Vec<i64> = mesh.triangles.as_flattened().iter().map(|&v| v.into()).collect();
+        let source = ObjSource::of_arrays(mesh.positions, &faces, 3).unwrap();
+        in_memory.in_memory.insert(name.into(), source.into());
+    }
+    let [read, given] = [SceneSpec { body, garment, ..spec }, in_memory.clone()].map(|spec| spec.load().unwrap());
+    assert_eq!(given.scene.garment, read.scene.garment);
+    assert_eq!(given.scene.body.mesh(), read.scene.body.mesh());
+    assert_eq!(given.in_file(&given.scene.garment.positions).len(), sheet().vertex_count());
+    assert_eq!(given.garment_name, "garment");
+    in_memory.in_memory.remove("arrays/garment");
+    assert!(in_memory.load().unwrap_err().to_string().contains("arrays/garment"));
+    let problem = ObjSource::of_arrays(vec![DVec3::ZERO; 2], &[0, 1, 2], 3).unwrap_err().to_string();
+    assert_eq!(problem, "faces[0, 2]: found 2, expected 0 to 1, the vertices of the mesh");
 }

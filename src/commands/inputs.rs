@@ -117,6 +117,7 @@ impl InputArgs {
             hold: self.hold.clone(),
             push_out: self.pushes_out(),
             measurements: self.measurements.spec()?,
+            ..SceneSpec::default()
         })
     }
 

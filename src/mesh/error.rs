@@ -21,6 +21,9 @@ pub enum MeshError {
     /// One line is wrong.
     #[error("{file}, line {line}: {problem}")]
     Line { file: PathBuf, line: usize, problem: String },
+    /// An entry of an array is wrong.
+    #[error("{problem}")]
+    Array { problem: String },
     /// No triangle left.
     #[error(
         "{file}: the mesh is empty: found {vertices} vertices and {faces} faces of three corners or more, and in them no \

@@ -6,6 +6,7 @@
 //! neighbours are turned to agree; a body is turned to face outward.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -46,6 +47,8 @@ pub struct ImportOptions {
     pub weld: bool,
     /// Accept a body with a boundary.
     pub open_body: bool,
+    /// The contents, where they are in memory; the file is not read then, and its name stands in messages only.
+    pub source: Option<Arc<ObjSource>>,
 }
 
 /// The body that a garment is imported for.
@@ -158,7 +161,10 @@ impl Imported {
         max_fan: usize,
         frame_of: impl FnOnce(&ObjSource) -> Result<Frame, MeshError>,
     ) -> Result<Self, MeshError> {
-        let mut source = ObjSource::read(file)?;
+        let mut source = match &options.source {
+            Some(source) => source.named(file),
+            None => ObjSource::read(file)?,
+        };
         let mut repairs = Vec::new();
         if let Some(name) = &options.group {
             let left_out = source.choose_group(name)?;
@@ -262,6 +268,16 @@ impl Imported {
             file_vertices[v as usize] = file_vertex as u32;
         }
         file_vertices
+    }
+
+    /// Positions by file vertex, in the file's frame, for the mesh's vertices at `positions` (m). Vertices that no triangle uses keep
+    /// the position of the file.
+    #[must_use]
+    pub(crate) fn in_file(&self, positions: &[DVec3]) -> Vec<DVec3> {
+        let place = |(v, own): (&u32, &DVec3)| {
+            positions.get(*v as usize).map_or(*own, |&position| self.report.frame.to_file(position))
+        };
+        self.mesh_vertex.iter().zip(&self.source.positions).map(place).collect()
     }
 
     /// This mesh at the positions of `other`, a file of the same faces that holds the rest shape.

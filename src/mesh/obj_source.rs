@@ -52,7 +52,7 @@ pub struct Face {
 }
 
 /// The contents of an OBJ file.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ObjSource {
     /// The file read.
     pub file: PathBuf,
@@ -77,8 +77,44 @@ pub struct ObjSource {
 }
 
 impl ObjSource {
+    /// A mesh in memory: positions in any unit and axes, and faces of `corners` vertices each, from 0.
+    ///
+    /// # Errors
+    /// [`MeshError::Array`] names the first entry that is not a coordinate or an index.
+    pub fn of_arrays(positions: Vec<DVec3>, faces: &[i64], corners: usize) -> Result<Self, MeshError> {
+        let wrong = |problem| MeshError::Array { problem };
+        for (v, position) in positions.iter().enumerate() {
+            let bad = position.to_array().into_iter().position(|x| x.is_nan() || x.abs() > MAX_COORDINATE);
+            if let Some(axis) = bad {
+                let found = position[axis];
+                let expected = format!("a finite number of at most {MAX_COORDINATE:e} either way");
+                return Err(wrong(format!("vertices[{v}, {axis}]: found {found}, expected {expected}")));
+            }
+        }
+        let index = |(k, &found): (usize, &i64)| {
+            let vertex = usize::try_from(found).ok().filter(|&v| v < positions.len());
+            vertex.map(|v| Corner { vertex: v as u32, texture: NONE }).ok_or_else(|| {
+                let expected = match positions.len() {
+                    0 => "no index, as the mesh has no vertices".to_owned(),
+                    count => format!("0 to {}, the vertices of the mesh", count - 1),
+                };
+                wrong(format!("faces[{}, {}]: found {found}, expected {expected}", k / corners, k % corners))
+            })
+        };
+        let corners_of_faces = faces.iter().enumerate().map(index).collect::<Result<Vec<_>, _>>()?;
+        let count = corners as u32;
+        let face = |number: u32| Face { first: number * count, count, number, group: NONE, object: NONE };
+        let faces = (0..(faces.len() / corners) as u32).map(face).collect();
+        Ok(Self { positions, corners: corners_of_faces, faces, ..Self::default() })
+    }
+
+    /// The same under another name.
+    pub(super) fn named(&self, file: &Path) -> Self {
+        Self { file: file.to_owned(), ..self.clone() }
+    }
+
     /// Reads a file.
-    pub(super) fn read(file: &Path) -> Result<Self, MeshError> {
+    pub(crate) fn read(file: &Path) -> Result<Self, MeshError> {
         let bytes = bounded(file, MAX_MESH).map_err(|e| Unreadable::new(file, &e))?;
         if let Some(found) = other_format(file, &bytes) {
             return Err(MeshError::NotObj { file: file.to_owned(), found });

@@ -102,6 +102,12 @@ impl Loaded {
         }
     }
 
+    /// The garment at `positions` (m) by the vertices of its file, in the unit and axes of the file; a garment without a file as it is.
+    #[must_use]
+    pub fn in_file(&self, positions: &[DVec3]) -> Vec<DVec3> {
+        self.imported.as_ref().map_or_else(|| positions.to_vec(), |imported| imported.in_file(positions))
+    }
+
     /// Writes the garment at `positions` (m) as glTF where the path ends in `.glb`, else as OBJ. In OBJ, a garment from a file
     /// keeps its faces, groups and texture coordinates; one of a pattern has its panels as groups and the flat pattern as
     /// texture coordinates.

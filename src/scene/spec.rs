@@ -1,6 +1,8 @@
 //! Body and garments by name or file, with all options of loading them: plain data that flags, sweep files and scripts fill.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -19,7 +21,7 @@ use crate::garment::sewing::{draw_shut, put_on};
 use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::{Axis, Frame, Front, RestShape, Unit, retain};
+use crate::mesh::{Axis, Frame, Front, ObjSource, RestShape, Unit, retain};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";
@@ -100,6 +102,9 @@ pub struct SceneSpec {
     pub push_out: bool,
     /// Measurements of the dress form, which built-in garments are made to.
     pub measurements: BodySpec,
+    /// Meshes in memory by the file names that stand for them above. They are no part of the plain data.
+    #[serde(skip)]
+    pub in_memory: BTreeMap<String, Arc<ObjSource>>,
 }
 
 impl Default for SceneSpec {
@@ -127,6 +132,7 @@ impl Default for SceneSpec {
             hold: None,
             push_out: true,
             measurements: BodySpec::default(),
+            in_memory: BTreeMap::new(),
         }
     }
 }
@@ -177,6 +183,7 @@ impl SceneSpec {
             weld: _,
             push_out: _,
             measurements: _,
+            in_memory: _,
         } = self;
         let mut named = vec![(FileRole::Body, body), (FileRole::Garment, garment)];
         named.extend(over.iter().map(|garment| (FileRole::Garment, garment)));
@@ -298,6 +305,7 @@ impl SceneSpec {
             up: self.body_up.or(self.up),
             weld: self.weld,
             open_body: self.open_body,
+            source: self.in_memory.get(&self.body).cloned(),
         }
     }
 
@@ -309,6 +317,7 @@ impl SceneSpec {
             up: self.garment_up.or(self.up),
             weld: self.weld,
             open_body: self.open_body,
+            source: self.in_memory.get(&self.garment).cloned(),
         }
     }
 
@@ -463,7 +472,8 @@ impl SceneSpec {
             ("texture", _) => of_texture(1.0)?,
             (file, _) => {
                 let frame = &imported.report.frame;
-                let options = ImportOptions { unit: Some(frame.unit), up: Some(frame.up), ..self.garment_options() };
+                let (unit, up, source) = (Some(frame.unit), Some(frame.up), self.in_memory.get(file).cloned());
+                let options = ImportOptions { unit, up, source, ..self.garment_options() };
                 let other = import_garment(file.as_ref(), &options, &Beside::File(frame))?;
                 let shape = imported.in_the_shape_of(&other)?;
                 name = file;

@@ -16,7 +16,7 @@ use proptest::prelude::*;
 use tempfile::TempDir;
 
 const METRES: ImportOptions =
-    ImportOptions { group: None, unit: Some(Unit::M), up: Some(Axis::Z), weld: false, open_body: true };
+    ImportOptions { group: None, unit: Some(Unit::M), up: Some(Axis::Z), weld: false, open_body: true, source: None };
 
 fn file(text: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
