@@ -37,9 +37,14 @@ static UNPRINTED: AtomicBool = AtomicBool::new(false);
 
 /// Prints a result on stdout. A closed pipe (`| head`) is not an error; any other failure is reported, and the program exits with 1.
 pub(crate) fn result(text: &str) {
+    document(format!("{}\n", without_control(text.trim_end_matches('\n'))).as_bytes());
+}
+
+/// Prints bytes on stdout as they are.
+pub(crate) fn document(bytes: &[u8]) {
     let mut stdout = std::io::stdout().lock();
     // Flushed here, because a failure of the flush at program exit is not reported.
-    let printed = writeln!(stdout, "{}", without_control(text.trim_end_matches('\n'))).and_then(|()| stdout.flush());
+    let printed = stdout.write_all(bytes).and_then(|()| stdout.flush());
     if let Err(error) = printed.or_else(|e| if e.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(e) }) {
         UNPRINTED.store(true, Ordering::SeqCst);
         report("error: ", "31;1", &format!("standard output: the result cannot be printed: {error}"));

@@ -11,6 +11,7 @@ mod live;
 mod pattern;
 mod run;
 mod runtime;
+mod shell;
 mod sinks;
 mod solved;
 mod stages;
@@ -106,6 +107,10 @@ enum Command {
     Assets(assets::AssetsArgs),
     /// Open a recording in the bundled web viewer
     View(view::ViewArgs),
+    /// Print the completion script of a shell
+    Completions(shell::CompletionsArgs),
+    /// Print a manual page, for `man -l -`
+    Man(shell::ManArgs),
 }
 
 /// Parses the arguments, runs the command and reports its error.
@@ -131,6 +136,8 @@ pub fn main() -> ExitCode {
         Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(cli.force),
         Some(Command::View(args)) => args.execute(),
+        Some(Command::Completions(args)) => args.execute(Cli::command()),
+        Some(Command::Man(args)) => args.execute(Cli::command()),
     });
     // Threads that still write end with the process; their incomplete files are removed.
     atomic_file::abandon_all();

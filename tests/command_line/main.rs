@@ -300,3 +300,27 @@ fn help_teaches_and_mistakes_exit_with_two() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("fake.rrd"));
 }
+
+#[test]
+fn completions_and_manual_pages_name_every_subcommand() {
+    let bench = Bench::new();
+    let stdout = |arguments: &[&str]| {
+        let out = bench.run(arguments);
+        assert!(out.status.success(), "{out:?}");
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let page = stdout(&["man"]);
+    assert!(page.contains(".TH partwise 1"), "{page}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = stdout(&["completions", shell]);
+        for command in ["sweep", "live", "compare", "completions"] {
+            assert!(script.contains(command), "{shell}: {command}");
+            assert!(page.contains(command), "{command}");
+        }
+    }
+    let sweep = stdout(&["man", "sweep"]);
+    assert!(sweep.contains("resume") && sweep.contains(".TH partwise-sweep 1"), "{sweep}");
+    let refused = bench.run(&["man", "sweeep"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("found `sweeep`, expected one of run, live"));
+}
