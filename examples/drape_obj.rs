@@ -1,5 +1,5 @@
 //! Drapes an OBJ garment over an OBJ body and writes it back with its own faces, groups and texture coordinates:
-//! `cargo run --release --no-default-features --example drape_obj -- me.obj shirt.obj draped.obj`
+//! `cargo run --no-default-features --example drape_obj -- me.obj shirt.obj draped.obj`
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 

@@ -1,5 +1,5 @@
 //! Logs a drape into a Rerun stream of the application:
-//! `cargo run --release --example record_stream -- out.rrd`
+//! `cargo run --example record_stream -- out.rrd`
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 

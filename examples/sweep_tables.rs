@@ -1,5 +1,5 @@
 //! Drapes one garment by several range tables and prints the time and the error of each against the canonical drape:
-//! `cargo run --release --no-default-features --example sweep_tables`
+//! `cargo run --no-default-features --example sweep_tables`
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example prints")]
 

@@ -56,6 +56,8 @@ pub mod mechanics;
 pub mod mesh;
 pub mod methods;
 pub mod parts;
+#[cfg(feature = "python")]
+mod python;
 #[cfg(feature = "viewer")]
 pub mod record;
 pub mod scene;

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Instructions that two drapes take on one thread, counted by callgrind: seconds depend on the machine and on what else it does, these
 # do not. A drape may take twice as many as it took when its count was written down (in AVX2's registers); more is a regression, much less
-# a reason to write down the new one. `tests/instructions.sh target/release/partwise`
+# a reason to write down the new one. `tests/instructions.sh target/debug/partwise` after `cargo build`
 set -eu
 program=$1
 XDG_CACHE_HOME=$(mktemp -d)

@@ -3,8 +3,8 @@
 # With `rerun` (pip install rerun-sdk==0.36.3) and Pillow at hand it takes the README's first picture too.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cargo build --release
-partwise="${CARGO_TARGET_DIR:-target}/release/partwise"
+cargo build
+partwise="${CARGO_TARGET_DIR:-target}/debug/partwise"
 for garment in pullover-1 flared-skirt long-sleeved-dress; do
     "$partwise" --garment "$garment@2500" --fabric jersey --no-iterations --save "recordings/gallery/$garment.rrd"
 done

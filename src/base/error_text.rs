@@ -3,6 +3,7 @@
 //! Messages quote names and lines of input files. A quoted line can be megabytes long, and its control characters could move
 //! the terminal's cursor or set the window's title.
 
+use std::any::Any;
 use std::borrow::Cow;
 use std::error::Error;
 
@@ -27,6 +28,15 @@ pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
         next = error.source();
     }
     causes.iter().map(|cause| short(cause)).collect::<Vec<_>>().join(separator)
+}
+
+/// The message of a panic.
+pub(crate) fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
 }
 
 /// ", did you mean `table-3`?" for the known name that is most like a mistyped one; empty where none is alike.

@@ -1,6 +1,5 @@
 //! Runs the points of a sweep: loads each scene once, times the passes and measures the result. A failure becomes a row.
 
-use std::any::Any;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -12,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 
 use super::{Point, Row, Timing};
-use crate::base::error_text::with_causes;
+use crate::base::error_text::{panic_text, with_causes};
 use crate::drape::{Drape, StageTimes};
 use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
@@ -104,32 +103,33 @@ pub(crate) fn row_of<T>(
     }
 }
 
-fn panic_text(payload: &(dyn Any + Send)) -> &str {
-    payload
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("without a message")
-}
-
 /// Drapes and measures points; with several jobs, from several threads at the same time.
 pub struct Bench<'a> {
     cache: Option<ReferenceCache>,
     meshes: MeshCache,
     stop: &'a AtomicBool,
-    scenes: Mutex<BTreeMap<String, Arc<Loaded>>>,
+    scenes: Arc<Scenes>,
 }
+
+/// Loaded scenes by the id of [`Point::scene_id`].
+pub(crate) type Scenes = Mutex<BTreeMap<String, Arc<Loaded>>>;
 
 impl<'a> Bench<'a> {
     /// A bench that stores references in `cache`, if there is one, and interrupts its work once `stop` is set.
     #[must_use]
     pub fn new(cache: Option<ReferenceCache>, stop: &'a AtomicBool) -> Self {
-        Self { cache, meshes: MeshCache::default(), stop, scenes: Mutex::default() }
+        Self { cache, meshes: MeshCache::default(), stop, scenes: Arc::default() }
     }
 
     /// The same with a cache of built-in meshes.
     pub(crate) fn with_meshes(self, meshes: MeshCache) -> Self {
         Self { meshes, ..self }
+    }
+
+    /// The same with scenes that other benches share.
+    #[cfg(feature = "python")]
+    pub(crate) fn with_scenes(self, scenes: Arc<Scenes>) -> Self {
+        Self { scenes, ..self }
     }
 
     /// The scene of a point. Other threads wait while a scene is loaded, since they usually need the same one.

@@ -27,6 +27,8 @@ mod tables;
 mod timing;
 mod written;
 
+#[cfg(feature = "python")]
+pub(crate) use bench::Scenes;
 pub use bench::{Bench, PointError, result_hash};
 pub(crate) use disk::Medium;
 pub use error::{MergeError, PlanError, StoreError};
@@ -38,6 +40,8 @@ pub(crate) use plan::MAX_PASSES;
 pub use plan::Plan;
 pub use point::Point;
 pub(crate) use row::cell;
+#[cfg(feature = "python")]
+pub(crate) use row::columns;
 pub use row::{Row, Status, csv_text};
 pub use run::{Outcome, Run, SweepProgress, sweep};
 pub use store::{Existing, Store};

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::inputs::Input;
 use crate::drape::Settings;
@@ -17,8 +17,9 @@ use crate::study::job::Job;
 /// The version of the program; rows of different versions are never mixed.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// One point of a sweep.
-#[derive(Debug, Clone, PartialEq)]
+/// One point of a sweep, as plain data that another process can compute.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Point {
     /// Content hash of all that determines the result, hexadecimal.
     pub id: String,
