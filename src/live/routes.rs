@@ -267,7 +267,7 @@ async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Pin {
-    label: Option<String>,
+    label: Value,
 }
 
 /// Pins the newest state under `{"label": "..."}`, or without a body under its number.
@@ -275,7 +275,11 @@ async fn pin(State(site): State<Arc<Site>>, request: Request) -> Answer {
     let bytes = body(request).await?;
     let Pin { label } =
         if bytes.is_empty() { Pin::default() } else { serde_json::from_slice(&bytes).map_err(|e| malformed(&e))? };
-    let label = label.map(|label| label.chars().filter(|c| !c.is_control()).take(60).collect());
+    let label = match label {
+        Value::Null => None,
+        Value::String(label) => Some(label.chars().filter(|c| !c.is_control()).take(60).collect()),
+        other => return Err(malformed(&format!("found label = {other}, expected a text"))),
+    };
     changed(site, move |session| session.pin(label)).await
 }
 
