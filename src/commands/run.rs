@@ -10,7 +10,7 @@ use std::time::Instant;
 use crate::Job;
 use crate::base::files::has_ending;
 use crate::colour::of_drape;
-use crate::drape::{self, LetGo};
+use crate::drape::{self, Release};
 use crate::mechanics::refine::{Observer, Step};
 use crate::mesh::glb::write_glb;
 use crate::methods::METHODS;
@@ -221,7 +221,7 @@ impl RunArgs {
         if self.certify || self.strict {
             let began = Instant::now();
             let mut scene = loaded.scene.clone();
-            if matches!(drape.let_go, Some(LetGo::Stays { .. })) {
+            if matches!(drape.let_go, Some(Release::Stays { .. })) {
                 scene.held.clear();
             }
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);

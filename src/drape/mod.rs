@@ -22,11 +22,11 @@ pub use error::DrapeError;
 pub(crate) use levels::Levels;
 pub(crate) use nested_iteration::approach;
 pub(crate) use parts::{ENOUGH, StageTwo, outcome, stage_one, stage_two};
-pub use release::LetGo;
-pub(crate) use release::{Released, let_go};
+pub use release::Release;
+pub(crate) use release::{ReleasedDrape, let_go};
 pub use result::{ClothState, Drape, PartOutcome, StageTimes};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
-pub(crate) use stages::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
+pub(crate) use stages::{Distances, DrapeParts, StartsFrom, folds_of, refine_from, settled};
 
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is called after each and may end
 /// them.

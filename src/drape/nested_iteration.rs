@@ -14,7 +14,7 @@ use super::levels::{Level, Levels};
 use super::parts::Asked;
 use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledOptions, Garment, Hints, Motion};
+use crate::mechanics::coupled::{self, CoupledOptions, Garment, Known, Method, Motion};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::Parts;
@@ -55,8 +55,9 @@ pub(crate) fn approach(
     let finer = parts.cut_to_extent(mesh, topology, FINE_EXTENT_M);
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let by_parts = |garment: &Garment<'_>, finer: &Parts, distance_m: &[f64], start: Vec<DVec3>| {
-        let options = CoupledOptions { max_steps: FINE_STEPS, motion: Motion::Affine, ..options.clone() };
-        let given = Hints { distance_m, least_share: 0.0 };
+        let (motion, method) = (Motion::Affine, Method::Newton);
+        let options = CoupledOptions { max_steps: FINE_STEPS, motion, method, ..options.clone() };
+        let given = Known { distance_m, least_share: 0.0 };
         let solved = coupled::solve_given(garment, body, finer, &start, given, &options, &mut |_| asked());
         solved.map_or(start, |result| result.positions)
     };

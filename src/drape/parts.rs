@@ -9,7 +9,7 @@ use super::levels::{Level, Levels};
 use super::result::PartOutcome;
 use super::settings::{Model, Settings};
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Hints, Method};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, CoupledResult, Folding, Garment, Known, Method};
 use crate::mechanics::paper::{self, Cut, PartForces};
 use crate::parts::range_table::RangeTable;
 use crate::parts::{Parts, segment};
@@ -136,19 +136,17 @@ fn through_levels(
 ) -> Result<CoupledResult, CoupledError> {
     let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
-    let given = Hints { distance_m: &distance, least_share: 0.0 };
+    let given = Known { distance_m: &distance, least_share: 0.0 };
     let by = |method| CoupledOptions { method, ..options.clone() };
-    let mut fallback = None;
-    if coupled::splits(&scene.garment, parts, &levels.cloth, options.method) {
+    if coupled::solved_by_admm(&scene.garment, parts, &levels.cloth, options.method) {
         let admm = by(Method::Admm);
         let solved = coupled::solve_given(&garment, &scene.body, parts, start, given, &admm, &mut |_| asked())?;
+        // A garment that falls off by steps of centimetres may stay on by steps of millimetres.
         if options.method == Method::Admm || scene.fallen(&solved.positions).is_none() {
             return Ok(solved);
         }
-        // A garment that falls off by steps of centimetres may stay on by steps of millimetres.
-        fallback = Some(by(Method::Newton));
     }
-    let options = fallback.as_ref().unwrap_or(options);
+    let options = &by(Method::Newton);
     let folding = Folding::of(&scene.garment, parts, &levels.cloth);
     let enough = |(below, level): &(usize, &Level)| {
         let least = if *below == 0 { ENOUGH } else { ENOUGH_BELOW };
@@ -162,7 +160,7 @@ fn through_levels(
         let parts = levels.parts(number, parts);
         let (garment, start) = (level.garment(), levels.restrict(number, &x));
         let distance_m = &levels.restrict(number, &distance);
-        let given = Hints { distance_m, least_share: LEAST_SHARE };
+        let given = Known { distance_m, least_share: LEAST_SHARE };
         let most = if number == coarsest { options.max_steps } else { options.max_steps.min(STEPS_BETWEEN) };
         let options = CoupledOptions { max_steps: most, ..options.clone() };
         let solved = coupled::solve_given(&garment, &scene.body, &parts, &start, given, &options, &mut |_| asked())?;

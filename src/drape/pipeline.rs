@@ -9,10 +9,10 @@ use super::error::DrapeError;
 use super::levels::Levels;
 use super::nested_iteration::approach;
 use super::parts::{StageTwo, stage_one, stage_two};
-use super::release::{LetGo, Released, let_go};
+use super::release::{Release, ReleasedDrape, let_go};
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
-use super::stages::{Distances, Made, StartsFrom, folds_of, refine_from, settled};
+use super::stages::{Distances, DrapeParts, StartsFrom, folds_of, refine_from, settled};
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::Observer;
 use crate::parts::Parts;
@@ -42,7 +42,7 @@ pub(super) fn drape_one(scene: &Scene, settings: &Settings, observer: Observer<'
     let Moved { stage, folds, state, let_go } =
         moved(scene, settings, &ground, parts, cloth.as_ref(), &mut times, observer)?;
     times.mechanics += cloth_time;
-    let made = Made { ground, table, level_part_count, stage, folds, state, let_go };
+    let made = DrapeParts { ground, table, level_part_count, stage, folds, state, let_go };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();
     Ok(drape)
@@ -58,7 +58,7 @@ pub(super) struct Moved {
     pub(super) stage: StageTwo,
     pub(super) folds: Option<Folds>,
     pub(super) state: Option<(Vec<DVec3>, ClothState)>,
-    pub(super) let_go: Option<LetGo>,
+    pub(super) let_go: Option<Release>,
 }
 
 /// Stage two, and as many steps at full resolution as the settings ask for.
@@ -75,7 +75,7 @@ pub(super) fn moved(
     let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &ground.surface, parts, cloth, &on))?;
     let folds = folds_of(settings, cloth, &stage);
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
-    let Released { cloth, refined, let_go } = timed(&mut times.refine, || {
+    let ReleasedDrape { cloth, refined, let_go } = timed(&mut times.refine, || {
         let start =
             approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, (&on, &mut *observer));
         let refined = refine_from(scene, settings, &levels.cloth, Some(ground), (start, StartsFrom::Parts), observer)?;

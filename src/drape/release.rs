@@ -22,7 +22,7 @@ const MAX_RELEASED_STEPS: usize = 80;
 
 /// What came of letting go.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum LetGo {
+pub enum Release {
     /// It rests without being held.
     Stays {
         /// How far what was held has sunk, m.
@@ -35,7 +35,7 @@ pub enum LetGo {
     },
 }
 
-impl std::fmt::Display for LetGo {
+impl std::fmt::Display for Release {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Stays { sank_m } => {
@@ -52,13 +52,13 @@ impl std::fmt::Display for LetGo {
 }
 
 /// A drape whose held edges were let go, if they were to be.
-pub(crate) struct Released {
+pub(crate) struct ReleasedDrape {
     /// The cloth with nothing held, where it stays up so.
     pub(crate) cloth: Option<Cloth>,
     /// Where it rests.
     pub(crate) refined: Refined,
     /// What came of it; `None` where nothing was to be let go.
-    pub(crate) let_go: Option<LetGo>,
+    pub(crate) let_go: Option<Release>,
 }
 
 /// Goes on from a held drape that rests, with nothing held, where the scene asks for it.
@@ -67,10 +67,10 @@ pub(crate) fn let_go(
     settings: &Settings,
     held: Refined,
     observer: Observer<'_>,
-) -> Result<Released, DrapeError> {
+) -> Result<ReleasedDrape, DrapeError> {
     let asked = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
     if !asked || held.stop != Stop::Converged {
-        return Ok(Released { cloth: None, refined: held, let_go: None });
+        return Ok(ReleasedDrape { cloth: None, refined: held, let_go: None });
     }
     let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &[])?;
     let mut contacts = free.contacts(&scene.body, &held.positions);
@@ -97,9 +97,9 @@ pub(crate) fn let_go(
         let later = |r: &Record| Record { iteration: held.steps + r.iteration, ..*r };
         let history = held.history.iter().copied().chain(again.history.iter().skip(1).map(later)).collect();
         let all = Refined { steps: held.steps + again.steps, history, ..again };
-        return Ok(Released { cloth: Some(free), refined: all, let_go: Some(LetGo::Stays { sank_m }) });
+        return Ok(ReleasedDrape { cloth: Some(free), refined: all, let_go: Some(Release::Stays { sank_m }) });
     }
     let stop = if stopped { Stop::Interrupted } else { held.stop };
-    let let_go = Some(LetGo::Slides { sank_m });
-    Ok(Released { cloth: None, refined: Refined { stop, ..held }, let_go })
+    let let_go = Some(Release::Slides { sank_m });
+    Ok(ReleasedDrape { cloth: None, refined: Refined { stop, ..held }, let_go })
 }

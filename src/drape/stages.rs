@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::error::DrapeError;
 use super::levels::Levels;
 use super::parts::StageTwo;
-use super::release::LetGo;
+use super::release::Release;
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
@@ -102,17 +102,17 @@ pub(crate) fn settled(
 }
 
 /// All that a drape is made of.
-pub(crate) struct Made {
+pub(crate) struct DrapeParts {
     pub(crate) ground: Distances,
     pub(crate) table: RangeTable,
     pub(crate) level_part_count: usize,
     pub(crate) stage: StageTwo,
     pub(crate) folds: Option<Folds>,
     pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
-    pub(crate) let_go: Option<LetGo>,
+    pub(crate) let_go: Option<Release>,
 }
 
-impl Made {
+impl DrapeParts {
     /// The drape, with what must be looked for in it.
     pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
         let Self { ground, table, level_part_count, stage, folds, state, let_go } = self;
@@ -123,7 +123,7 @@ impl Made {
             Some((positions, state)) => (positions, Some(state)),
         };
         warnings.extend(state.as_ref().and_then(|s| unsettled_warning(settings.refine, s)));
-        if let Some(slides @ LetGo::Slides { .. }) = &let_go {
+        if let Some(slides @ Release::Slides { .. }) = &let_go {
             warnings.push(format!("the garment {slides}"));
         }
         warnings.extend(state.as_ref().and_then(|_| scene.fallen(&positions)));

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::drape::{ClothState, Distances, Drape, LetGo, PartOutcome, Refine, Settings};
+use crate::drape::{ClothState, Distances, Drape, PartOutcome, Refine, Release, Settings};
 use crate::garment::fabric::Fabric;
 use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
@@ -118,7 +118,7 @@ pub struct AtRest {
     pub ms: f64,
     pub after_ms: f64,
     /// Outcome of releasing the vertices that were held until the garment rested.
-    pub let_go: Option<LetGo>,
+    pub let_go: Option<Release>,
     /// Reaction of the body on each vertex, N.
     pub(crate) reaction_n: Arc<Vec<DVec3>>,
     pub(crate) cloth_state: Option<Arc<ClothState>>,

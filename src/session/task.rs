@@ -10,7 +10,7 @@ use super::handle::Session;
 use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented, Snapshot};
 use super::state::{SessionState, ms_since};
 use crate::drape::{Drape, ENOUGH, Levels, Settings};
-use crate::mechanics::coupled::{self, CoupledOptions, Hints, Motion};
+use crate::mechanics::coupled::{self, CoupledOptions, Known, Method, Motion};
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::parts::Parts;
 use crate::scene::Scene;
@@ -88,11 +88,11 @@ impl<'a> Task<'a> {
     ) -> Option<Vec<DVec3>> {
         let level =
             levels.coarser(self.scene()).first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
-        let options = CoupledOptions { max_steps: COARSE_STEPS, ..options.clone() };
+        let options = CoupledOptions { max_steps: COARSE_STEPS, method: Method::Newton, ..options.clone() };
         let (coarse, parts) = (levels.restrict(1, start), levels.parts(1, parts));
         let (garment, body) = (level.garment(), &self.scene().body);
         let mut check = |_: &[DVec3]| self.check();
-        let solved = coupled::solve_given(&garment, body, &parts, &coarse, Hints::default(), &options, &mut check);
+        let solved = coupled::solve_given(&garment, body, &parts, &coarse, Known::default(), &options, &mut check);
         solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
     }
 

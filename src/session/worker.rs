@@ -14,12 +14,12 @@ use super::state::{SessionState, ms_since, sum_by_part};
 use super::task::{COARSE_STEPS, Refinement, Target, Task, reactions};
 use crate::base::error_text::with_causes;
 use crate::drape::{
-    ClothState, Distances, Drape, DrapeError, Levels, Made, Model, Refine, Released, StageTimes, StageTwo, StartsFrom,
-    approach, drape, folds_of, let_go, outcome, refine_from, settled, stage_two,
+    ClothState, Distances, Drape, DrapeError, DrapeParts, Levels, Model, Refine, ReleasedDrape, StageTimes, StageTwo,
+    StartsFrom, approach, drape, folds_of, let_go, outcome, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Hints};
+use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Known, Method};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{Step, Stop};
 use crate::study::accuracy;
@@ -154,7 +154,7 @@ impl Worker {
             self.progress.warm_preview_done = true;
             // From the placed garment, and before any drape at rest: this takes milliseconds, and does not depend on the last preview.
             if options.extents_m.is_empty()
-                && coupled::splits(&task.scene().garment, &segmented.table_parts, &levels.cloth, options.method)
+                && coupled::solved_by_admm(&task.scene().garment, &segmented.table_parts, &levels.cloth, options.method)
             {
                 return self.both_stages(task, Some(&**levels));
             }
@@ -240,7 +240,7 @@ impl Worker {
         }
         let start = reached.clone();
         let max_steps = if rest_follows { COARSE_STEPS } else { WARM_STEPS };
-        let options = CoupledOptions { max_steps, ..options.clone() };
+        let options = CoupledOptions { max_steps, method: Method::Newton, ..options.clone() };
         let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
         let mut observer = |positions: &[DVec3]| {
             reached.clear();
@@ -250,7 +250,7 @@ impl Worker {
             task.check()
         };
         let solved =
-            coupled::solve_given(&garment, &scene.body, &parts, &start, Hints::default(), &options, &mut observer);
+            coupled::solve_given(&garment, &scene.body, &parts, &start, Known::default(), &options, &mut observer);
         let mut solved = match solved {
             Ok(solved) => solved,
             Err(CoupledError::Interrupted) => {
@@ -322,7 +322,7 @@ impl Worker {
         let held_positions = Arc::new(refined.positions.clone());
         let generation = task.loaded_scene().generation;
         self.rest = Some(WarmStart { generation, positions: Arc::clone(&held_positions) });
-        let Released { cloth, refined, let_go } = let_go(scene, settings, refined, &mut observer)?;
+        let ReleasedDrape { cloth, refined, let_go } = let_go(scene, settings, refined, &mut observer)?;
         // A drape that falls off the body is interrupted, too, and published.
         if refined.stop == Stop::Interrupted && task.check().is_break() {
             return Ok(());
@@ -390,7 +390,7 @@ impl Worker {
             let cloth_state: &ClothState = rest.cloth_state.as_deref()?;
             Some((rest.positions.to_vec(), ClothState { steps: rest.steps, ..cloth_state.clone() }))
         });
-        let made = Made {
+        let made = DrapeParts {
             ground: loaded_scene.distances.clone(),
             table: (*segmented.table).clone(),
             level_part_count: segmented.table_parts.len(),

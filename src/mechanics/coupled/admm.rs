@@ -57,9 +57,11 @@ const MIN_DAMPING: f64 = 1e-12;
 /// α: 1.5 to 1.8 is usual.
 const OVER_RELAXATION: f64 = 1.6;
 
-/// Sampled elements of each kind for each PART. With half as many triangles a skirt in three PARTs ends 97 mm off instead of 34.
-const TRIANGLES_PER_PART: f64 = 96.0;
-const VERTICES_PER_PART: f64 = 32.0;
+/// Sampled elements of each kind for a PART, over the square root of its elements. On nine drapes in three tables 2 to 10 triangles
+/// differ by 0.3 mm on average and 2 mm at most; with a fixed number a small PART takes all of its triangles, and 48 of a skirt in three
+/// PARTs leave it 97 mm off instead of 35.
+const TRIANGLES_PER_ROOT: f64 = 3.0;
+const VERTICES_PER_ROOT: f64 = 1.5;
 
 /// Distance to the body at the start within which vertices touch it, m. The penalty slows cloth that does not touch: with all vertices in
 /// it, dresses end 5 to 10 mm farther off.
@@ -158,14 +160,14 @@ impl<'a> Admm<'a> {
         let functions = motions.functions_at(start);
         let (penalty, contact_penalty) = (MEMBRANE_PENALTY * tension, CONTACT_PENALTY * tension);
         let mut matrix = PartMatrix::new(motions);
-        let rate = |per_part: f64| move |size: f64| per_part / size;
+        let rate = |per_root: f64| move |size: f64| per_root / size.sqrt();
 
         let of_triangle = parts_of(&motions.weights, cloth.triangles.iter().map(|t| &t.vertices[..]));
         let mut membranes = Vec::new();
         let mut membrane_terms = Csr::default();
         let mut terms: Vec<(u32, f64, f64)> = Vec::new();
         let mut unknowns: Vec<u32> = Vec::new();
-        for (number, stands_for) in sample(parts, &of_triangle, rate(TRIANGLES_PER_PART)) {
+        for (number, stands_for) in sample(parts, &of_triangle, rate(TRIANGLES_PER_ROOT)) {
             let t = &cloth.triangles[number as usize];
             terms.clear();
             for (&v, b) in t.vertices.iter().zip(&t.gradients) {
@@ -194,7 +196,7 @@ impl<'a> Admm<'a> {
         }
         let mut nears = Vec::new();
         let mut near_terms = Csr::default();
-        for (vertex, stands_for) in sample(parts, &near_part, rate(VERTICES_PER_PART)) {
+        for (vertex, stands_for) in sample(parts, &near_part, rate(VERTICES_PER_ROOT)) {
             let v = vertex as usize;
             let (area, own) = (cloth.areas[v] * stands_for, functions.of(v));
             unknowns.clear();

@@ -88,7 +88,7 @@ pub struct Garment<'a> {
 }
 
 /// Called with the vertex positions after every step; may end the solve with [`CoupledError::Interrupted`].
-pub(crate) type Onlooker<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
+pub(crate) type StepCallback<'a> = &'a mut (dyn FnMut(&[DVec3]) -> ControlFlow<()> + Send);
 
 /// Solves the PARTs together from the vertex positions `start`.
 ///
@@ -101,33 +101,33 @@ pub fn solve(
     start: &[DVec3],
     options: &CoupledOptions,
 ) -> Result<CoupledResult, CoupledError> {
-    solve_given(garment, body, parts, start, Hints::default(), options, &mut |_| ControlFlow::Continue(()))
+    solve_given(garment, body, parts, start, Known::default(), options, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Known distances, and the accuracy that the next stage needs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Hints<'a> {
+pub(crate) struct Known<'a> {
     /// Signed distances of the garment as placed, m; none where they are not known.
     pub distance_m: &'a [f64],
     /// The solve ends early when the last six steps contribute less than this share of the total energy decrease.
     pub least_share: f64,
 }
 
-/// Number of the last steps whose contribution ends a solve early: see [`Hints::least_share`].
+/// Number of the last steps whose contribution ends a solve early: see [`Known::least_share`].
 const LAST_STEPS: usize = 6;
 
-/// [`solve`] with something [`Hints`], before an onlooker.
+/// [`solve`] with known distances, calling `on_step` after each step.
 ///
 /// # Errors
-/// As there; [`CoupledError::Interrupted`] where `onlooker` ends it.
+/// As there; [`CoupledError::Interrupted`] where `on_step` ends it.
 pub(crate) fn solve_given(
     garment: &Garment<'_>,
     body: &Body,
     parts: &Parts,
     start: &[DVec3],
-    given: Hints<'_>,
+    given: Known<'_>,
     options: &CoupledOptions,
-    onlooker: Onlooker<'_>,
+    on_step: StepCallback<'_>,
 ) -> Result<CoupledResult, CoupledError> {
     let Garment { mesh, topology, cloth } = *garment;
     check("the list of start positions", start.len(), mesh.vertex_count())?;
@@ -135,8 +135,8 @@ pub(crate) fn solve_given(
     if parts.is_empty() {
         return Err(CoupledError::NoParts);
     }
-    if splits(mesh, parts, cloth, options.method) {
-        return solve_by_admm(garment, body, parts, start, given.distance_m, options, onlooker);
+    if solved_by_admm(mesh, parts, cloth, options.method) {
+        return solve_by_admm(garment, body, parts, start, given.distance_m, options, on_step);
     }
     let began = Instant::now();
     let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
@@ -149,7 +149,7 @@ pub(crate) fn solve_given(
     let contacts = soft.contacts_from_distances(body, start, true, &mesh.positions, given.distance_m.iter().copied());
     let mut descent =
         NewtonState::new(&soft, contacts, start.to_vec(), options.damping).with_relaxation_end(RELAXATION_END_SHARE);
-    let history = settle(&mut descent, &mut tangent, given, options, onlooker)?;
+    let history = settle(&mut descent, &mut tangent, given, options, on_step)?;
     let residual = tangent.residual(&descent.state()) / cloth.weight;
     let mut results = balance(&descent, parts);
     let mut positions = descent.x;
@@ -185,8 +185,8 @@ pub(crate) fn solve_given(
 /// Share of the garment in PARTs that fold with their neighbours from which Newton's method solves them.
 const FOLDING_SHARE: f64 = 0.5;
 
-/// Whether these PARTs are solved by ADMM. A garment laid flat is not: it has far to go, and its levels say little about where it will lie.
-pub(crate) fn splits(mesh: &TriMesh, parts: &Parts, cloth: &Cloth, method: Method) -> bool {
+/// Whether these PARTs are solved by ADMM alone. A garment laid flat is not: it has far to go, and its levels say little about where it will lie.
+pub(crate) fn solved_by_admm(mesh: &TriMesh, parts: &Parts, cloth: &Cloth, method: Method) -> bool {
     match method {
         Method::Auto => !folding::is_flat(mesh) && Folding::of(mesh, parts, cloth).share < FOLDING_SHARE,
         Method::Admm => true,
@@ -207,7 +207,7 @@ fn solve_by_admm(
     start: &[DVec3],
     distance_m: &[f64],
     options: &CoupledOptions,
-    onlooker: Onlooker<'_>,
+    on_step: StepCallback<'_>,
 ) -> Result<CoupledResult, CoupledError> {
     let Garment { mesh, topology, cloth } = *garment;
     let began = Instant::now();
@@ -233,7 +233,7 @@ fn solve_by_admm(
     };
     for iteration in 1..=options.max_iterations {
         let ends = admm.iterate() < options.least_change_m || iteration == options.max_iterations;
-        if onlooker(&positions).is_break() {
+        if on_step(&positions).is_break() {
             return Err(CoupledError::Interrupted);
         }
         if !ends && iteration % CONFORM_INTERVAL != 0 {
@@ -280,9 +280,9 @@ fn solve_by_admm(
 fn settle(
     descent: &mut NewtonState<'_, '_>,
     tangent: &mut Reduced,
-    given: Hints<'_>,
+    given: Known<'_>,
     options: &CoupledOptions,
-    onlooker: Onlooker<'_>,
+    on_step: StepCallback<'_>,
 ) -> Result<Vec<Record>, CoupledError> {
     let limits =
         StepLimits { longest_move_m: MAX_MOVE_M, relaxing: options.relaxing, relaxing_trial: options.relaxing_trial };
@@ -290,7 +290,7 @@ fn settle(
     for iteration in 1..=options.max_steps {
         let advance = descent.advance(tangent, limits)?;
         history.push(descent.record(iteration, Some(advance), true));
-        if onlooker(&descent.x).is_break() {
+        if on_step(&descent.x).is_break() {
             return Err(CoupledError::Interrupted);
         }
         let still = advance.accepted && advance.step_length >= 1.0 && advance.largest_move_m < options.least_move_m;
