@@ -1,6 +1,8 @@
 //! Per-vertex values of a drape in the colours of a recording, for meshes that are exported or logged by others. It is independent of
 //! Rerun.
 
+use glam::DVec3;
+
 use super::map::{ColourMap, Range};
 use super::palette::{by_parts, opaque};
 use crate::drape::Drape;
@@ -21,6 +23,8 @@ pub struct Overlay<'a> {
     pub unit: &'a str,
     /// One value per vertex.
     pub values: &'a [f64],
+    /// Positions to draw it at, m, if not those of the draped garment.
+    pub positions: Option<&'a [DVec3]>,
 }
 
 impl Overlay<'_> {
@@ -51,7 +55,7 @@ pub(crate) fn of_drape(garment: &TriMesh, drape: &Drape, quantity: &str) -> Opti
     };
     let parts = &drape.parts;
     let fit = drape.state.as_ref().map(|state| &state.fit);
-    let overlay = |name, unit, values| Overlay { name, unit, values }.vertex_colours();
+    let overlay = |name, unit, values| Overlay { name, unit, values, positions: None }.vertex_colours();
     match quantity {
         "distance" => {
             let cm: Vec<f64> = drape.distance.iter().map(|m| 100.0 * m).collect();

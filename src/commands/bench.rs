@@ -251,7 +251,7 @@ fn record(folder: &Path, draped_row: &DrapedRow, scene: &Scene, rows: &[Table4Ro
     let range = Range::to_quantile(errors_mm.iter().flatten().flatten().copied(), COLOUR_QUANTILE);
     for (slot, (x, errors_mm)) in draped.iter().zip(&errors_mm).enumerate() {
         let (Some(x), Some(values)) = (x, errors_mm) else { continue };
-        let colours = Colours::Overlay(Overlay { name: "distance", unit: "mm", values }, range);
+        let colours = Colours::Overlay(Overlay { name: "distance", unit: "mm", values, positions: None }, range);
         recorder.compare(&Compared { index: 0, slot, caption: "", draped: x, colours })?;
     }
     let points = |of: &Table4Row, place: fn(&Table4Row, usize) -> [f64; 2], named: bool| {

@@ -10,7 +10,7 @@ use std::time::Instant;
 use crate::Job;
 use crate::base::files::has_ending;
 use crate::colour::of_drape;
-use crate::drape::{self, Release};
+use crate::drape::{self, Refine, Release};
 use crate::mechanics::refine::{Observer, Step};
 use crate::mesh::glb::write_glb;
 use crate::methods::METHODS;
@@ -25,7 +25,7 @@ use super::console::{self, Format};
 use super::inputs::InputArgs;
 use super::runtime::{interrupted, reference_cache, refuse, use_threads, wait_for_interrupt, with_progress};
 use super::sinks::{SinkArgs, mesh_file};
-use super::solved::{Iteration, Solved};
+use super::solved::{Iteration, Solved, folded_preview};
 use super::stages::StageArgs;
 use super::summary::{Summary, print_certificate, require_pass};
 
@@ -81,6 +81,10 @@ pub(crate) struct RunArgs {
     /// the body (kPa), or `folds` (excess length of the cloth, %)
     #[arg(long, value_parser = ["parts", "strain", "pressure", "folds"], value_name = "WHAT", requires = "export", help_heading = "Output")]
     export_colours: Option<String>,
+    /// With --refine 0: export the preview with the folds drawn that its PARTs are too wide for, as in the recording's view of
+    /// folds; forces and errors stay those of the PARTs
+    #[arg(long, requires = "export", help_heading = "Output")]
+    folds: bool,
     /// Format of the result on stdout
     #[arg(long, value_enum, default_value_t = Format::Text, help_heading = "Output")]
     format: Format,
@@ -126,6 +130,11 @@ impl RunArgs {
         }
         let start = Instant::now();
         let job = self.job()?;
+        if self.folds && job.settings.refine != Refine::Steps(0) {
+            refuse!(
+                "--folds: found a drape with steps at full resolution, which has its own folds, expected --refine 0"
+            );
+        }
         self.sinks.refuse_unwritable(&job.scene.garment_name())?;
         let mut solved = self.solve(job, start)?;
         let mut recorder = solved.open(&self.sinks, !self.no_iterations, false)?;
@@ -149,14 +158,30 @@ impl RunArgs {
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
         if let Some(path) = &self.export {
             self.write_export(solved, path)?;
-            solved.summary.outputs.push(format!("draped garment: {}", path.display()));
+            let mut line = format!("draped garment: {}", path.display());
+            match &solved.folded {
+                Some(folded) if self.folds => {
+                    let counts: Vec<String> = folded.counts.iter().map(ToString::to_string).collect();
+                    line += &format!(", with {} folds drawn", counts.join(" and "));
+                }
+                None if self.folds => console::warning(
+                    "--folds: found no region to fold, expected one that closes around a vertical axis and is compressed, as a flared \
+                     skirt is; the preview is exported without folds",
+                ),
+                _ => (),
+            }
+            solved.summary.outputs.push(line);
         }
         Ok(())
     }
 
     fn write_export(&self, solved: &Solved, path: &Path) -> anyhow::Result<()> {
         let (scene, drape) = (&solved.loaded.scene, &solved.drape);
-        let Some(quantity) = &self.export_colours else { return Ok(solved.loaded.write(path, &drape.positions)?) };
+        let positions = match &solved.folded {
+            Some(folded) if self.folds => &folded.positions,
+            _ => &drape.positions,
+        };
+        let Some(quantity) = &self.export_colours else { return Ok(solved.loaded.write(path, positions)?) };
         let Some(colours) = of_drape(&scene.garment, drape, quantity) else {
             refuse!(
                 "{}: found no {quantity} to colour it by, because this model does not compute it; expected --export-colours \
@@ -164,7 +189,7 @@ impl RunArgs {
                 path.display()
             )
         };
-        Ok(write_glb(path, &scene.garment.with_positions(drape.positions.clone()), Some(&colours))?)
+        Ok(write_glb(path, &scene.garment.with_positions(positions.clone()), Some(&colours))?)
     }
 
     /// The job that the arguments specify, its tables and fabrics read.
@@ -227,7 +252,8 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        Ok(Solved { loaded, drape, measured, iterations, summary })
+        let folded = folded_preview(&loaded, &job, &drape)?;
+        Ok(Solved { loaded, drape, measured, folded, iterations, summary })
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::Job;
-use crate::drape::{Drape, unobserved};
+use crate::drape::{Drape, DrapeError, Refine, unobserved};
+use crate::mechanics::folded_surface::FoldedSurface;
 use crate::record::{
     FoldView, Layout, OutfitView, Overlay, PatternView, RecordError, RecordOptions, RecordSummary, Recorder, StepView,
     Tab, WrinkleView,
@@ -24,6 +25,8 @@ pub(super) struct Solved {
     pub(super) loaded: Loaded,
     pub(super) drape: Drape,
     pub(super) measured: Measured,
+    /// The preview with its folds, where it is the result.
+    pub(super) folded: Option<FoldedSurface>,
     /// States of the solver by iteration.
     pub(super) iterations: BTreeMap<usize, Iteration>,
     pub(super) summary: Summary,
@@ -38,13 +41,23 @@ pub(super) struct Iteration {
     pub(super) positions: Option<Vec<DVec3>>,
 }
 
+/// The preview with its folds, where the job ends with the preview.
+pub(super) fn folded_preview(loaded: &Loaded, job: &Job, drape: &Drape) -> Result<Option<FoldedSurface>, DrapeError> {
+    if job.settings.refine != Refine::Steps(0) {
+        return Ok(None);
+    }
+    let folded = drape.folded_preview(&loaded.scene, &job.settings)?;
+    Ok(folded.filter(|folded| !folded.counts.is_empty()))
+}
+
 impl Solved {
     /// A state of a session and its measurements.
     pub(super) fn of_session(job: &Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
         let (loaded, drape) = (finished.loaded_scene.input.clone(), finished.drape.clone());
+        let folded = folded_preview(&loaded, job, &drape)?;
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.loaded_scene.load_ms));
-        Ok(Self { loaded, drape, measured, iterations: BTreeMap::new(), summary })
+        Ok(Self { loaded, drape, measured, folded, iterations: BTreeMap::new(), summary })
     }
 
     /// Opens a recording of this garment. With `live`, further steps follow, whose meshes may differ.
@@ -77,14 +90,15 @@ impl Solved {
     pub(super) fn overlays(&self) -> Vec<Overlay<'_>> {
         let mut overlays = Vec::new();
         if let Some(state) = &self.drape.state {
-            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent });
-            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa });
+            overlays.push(Overlay { name: "strain", unit: "%", values: &state.fit.strain_percent, positions: None });
+            overlays.push(Overlay { name: "pressure", unit: "kPa", values: &state.fit.pressure_kpa, positions: None });
         }
         if let Some(folds) = &self.drape.folds {
-            overlays.push(Overlay { name: "folds", unit: "%", values: &folds.excess_percent });
+            let (values, positions) = (&folds.excess_percent, self.folded.as_ref().map(|folded| &folded.positions[..]));
+            overlays.push(Overlay { name: "folds", unit: "%", values, positions });
         }
         if self.measured.evaluation.is_some() {
-            overlays.push(Overlay { name: "error", unit: "mm", values: &self.measured.error_mm });
+            overlays.push(Overlay { name: "error", unit: "mm", values: &self.measured.error_mm, positions: None });
         }
         overlays
     }
@@ -126,6 +140,7 @@ impl Solved {
         }
         if let Some(folds) = &drape.folds {
             let (excess_percent, across) = (&folds.excess_percent, &folds.across);
+            let draped = self.folded.as_ref().map_or(draped, |folded| &folded.positions);
             recorder.folds(&FoldView { index, draped, excess_percent, across })?;
         }
         if let Some(evaluation) = &measured.evaluation {

@@ -4,13 +4,18 @@ use std::time::Duration;
 
 use glam::DVec3;
 
-use super::release::LetGo;
+use super::error::DrapeError;
+use super::release::Release;
+use super::settings::Settings;
 use crate::body::distance::SurfacePoint;
+use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
+use crate::mechanics::folded_surface::{FoldedSurface, folded_surface};
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Record, Stop};
 use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
+use crate::scene::Scene;
 
 /// How long each stage took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -88,7 +93,7 @@ pub struct Drape {
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
     /// What came of letting go what was held until it rested.
-    pub let_go: Option<LetGo>,
+    pub let_go: Option<Release>,
     /// Pairs of triangles of the displaced garment that cross: steps at full resolution keep cloth off cloth, PARTs alone do not.
     pub self_intersecting_pairs: usize,
     /// Vertices of the displaced garment inside the body.
@@ -99,4 +104,18 @@ pub struct Drape {
     pub times: StageTimes,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+impl Drape {
+    /// The preview with the folds that its PARTs do not show; `scene` and `settings` are those of the drape. `None` for several layers
+    /// and for the paper's model, which know no excess length.
+    ///
+    /// # Errors
+    /// [`DrapeError`] where a constant of the fabric cannot be used.
+    pub fn folded_preview(&self, scene: &Scene, settings: &Settings) -> Result<Option<FoldedSurface>, DrapeError> {
+        let (Some(folds), 0..=1) = (&self.folds, scene.layers.len()) else { return Ok(None) };
+        let Scene { garment, topology, rest, held, body, .. } = scene;
+        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?;
+        Ok(Some(folded_surface(&cloth, topology, body, &self.preview, folds)))
+    }
 }

@@ -4,6 +4,7 @@ pub mod coupled;
 pub(crate) mod curvature;
 pub mod energy;
 pub mod fit;
+pub mod folded_surface;
 pub mod folds;
 pub(crate) mod linear_algebra;
 pub(crate) mod newton;

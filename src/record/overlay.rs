@@ -38,7 +38,11 @@ pub(super) fn log_overlay(
     let range = overlay.range(recording);
     let map = ColourMap::ALARM;
     let colours = rerun_colours(map.colours(overlay.values, range));
-    recording.log(&path, &meshes::shape(draped).with_vertex_colors(colours))?;
+    let shape = match overlay.positions {
+        Some(positions) => meshes::shape(&draped.with_positions(positions.to_vec())),
+        None => meshes::shape(draped),
+    };
+    recording.log(&path, &shape.with_vertex_colors(colours))?;
     Legend::new(overlay.name, overlay.unit, map, range, overlay.values).log(recording, legend, cell)
 }
 
@@ -113,7 +117,7 @@ mod tests {
     #[test]
     fn colours_are_comparable_from_step_to_step_and_a_small_error_is_pale() {
         let recording = OpenRecording::new(RecordOptions::default()).unwrap();
-        let error = |values| Overlay { name: "error", unit: "mm", values };
+        let error = |values| Overlay { name: "error", unit: "mm", values, positions: None };
         let first = error(&[0.0, 40.0]).range(&recording);
         assert!(first.high >= 40.0);
         assert_eq!(error(&[0.0, 0.4]).range(&recording), first);
@@ -122,7 +126,7 @@ mod tests {
 
     #[test]
     fn exported_colours_differ_with_the_strain_and_a_small_strain_is_pale() {
-        let colours = |values| Overlay { name: "strain", unit: "%", values }.vertex_colours();
+        let colours = |values| Overlay { name: "strain", unit: "%", values, positions: None }.vertex_colours();
         let strain = colours(&[0.0, 2.0, 4.0, 40.0]);
         assert!(strain.windows(2).all(|two| two[0] != two[1]) && strain.iter().all(|c| c[3] == 255), "{strain:?}");
         let small = colours(&[0.0, 0.1, 0.0, 0.1]);

@@ -47,7 +47,10 @@ impl StepView<'_> {
             ("PART numbers", self.part_of_vertex.len()),
             ("displaced positions", self.draped.len()),
         ];
-        lists.extend(self.overlays.iter().map(|overlay| (overlay.name, overlay.values.len())));
+        for overlay in self.overlays {
+            lists.push((overlay.name, overlay.values.len()));
+            lists.extend(overlay.positions.map(|positions| ("positions of an overlay", positions.len())));
+        }
         recording.check_lengths(&lists)?;
         let assigned = self.part_of_vertex.iter().filter(|part| **part != UNASSIGNED);
         let (found, expected) = (self.part_force_n.len(), assigned.max().map_or(0, |&part| part as usize + 1));

@@ -52,7 +52,7 @@ pub(super) fn log(recording: &OpenRecording, view: &WrinkleView<'_>) -> Result<(
     recording.check_lengths(&lists)?;
     let draped = recording.garment.with_positions(view.draped.to_vec());
     recording.at(view.index, 6);
-    let curvature = Overlay { name: "curvature", unit: "1/m", values: view.curvature_per_m };
+    let curvature = Overlay { name: "curvature", unit: "1/m", values: view.curvature_per_m, positions: None };
     let legend = |name: &str| format!("{}/{name}", paths::WRINKLES_LEGEND);
     log_overlay(recording, paths::CURVATURE, &draped, &curvature, &legend("curvature"), [1, 0])?;
 

@@ -3,6 +3,9 @@
 use std::collections::BTreeSet;
 use std::fs;
 
+use glam::DVec3;
+use partwise::mesh::{Topology, TriMesh};
+
 use super::{Bench, sheet};
 
 #[test]
@@ -44,4 +47,41 @@ fn a_coloured_export_has_the_colours_of_parts_and_of_strain() {
     bench
         .refuses(&[&scene[..], &["--export", "out.obj", "--export-colours", "parts"]].concat(), &["out.obj", "`.glb`"]);
     bench.refuses(&[&scene[..], &["--export-colours", "parts"]].concat(), &["--export"]);
+}
+
+/// Length of the boundary loop that lies lowest, m.
+fn hem_m(obj: &str) -> f64 {
+    let rows = |key: &str| -> Vec<Vec<String>> {
+        let lines = obj.lines().filter_map(|line| line.strip_prefix(key));
+        lines.map(|line| line.split_whitespace().map(str::to_owned).collect()).collect()
+    };
+    let coordinate = |text: &String| text.parse::<f64>().unwrap();
+    let vertex = |row: &Vec<String>| DVec3::new(coordinate(&row[0]), coordinate(&row[1]), coordinate(&row[2]));
+    let corner = |text: &String| text.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
+    let positions: Vec<DVec3> = rows("v ").iter().map(vertex).collect();
+    let triangles = rows("f ").iter().map(|row| [0, 1, 2].map(|k| corner(&row[k]))).collect();
+    let mesh = TriMesh::new(positions, triangles);
+    let at = |v: &u32| mesh.positions[*v as usize];
+    let height = |hem: &[u32]| hem.iter().map(|v| at(v).z).sum::<f64>() / hem.len() as f64;
+    let loops = Topology::new(&mesh).boundary_loops();
+    let hem = loops.into_iter().min_by(|a, b| height(a).total_cmp(&height(b))).unwrap();
+    hem.iter().zip(hem.iter().cycle().skip(1)).map(|(a, b)| at(a).distance(at(b))).sum()
+}
+
+#[test]
+fn a_preview_is_exported_with_its_folds() {
+    let bench = Bench::new();
+    let scene = ["--garment", "flared-skirt@1500", "--no-save"];
+    let export = |more: &[&str]| {
+        let output = bench.run(&[&scene[..], more, &["--refine", "0", "--export", "skirt.obj"]].concat());
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        (hem_m(&fs::read_to_string(bench.path("skirt.obj")).unwrap()), text)
+    };
+    let ((tube_m, tube), (folded_m, folded)) = (export(&[]), export(&["--folds"]));
+    assert!(!tube.contains("folds drawn") && folded.contains("folds drawn"), "{folded}");
+    // Cut at 2.7 m.
+    assert!(tube_m < 1.5 && (2.4..2.8).contains(&folded_m), "{tube_m} and {folded_m} m");
+    let converged = [&scene[..], &["--folds", "--export", "skirt.obj"]].concat();
+    bench.refuses(&converged, &["--folds", "expected --refine 0"]);
 }

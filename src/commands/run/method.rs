@@ -179,8 +179,8 @@ impl RunArgs {
     fn record_method(&self, draped: &Draped<'_>, report: &Report<'_>) -> anyhow::Result<Recorder> {
         let Draped { loaded, drape, fit, fabric, moments } = draped;
         let overlays = [
-            Overlay { name: "strain", unit: "%", values: &fit.strain_percent },
-            Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa },
+            Overlay { name: "strain", unit: "%", values: &fit.strain_percent, positions: None },
+            Overlay { name: "pressure", unit: "kPa", values: &fit.pressure_kpa, positions: None },
         ];
         let mut recorder = Recorder::open(RecordOptions {
             sinks: self.sinks.sinks(&loaded.garment_name),

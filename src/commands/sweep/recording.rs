@@ -184,7 +184,7 @@ pub(crate) fn record(
     recorder.garment(0, &scene.garment)?;
     for (index, (row, label)) in (0..).zip(rows.iter().zip(&label)) {
         let Some(point) = store.point(&row.point) else { continue };
-        let error = Overlay { name: "error", unit: "mm", values: &point.error_mm };
+        let error = Overlay { name: "error", unit: "mm", values: &point.error_mm, positions: None };
         let overlays = if point.error_mm.is_empty() { &[][..] } else { std::slice::from_ref(&error) };
         recorder.step(&StepView {
             index,

@@ -308,7 +308,7 @@ fn step(recorder: &mut Recorder, garment: &Garment, shown: &Shown<'_>) -> anyhow
         draped: &positions,
         panel: &panel,
         scalars: &[("error/representable_rms_mm", fit.rms_mm), ("levels", shown.table.levels.len() as f64)],
-        overlays: &[Overlay { name: "error", unit: "mm", values: &error_mm }],
+        overlays: &[Overlay { name: "error", unit: "mm", values: &error_mm, positions: None }],
     })?;
     Ok(())
 }

@@ -137,7 +137,7 @@ fn a_sweep_logs_the_triangles_once_and_has_all_tables() {
             solved.panel.timings_ms[3].1 = ms;
             let error: Vec<f64> = scene.distances_m.iter().map(|d| 1e3 * d / ms).collect();
             let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len() as f64).sqrt();
-            let overlays = [Overlay { name: "error", unit: "mm", values: &error }];
+            let overlays = [Overlay { name: "error", unit: "mm", values: &error, positions: None }];
             let scalars = [("error/rms_mm", rms)];
             recorder.step(&StepView { scalars: &scalars, ..step(i as i64, &scene, &solved, &overlays) }).unwrap();
             let caption = format!("{} PARTs · {ms:.1} ms · {rms:.0} mm", solved.part_force_n.len());
@@ -210,8 +210,8 @@ fn all_stages_are_on_the_solvers_timeline_and_overlays_have_legends() {
     let strain: Vec<f64> = scene.draped.iter().map(|p| 8.0 * (1.4 - p.z).max(0.0)).collect();
     let pressure: Vec<f64> = scene.distances_m.iter().map(|d| (0.02 - d).max(0.0) * 60.0).collect();
     let overlays = [
-        Overlay { name: "strain", unit: "%", values: &strain },
-        Overlay { name: "pressure", unit: "kPa", values: &pressure },
+        Overlay { name: "strain", unit: "%", values: &strain, positions: None },
+        Overlay { name: "pressure", unit: "kPa", values: &pressure, positions: None },
     ];
     recorder.step(&step(0, &scene, &solved, &overlays)).unwrap();
     let part = &solved.part_of_vertex;
