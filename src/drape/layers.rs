@@ -33,7 +33,7 @@ struct LayerState<'a> {
     scene: &'a Scene,
     /// Where they are, m: as placed, if nothing was done with them yet.
     positions: Vec<DVec3>,
-    /// What stage two made of each.
+    /// Result of stage two of each garment.
     stages: Vec<StageTwo>,
     folds: Vec<Folds>,
     /// Every step at full resolution.

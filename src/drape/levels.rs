@@ -125,7 +125,7 @@ impl Level {
         edges.iter().map(|&[a, b]| at(a).distance(at(b))).sum::<f64>() / edges.len().max(1) as f64
     }
 
-    /// What is draped at this level.
+    /// The garment at this level.
     pub(crate) fn garment(&self) -> Garment<'_> {
         Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth }
     }

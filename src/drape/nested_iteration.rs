@@ -36,8 +36,8 @@ const MIN_COARSE_VERTICES: usize = 1500;
 /// With eighty, five stiff garments of 16,000 take 239 steps at full resolution for 213.
 const COARSE_STEPS: usize = 20;
 
-/// From where stage two ended, by finer PARTs and the rest of coarser garments; where that fails, nothing is lost. `observer` is told of the
-/// steps on coarser garments as of step 0, where the full one still is.
+/// Moves the result of stage two towards its rest by finer PARTs and coarser garments. Where that fails, the result of stage two is returned.
+/// `observer` receives the steps on coarser garments as step 0 of the full garment.
 pub(crate) fn approach(
     scene: &Scene,
     settings: &Settings,

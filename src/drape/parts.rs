@@ -15,7 +15,7 @@ use crate::parts::range_table::RangeTable;
 use crate::parts::{Parts, segment};
 use crate::scene::Scene;
 
-/// What stage two leaves.
+/// Result of stage two.
 #[derive(Debug, Clone)]
 pub(crate) struct StageTwo {
     pub(crate) parts: Parts,

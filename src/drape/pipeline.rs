@@ -53,7 +53,7 @@ pub(super) fn needs_cloth(settings: &Settings) -> bool {
     matches!(settings.model, Model::Coupled(_)) || settings.refine != Refine::Steps(0)
 }
 
-/// What stage two and the steps after it make of the PARTs.
+/// Result of stage two and of the steps after it.
 pub(super) struct Moved {
     pub(super) stage: StageTwo,
     pub(super) folds: Option<Folds>,

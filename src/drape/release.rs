@@ -1,8 +1,8 @@
-//! What is held only until it rests is let go, and either stays where it is or slides.
+//! Releases edges that are held only until the garment rests: it then stays up or slides.
 //!
-//! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Whether it stays up is another question, and
-//! friction's and the hips' to answer: the steps go on with nothing held. Where the cloth comes to rest again and its waist has
-//! hardly moved, that is the drape; where it slides, the held one is, and is said to be.
+//! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Friction and the shape of the hips
+//! decide whether it stays up: the steps continue with nothing held. If the cloth comes to rest again and its waist has sunk little, this
+//! is the drape; if it slides, the held drape is kept and a warning says so.
 
 use std::ops::ControlFlow;
 
@@ -20,7 +20,7 @@ const MAX_SINK_M: f64 = 0.1;
 /// Steps it may take to rest again.
 const MAX_RELEASED_STEPS: usize = 80;
 
-/// What came of letting go.
+/// Result of the release.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Release {
     /// It rests without being held.
@@ -51,13 +51,13 @@ impl std::fmt::Display for Release {
     }
 }
 
-/// A drape whose held edges were let go, if they were to be.
+/// A drape after the release of its held edges, if the scene asks for it.
 pub(crate) struct ReleasedDrape {
     /// The cloth with nothing held, where it stays up so.
     pub(crate) cloth: Option<Cloth>,
-    /// Where it rests.
+    /// The drape at rest.
     pub(crate) refined: Refined,
-    /// What came of it; `None` where nothing was to be let go.
+    /// Result of the release; `None` where nothing is released.
     pub(crate) let_go: Option<Release>,
 }
 

@@ -26,15 +26,15 @@ pub struct StageTimes {
     pub segment: Duration,
     /// Stage two.
     pub mechanics: Duration,
-    /// Newton steps at full resolution, and what of setting them up is not done beside stage two; zero where none are asked
-    /// for, though the preview's energy and residual are still measured.
+    /// Newton steps at full resolution, and the part of their setup that does not overlap stage two; zero if no steps are requested,
+    /// although the preview's energy and residual are still measured.
     pub refine: Duration,
     /// All of it, start to end; more than the sum by what lies between.
     pub total: Duration,
 }
 
 impl StageTimes {
-    /// What lies between the stages.
+    /// Time between the stages.
     #[must_use]
     pub(crate) fn other(self) -> Duration {
         self.total.saturating_sub(self.distance + self.segment + self.mechanics + self.refine)
@@ -69,7 +69,7 @@ pub struct ClothState {
     pub fit: Fit,
 }
 
-/// What came out, stage by stage.
+/// The result, stage by stage.
 #[derive(Debug, Clone)]
 pub struct Drape {
     /// Closest points on the body, per garment vertex, before draping.
@@ -92,7 +92,7 @@ pub struct Drape {
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
     pub state: Option<ClothState>,
-    /// What came of letting go what was held until it rested.
+    /// Result of the release of edges that were held until the garment rested.
     pub let_go: Option<Release>,
     /// Pairs of triangles of the displaced garment that cross: steps at full resolution keep cloth off cloth, PARTs alone do not.
     pub self_intersecting_pairs: usize,
@@ -102,7 +102,7 @@ pub struct Drape {
     pub penetration: f64,
     /// Stage times.
     pub times: StageTimes,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a drape is given besides its scene: the dials. Plain data, the same defaults wherever they are filled in.
+//! Settings of a drape: everything but its scene. Plain data with one set of defaults.
 
 use serde::{Deserialize, Serialize};
 
@@ -67,7 +67,7 @@ impl Model {
         }
     }
 
-    /// With PARTs that move like this; those of the paper's model have one displacement whatever is asked.
+    /// The same model with this motion of its PARTs; the paper's model has one displacement a PART in any case.
     #[must_use]
     pub(crate) fn with_motion(mut self, motion: Motion) -> Self {
         if let Self::Coupled(options) = &mut self {

@@ -1,4 +1,4 @@
-//! The pieces that a drape is made of, for [`drape()`](super::drape) and for whoever makes them one at a time.
+//! Stages of a drape, for [`drape()`](super::drape) and for the session, which computes them one at a time.
 
 use std::ops::ControlFlow;
 
@@ -52,10 +52,10 @@ pub(crate) fn folds_of(settings: &Settings, levels: Option<&Levels>, stage: &Sta
     }
 }
 
-/// What steps at full resolution begin with.
+/// The start of the steps at full resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StartsFrom {
-    /// What PARTs made of the garment as placed.
+    /// Stage two of the garment as placed.
     Parts,
     /// A drape of the same garment that rested, in another fabric or by another table.
     Rest,
@@ -65,7 +65,7 @@ pub(crate) enum StartsFrom {
 /// until its forces balanced, with the 300 of a preview 51.
 const DAMPING_FROM_REST: f64 = 10.0;
 
-/// Steps at full resolution. None are done for [`Refine::Steps`]`(0)`, but the coupled model's energy and residual are told.
+/// Steps at full resolution. [`Refine::Steps`]`(0)` takes none, but measures the coupled model's energy and residual.
 pub(crate) fn refine_from(
     scene: &Scene,
     settings: &Settings,
@@ -101,7 +101,7 @@ pub(crate) fn settled(
     (positions, ClothState { energy, residual_over_weight, steps, stop, history, fit })
 }
 
-/// All that a drape is made of.
+/// The results of all stages.
 pub(crate) struct DrapeParts {
     pub(crate) ground: Distances,
     pub(crate) table: RangeTable,

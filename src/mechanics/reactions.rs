@@ -107,7 +107,7 @@ impl Forces {
         Self::on(cloth, Some(body), x)
     }
 
-    /// The same, without a body if there is none.
+    /// [`new`](Self::new) with an optional body.
     pub(crate) fn on(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Self {
         // The gradient of a cloth is zero at held vertices; their reactions are the gradient with nothing held.
         let mut free = cloth.clone();

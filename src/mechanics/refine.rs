@@ -1,9 +1,9 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
 //! The steps are those of `mechanics::newton` in all vertices. Stops where the residual ‖∇E‖₂ over the free vertices, divided
-//! by the garment's weight, is under the tolerance and no vertex is inside the body, and where that rest lasts: a residual is as small on
-//! a saddle of the energy, and where cloth slides slowly. A rest is therefore looked at, and left where it is none
-//! (`newton::saddle_escape`); that costs one to two steps, and what it takes to come to rest again.
+//! by the garment's weight, is under the tolerance and no vertex is inside the body, and where the equilibrium is stable: the residual is also
+//! small at a saddle of the energy and where cloth slides slowly. Stability is therefore checked, and a saddle is left
+//! (`newton::saddle_escape`); this costs one to two steps and the steps to the next rest.
 //!
 //! **Stiff cloth begins soft.** A woven membrane lets a step go only as far as its triangles stay as long as they are to a part
 //! in thousands, so it creeps into its folds a millimetre at a time. Far from rest it is therefore first settled with its stiffness
@@ -39,10 +39,10 @@ const FAR_FROM_REST: f64 = 0.5;
 /// Residual over weight below which damping falls faster: only the softest directions are left, which damping slows most. Heuristic.
 const NEAR_REST: f64 = 1e-2;
 
-/// Residual over weight below which contact places are added before the cloth has come to rest with those it has. Heuristic.
+/// Residual over weight below which contact places are added before the cloth rests with the present ones. Heuristic.
 const FACE_CONTACT_RESIDUAL: f64 = 3e-2;
 
-/// Steps in which the cloth must come to rest with its contact places; after that they are removed. The most observed are 24, in a pair of
+/// Steps after which contact places are removed if the cloth does not rest with them. The most observed are 24, in a pair of
 /// trousers.
 const MAX_FACE_CONTACT_STEPS: usize = 80;
 
@@ -100,7 +100,7 @@ pub struct RefineOptions {
     pub longest_move_m: f64,
     /// Strain under its own hanging weight that stiff cloth may have to begin with; 0 for its true stiffness throughout.
     pub soft_strain: f64,
-    /// Whether cloth keeps off cloth: see `proximity`.
+    /// Whether cloth is kept apart from cloth: see `proximity`.
     pub self_contact: bool,
     /// Whether a rest must last: hardly anything moves by the next step, and no way leads out on which the energy falls.
     pub lasting: bool,
@@ -139,7 +139,7 @@ pub struct Step<'a> {
     pub contacts: usize,
     /// Positions, m.
     pub positions: &'a [DVec3],
-    /// Whether it rests as far as its forces tell; told once, before it is looked at whether that lasts.
+    /// Whether the forces balance; set once, before the check of stability.
     pub at_rest: bool,
 }
 
@@ -255,7 +255,7 @@ fn settle(
     let (mut tolerance, mut continued_to) = (options.tolerance, options.continued_to);
     // The criterion of rest that failed at the last check.
     let mut failed = "";
-    // The step at which the contact places changed, until the cloth has come to rest with them.
+    // The step at which the contact places changed, until the cloth rests with them.
     let mut face_contacts_since: Option<usize> = None;
     let mut cycles = CycleDamping::default();
     let stop = loop {
@@ -396,7 +396,7 @@ fn seen<'a>(descent: &'a NewtonState<'_, '_>, iteration: usize, at_rest: bool) -
     }
 }
 
-/// The longest side of the box about `x`, m: about the length that hangs, whichever way the cloth lies as yet.
+/// The longest side of the box about `x`, m: about the hanging length, in whichever direction the cloth lies.
 fn extent(x: &[DVec3]) -> f64 {
     let (low, high) = box_about(x.iter().copied());
     (high - low).max_element().max(0.0)
@@ -444,7 +444,7 @@ impl CycleDamping {
         }
     }
 
-    /// Starts anew, with whole steps and without under-relaxation.
+    /// Restarts with whole steps and without under-relaxation.
     fn reset(&mut self, descent: &mut NewtonState<'_, '_>) {
         *self = Self::default();
         descent.step_share = 1.0;

@@ -130,7 +130,7 @@ pub struct Curvature {
     pub at: usize,
     /// The next Newton step of every vertex, m; zero where held.
     pub step: Vec<DVec3>,
-    /// The unstable modes, or the softest if there is none; each a displacement of every vertex.
+    /// The unstable modes, or the softest mode; each a displacement of every vertex.
     pub(crate) modes: Vec<Vec<DVec3>>,
 }
 

@@ -1,8 +1,8 @@
 //! Which PARTs move each triangle, each bending ring and each vertex, and where their blocks of the reduced Hessian are.
 //!
-//! An element couples every pair of PARTs that have weight at one of its vertices: such pairs are numbered, and what elements add is summed
-//! pair by pair. The pattern is built PART by PART: the column of a PART's unknown holds what is left of its own block, then its
-//! neighbours that come later in the order of elimination.
+//! An element couples every pair of PARTs that have weight at one of its vertices: such pairs are numbered, and contributions of elements are
+//! summed by pair. The pattern is built by PART: the column of a PART's unknown holds the lower triangle of its own block, then the
+//! blocks of neighbours that are eliminated later.
 
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::energy::ordering::{Adjacency, nested_dissection};
@@ -13,8 +13,8 @@ use super::motions::Motions;
 use super::weights::Weights;
 
 /// Elements of this many for each PART are sampled for the Hessian: a PART has twelve unknowns, a triangle says three things. The
-/// energy and its gradient take them all. Where a PART has more than [`MANY_ELEMENTS`], one in [`SAMPLING_INTERVAL`] of those as well: beside a gradient of so many
-/// they cost nothing, and twelve of 6,000 are luck. (No cure: a skirt of 62,500 vertices in 22 PARTs has crept for 40 steps with either.)
+/// energy and its gradient take them all. Where a PART has more than [`MANY_ELEMENTS`], one in [`SAMPLING_INTERVAL`] of those as well: they cost little beside a gradient over all
+/// elements, and twelve of 6,000 depend on chance. (No cure: a skirt of 62,500 vertices in 22 PARTs has crept for 40 steps with either.)
 const SAMPLES_PER_PART: f64 = 12.0;
 const MANY_ELEMENTS: f64 = 4000.0;
 const SAMPLING_INTERVAL: f64 = 50.0;

@@ -1,7 +1,7 @@
 //! Folds finer than a PART: the compression ratio of the membrane.
 //!
-//! A PART cannot fold within itself, and the cloth in it can: a ring of a skirt takes up what is too wide for where it hangs in
-//! folds that no motion of the ring shows. Tension field theory says what that costs ([`membrane`]): next to nothing. A
+//! A PART does not fold within itself, but its cloth can: a ring of a skirt that is too wide for its place takes up the excess in
+//! folds that no motion of the ring shows. By tension field theory their energy is close to zero ([`membrane`]). A
 //! strip of length ℓ buckles under π² B/ℓ², so the share of the stiffness k that a PART as wide as ℓ keeps under compression is
 //!
 //! r = π² B / (k ℓ²), and never more than the mesh's own.
@@ -48,7 +48,7 @@ const FLAT_HEIGHT_SHARE: f64 = 0.25;
 /// Least width of a PART, m: one of a single vertex has none.
 const MIN_WIDTH_M: f64 = 1e-3;
 
-/// What folds there are to make, by how wide the PARTs are.
+/// Width of the folds, and the share of the garment in PARTs narrow enough to form them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Folding {
     /// λ, the width of a fold, m; of several fabrics the narrowest.

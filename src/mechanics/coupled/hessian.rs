@@ -72,7 +72,7 @@ impl Reduced {
             let column = motions.first[place.column as usize] as usize;
             for b in 0..columns {
                 let start = layout.pattern.starts[column + b] as usize;
-                // Of a PART's own block the lower half; beside it, what is left of its own comes before.
+                // Of a PART's own block only the lower half is stored, before the blocks of its neighbours.
                 let own = place.row == place.column;
                 let (from, start) = if own { (b, start) } else { (0, start + columns - b + place.skip as usize) };
                 for a in from..rows {

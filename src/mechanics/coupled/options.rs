@@ -1,4 +1,4 @@
-//! What is asked of the coupled solve, and what it answers.
+//! Options and result of the coupled solve.
 
 use std::time::Duration;
 
@@ -129,7 +129,7 @@ impl Default for CoupledOptions {
     }
 }
 
-/// What one PART did.
+/// Displacement and forces of one PART.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartResult {
     /// Mean displacement of its vertices from their start, D, m.
@@ -153,7 +153,7 @@ pub struct PartResult {
 pub struct CoupledResult {
     /// Vertex positions, m.
     pub positions: Vec<DVec3>,
-    /// What each PART did.
+    /// Displacement and forces of each PART.
     pub parts: Vec<PartResult>,
     /// Every Newton step, the start first.
     pub history: Vec<Record>,
@@ -167,6 +167,6 @@ pub struct CoupledResult {
     pub setup: Duration,
     /// Time for Newton's steps.
     pub solve: Duration,
-    /// What a user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }

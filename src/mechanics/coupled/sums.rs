@@ -6,7 +6,7 @@
 //! - a bending ring: Σ_c k_c (B f_a)_c (B g_b)_c on the diagonal, B its fit, c its three curvatures;
 //! - a vertex: m ε f_a g_b on the diagonal, and K f_a g_b with K the Hessian of its contact and friction.
 //!
-//! The four f_a are one register. What comes on the diagonal alone is kept by itself, a ninth of the work. Same bits on every machine
+//! The four f_a are one register. Contributions to the diagonal alone are summed separately, at a ninth of the work. Same bits on every machine
 //! ([`lanes`](crate::base::simd)).
 
 use std::ops::Range;
@@ -19,7 +19,7 @@ use crate::base::simd::{Four, Lanes, Pack, Work, run};
 use crate::mechanics::energy::HessianKind;
 use crate::mechanics::newton::State;
 
-/// What is summed.
+/// The elements of a sum.
 #[derive(Debug, Clone)]
 pub(super) enum Element {
     /// The membrane of these triangles, by place among the sampled.

@@ -128,7 +128,7 @@ const PRODUCTS_PER_TASK: usize = 1 << 20;
 const TILE_REGISTERS: usize = 2;
 const TILE_COLUMNS: usize = 4;
 
-/// Factors a panel of so many rows, its diagonal block on top, lower half. The error is the column whose pivot is not positive.
+/// Factors a panel of `height` rows, its diagonal block on top, lower half. The error is the column whose pivot is not positive.
 pub(super) fn factor_panel<T: Precision>(panel: &mut [T], height: usize) -> Result<(), usize> {
     factor_below(panel, height, 0)
 }

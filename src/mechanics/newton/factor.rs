@@ -1,8 +1,8 @@
-//! One sparse Cholesky factor, in one of two precisions, made anew in place: the multifrontal method.
+//! A sparse Cholesky factor in single or double precision, recomputed in place by the multifrontal method.
 //!
 //! Front by front, children first (Duff, Reid: "The multifrontal solution of indefinite sparse symmetric linear equations", ACM Trans.
 //! Math. Softw. 9(3), 1983): a front's panel takes the matrix's own blocks and the updates of its children; it is factored densely,
-//! and what that takes from the rows below is the front's own update. Subtrees go side by side, each with its updates on a stack; in
+//! and the product of its rows below the diagonal block is the front's own update. Subtrees go side by side, each with its updates on a stack; in
 //! the top above them the threads share each front's dense part. Nothing is allocated after the first time.
 
 use std::collections::TryReserveError;
@@ -66,7 +66,7 @@ struct SubtreeFactor<T> {
 }
 
 impl<T: Precision> Factor<T> {
-    /// Makes room where there is none yet: a solver seldom needs both precisions.
+    /// Allocates at the first use: a solver seldom needs both precisions.
     fn allocate(&mut self, symbolic: &SymbolicFactor) -> Result<(), SolveError> {
         let unknowns = 3 * symbolic.order.len();
         if self.right_side.len() == unknowns {
@@ -155,7 +155,7 @@ impl<T: Precision> Factor<T> {
         }
     }
 
-    /// L⁻¹ of what is in `right_side`, numbered anew.
+    /// L⁻¹ of `right_side`, in the order of elimination.
     fn forward(&mut self, symbolic: &SymbolicFactor) {
         let Self { subtrees, top, right_side, .. } = self;
         let (mut own, high) = by_subtree(symbolic, right_side);
@@ -182,7 +182,7 @@ impl<T: Precision> Factor<T> {
         }
     }
 
-    /// L⁻ᵀ of what is in `right_side`, numbered anew.
+    /// L⁻ᵀ of `right_side`, in the order of elimination.
     fn backward(&mut self, symbolic: &SymbolicFactor) {
         let Self { subtrees, top, right_side, .. } = self;
         let (mut own, high) = by_subtree(symbolic, right_side);
@@ -333,7 +333,7 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
     Ok(())
 }
 
-/// Adds some columns of a child's update to a matrix of so many rows, whose first row is the parent's row `skip`.
+/// Adds columns of a child's update to a matrix whose first row is the parent's row `skip`.
 fn extend<T: Precision>(
     symbolic: &SymbolicFactor,
     child: &Front,

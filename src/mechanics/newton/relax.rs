@@ -15,7 +15,7 @@
 //! | D_i | diagonal block of the damped Hessian of vertex i | N/m |
 //! | m | pairs kept, six: more cost more than they bring | – |
 //!
-//! Limits: takes off what is as short as a few triangles; a whole fold it moves by next to nothing.
+//! Limits: reduces errors as short as a few triangles; a whole fold hardly moves.
 
 use glam::{DMat3, DVec3};
 

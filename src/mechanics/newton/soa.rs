@@ -85,7 +85,7 @@ fn moved([p, q, r, s]: &[DVec3; 4], t: f64, [Four(a), Four(b), Four(c)]: &[Four;
 pub(super) struct Blocks(pub(super) Vec<[Four; 6]>);
 
 impl Blocks {
-    /// Zero for so many vertices.
+    /// Sets the blocks of this number of vertices to zero.
     pub(super) fn clear(&mut self, vertices: usize) {
         self.0.clear();
         self.0.resize(vertices.div_ceil(16) * 4, [Four::ZERO; 6]);

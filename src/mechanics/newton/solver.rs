@@ -103,7 +103,7 @@ impl Solver {
         done
     }
 
-    /// L⁻¹ x with the factor of the last [`solve`](Self::solve), L Lᵀ being a positive matrix near to that one; in an order of its own.
+    /// L⁻¹ x with the factor of the last [`solve`](Self::solve), L Lᵀ being a positive definite matrix near that one; in the order of elimination.
     pub(crate) fn lower(&mut self, x: &[DVec3]) -> Vec<f64> {
         let Self { symbolic, single, double } = self;
         single.as_mut().map_or_else(|| double.lower(symbolic, x), |single| single.lower(symbolic, x))

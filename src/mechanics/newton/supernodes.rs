@@ -13,13 +13,13 @@
 use crate::mechanics::energy::sparsity::Pattern;
 use crate::mesh::{Csr, NONE, renumbered};
 
-/// Up to so many columns may be put together with that share of zeros.
+/// Largest share of zeros at which supernodes are merged, by number of columns.
 const MAX_ZEROS: [(usize, f64); 4] = [(8, 0.5), (16, 0.2), (32, 0.1), (usize::MAX, 0.03)];
 
 /// A subtree has at most this share of all the work.
 const MAX_WORK_SHARE: f64 = 1.0 / 12.0;
 
-/// What is less work than this, in multiplications of blocks, is not worth a thread.
+/// Least work of a subtree that gets a thread, in multiplications of blocks.
 const MIN_WORK: f64 = 2e5;
 
 /// Columns that are eliminated together.

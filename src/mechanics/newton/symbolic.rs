@@ -1,6 +1,6 @@
 //! The elimination's plan: fronts in their order, what goes into each, and which of them are done side by side.
 //!
-//! Unknowns are numbered anew, supernode by supernode. The tree of supernodes is cut into a top and [`Subtree`]s below it: whole
+//! Unknowns are renumbered, supernode by supernode. The tree of supernodes is cut into a top and [`Subtree`]s below it: whole
 //! subtrees with about as much work each, that depend on none but themselves. Where the cut runs depends on the pattern alone, so the
 //! factor has the same bits on any number of threads.
 
@@ -30,7 +30,7 @@ pub(super) struct Run {
 /// A supernode's front: its columns, and the rows below them.
 #[derive(Debug, Clone)]
 pub(super) struct Front {
-    /// First unknown, numbered anew.
+    /// First unknown in the order of elimination.
     pub(super) first: usize,
     /// Unknowns eliminated, in blocks as all here.
     pub(super) columns: usize,
@@ -66,7 +66,7 @@ impl Front {
 #[derive(Debug, Clone)]
 pub(super) struct Subtree {
     pub(super) fronts: Range<usize>,
-    /// Its unknowns, numbered anew.
+    /// Its unknowns, in the order of elimination.
     pub(super) unknowns: Range<usize>,
     /// Numbers that its panels and its updates take, these one on top of the other.
     pub(super) panels_len: usize,
