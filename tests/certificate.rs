@@ -65,7 +65,7 @@ fn a_cloth_on_a_table_passes_every_line() {
     let (scene, x) = lying();
     let certificate = certified(&scene, &x);
     assert!(certificate.passes, "{:#?}", certificate.findings);
-    assert_eq!(certificate.findings.len(), 11);
+    assert_eq!(certificate.findings.len(), 12);
     let carried = &certificate.finding("forces add up").unwrap().remark;
     assert!(carried.contains("the body carries 100.0 %"), "{carried}");
 }
