@@ -169,7 +169,8 @@ fn skin_between_vertices_outside_the_body_is_reported() {
     // A fine mesh shows none even so.
     let (metrics, warnings, _) = draped_by(&Scene::of_meshes(&sphere(), cape(90, 36)).unwrap(), &bare);
     assert_eq!(metrics.body_crossing_pairs, 0);
-    assert_eq!(warnings, [""; 0]);
+    // Its folds may go through each other, as nothing keeps them apart here.
+    assert!(warnings.iter().all(|warning| !warning.contains("skin")), "{warnings:?}");
 }
 
 #[test]
