@@ -269,7 +269,7 @@ fn a_garment_that_its_fabric_crushes_is_warned_of_and_not_certified() {
         let certificate = certify(&scene, &settings.fabric, &drape.positions).unwrap();
         assert_eq!(certificate.finding("area kept").unwrap().passes, !crushed);
         assert_eq!(Metrics::of(&scene, &drape).verdict.contains("crushed to"), crushed);
-        // Cloth that has not come to rest may still unfold.
+        // Cloth that does not rest yet may still unfold.
         for steps in [0, 1, 2, 4, 8] {
             let unfinished = scene.drape(&Settings { refine: Refine::Steps(steps), ..settings.clone() }).unwrap();
             let rests = unfinished.state.as_ref().unwrap().stop == Stop::Converged;

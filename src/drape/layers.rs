@@ -17,7 +17,7 @@ use super::parts::{StageTwo, stage_one};
 use super::pipeline::{Moved, moved, needs_cloth, timed};
 use super::result::{Drape, PartOutcome, StageTimes};
 use super::settings::Settings;
-use super::stages::{Distances, DrapeParts, StartsFrom, refine_from, settled};
+use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Observer, Record, Step};
@@ -84,7 +84,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         times.refine += refining.elapsed();
     }
     let folds = worn.all_folds();
-    let made = DrapeParts {
+    let made = StageResults {
         ground,
         table,
         level_part_count: parts.len(),

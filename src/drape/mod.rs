@@ -26,7 +26,7 @@ pub use release::Release;
 pub(crate) use release::{ReleasedDrape, let_go};
 pub use result::{ClothState, Drape, PartOutcome, StageTimes};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
-pub(crate) use stages::{Distances, DrapeParts, StartsFrom, folds_of, refine_from, settled};
+pub(crate) use stages::{Distances, StageResults, StartsFrom, folds_of, refine_from, settled};
 
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is called after each and may end
 /// them.

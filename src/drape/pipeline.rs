@@ -12,7 +12,7 @@ use super::parts::{StageTwo, stage_one, stage_two};
 use super::release::{Release, ReleasedDrape, let_go};
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
-use super::stages::{Distances, DrapeParts, StartsFrom, folds_of, refine_from, settled};
+use super::stages::{Distances, StageResults, StartsFrom, folds_of, refine_from, settled};
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::Observer;
 use crate::parts::Parts;
@@ -42,7 +42,7 @@ pub(super) fn drape_one(scene: &Scene, settings: &Settings, observer: Observer<'
     let Moved { stage, folds, state, let_go } =
         moved(scene, settings, &ground, parts, cloth.as_ref(), &mut times, observer)?;
     times.mechanics += cloth_time;
-    let made = DrapeParts { ground, table, level_part_count, stage, folds, state, let_go };
+    let made = StageResults { ground, table, level_part_count, stage, folds, state, let_go };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();
     Ok(drape)

@@ -1,7 +1,7 @@
 //! Releases edges that are held only until the garment rests: it then stays up or slides.
 //!
 //! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Friction and the shape of the hips
-//! decide whether it stays up: the steps continue with nothing held. If the cloth comes to rest again and its waist has sunk little, this
+//! decide whether it stays up: the steps continue with nothing held. If the cloth rests again and its waist has sunk little, this
 //! is the drape; if it slides, the held drape is kept and a warning says so.
 
 use std::ops::ControlFlow;

@@ -116,6 +116,7 @@ impl Drape {
         let (Some(folds), 0..=1) = (&self.folds, scene.layers.len()) else { return Ok(None) };
         let Scene { garment, topology, rest, held, body, .. } = scene;
         let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?;
-        Ok(Some(folded_surface(&cloth, topology, body, &self.preview, folds)))
+        let preview = garment.with_positions(self.preview.clone());
+        Ok(Some(folded_surface(&cloth, topology, body, &preview, folds)))
     }
 }

@@ -102,7 +102,7 @@ pub(crate) fn settled(
 }
 
 /// The results of all stages.
-pub(crate) struct DrapeParts {
+pub(crate) struct StageResults {
     pub(crate) ground: Distances,
     pub(crate) table: RangeTable,
     pub(crate) level_part_count: usize,
@@ -112,7 +112,7 @@ pub(crate) struct DrapeParts {
     pub(crate) let_go: Option<Release>,
 }
 
-impl DrapeParts {
+impl StageResults {
     /// The drape, with what must be looked for in it.
     pub(crate) fn judged(self, scene: &Scene, settings: &Settings, times: StageTimes) -> Drape {
         let Self { ground, table, level_part_count, stage, folds, state, let_go } = self;

@@ -39,7 +39,7 @@ use super::folds::Folds;
 use crate::GRAVITY;
 use crate::base::math;
 use crate::body::distance::Body;
-use crate::mesh::Topology;
+use crate::mesh::{Topology, TriMesh};
 
 /// Excess length from which cloth folds: below it compression and rounding of the mesh look alike. Folds grow from here to twice of it.
 const MIN_EXCESS: f64 = 0.05;
@@ -71,20 +71,21 @@ pub struct FoldedSurface {
     pub counts: Vec<usize>,
 }
 
-/// Draws the `folds` of `cloth` at `x` (m), over `body`.
+/// Draws the `folds` of `cloth` on its `preview`, over `body`.
 pub(crate) fn folded_surface(
     cloth: &Cloth,
     topology: &Topology,
     body: &Body,
-    x: &[DVec3],
+    preview: &TriMesh,
     folds: &Folds,
 ) -> FoldedSurface {
+    let x = &preview.positions;
     let mut excess: Vec<f64> = folds.excess_percent.iter().map(|percent| 0.01 * percent).collect();
     for _ in 0..SMOOTHING {
         excess = averaged(topology, &excess);
     }
     let wave = Wave::new();
-    let normals = normals(cloth, x);
+    let normals = preview.vertex_normals();
     let mut moves = vec![0.0; x.len()];
     let mut counts = Vec::new();
     for region in regions(topology, &excess) {
@@ -125,17 +126,6 @@ fn averaged(topology: &Topology, values: &[f64]) -> Vec<f64> {
         if near.is_empty() { value } else { 0.5 * (value + sum / near.len() as f64) }
     };
     values.iter().enumerate().map(of_vertex).collect()
-}
-
-/// Unit normals of the vertices, by area.
-fn normals(cloth: &Cloth, x: &[DVec3]) -> Vec<DVec3> {
-    let mut sum = vec![DVec3::ZERO; x.len()];
-    for t in cloth.triangles.iter() {
-        let [a, b, c] = t.vertices.map(|v| x[v as usize]);
-        let normal = (b - a).cross(c - a);
-        t.vertices.iter().for_each(|&v| sum[v as usize] += normal);
-    }
-    sum.into_iter().map(DVec3::normalize_or_zero).collect()
 }
 
 /// Connected vertices whose excess is over [`MIN_EXCESS`].
@@ -367,8 +357,8 @@ mod tests {
     use super::*;
     use crate::garment::fabric::Fabric;
     use crate::mechanics::folds::folds;
+    use crate::mesh::RestShape;
     use crate::mesh::samples::{cuboid, tube};
-    use crate::mesh::{RestShape, TriMesh};
 
     const ROWS: u32 = 30;
     const AROUND: u32 = 96;
@@ -389,7 +379,7 @@ mod tests {
         let topology = Topology::new(&tube);
         let cloth = Cloth::new(&tube, &topology, &RestShape::from_edges(&rest).unwrap(), &fabric, &[]).unwrap();
         let body = Body::new(&cuboid(DVec3::new(-post, -post, -0.1), DVec3::new(post, post, 0.7))).unwrap();
-        let drawn = folded_surface(&cloth, &topology, &body, &tube.positions, &folds(&cloth, &tube.positions));
+        let drawn = folded_surface(&cloth, &topology, &body, &tube, &folds(&cloth, &tube.positions));
         let inside = body.nearest_all(&drawn.positions).iter().filter(|near| near.signed_distance <= 0.0).count();
         assert_eq!(inside, 0);
         let hem = |v: usize| drawn.positions[v % AROUND as usize];
@@ -425,17 +415,18 @@ mod tests {
         let body = Body::new(&cuboid(DVec3::splat(-0.05), DVec3::splat(0.05))).unwrap();
         let cloth = Cloth::new(&mesh, &topology, &RestShape::from_edges(&mesh).unwrap(), &fabric, &[]).unwrap();
         let none = folds(&cloth, &mesh.positions);
-        let drawn = folded_surface(&cloth, &topology, &body, &mesh.positions, &none);
+        let drawn = folded_surface(&cloth, &topology, &body, &mesh, &none);
         assert!(drawn.counts.is_empty() && drawn.positions == mesh.positions);
         // Half of a tube does not close: squeezed to half its width, it has excess and no folds.
         let half = crate::mesh::samples::sheet(24, 12, |i, j| (math::unit(PI * i / 24.0) * 0.2).extend(j * 0.03));
-        let squeezed: Vec<DVec3> = half.positions.iter().map(|p| *p * DVec3::new(0.5, 0.5, 1.0)).collect();
+        let squeeze = |p: &DVec3| *p * DVec3::new(0.5, 0.5, 1.0);
+        let squeezed = half.with_positions(half.positions.iter().map(squeeze).collect());
         let topology = Topology::new(&half);
         let cloth = Cloth::new(&half, &topology, &RestShape::from_edges(&half).unwrap(), &fabric, &[]).unwrap();
-        let excess = folds(&cloth, &squeezed);
+        let excess = folds(&cloth, &squeezed.positions);
         assert!(excess.excess_percent.iter().all(|&e| e > 40.0));
         let drawn = folded_surface(&cloth, &topology, &body, &squeezed, &excess);
-        assert!(drawn.counts.is_empty() && drawn.positions == squeezed);
+        assert!(drawn.counts.is_empty() && drawn.positions == squeezed.positions);
     }
 
     #[test]

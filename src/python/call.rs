@@ -1,4 +1,4 @@
-//! Runs a computation for Python: without the GIL, on threads of its own, until a signal arrives.
+//! Runs a computation for Python: without the GIL, in a separate pool of threads, until a signal arrives.
 //!
 //! The global pool of rayon does not survive a fork, and two computations in one pool could wait for each other's locks. Each call
 //! therefore takes a pool that no other call uses and returns it afterwards.

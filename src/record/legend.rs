@@ -152,7 +152,7 @@ fn width(label: &str) -> f64 {
 const CAPTION_ROW: f64 = 4.2;
 
 /// The visible part of a drawing of captions alone. It is wider for its height than its view, so that the columns are as wide as those of
-/// the views above, whatever the window.
+/// the views above in a window of any size.
 pub(super) fn visible_captions([columns, rows]: [usize; 2]) -> [[f64; 2]; 2] {
     let step = CAPTION_ROW * columns as f64;
     [[0.0, columns as f64 * CELL[0]], [0.0, (rows as f64 - 0.5) * step]]

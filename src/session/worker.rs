@@ -14,7 +14,7 @@ use super::state::{SessionState, ms_since, sum_by_part};
 use super::task::{COARSE_STEPS, Refinement, Target, Task, reactions};
 use crate::base::error_text::with_causes;
 use crate::drape::{
-    ClothState, Distances, Drape, DrapeError, DrapeParts, Levels, Model, Refine, ReleasedDrape, StageTimes, StageTwo,
+    ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, StageResults, StageTimes, StageTwo,
     StartsFrom, approach, drape, folds_of, let_go, outcome, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
@@ -390,7 +390,7 @@ impl Worker {
             let cloth_state: &ClothState = rest.cloth_state.as_deref()?;
             Some((rest.positions.to_vec(), ClothState { steps: rest.steps, ..cloth_state.clone() }))
         });
-        let made = DrapeParts {
+        let made = StageResults {
             ground: loaded_scene.distances.clone(),
             table: (*segmented.table).clone(),
             level_part_count: segmented.table_parts.len(),

@@ -7,7 +7,7 @@ export function centimetres(text, open = false) {
   return /^[+-]?(\d+\.?\d*|\.\d+)$/.test(plain) ? Number(plain) : null;
 }
 
-// Several numbers between separators; null if any is none.
+// Several numbers between separators; null if one of them is not a number.
 export function several(text, separators) {
   const numbers = text.split(separators).filter((part) => part.trim() !== "").map((part) => centimetres(part));
   return numbers.includes(null) ? null : numbers;
@@ -44,7 +44,7 @@ export function accept(field) {
   (reason?.closest("tr.reason") ?? reason)?.remove();
 }
 
-// Takes all marks away; whatever is then shown replaces what was refused.
+// Removes all marks, before the fields show other values.
 export function acceptAll() {
   document.querySelectorAll('[aria-invalid="true"]').forEach(accept);
 }

@@ -27,7 +27,7 @@ function write(field, text) {
   if (document.activeElement !== field && !isRefused(field)) field.value = text;
 }
 
-// What a field holds while nothing wrong is typed.
+// The last valid value of a field.
 const kept = {
   measure: (name) => cm(session.state.job.measurements[name]),
   extent: () => session.state.job.max_extent_cm.join(", "),

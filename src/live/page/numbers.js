@@ -141,7 +141,7 @@ export function showPins(state, remove) {
   showColumns(state);
 }
 
-// What each column of views shows, while pinned states have columns: the newest state, the pins, and the drape at rest.
+// Contents of the columns of views while pinned states have columns: the newest state, the pins, and the drape at rest.
 function showColumns(state) {
   const shown = state.pins.filter((pin) => pin.shown);
   const parts = (count) => (count === undefined ? "" : `, ${count} PARTs`);

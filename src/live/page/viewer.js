@@ -41,7 +41,7 @@ export async function start(theme, picked) {
 
 // The viewer takes the Tab key for its own fields and would never give the focus back; here the browser moves it on.
 function leaveByTab() {
-  // The hidden field in which the viewer takes texts is no stop of its own.
+  // The viewer's hidden text field is skipped by Tab.
   const texts = scene.querySelector(":scope > input");
   if (texts) texts.tabIndex = -1;
   const leave = (event) => {

@@ -1,7 +1,7 @@
 //! Which PARTs move each triangle, each bending ring and each vertex, and where their blocks of the reduced Hessian are.
 //!
 //! An element couples every pair of PARTs that have weight at one of its vertices: such pairs are numbered, and contributions of elements are
-//! summed by pair. The pattern is built by PART: the column of a PART's unknown holds the lower triangle of its own block, then the
+//! summed by pair. The pattern is built by PART: the column of an unknown holds the lower triangle of its PART's block, then the
 //! blocks of neighbours that are eliminated later.
 
 use crate::mechanics::energy::Cloth;

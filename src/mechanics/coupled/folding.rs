@@ -1,7 +1,7 @@
 //! Folds finer than a PART: the compression ratio of the membrane.
 //!
-//! A PART does not fold within itself, but its cloth can: a ring of a skirt that is too wide for its place takes up the excess in
-//! folds that no motion of the ring shows. By tension field theory their energy is close to zero ([`membrane`]). A
+//! A PART does not fold within itself, but its cloth can: a ring of a skirt that is too wide for its place folds up the excess,
+//! although no motion of the ring shows it. By tension field theory their energy is close to zero ([`membrane`]). A
 //! strip of length ℓ buckles under π² B/ℓ², so the share of the stiffness k that a PART as wide as ℓ keeps under compression is
 //!
 //! r = π² B / (k ℓ²), and never more than the mesh's own.
