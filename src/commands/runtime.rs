@@ -17,6 +17,7 @@ use crate::live::LiveError;
 use crate::mechanics::refine::{Observer, RefineOptions};
 use crate::record::RecordError;
 use crate::study::accuracy::ReferenceCache;
+use crate::study::drape_test::DrapeTestError;
 use crate::study::evaluate::EvaluateError;
 
 use super::console;
@@ -65,6 +66,7 @@ fn is_users(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<crate::parts::range_table::TableError>()
         || cause.is::<crate::scene::SceneError>()
         || cause.is::<crate::session::EditError>()
+        || matches!(cause.downcast_ref(), Some(DrapeTestError::Radii { .. } | DrapeTestError::TooCoarse { .. }))
         || cause.is::<crate::study::sweep::MergeError>()
         || cause.is::<crate::study::sweep::PlanError>()
         || cause.is::<crate::study::sweep::StoreError>()

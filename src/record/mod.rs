@@ -6,6 +6,7 @@
 mod blueprint;
 mod charts;
 mod compare;
+mod drape_tests;
 mod error;
 mod eye;
 mod layout;
@@ -32,6 +33,7 @@ mod writer;
 
 pub use crate::colour::Overlay;
 pub(crate) use compare::{Colours, Compared};
+pub(crate) use drape_tests::{DrapeTestRecording, NamedOutline};
 pub use error::RecordError;
 pub use layout::{Layout, Tab};
 pub(crate) use live::{LiveEncoder, LiveShape, PinnedView, outlines};

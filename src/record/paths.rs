@@ -33,6 +33,7 @@
 //! | `/legend/stages/table` | Points2D | the table's name | `table` |
 //! | `/legend/<tab>/<name>/bar`, `.../ticks` | LineStrips2D, Points2D | colour bars of a tab, in one drawing | `table` |
 //! | `/scatter/points`, `.../names`, `.../leaders`, `.../axes`, `.../ticks` | Points2D, LineStrips2D | time against error, a point per table | `table` |
+//! | `/outlines` | LineStrips2D | outlines of drape tests from above, mm | `table` |
 //! | `/growth/points` and so on | the same | vertices against time, a point per method and garment | `table` |
 
 pub(crate) const BODY: &str = "/body";
@@ -48,6 +49,7 @@ pub(crate) const PATTERN: &str = "/pattern";
 pub(crate) const OUTFIT: &str = "/outfit";
 pub(crate) const SEAMS: &str = "/wrinkles/seams";
 pub(crate) const CURVATURE: &str = "/wrinkles/curvature";
+pub(crate) const OUTLINES: &str = "/outlines";
 pub(crate) const ERROR: &str = "/error";
 pub(crate) const REPORT: &str = "/report";
 pub(crate) const HISTOGRAM: &str = "/levels/histogram";

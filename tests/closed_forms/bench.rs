@@ -96,6 +96,7 @@ pub(crate) fn fabric(density: f64, stretch: f64, poisson: f64, bending: f64, fri
         shear_n_per_m: stretch / (2.0 * (1.0 + poisson)),
         poisson,
         bending_nm: [bending; 3],
+        bending_friction_n: [0.0; 2],
         friction,
     }
 }

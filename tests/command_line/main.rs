@@ -281,7 +281,7 @@ fn the_drape_test_takes_a_fabric_from_a_file() {
         reader.records().next().unwrap().unwrap()
     };
     let (file, built_in) = (test("my, silk.toml", "file.csv"), test("silk", "built-in.csv"));
-    assert_eq!((&file[0], &file[1], &file[5]), ("my, silk.toml", &built_in[1], "no published band"));
+    assert_eq!((&file[0], &file[1], &file[6]), ("my, silk.toml", &built_in[1], "no published band"));
     bench.refuses(&["cusick", "nowhere.toml"], &["nowhere.toml", "cannot be read"]);
 }
 

@@ -36,6 +36,7 @@ fn cloth() -> Fabric {
         shear_n_per_m: 10.0,
         poisson: 0.3,
         bending_nm: [1e-5; 3],
+        bending_friction_n: [0.0; 2],
         friction: 0.3,
     }
 }

@@ -23,11 +23,12 @@
 //! | B_u, B_45, B_v | bending stiffness along weft, bias and warp | N·m |
 //! | x_uu, x_uv, x_vv | second derivatives of the position | 1/m |
 //!
-//! Limits: flat rest; the stiffness is that at small curvature, without the hysteresis of real cloth.
+//! Limits: flat rest; one stiffness at all curvatures. The friction between yarns is a term of its own (`bending_friction`).
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::bending_friction::BendingFriction;
 use super::bending_matrix::BendingMatrix;
 use super::vertex_ring::VertexRing;
 use crate::garment::fabric::Fabric;
@@ -44,6 +45,8 @@ pub(crate) struct Bending {
     weights: Vec<DVec3>,
     /// The sum of all elements.
     pub(super) matrix: BendingMatrix,
+    /// Friction between yarns.
+    pub(super) friction: BendingFriction,
 }
 
 /// One ring or hinge: its range of the weights, and its stiffness A·(B_u, H, B_v), N·m³.
@@ -81,6 +84,7 @@ impl Bending {
             if let (Some(ring), Some(weights)) = (ring, weights) {
                 let whole = stiffness.iter().zip(&share).map(|(stiffness, share)| *stiffness * share[v]).sum();
                 bending.push_ring(v as u32, ring, weights, whole);
+                bending.add_friction(fabrics, share.iter().map(|share| share[v]));
             }
         }
         let mean: Vec<f64> = fabrics.iter().map(Fabric::mean_bending_nm).collect();
@@ -101,6 +105,14 @@ impl Bending {
         self.vertices.extend(&ring.neighbours);
         self.weights.extend(weights);
         self.elements.push(Element { start, end: self.vertices.len() as u32, stiffness });
+    }
+
+    /// Gives the last ring its friction.
+    fn add_friction(&mut self, fabrics: &[Fabric], shares: impl Iterator<Item = f64>) {
+        if let Some(Element { start, .. }) = self.elements.last() {
+            let (vertices, weights) = (&self.vertices[*start as usize..], &self.weights[*start as usize..]);
+            self.friction.push(vertices, weights, fabrics, shares);
+        }
     }
 
     fn push_hinge(&mut self, mesh: &TriMesh, rest: &RestShape, [a, b]: [u32; 2], wings: [u32; 2], mean: &[f64]) {

@@ -375,7 +375,8 @@ impl Cloth {
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
         let with_itself = contacts.proximity.as_ref().map_or(0.0, |p| p.add_gradient(x, &self.held, gradient));
-        weight + (a + b) + contacts.energy() + contacts.friction.energy(x) + with_itself
+        let between_yarns = self.bending.friction.add_gradient(x, &self.held, gradient);
+        weight + (a + b) + contacts.energy() + contacts.friction.energy(x) + with_itself + between_yarns
     }
 
     /// Adds the gradients of both halves and of gravity, zero at held vertices; returns the energy of gravity.
@@ -430,6 +431,9 @@ impl Cloth {
         for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
             layout.add(&layout.free(gap.members()), block, blocks);
         }
+        for bent in self.bending.friction.bent(x) {
+            layout.add_element(bent.vertices(), |i, j| bent.block(i, j), blocks);
+        }
     }
 
     /// The diagonal block of each vertex in the projected Hessian plus ε M at `x`, N/m.
@@ -448,6 +452,11 @@ impl Cloth {
         for (gap, block) in contacts.proximity.iter().flat_map(|p| p.hessian(x)) {
             for (v, w) in gap.members() {
                 blocks[v as usize] += block * (w * w);
+            }
+        }
+        for bent in self.bending.friction.bent(x) {
+            for (i, &v) in bent.vertices().iter().enumerate() {
+                blocks[v as usize] += bent.block(i, i);
             }
         }
     }

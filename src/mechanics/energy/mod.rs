@@ -14,6 +14,7 @@
 //! | self-contact | `proximity` | Σ ½ κ A (h − n·Σ w x)², and friction |
 
 pub(crate) mod bending;
+mod bending_friction;
 mod bending_matrix;
 mod cloth;
 mod contact;

@@ -180,6 +180,18 @@ impl HessianLayout {
         }
     }
 
+    /// Adds the symmetric matrix whose block (N/m) between members i and j of `vertices` is `block(i, j)`.
+    pub(crate) fn add_element(&self, vertices: &[u32], block: impl Fn(usize, usize) -> DMat3, blocks: &mut [DMat3]) {
+        for (i, &v) in vertices.iter().enumerate() {
+            for (j, &w) in vertices[..=i].iter().enumerate() {
+                let slot = self.pattern.slot(self.unknown[v as usize], self.unknown[w as usize]);
+                if let Some(sum) = blocks.get_mut(slot.block as usize) {
+                    *sum += if slot.transposed { block(i, j).transpose() } else { block(i, j) };
+                }
+            }
+        }
+    }
+
     /// Whether the pattern has a block for each of these pairs of vertices; pairs with a held vertex need none.
     pub(crate) fn has(&self, mut pairs: impl Iterator<Item = [u32; 2]>) -> bool {
         pairs.all(|[a, b]| {

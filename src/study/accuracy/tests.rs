@@ -65,6 +65,7 @@ fn fabric() -> Fabric {
         shear_n_per_m: 40.0,
         poisson: 0.0,
         bending_nm: [1e-6; 3],
+        bending_friction_n: [0.0; 2],
         friction: 0.0,
     }
 }

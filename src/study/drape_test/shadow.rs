@@ -8,9 +8,9 @@ use crate::mesh::TriMesh;
 /// alike: 0.5 % of the coefficient. Halving it quadruples the time.
 const CELL: f64 = 2.5e-4;
 
-/// Area of the shadow of `drape` along z together with a full disc of radius `plate` (m) about the origin, m².
-pub(crate) fn shadow_area(drape: &TriMesh, plate: f64) -> f64 {
-    let reach = drape.positions.iter().map(|p| p.x.abs().max(p.y.abs())).fold(plate, f64::max);
+/// Area of the shadow of `drape` along z together with a full disc of radius `disc` (m) about the origin, m².
+pub(crate) fn shadow_area(drape: &TriMesh, disc: f64) -> f64 {
+    let reach = drape.positions.iter().map(|p| p.x.abs().max(p.y.abs())).fold(disc, f64::max);
     let half = (reach / CELL).ceil() as i64 + 1;
     let side = 2 * half as usize;
     let mut dark = vec![false; side * side];
@@ -31,10 +31,10 @@ pub(crate) fn shadow_area(drape: &TriMesh, plate: f64) -> f64 {
             }
         }
     }
-    let disc = |i: i64, j: i64| DVec2::new(centre(i), centre(j)).length() <= plate;
+    let on_disc = |i: i64, j: i64| DVec2::new(centre(i), centre(j)).length() <= disc;
     let count = (-half..half)
         .flat_map(|j| (-half..half).map(move |i| (i, j)))
-        .filter(|&(i, j)| dark[(j + half) as usize * side + (i + half) as usize] || disc(i, j))
+        .filter(|&(i, j)| dark[(j + half) as usize * side + (i + half) as usize] || on_disc(i, j))
         .count();
     count as f64 * CELL * CELL
 }
@@ -42,12 +42,14 @@ pub(crate) fn shadow_area(drape: &TriMesh, plate: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::drape_test::{PLATE_RADIUS, SPECIMEN_RADIUS, specimen};
+    use crate::study::drape_test::specimen::specimen;
+    use crate::study::drape_test::standards::DrapeTest;
 
     #[test]
     fn the_shadow_of_a_flat_specimen_has_its_area() {
-        let area = shadow_area(&specimen(12).mesh, PLATE_RADIUS);
-        let circle = std::f64::consts::PI * SPECIMEN_RADIUS * SPECIMEN_RADIUS;
+        let test = DrapeTest::default();
+        let area = shadow_area(&specimen(&test).mesh, test.disc_m);
+        let circle = std::f64::consts::PI * test.specimen_m * test.specimen_m;
         assert!((area / circle - 1.0).abs() < 3e-3, "{area} for {circle}");
     }
 }

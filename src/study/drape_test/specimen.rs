@@ -1,40 +1,34 @@
-//! The specimen: a disc meshed in rings of nearly equilateral triangles, without the part between the plates.
+//! The specimen: a circle meshed in rings of nearly equilateral triangles, without the part on the disc.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::DVec3;
 
+use super::standards::DrapeTest;
 use crate::base::math;
 use crate::mesh::TriMesh;
-
-/// Radius of the specimen, m.
-pub(crate) const SPECIMEN_RADIUS: f64 = 0.15;
-
-/// Radius of the plates, m.
-pub(crate) const PLATE_RADIUS: f64 = 0.09;
 
 /// The flat specimen.
 #[derive(Debug, Clone)]
 pub(crate) struct Specimen {
     /// Its mesh, at z = 0.
     pub mesh: TriMesh,
-    /// The vertices between the plates.
+    /// The vertices on the disc.
     pub held: Vec<u32>,
-    /// The vertices of the rim, in order.
-    pub rim: Range<usize>,
 }
 
-/// A specimen with `rows` rows of cells from the plates' edge to the rim.
+/// The specimen of a test.
 ///
-/// The last held ring lies half a cell outside the plates' edge. A ring of vertices bends over half a cell to either side, so the
-/// discrete cloth is clamped at the plates' edge.
-pub(crate) fn specimen(rows: usize) -> Specimen {
-    let cell = (SPECIMEN_RADIUS - PLATE_RADIUS) / (rows as f64 + 0.5);
+/// The last held ring lies half a cell outside the disc's edge. A ring of vertices bends over half a cell to either side, so the
+/// discrete cloth is clamped at the disc's edge.
+pub(crate) fn specimen(test: &DrapeTest) -> Specimen {
+    let rows = test.rows;
+    let cell = (test.specimen_m - test.disc_m) / (rows as f64 + 0.5);
     let mut mesh = TriMesh::default();
     let mut rings: Vec<Range<usize>> = Vec::new();
     for k in 0..rows + 2 {
-        let radius = SPECIMEN_RADIUS - cell * (rows + 1 - k) as f64;
+        let radius = test.specimen_m - cell * (rows + 1 - k) as f64;
         // Equilateral triangles are 2/√3 of their height wide.
         let count = (TAU * radius / (cell * 2.0 / 3f64.sqrt())).round().max(6.0) as usize;
         let start = mesh.positions.len();
@@ -48,7 +42,7 @@ pub(crate) fn specimen(rows: usize) -> Specimen {
         }
         rings.push(start..start + count);
     }
-    Specimen { mesh, held: (0..rings[1].end as u32).collect(), rim: rings[rows + 1].clone() }
+    Specimen { mesh, held: (0..rings[1].end as u32).collect() }
 }
 
 /// Triangles between two rings, counter-clockwise from above; each step advances the ring that lags behind.
@@ -69,14 +63,20 @@ fn triangulate(inner: Range<usize>, outer: Range<usize>, offsets: [f64; 2], tria
     }
 }
 
-/// Start positions: waves of two to nine folds with an amplitude of half a millimetre each at the rim, because a flat cloth is an unstable
-/// equilibrium. Phases differ by golden angles, so that no number of folds is favoured.
-pub(super) fn waved(flat: &Specimen) -> Vec<DVec3> {
+/// Start positions: waves of two to nine nodes with an amplitude of half a millimetre each at the rim, because a flat cloth is an unstable
+/// equilibrium. Phases differ by golden angles, so that no number of nodes is favoured, and differ from start to start. The waves turn
+/// with the weft, so that the mesh alone distinguishes turned tests.
+pub(super) fn waved(flat: &Specimen, test: &DrapeTest) -> Vec<DVec3> {
     let golden = TAU * (1.0 - 1.0 / 1.618_033_988_749_895);
     let wave = |p: &DVec3| {
-        let r = (p.truncate().length() - PLATE_RADIUS).max(0.0) / (SPECIMEN_RADIUS - PLATE_RADIUS);
-        let theta = math::atan2(p.y, p.x);
-        let sum: f64 = (2..10).map(|n| math::cos(f64::from(n) * (theta + golden * f64::from(n)))).sum();
+        let r = (p.truncate().length() - test.disc_m).max(0.0) / (test.specimen_m - test.disc_m);
+        let theta = math::atan2(p.y, p.x) - test.turned;
+        let sum: f64 = (2..10)
+            .map(|n| {
+                let phase = golden * f64::from(n + 8 * test.start);
+                math::cos(f64::from(n) * (theta + phase))
+            })
+            .sum();
         *p + DVec3::Z * (5e-4 * r * r * sum)
     };
     let (held, free) = flat.mesh.positions.split_at(flat.held.len());

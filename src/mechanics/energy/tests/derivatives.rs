@@ -64,6 +64,49 @@ fn bending_gradient_matches_differences() {
     assert!((rest - cloth.bending.energy(&x)).abs() < 1e-12 * whole.abs(), "{rest} J");
 }
 
+/// A fabric whose friction between yarns exceeds its elastic moments at the curvatures of [`deformed`].
+fn rubbing() -> Fabric {
+    Fabric { bending_friction_n: [3e-4, 1e-3], ..fabric() }
+}
+
+#[test]
+fn bending_friction_gradient_matches_differences() {
+    // Ten times as large, so that a difference bends by much less than the width. Bent far beyond the width, and nearly flat.
+    let large = |p: DVec3| 10.0 * p;
+    let mesh = TriMesh::new(sheet().positions.into_iter().map(large).collect(), sheet().triangles);
+    let cloth = cloth_of(&mesh, &rubbing(), &[]);
+    let energy = |x: &[DVec3]| {
+        let mut unused = vec![DVec3::ZERO; x.len()];
+        cloth.bending.friction.add_gradient(x, &cloth.held, &mut unused)
+    };
+    for height in [100.0, 1.0] {
+        let x: Vec<DVec3> = deformed(&sheet()).iter().map(|p| large(*p * DVec3::new(1.0, height, 1.0))).collect();
+        let mut gradient = vec![DVec3::ZERO; x.len()];
+        cloth.bending.friction.add_gradient(&x, &cloth.held, &mut gradient);
+        check_gradient(&x, energy, &gradient, "bending friction");
+    }
+}
+
+#[test]
+fn bending_friction_hessian_matches_differences() {
+    // Flat and stretched, the projection drops nothing; the curvature is of the order of the width.
+    let mesh = sheet();
+    let x: Vec<DVec3> =
+        mesh.positions.iter().map(|p| DVec3::new(1.05 * p.x, 0.7 * p.x * p.z + 0.3 * p.z * p.z, 1.08 * p.z)).collect();
+    let stiff = Fabric { bending_friction_n: [0.3, 1.0], ..fabric() };
+    let cloth = cloth_of(&mesh, &stiff, &[0, 7, 20]);
+    // The step of the difference bends by a hundredth of the width.
+    check_hessian(&cloth, &x, &Contacts::none(), 3e-3);
+    let (mut blocks, mut diagonal) = (Vec::new(), Vec::new());
+    cloth.hessian(&x, &Contacts::none(), &mut blocks);
+    cloth.diagonal_blocks(&x, &Contacts::none(), 0.0, &mut diagonal);
+    for (i, &v) in cloth.order().iter().enumerate() {
+        let own = blocks[cloth.pattern().starts[i] as usize];
+        let error = (own - diagonal[v as usize]).abs_diff_eq(glam::DMat3::ZERO, 1e-9 * own.determinant().abs().cbrt());
+        assert!(error, "vertex {v}");
+    }
+}
+
 /// A block below y = 0.
 pub(crate) fn block() -> Body {
     Body::new(&cuboid(DVec3::new(-0.5, -1.0, -0.5), DVec3::new(0.5, 0.0, 0.5))).unwrap()

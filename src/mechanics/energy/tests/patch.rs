@@ -51,6 +51,7 @@ pub(crate) fn fabric() -> Fabric {
         shear_n_per_m: 40.0,
         poisson: 0.25,
         bending_nm: [2e-5, 5e-5, 9e-5],
+        bending_friction_n: [0.0; 2],
         friction: 0.3,
     }
 }

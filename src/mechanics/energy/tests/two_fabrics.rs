@@ -19,6 +19,7 @@ fn other() -> Fabric {
         shear_n_per_m: 150.0,
         poisson: 0.1,
         bending_nm: [3e-4, 1e-4, 2e-4],
+        bending_friction_n: [0.0; 2],
         friction: 0.7,
         ..fabric()
     }
