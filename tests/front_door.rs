@@ -9,7 +9,7 @@ use std::path::Path;
 
 use fixtures::{Diagonals, cuboid, flipped, grid};
 use partwise::drape::{Refine, unobserved};
-use partwise::mesh::{ObjSource, TriMesh};
+use partwise::mesh::{MeshSource, TriMesh};
 use partwise::parts::range_table::TableRule;
 use partwise::scene::SceneError;
 use partwise::study::job::{Against, Job};
@@ -129,7 +129,7 @@ fn meshes_in_memory_give_the_scene_of_their_files() {
     for (file, name, mesh) in [(&body, "arrays/body", block()), (&garment, "arrays/garment", sheet())] {
         write(Path::new(file), &mesh);
         let faces: Vec<i64> = mesh.triangles.as_flattened().iter().map(|&v| v.into()).collect();
-        let source = ObjSource::of_arrays(mesh.positions, &faces, 3).unwrap();
+        let source = MeshSource::of_arrays(mesh.positions, &faces, 3).unwrap();
         in_memory.in_memory.insert(name.into(), source.into());
     }
     let [read, given] = [SceneSpec { body, garment, ..spec }, in_memory.clone()].map(|spec| spec.load().unwrap());
@@ -139,6 +139,6 @@ fn meshes_in_memory_give_the_scene_of_their_files() {
     assert_eq!(given.garment_name, "garment");
     in_memory.in_memory.remove("arrays/garment");
     assert!(in_memory.load().unwrap_err().to_string().contains("arrays/garment"));
-    let problem = ObjSource::of_arrays(vec![DVec3::ZERO; 2], &[0, 1, 2], 3).unwrap_err().to_string();
+    let problem = MeshSource::of_arrays(vec![DVec3::ZERO; 2], &[0, 1, 2], 3).unwrap_err().to_string();
     assert_eq!(problem, "faces[0, 2]: found 2, expected 0 to 1, the vertices of the mesh");
 }

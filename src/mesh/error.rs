@@ -14,10 +14,11 @@ pub enum MeshError {
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
     /// The file has another format.
-    #[error(
-        "{file}: found {found}, expected a Wavefront OBJ text (lines that begin with v and f); export the mesh as .obj"
-    )]
-    NotObj { file: PathBuf, found: &'static str },
+    #[error("{file}: found {found}, expected a mesh as OBJ, PLY, STL, glTF (.glb) or NumPy archive (.npz); export it as one of these")]
+    UnknownFormat { file: PathBuf, found: &'static str },
+    /// The contents of a file without lines are wrong.
+    #[error("{file}: {problem}")]
+    Broken { file: PathBuf, problem: String },
     /// One line is wrong.
     #[error("{file}, line {line}: {problem}")]
     Line { file: PathBuf, line: usize, problem: String },

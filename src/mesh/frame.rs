@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::box_about;
 use super::error::MeshError;
+use super::source::Declared;
 use crate::base::serde_name;
 
 /// Height of a body, m: from a toddler's torso form to a tall adult in heels.
@@ -206,16 +207,29 @@ impl Frame {
     }
 }
 
-/// Unit and up axis of a body from its vertices `raw` in the file's frame; a given unit or axis is not guessed.
+/// Unit and up axis of a body from its vertices `raw` in the file's frame; a given unit or axis is not guessed. Those that the
+/// format prescribes count if the body is of a body's height in them.
 ///
 /// # Errors
 /// The height in units of the file, where it is a body's in no unit.
-pub(super) fn guess_frame(raw: &[DVec3], unit: Option<Unit>, up: Option<Axis>) -> Result<Frame, f64> {
+pub(super) fn guess_frame(
+    raw: &[DVec3],
+    unit: Option<Unit>,
+    up: Option<Axis>,
+    declared: Option<Declared>,
+) -> Result<Frame, f64> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Ok(given(raw, unit, up));
     }
     let (lo, hi) = box_about(raw.iter().copied());
     let extent = (hi - lo).to_array();
+    if let (Some(declared), None, None) = (declared, unit, up) {
+        let tall = extent[declared.up.index()] * declared.unit.metres();
+        if BODY_HEIGHT.contains(&tall) {
+            let reason = format!("{}, in which the body is {tall:.2} m tall", declared.reason());
+            return Ok(Frame { reason, ..declared.frame() });
+        }
+    }
     let up_found = up.unwrap_or_else(|| guess_up(raw, lo, hi));
     let height = extent[up_found.index()];
     let unit_found = unit.or_else(|| unit_of_a_body(height)).ok_or(height)?;
@@ -248,12 +262,14 @@ fn given(raw: &[DVec3], unit: Unit, up: Axis) -> Frame {
 }
 
 /// Unit and up axis of a garment from its vertices `raw` in the file's frame, for a body within these bounds (m, z up):
-/// the frame in which the boxes of garment and body share the largest part of their volume.
+/// the frame in which the boxes of garment and body share the largest part of their volume. The frame that the format prescribes
+/// weighs [`SAME_UNIT`] times [`SAME_UP`] as much.
 pub(super) fn guess_frame_around(
     raw: &[DVec3],
     body: (DVec3, DVec3),
     unit: Option<Unit>,
     up: Option<Axis>,
+    declared: Option<Declared>,
 ) -> Option<Frame> {
     if let (Some(unit), Some(up)) = (unit, up) {
         return Some(Frame::given(unit, up));
@@ -263,11 +279,17 @@ pub(super) fn guess_frame_around(
     let mut best = (0.0, None);
     for frame in ups.iter().flat_map(|&up| units.iter().map(move |&unit| Frame::given(unit, up))) {
         let overlap = overlap(box_about(raw.iter().map(|&p| frame.to_metres(p))), body);
-        if overlap > best.0 {
-            best = (overlap, Some(frame));
+        let is_declared = declared.is_some_and(|declared| (declared.unit, declared.up) == (frame.unit, frame.up));
+        let score = if is_declared { SAME_UNIT * SAME_UP * overlap } else { overlap };
+        if score > best.0 {
+            best = (score, Some((frame, overlap)));
         }
     }
-    let (overlap, frame) = (100.0 * best.0, best.1?);
+    let (frame, overlap) = best.1?;
+    if let Some(declared) = declared.filter(|declared| (declared.unit, declared.up) == (frame.unit, frame.up)) {
+        return Some(Frame { reason: declared.reason(), ..declared.frame() });
+    }
+    let overlap = 100.0 * overlap;
     let reason = format!(
         "in {}, {} up, the garment's box and the body's share {overlap:.0} % of their volume, the most of all frames",
         frame.unit, frame.up
@@ -275,15 +297,15 @@ pub(super) fn guess_frame_around(
     Some(Frame { guessed: true, reason, ..frame })
 }
 
-/// Unit and up axis of a garment from its vertices `raw` in the file's frame, for a body of the frame `own` within the bounds
-/// `body` (m, z up). `closeness` of points (m, z up) about the body is 1 where they lie on it, and near 0 where they are far from it
+/// Unit and up axis of a garment from its vertices `raw` in the file's frame, for a body within the bounds `body` (m, z up).
+/// `own` is the frame of the body, or the one that the garment's format prescribes, and `its_name` says which. `closeness` of points (m, z up) about the body is 1 where they lie on it, and near 0 where they are far from it
 /// or deep inside.
 ///
 /// A frame scores the shared volume of both boxes times that closeness, weighted by [`SAME_UNIT`] and [`SAME_UP`]. Without a score in
-/// any frame the garment is in the body's, if it is of a garment's size there. `None` where it is not.
+/// any frame the garment is in its own, if it is of a garment's size there. `None` where it is not.
 pub(super) fn guess_frame_worn(
     raw: &[DVec3],
-    own: &Frame,
+    (own, its_name): (&Frame, &str),
     body: (DVec3, DVec3),
     closeness: &dyn Fn(&[DVec3]) -> f64,
     (unit, up): (Option<Unit>, Option<Axis>),
@@ -323,19 +345,21 @@ pub(super) fn guess_frame_worn(
     match (best.1, in_own) {
         (Some((frame, close)), (own_close, _)) if (frame.unit, frame.up) != (own.unit, own.up) => {
             let reason = format!(
-                "in {}, {} up, the garment lies closest about the body ({:.0} of 100; {:.0} in the body's own frame)",
+                "in {}, {} up, the garment lies closest about the body ({:.0} of 100; {:.0} in {}, {} up, {its_name})",
                 frame.unit,
                 frame.up,
                 100.0 * close,
-                100.0 * own_close
+                100.0 * own_close,
+                own.unit,
+                own.up
             );
             Some(Frame { guessed: true, reason, ..frame })
         }
         (best, (_, in_own)) => {
             let frame = best.map(|(frame, _)| frame).or(in_own)?;
             let is_own = (frame.unit, frame.up) == (own.unit, own.up);
-            let reason = if is_own { "as the body" } else { "as given, otherwise as the body" };
-            Some(Frame { guessed: own.guessed, reason: reason.to_owned(), ..frame })
+            let reason = if is_own { its_name.to_owned() } else { format!("as given, otherwise {its_name}") };
+            Some(Frame { guessed: own.guessed, reason, ..frame })
         }
     }
 }
@@ -414,22 +438,22 @@ mod tests {
     #[test]
     fn a_t_pose_is_not_laid_on_its_side() {
         for (h, unit) in [(1.7, Unit::M), (16.8, Unit::Dm), (171.0, Unit::Cm), (1650.0, Unit::Mm)] {
-            let frame = guess_frame(&t_pose(h), None, None).unwrap();
+            let frame = guess_frame(&t_pose(h), None, None, None).unwrap();
             assert_eq!((frame.unit, frame.up), (unit, Axis::Y), "{}", frame.reason);
             let z_up: Vec<_> = t_pose(h).iter().map(|p| DVec3::new(p.x, -p.z, p.y)).collect();
-            assert_eq!(guess_frame(&z_up, None, None).unwrap().up, Axis::Z);
+            assert_eq!(guess_frame(&z_up, None, None, None).unwrap().up, Axis::Z);
         }
     }
 
     #[test]
     fn given_values_are_not_guessed_and_impossible_heights_are_refused() {
-        assert_eq!(guess_frame(&t_pose(66.0), Some(Unit::In), None).unwrap().unit, Unit::In);
-        assert_eq!(guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X)).unwrap(), Frame::given(Unit::M, Axis::X));
+        assert_eq!(guess_frame(&t_pose(66.0), Some(Unit::In), None, None).unwrap().unit, Unit::In);
+        assert_eq!(guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X), None).unwrap(), Frame::given(Unit::M, Axis::X));
         // The given unit is taken, and the reason names the unit in which the height is a body's.
-        let tiny = guess_frame(&t_pose(16.8), Some(Unit::Cm), Some(Axis::Y)).unwrap();
+        let tiny = guess_frame(&t_pose(16.8), Some(Unit::Cm), Some(Axis::Y), None).unwrap();
         assert_eq!((tiny.unit, tiny.up), (Unit::Cm, Axis::Y));
         assert!(tiny.reason.contains("0.17 m tall in that, and would be 1.68 m in dm"), "{}", tiny.reason);
-        assert!((guess_frame(&t_pose(40.0), None, None).unwrap_err() - 40.0).abs() < 1e-12);
+        assert!((guess_frame(&t_pose(40.0), None, None, None).unwrap_err() - 40.0).abs() < 1e-12);
     }
 
     #[test]
@@ -437,7 +461,7 @@ mod tests {
         let body = (DVec3::new(-0.3, -0.2, 0.0), DVec3::new(0.3, 0.2, 1.7));
         // A shirt in centimetres, y up.
         let shirt = [DVec3::new(-28.0, 90.0, -18.0), DVec3::new(28.0, 145.0, 18.0)];
-        let frame = guess_frame_around(&shirt, body, None, None).unwrap();
+        let frame = guess_frame_around(&shirt, body, None, None, None).unwrap();
         assert_eq!((frame.unit, frame.up), (Unit::Cm, Axis::Y));
     }
 }

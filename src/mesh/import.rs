@@ -1,4 +1,4 @@
-//! Imports a body or a garment from OBJ: converts it to metres with z up and repairs it as far as is safe.
+//! Imports a body or a garment from a mesh file: converts it to metres with z up and repairs it as far as is safe.
 //!
 //! The mesh has the vertices of the file that a face uses, in the order of the file: corners that differ only in their
 //! texture coordinate share a vertex. Vertices are welded by position only on request, because welding can make a clean
@@ -15,7 +15,7 @@ use super::duplicates::{duplicate_parts, first_triangles, same_place};
 use super::error::MeshError;
 use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around, guess_frame_worn};
 use super::health::Findings;
-use super::obj_source::{Corner, ObjSource};
+use super::source::{Corner, Declared, MeshSource};
 use super::report::{MeshReport, Remark, Repair};
 use super::rest::RestShape;
 use super::topology::{NONE, Topology};
@@ -48,7 +48,7 @@ pub struct ImportOptions {
     /// Accept a body with a boundary.
     pub open_body: bool,
     /// The contents, where they are in memory; the file is not read then, and its name stands in messages only.
-    pub source: Option<Arc<ObjSource>>,
+    pub source: Option<Arc<MeshSource>>,
 }
 
 /// The body that a garment is imported for.
@@ -73,11 +73,11 @@ pub enum Beside<'a> {
 /// Imports a body.
 ///
 /// # Errors
-/// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; a unit that
+/// [`MeshError`]: a file that is missing, of no known format, empty, or malformed; a group that is not there; a unit that
 /// cannot be guessed; [`MeshError::BodyOpen`] where it has a boundary and `open_body` is not set.
 pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, MeshError> {
     let mut imported = Imported::new(file, options, MAX_BODY_FAN, |source| {
-        guess_frame(&source.used_positions(), options.unit, options.up)
+        guess_frame(&source.used_positions(), options.unit, options.up, source.declared)
             .map_err(|height| MeshError::UnknownScale { file: file.to_owned(), height })
     })?;
     imported.face_outward();
@@ -97,7 +97,7 @@ pub fn import_body(file: &Path, options: &ImportOptions) -> Result<Imported, Mes
 /// Imports a garment for a body.
 ///
 /// # Errors
-/// [`MeshError`]: a file that is missing, not an OBJ, empty, or malformed; a group that is not there; no frame that
+/// [`MeshError`]: a file that is missing, of no known format, empty, or malformed; a group that is not there; no frame that
 /// puts it around the body.
 pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -> Result<Imported, MeshError> {
     Imported::new(file, options, MAX_GARMENT_FAN, |source| match (body, options.unit, options.up) {
@@ -109,15 +109,19 @@ pub fn import_garment(file: &Path, options: &ImportOptions, body: &Beside<'_>) -
             reason: "as the body".to_owned(),
         }),
         (&Beside::Body { frame, bounds, closeness }, unit, up) => {
-            guess_frame_worn(&source.used_positions(), frame, bounds, closeness, (unit, up))
+            let declared = source.declared.map(|declared| (declared.frame(), declared.reason()));
+            let own = declared.as_ref().map_or((frame, "as the body"), |(frame, reason)| (frame, reason));
+            guess_frame_worn(&source.used_positions(), own, bounds, closeness, (unit, up))
                 .ok_or_else(|| no_frame(file, source, bounds))
         }
-        (&Beside::Bounds(lo, hi), unit, up) => guess_frame_around(&source.used_positions(), (lo, hi), unit, up)
-            .ok_or_else(|| no_frame(file, source, (lo, hi))),
+        (&Beside::Bounds(lo, hi), unit, up) => {
+            guess_frame_around(&source.used_positions(), (lo, hi), unit, up, source.declared)
+                .ok_or_else(|| no_frame(file, source, (lo, hi)))
+        }
     })
 }
 
-fn no_frame(file: &Path, source: &ObjSource, (low, high): (DVec3, DVec3)) -> MeshError {
+fn no_frame(file: &Path, source: &MeshSource, (low, high): (DVec3, DVec3)) -> MeshError {
     let own = box_about(source.used_positions());
     MeshError::NoFrame { file: file.to_owned(), garment: own.1 - own.0, body_m: high - low }
 }
@@ -144,10 +148,10 @@ pub struct Imported {
     /// Counts, repairs and remarks.
     pub report: MeshReport,
     /// The file, for the export.
-    pub source: ObjSource,
+    pub source: MeshSource,
     /// Texture coordinates of the corners of each triangle; `None` if a corner has none.
     pub texture: Vec<Option<[DVec2; 3]>>,
-    /// Index into [`ObjSource::faces`] of the face that each triangle was cut from.
+    /// Index into [`MeshSource::faces`] of the face that each triangle was cut from.
     face: Vec<u32>,
     /// Mesh vertex of each file vertex, or [`NONE`] where no triangle uses it.
     pub(super) mesh_vertex: Vec<u32>,
@@ -159,18 +163,18 @@ impl Imported {
         file: &Path,
         options: &ImportOptions,
         max_fan: usize,
-        frame_of: impl FnOnce(&ObjSource) -> Result<Frame, MeshError>,
+        frame_of: impl FnOnce(&MeshSource) -> Result<Frame, MeshError>,
     ) -> Result<Self, MeshError> {
         let mut source = match &options.source {
             Some(source) => source.named(file),
-            None => ObjSource::read(file)?,
+            None => MeshSource::read(file)?,
         };
         let mut repairs = Vec::new();
         if let Some(name) = &options.group {
             let left_out = source.choose_group(name)?;
             repairs.push(Repair::GroupChosen { name: name.clone(), left_out });
         }
-        let empty = |source: &ObjSource, faces| MeshError::Empty {
+        let empty = |source: &MeshSource, faces| MeshError::Empty {
             file: file.to_owned(),
             vertices: source.positions.len(),
             faces,
@@ -188,6 +192,8 @@ impl Imported {
         let mesh = TriMesh::new(positions, Vec::new());
         let mut imported = Self { mesh, report, source, texture: Vec::new(), face: Vec::new(), mesh_vertex };
 
+        let vertices = imported.source.merged;
+        imported.repaired(vertices, Repair::Merged { vertices });
         let [quads, larger, degenerate] = imported.triangulate();
         imported.repaired(quads + larger, Repair::PolygonsCut { quads, larger });
         if options.weld {
@@ -216,9 +222,9 @@ impl Imported {
         imported.report.groups = imported.mesh.groups.len();
         let count = imported.source.small_faces;
         imported.remark(count, Remark::SmallFaces { count });
-        if let Some((line, text)) = imported.source.first_unknown.take() {
-            imported.report.remarks.push(Remark::UnknownLines { count: imported.source.unknown, line, text });
-        }
+        let remarks = std::mem::take(&mut imported.source.remarks);
+        imported.report.remarks.extend(remarks);
+        imported.remark_on_frame();
 
         let (turned, patches) = winding::agree(&imported.mesh);
         turned.iter().for_each(|&t| imported.turn(t));
@@ -293,7 +299,7 @@ impl Imported {
             let used = source.used_vertices();
             renumbered(used.len(), |v| used[v])
         });
-        let vertices = |source: &ObjSource, face, rank: &[u32]| -> Vec<u32> {
+        let vertices = |source: &MeshSource, face, rank: &[u32]| -> Vec<u32> {
             source.corners_of(face).iter().map(|c| rank[c.vertex as usize]).collect()
         };
         let mut pairs = ours.faces.iter().zip(&theirs.faces);
@@ -431,6 +437,15 @@ impl Imported {
         if let Some(&(_, t, rest_m, worn_m)) = off.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
             let (triangles, first) = (off.len(), self.file_face(t));
             self.report.remarks.push(Remark::OtherThanWorn { triangles, first, rest_m, worn_m });
+        }
+    }
+
+    /// Remarks on a frame other than the one that the format prescribes.
+    fn remark_on_frame(&mut self) {
+        let Frame { unit, up, .. } = self.report.frame;
+        let Some(Declared { format, unit: declared_unit, up: declared_up }) = self.source.declared else { return };
+        if (unit, up) != (declared_unit, declared_up) {
+            self.report.remarks.push(Remark::OtherThanDeclared { format, declared_unit, declared_up, unit, up });
         }
     }
 

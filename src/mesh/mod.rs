@@ -18,12 +18,13 @@ pub mod health;
 pub mod import;
 pub(crate) mod lattice;
 pub(crate) mod morton;
-mod obj_source;
 pub(crate) mod polygon;
 pub(crate) mod remesh;
+mod read;
 pub mod report;
 pub mod rest;
 pub mod self_intersection;
+mod source;
 mod topology;
 pub(crate) mod winding;
 
@@ -32,9 +33,9 @@ use glam::{DMat3, DVec3};
 pub(crate) use csr::Csr;
 pub use error::MeshError;
 pub use frame::{Axis, Frame, Front, Unit};
-pub use obj_source::{Corner, Face, ObjSource};
 pub use remesh::Density;
 pub use rest::RestShape;
+pub use source::{Corner, Face, MeshSource};
 pub(crate) use topology::Dijkstra;
 pub use topology::{NONE, Topology};
 

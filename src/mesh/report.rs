@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::frame::Frame;
+use super::frame::{Axis, Frame, Unit};
 
 /// A change made by the import.
 #[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
@@ -17,6 +17,9 @@ pub enum Repair {
     /// Vertices at the same place were welded on request.
     #[error("joined {vertices} vertices to another at the same place, as asked")]
     Welded { vertices: usize },
+    /// Vertices that the format stores once for each normal or texture coordinate were merged.
+    #[error("merged {vertices} vertices with another at the same position, which the format stores for each corner")]
+    Merged { vertices: usize },
     /// Triangles that name a vertex twice were dropped.
     #[error("dropped {triangles} triangles that name the same vertex twice")]
     DegenerateDropped { triangles: usize },
@@ -105,6 +108,12 @@ pub enum Remark {
     /// Points and lines, passed over.
     #[error("passed over {count} points and lines given as faces")]
     SmallFaces { count: usize },
+    /// The unit or the axis that the format prescribes does not fit.
+    #[error("{format} is in {declared_unit}, {declared_up} up, and this file is not: it was taken in {unit}, {up} up")]
+    OtherThanDeclared { format: &'static str, declared_unit: Unit, declared_up: Axis, unit: Unit, up: Axis },
+    /// Elements and properties of no known name, passed over.
+    #[error("passed over {}", crate::base::files::listed(.names))]
+    Ignored { names: Vec<String> },
     /// Lines of no known keyword, passed over.
     #[error("passed over {count} lines of no known keyword, the first on line {line}: \"{text}\"")]
     UnknownLines { count: usize, line: usize, text: String },

@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use super::error::{Error, exception};
 use crate::base::error_text::with_causes;
-use crate::mesh::ObjSource;
+use crate::mesh::MeshSource;
 use crate::session::Edit;
 use crate::study::job::Job;
 
@@ -20,7 +20,7 @@ use crate::study::job::Job;
 const FIELDS: [&str; 5] = ["scene", "settings", "seed", "accuracy", "spread_starts"];
 
 /// The job of these keyword arguments, a JSON object. `meshes` are those that it names as body, garment or rest shape.
-pub(super) fn job(keywords: &str, meshes: BTreeMap<String, Arc<ObjSource>>) -> PyResult<Job> {
+pub(super) fn job(keywords: &str, meshes: BTreeMap<String, Arc<MeshSource>>) -> PyResult<Job> {
     let mut keys: Map<String, Value> = serde_json::from_str(keywords).map_err(|e| exception(&e))?;
     let fields: Map<String, Value> =
         FIELDS.iter().filter_map(|field| Some(((*field).to_owned(), keys.remove(*field)?))).collect();

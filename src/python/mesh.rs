@@ -10,12 +10,12 @@ use pyo3::types::PyString;
 
 use super::call;
 use super::error::{Error, exception};
-use crate::mesh::ObjSource;
+use crate::mesh::MeshSource;
 
 /// A mesh in any unit and up axis, both of which are guessed where a job does not name them.
 #[pyclass(frozen, module = "partwise")]
 pub(super) struct Mesh {
-    pub(super) source: Arc<ObjSource>,
+    pub(super) source: Arc<MeshSource>,
 }
 
 #[pymethods]
@@ -36,7 +36,7 @@ impl Mesh {
         let positions = numbers::<f64>(&vertices, "float64")?;
         let positions = positions.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect();
         let faces = numbers::<i64>(&faces, "int64")?;
-        let source = ObjSource::of_arrays(positions, &faces, corners).map_err(|e| exception(&e))?;
+        let source = MeshSource::of_arrays(positions, &faces, corners).map_err(|e| exception(&e))?;
         Ok(Self { source: Arc::new(source) })
     }
 
@@ -64,7 +64,7 @@ impl Mesh {
     }
 
     fn __repr__(&self) -> String {
-        let ObjSource { positions, faces, .. } = &*self.source;
+        let MeshSource { positions, faces, .. } = &*self.source;
         format!("<partwise.Mesh: {} vertices, {} faces>", positions.len(), faces.len())
     }
 }
@@ -72,7 +72,7 @@ impl Mesh {
 /// Reads an OBJ file, with its groups and texture coordinates.
 #[pyfunction]
 pub(super) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Mesh> {
-    let source = call::run(py, |_| ObjSource::read(&path).map_err(|e| exception(&e)))?;
+    let source = call::run(py, |_| MeshSource::read(&path).map_err(|e| exception(&e)))?;
     Ok(Mesh { source: Arc::new(source) })
 }
 

@@ -21,7 +21,7 @@ use crate::garment::sewing::{draw_shut, put_on};
 use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::import::{Beside, ImportOptions, Imported, import_body, import_garment};
-use crate::mesh::{Axis, Frame, Front, ObjSource, RestShape, Unit, retain};
+use crate::mesh::{Axis, Frame, Front, MeshSource, RestShape, Unit, retain};
 
 /// The name of the built-in body.
 pub const DRESS_FORM: &str = "form";
@@ -104,7 +104,7 @@ pub struct SceneSpec {
     pub measurements: BodySpec,
     /// Meshes in memory by the file names that stand for them above. They are no part of the plain data.
     #[serde(skip)]
-    pub in_memory: BTreeMap<String, Arc<ObjSource>>,
+    pub in_memory: BTreeMap<String, Arc<MeshSource>>,
 }
 
 impl Default for SceneSpec {
