@@ -28,8 +28,9 @@ pub(crate) struct InputArgs {
     /// Distances of layered garments: to the `body`, or to the nearest surface `below`, body or garment
     #[arg(long, value_name = "body|below", default_value_t = SceneSpec::default().distance_to)]
     distance_to: DistanceTo,
-    /// Sewing pattern (JSON in the GarmentCode format) to sew around the body, in place of --garment
-    #[arg(long, value_name = "FILE.json", conflicts_with = "garment", value_parser = pattern_file)]
+    /// Sewing pattern to sew around the body, in place of --garment: JSON in the GarmentCode format, or a DXF (ASTM D6673, AAMA) with
+    /// FILE.sewing.toml beside it
+    #[arg(long, value_name = "FILE.json|FILE.dxf", conflicts_with = "garment", value_parser = pattern_file)]
     pattern: Option<String>,
     /// TOML file with a fabric for each panel or group: `default = "interlock"`, then under `[panels]` lines such as
     /// `left_cuff = "denim"` or `"sleeve*" = "rib.toml"` (relative to this file) [default: NAME.fabrics.toml beside NAME.json or NAME.obj]
@@ -148,10 +149,12 @@ impl InputArgs {
 }
 
 fn pattern_file(name: &str) -> Result<String, String> {
-    if has_ending(name.as_ref(), "json") {
+    if ["json", "dxf"].iter().any(|ending| has_ending(name.as_ref(), ending)) {
         return Ok(name.to_owned());
     }
-    Err(format!("found `{name}`, expected a file that ends in `.json`; use --garment for a mesh or a description"))
+    Err(format!(
+        "found `{name}`, expected a file that ends in `.json` or `.dxf`; use --garment for a mesh or a description"
+    ))
 }
 
 /// Measurements of the built-in dress form, in centimetres. The defaults are European size 38.

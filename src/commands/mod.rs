@@ -98,8 +98,9 @@ enum Command {
     Merge(Box<sweep::MergeArgs>),
     /// Summarise a sewing pattern, and draw it flat
     ///
-    /// Reads a sewing pattern (JSON in the GarmentCode format: *_specification.json), checks it, sews it and lists the panels with
-    /// their areas and the seams with the lengths of both sides.
+    /// Reads a sewing pattern (JSON in the GarmentCode format: *_specification.json, or a DXF by ASTM D6673 or AAMA), checks it, sews it
+    /// and lists the panels with their areas and the seams with the lengths of both sides. A DXF is sewn as the TOML file beside it
+    /// says, NAME.sewing.toml; without that its pieces are listed, and --svg draws them with the numbers of their edges.
     ///
     /// `partwise --pattern FILE` drapes it, on the dress form or on --body.
     Pattern(pattern::PatternArgs),

@@ -13,10 +13,10 @@ use super::runtime::{check, write};
 /// Arguments of `pattern`.
 #[derive(Debug, Args)]
 pub(crate) struct PatternArgs {
-    /// Sewing pattern
-    #[arg(value_name = "FILE.json")]
+    /// Sewing pattern: JSON of GarmentCode, or a DXF (ASTM D6673, AAMA), sewn if FILE.sewing.toml is beside it
+    #[arg(value_name = "FILE.json|FILE.dxf")]
     file: PathBuf,
-    /// Draw the flat panels in true size with numbered seams
+    /// Draw the flat panels in true size with numbered edges and seams
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
     /// Edge length of the mesh
@@ -32,7 +32,7 @@ impl PatternArgs {
         if let Some(path) = &self.svg {
             check(path, "--svg")?;
         }
-        let pattern = pattern::read(&self.file)?;
+        let pattern = pattern::read_unsewn(&self.file)?;
         let sewn = pattern::sew(&pattern, 0.01 * self.edge_length)?;
         let (vertices, triangles) = (sewn.mesh.vertex_count(), sewn.mesh.triangles.len());
         let notes = [&pattern.notes[..], &sewn.notes].concat();

@@ -12,7 +12,6 @@ use crate::base::files::has_ending;
 use crate::colour::of_drape;
 use crate::drape::{self, Refine, Release};
 use crate::mechanics::refine::{Observer, Step};
-use crate::mesh::glb::write_glb;
 use crate::methods::METHODS;
 use crate::record::Recorder;
 use crate::study::certificate::certify;
@@ -73,11 +72,14 @@ pub(crate) struct RunArgs {
     /// Certify as --certify does, and exit with code 3 unless the verdict is that the garment rests and every criterion passes
     #[arg(long, help_heading = "Stages", conflicts_with = "watch")]
     strict: bool,
-    /// Export the draped garment: as OBJ with its original faces, groups and texture coordinates (of a sewing pattern: panels and flat
-    /// positions), or as glTF in metres, y up
-    #[arg(long, value_name = "FILE.obj|FILE.glb", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
+    /// Export the draped garment with its groups and texture coordinates (of a sewing pattern: panels and flat positions): as OBJ or PLY
+    /// with its original faces, unit and axes, as glTF in metres, y up, or as USD in metres, z up
+    #[arg(long, value_name = "FILE.obj|.ply|.glb|.usda", value_parser = PathBufValueParser::new().try_map(mesh_file), help_heading = "Output")]
     export: Option<PathBuf>,
-    /// Colour the vertices of a `.glb` as in the recording, by `parts` (the hue shows the level), largest `strain` (%), `pressure` on
+    /// Export the body, too, into a `.glb` or `.usda`
+    #[arg(long, requires = "export", help_heading = "Output")]
+    export_body: bool,
+    /// Colour the vertices of a `.glb`, `.ply` or `.usda` as in the recording, by `parts` (the hue shows the level), largest `strain` (%), `pressure` on
     /// the body (kPa), or `folds` (excess length of the cloth, %)
     #[arg(long, value_parser = ["parts", "strain", "pressure", "folds"], value_name = "WHAT", requires = "export", help_heading = "Output")]
     export_colours: Option<String>,
@@ -111,14 +113,7 @@ impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
         self.sinks.check_outputs(&[("--export", self.export.as_deref())])?;
-        if let Some(path) =
-            self.export.as_deref().filter(|path| self.export_colours.is_some() && !has_ending(path, "glb"))
-        {
-            refuse!(
-                "{}: found --export-colours for an OBJ, which has no colours, expected a name that ends in `.glb`",
-                path.display()
-            );
-        }
+        self.check_export()?;
         if self.method != TWO_STAGE {
             if self.strict {
                 refuse!("--strict: found --method {}, expected {TWO_STAGE}, the method that is certified", self.method);
@@ -155,6 +150,24 @@ impl RunArgs {
         require_pass(solved.summary.certificate.as_ref())
     }
 
+    /// Refuses options that the format of the export cannot hold.
+    fn check_export(&self) -> anyhow::Result<()> {
+        let Some(path) = &self.export else { return Ok(()) };
+        let is = |endings: &[&str]| endings.iter().any(|ending| has_ending(path, ending));
+        let name = path.display();
+        if self.export_colours.is_some() && !is(&["glb", "ply", "usda"]) {
+            refuse!(
+                "{name}: found --export-colours for an OBJ, which has no colours, expected a name that ends in `.glb`, `.ply` or `.usda`"
+            );
+        }
+        if self.export_body && !is(&["glb", "usda"]) {
+            refuse!(
+                "{name}: found --export-body for a file of one mesh, expected a name that ends in `.glb` or `.usda`"
+            );
+        }
+        Ok(())
+    }
+
     fn export(&self, solved: &mut Solved) -> anyhow::Result<()> {
         if let Some(path) = &self.export {
             self.write_export(solved, path)?;
@@ -181,15 +194,18 @@ impl RunArgs {
             Some(folded) if self.folds => &folded.positions,
             _ => &drape.positions,
         };
-        let Some(quantity) = &self.export_colours else { return Ok(solved.loaded.write(path, positions)?) };
-        let Some(colours) = of_drape(&scene.garment, drape, quantity) else {
-            refuse!(
-                "{}: found no {quantity} to colour it by, because this model does not compute it; expected --export-colours \
-                 parts, or --model coupled",
-                path.display()
-            )
-        };
-        Ok(write_glb(path, &scene.garment.with_positions(positions.clone()), Some(&colours))?)
+        let mut colours = None;
+        if let Some(quantity) = &self.export_colours {
+            colours = of_drape(&scene.garment, drape, quantity);
+            if colours.is_none() {
+                refuse!(
+                    "{}: found no {quantity} to colour it by, because this model does not compute it; expected --export-colours \
+                     parts, or --model coupled",
+                    path.display()
+                )
+            }
+        }
+        Ok(solved.loaded.write_with(path, positions, colours.as_deref(), self.export_body)?)
     }
 
     /// The job that the arguments specify, its tables and fabrics read.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::atomic_file::same_place;
 use crate::base::files::has_ending;
+use crate::mesh::export::ENDINGS;
 use crate::record::Sink;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -34,11 +35,11 @@ impl SeenFrom {
     }
 }
 
-/// Parses the name of an exported garment; only OBJ and glTF can be written.
+/// Parses the name of an exported garment.
 pub(crate) fn mesh_file(path: PathBuf) -> Result<PathBuf, String> {
     match path.extension() {
-        Some(ending) if !["obj", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)) => Err(format!(
-            "found the ending `.{}`, expected `.obj` or `.glb`: garments are written as OBJ or glTF",
+        Some(ending) if !ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)) => Err(format!(
+            "found the ending `.{}`, expected `.obj`, `.ply`, `.glb` or `.usda`: garments are written as OBJ, PLY, glTF or USD",
             ending.display()
         )),
         _ => Ok(path),

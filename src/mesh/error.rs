@@ -14,7 +14,9 @@ pub enum MeshError {
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
     /// The file has another format.
-    #[error("{file}: found {found}, expected a mesh as OBJ, PLY, STL, glTF (.glb) or NumPy archive (.npz); export it as one of these")]
+    #[error(
+        "{file}: found {found}, expected a mesh as OBJ, PLY, STL, glTF (.glb) or NumPy archive (.npz); export it as one of these"
+    )]
     UnknownFormat { file: PathBuf, found: &'static str },
     /// The contents of a file without lines are wrong.
     #[error("{file}: {problem}")]
@@ -28,7 +30,8 @@ pub enum MeshError {
     /// No triangle left.
     #[error(
         "{file}: the mesh is empty: found {vertices} vertices and {faces} faces of three corners or more, and in them no \
-         triangle of three different vertices; expected at least one"
+         triangle of three different vertices; expected at least one{}",
+        if *faces == 0 && *vertices > 0 { "; a cloud of points has no surface, so make one of it first" } else { "" }
     )]
     Empty { file: PathBuf, vertices: usize, faces: usize },
     /// Too many triangles about one vertex.

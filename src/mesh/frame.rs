@@ -448,7 +448,10 @@ mod tests {
     #[test]
     fn given_values_are_not_guessed_and_impossible_heights_are_refused() {
         assert_eq!(guess_frame(&t_pose(66.0), Some(Unit::In), None, None).unwrap().unit, Unit::In);
-        assert_eq!(guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X), None).unwrap(), Frame::given(Unit::M, Axis::X));
+        assert_eq!(
+            guess_frame(&t_pose(1.7), Some(Unit::M), Some(Axis::X), None).unwrap(),
+            Frame::given(Unit::M, Axis::X)
+        );
         // The given unit is taken, and the reason names the unit in which the height is a body's.
         let tiny = guess_frame(&t_pose(16.8), Some(Unit::Cm), Some(Axis::Y), None).unwrap();
         assert_eq!((tiny.unit, tiny.up), (Unit::Cm, Axis::Y));

@@ -1,17 +1,19 @@
-//! Writes one mesh as binary glTF (`.glb`) for viewers and try-on programs.
+//! Writes meshes as binary glTF (`.glb`) for viewers and try-on programs.
 //!
 //! Metres, y up, the body's front at +z, counter-clockwise from outside, as glTF 2.0 requires (Khronos Group, 2021, sections
-//! 3.4 and 4.4). Positions and vertex normals are in single precision, optional colours in eight bits. The material is
-//! double-sided.
+//! 3.4 and 4.4). Positions, vertex normals and texture coordinates are in single precision, optional colours in eight bits. A
+//! vertex with several texture coordinates is stored once for each. Each group is a primitive with a material of its name, and
+//! materials are double-sided. Texture coordinates count from above, so v of the mesh is written as 1 − v.
 
 use std::path::Path;
 
-use glam::DVec3;
-use serde_json::json;
+use glam::{DVec2, DVec3};
+use indexmap::IndexSet;
+use serde_json::{Value, json};
 
-use super::TriMesh;
 use super::error::MeshError;
-use super::export::write;
+use super::export::{Export, write};
+use super::{TriMesh, box_about};
 
 /// Codes of the format for chunk types, component types and buffer targets.
 const JSON_CHUNK: u32 = 0x4E4F_534A;
@@ -22,63 +24,116 @@ const UNSIGNED_BYTE: u32 = 5121;
 const ARRAY: u32 = 34962;
 const ELEMENTS: u32 = 34963;
 
-/// Writes a mesh (m, z up) as `.glb`, with an optional colour for each vertex (red, green, blue, opacity).
-///
-/// # Errors
-/// [`MeshError::WrongCount`] where there are not as many colours as vertices, [`MeshError::Unwritable`].
-pub(crate) fn write_glb(path: &Path, mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Result<(), MeshError> {
-    let expected = mesh.vertex_count();
-    if let Some(found) = colours.map(<[_]>::len).filter(|&found| found != expected) {
-        return Err(MeshError::WrongCount { found, expected });
-    }
-    write(path, bytes(mesh, colours))
+/// Writes a mesh as `.glb`, and the body beside it.
+pub(super) fn write_glb(path: &Path, export: &Export<'_>) -> Result<(), MeshError> {
+    write(path, bytes(export))
 }
 
-fn bytes(mesh: &TriMesh, colours: Option<&[[u8; 4]]>) -> Vec<u8> {
-    let upright = |p: &DVec3| [p.x as f32, p.z as f32, -p.y as f32];
-    let places: Vec<[f32; 3]> = mesh.positions.iter().map(upright).collect();
-    let normals: Vec<[f32; 3]> = mesh.vertex_normals().iter().map(upright).collect();
-    let bound = |pick: fn(f32, f32) -> f32, start: f32| {
-        places.iter().fold([start; 3], |bound, p| [0, 1, 2].map(|k| pick(bound[k], p[k])))
-    };
-    let (low, high) = (bound(f32::min, f32::INFINITY), bound(f32::max, f32::NEG_INFINITY));
-    let mut binary: Vec<u8> = Vec::new();
-    let mut views = Vec::new();
-    let mut push = |part: Vec<u8>, target: u32| {
-        views.push(json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": part.len(), "target": target }));
-        binary.extend(part);
-    };
-    let floats = |list: &[[f32; 3]]| list.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    push(floats(&places), ARRAY);
-    push(floats(&normals), ARRAY);
-    push(mesh.triangles.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect(), ELEMENTS);
-    let (n, corners) = (places.len(), 3 * mesh.triangles.len());
-    let mut accessors = vec![
-        json!({ "bufferView": 0, "componentType": FLOAT, "count": n, "type": "VEC3", "min": low, "max": high }),
-        json!({ "bufferView": 1, "componentType": FLOAT, "count": n, "type": "VEC3" }),
-        json!({ "bufferView": 2, "componentType": UNSIGNED_INT, "count": corners, "type": "SCALAR" }),
-    ];
-    let mut attributes = json!({ "POSITION": 0, "NORMAL": 1 });
-    if let Some(colours) = colours {
-        push(colours.as_flattened().to_vec(), ARRAY);
-        accessors.push(json!({
-            "bufferView": 3, "componentType": UNSIGNED_BYTE, "normalized": true, "count": n, "type": "VEC4"
-        }));
-        attributes["COLOR_0"] = json!(3);
+#[derive(Default)]
+struct Builder {
+    binary: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    materials: Vec<Value>,
+}
+
+impl Builder {
+    /// Adds numbers of four bytes each, as an accessor with these properties; returns its index.
+    fn push(&mut self, numbers: impl IntoIterator<Item = [u8; 4]>, target: u32, mut accessor: Value) -> usize {
+        let offset = self.binary.len();
+        self.binary.extend(numbers.into_iter().flatten());
+        let length = self.binary.len() - offset;
+        accessor["bufferView"] = json!(self.views.len());
+        self.views.push(json!({ "buffer": 0, "byteOffset": offset, "byteLength": length, "target": target }));
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
     }
+
+    fn material(&mut self, name: &str) -> usize {
+        let surface = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.9 });
+        self.materials.push(json!({ "name": name, "doubleSided": true, "pbrMetallicRoughness": surface }));
+        self.materials.len() - 1
+    }
+
+    /// Adds a mesh and its materials.
+    fn mesh(
+        &mut self,
+        name: &str,
+        mesh: &TriMesh,
+        texture: Option<&[[DVec2; 3]]>,
+        colours: Option<&[[u8; 4]]>,
+    ) -> Value {
+        // A vertex of the file for each vertex of the mesh and each texture coordinate that it has, in the order of the mesh.
+        let single = |uv: DVec2| [uv.x as f32, 1.0 - uv.y as f32].map(f32::to_bits);
+        let corner = |(k, &v): (usize, &u32)| (v, texture.map(|texture| single(texture[k / 3][k % 3])));
+        let corners = mesh.triangles.as_flattened().iter().enumerate().map(corner);
+        let mut vertices: IndexSet<(u32, Option<[u32; 2]>)> = corners.clone().collect();
+        if texture.is_none() {
+            vertices = (0..mesh.vertex_count() as u32).map(|v| (v, None)).collect();
+        }
+        vertices.sort_unstable();
+        let upright = |p: DVec3| [p.x as f32, p.z as f32, -p.y as f32];
+        let normals = mesh.vertex_normals();
+        let of_vertices = |list: &[DVec3]| -> Vec<[u8; 4]> {
+            vertices.iter().flat_map(|(v, _)| upright(list[*v as usize])).map(f32::to_le_bytes).collect()
+        };
+        let (places, normals) = (of_vertices(&mesh.positions), of_vertices(&normals));
+        let (low, high) = box_about(vertices.iter().map(|(v, _)| mesh.positions[*v as usize]));
+        let [low, high] = [DVec3::new(low.x, high.y, low.z), DVec3::new(high.x, low.y, high.z)].map(upright);
+        let n = vertices.len();
+        let vectors = json!({ "componentType": FLOAT, "count": n, "type": "VEC3", "min": low, "max": high });
+        let mut attributes = json!({ "POSITION": self.push(places, ARRAY, vectors) });
+        let vectors = json!({ "componentType": FLOAT, "count": n, "type": "VEC3" });
+        attributes["NORMAL"] = json!(self.push(normals, ARRAY, vectors));
+        if texture.is_some() {
+            let numbers = vertices.iter().flat_map(|(_, uv)| uv.unwrap_or_default().map(u32::to_le_bytes));
+            let accessor = json!({ "componentType": FLOAT, "count": n, "type": "VEC2" });
+            attributes["TEXCOORD_0"] = json!(self.push(numbers, ARRAY, accessor));
+        }
+        if let Some(colours) = colours {
+            let accessor = json!({ "componentType": UNSIGNED_BYTE, "normalized": true, "count": n, "type": "VEC4" });
+            let numbers = vertices.iter().map(|(v, _)| colours[*v as usize]);
+            attributes["COLOR_0"] = json!(self.push(numbers, ARRAY, accessor));
+        }
+        let indices: Vec<u32> = corners.filter_map(|c| vertices.get_index_of(&c)).map(|i| i as u32).collect();
+        let groups = if mesh.groups.is_empty() { vec![name] } else { mesh.groups.iter().map(String::as_str).collect() };
+        let mut primitives = Vec::new();
+        for (g, group) in groups.into_iter().enumerate() {
+            let of_group = |t: usize| mesh.triangle_group.get(t).is_none_or(|&group| group as usize == g);
+            let triangles = indices.as_chunks::<3>().0.iter().enumerate().filter(|(t, _)| of_group(*t));
+            let indices: Vec<u32> = triangles.flat_map(|(_, triangle)| *triangle).collect();
+            if indices.is_empty() {
+                continue;
+            }
+            let accessor = json!({ "componentType": UNSIGNED_INT, "count": indices.len(), "type": "SCALAR" });
+            let indices = self.push(indices.into_iter().map(u32::to_le_bytes), ELEMENTS, accessor);
+            let material = self.material(group);
+            primitives.push(json!({ "attributes": attributes, "indices": indices, "material": material }));
+        }
+        json!({ "name": name, "primitives": primitives })
+    }
+}
+
+fn bytes(export: &Export<'_>) -> Vec<u8> {
+    let mut builder = Builder::default();
+    let mut meshes = vec![builder.mesh("garment", export.mesh, export.texture, export.colours)];
+    meshes.extend(export.body.map(|body| builder.mesh("body", body, None, None)));
+    let names = ["garment", "body"].iter().take(meshes.len()).enumerate();
+    let nodes: Vec<Value> = names.map(|(mesh, name)| json!({ "mesh": mesh, "name": name })).collect();
+    let Builder { binary, views, accessors, materials } = builder;
     let document = json!({
         "asset": { "version": "2.0", "generator": env!("CARGO_PKG_NAME") },
         "scene": 0,
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0, "name": "garment" }],
-        "meshes": [{ "primitives": [{ "attributes": attributes, "indices": 2, "material": 0 }] }],
-        "materials": [{ "doubleSided": true, "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 } }],
+        "scenes": [{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": materials,
         "accessors": accessors,
         "bufferViews": views,
         "buffers": [{ "byteLength": binary.len() }],
     });
     let mut text = document.to_string().into_bytes();
-    // Chunks end at multiples of four; positions, normals, indices and colours do by themselves.
+    // Chunks end at multiples of four; the numbers do by themselves.
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut file = Vec::with_capacity(28 + text.len() + binary.len());
     let word = |file: &mut Vec<u8>, value: u32| file.extend(value.to_le_bytes());
@@ -101,12 +156,13 @@ mod tests {
     fn chunk_lengths_and_contents_agree_with_the_header() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, -2.0, 3.0)];
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]);
-        let file = bytes(&mesh, Some(&[[1, 2, 3, 255]; 3]));
+        let colours = Some(&[[1, 2, 3, 255]; 3][..]);
+        let file = bytes(&Export { mesh: &mesh, imported: None, texture: None, colours, body: None });
         let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
         assert_eq!((&file[..4], word(4), word(8)), (&b"glTF"[..], 2, file.len()));
         let length = word(12);
         assert_eq!((word(16), length % 4), (JSON_CHUNK as usize, 0));
-        let document: serde_json::Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
+        let document: Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
         let binary = &file[28 + length..];
         assert_eq!(word(20 + length), binary.len());
         assert_eq!(word(24 + length), BINARY_CHUNK as usize);
@@ -119,6 +175,7 @@ mod tests {
             (0..3).map(|k| f32::from_le_bytes(binary[24 + 4 * k..28 + 4 * k].try_into().unwrap())).collect();
         assert_eq!(third, [0.0, 3.0, 2.0]);
         assert_eq!(document["accessors"][0]["max"], json!([1.0, 3.0, 2.0]));
-        assert_eq!(&binary[84..88], &[1, 2, 3, 255]);
+        assert_eq!(document["accessors"][0]["min"], json!([0.0, 0.0, 0.0]));
+        assert_eq!(&binary[72..76], &[1, 2, 3, 255]);
     }
 }

@@ -10,7 +10,7 @@ use indexmap::IndexSet;
 use super::error::MeshError;
 use super::report::Remark;
 use super::topology::NONE;
-use super::{Axis, Frame, Unit, each_once, retain};
+use super::{Axis, Frame, TriMesh, Unit, each_once, retain};
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -126,15 +126,32 @@ impl MeshSource {
         Ok(Self { positions, corners: corners_of_faces, faces, ..Self::default() })
     }
 
+    /// The triangles of a mesh, with texture coordinates of their corners.
+    pub(super) fn of_mesh(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> Self {
+        let mut source = Self { positions: mesh.positions.clone(), ..Self::default() };
+        source.textures = texture.map(<[_]>::as_flattened).unwrap_or_default().to_vec();
+        let names: Vec<u32> = mesh.groups.iter().map(|name| source.name(name)).collect();
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            let group = mesh.triangle_group.get(t).map_or(NONE, |&group| names[group as usize]);
+            let texture = |k: usize| if texture.is_some() { (3 * t + k) as u32 } else { NONE };
+            let corners = (0..3).map(|k| Corner { vertex: triangle[k], texture: texture(k) });
+            source.push_face(corners, group, NONE);
+        }
+        source
+    }
+
     /// The same under another name.
     pub(super) fn named(&self, file: &Path) -> Self {
         Self { file: file.to_owned(), ..self.clone() }
     }
 
-    /// The index of a group's or an object's name, [`NONE`] for an empty one. Blanks and line ends become one blank each, as in an
-    /// OBJ, whose lines they would break.
+    /// The index of a group's or an object's name, [`NONE`] for an empty one. Blanks and control characters become one blank each, and
+    /// marks that begin a comment of an OBJ or continue its line go, so that every name can be written to one.
     pub(super) fn name(&mut self, name: &str) -> u32 {
-        let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
+        let words = name.split(|c: char| c.is_whitespace() || c.is_control());
+        let plain =
+            words.map(|word| word.trim_start_matches('#').trim_end_matches('\\')).filter(|word| !word.is_empty());
+        let name = plain.collect::<Vec<_>>().join(" ");
         if name.is_empty() { NONE } else { self.names.insert_full(name).0 as u32 }
     }
 

@@ -7,12 +7,10 @@ use glam::DVec3;
 use super::layering::join;
 use super::materials::{Cut, Swatch};
 use super::{Layer, PushOutReport, Scene};
-use crate::base::files::has_ending;
 use crate::garment::pattern::SewingPattern;
 use crate::garment::sewing::PutOn;
-use crate::mesh::export::{write_imported, write_mesh, write_textured};
+use crate::mesh::export::Export;
 use crate::mesh::flat_pattern::FlatPattern;
-use crate::mesh::glb::write_glb;
 use crate::mesh::import::Imported;
 use crate::mesh::report::{MeshReport, Repair};
 use crate::mesh::{Frame, MeshError, RestShape, TriMesh};
@@ -108,20 +106,37 @@ impl Loaded {
         self.imported.as_ref().map_or_else(|| positions.to_vec(), |imported| imported.in_file(positions))
     }
 
-    /// Writes the garment at `positions` (m) as glTF where the path ends in `.glb`, else as OBJ. In OBJ, a garment from a file
-    /// keeps its faces, groups and texture coordinates; one of a pattern has its panels as groups and the flat pattern as
-    /// texture coordinates.
+    /// Writes the garment at `positions` (m) as glTF, PLY or USD where the path ends in `.glb`, `.ply` or `.usda`, else as OBJ. Groups
+    /// and texture coordinates are those of the garment's file; a garment of a pattern has its panels and the flat pattern. OBJ and
+    /// PLY keep the polygons, unit and axes of the file, too.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a file that cannot be written.
     pub fn write(&self, path: impl AsRef<Path>, positions: &[DVec3]) -> Result<(), MeshError> {
-        let path = path.as_ref();
-        let mesh = || self.scene.garment.with_positions(positions.to_vec());
-        match (&self.imported, &self.tailored) {
-            _ if has_ending(path, "glb") => write_glb(path, &mesh(), None),
-            (Some(imported), _) => write_imported(path, imported, positions),
-            (None, Some(Tailored { pattern, put_on })) => {
-                write_textured(path, &mesh(), &put_on.garment.laid_out(pattern))
-            }
-            (None, None) => write_mesh(path, &mesh()),
-        }
+        self.write_with(path.as_ref(), positions, None, false)
+    }
+
+    /// [`write`](Self::write) with a colour for each vertex, and in glTF and USD with the body, if wanted.
+    pub(crate) fn write_with(
+        &self,
+        path: &Path,
+        positions: &[DVec3],
+        colours: Option<&[[u8; 4]]>,
+        with_body: bool,
+    ) -> Result<(), MeshError> {
+        let mesh = self.scene.garment.with_positions(positions.to_vec());
+        let of_file = |imported: &Imported| -> Option<Vec<_>> {
+            let corners = &imported.texture;
+            corners.iter().any(Option::is_some).then(|| corners.iter().map(|c| c.unwrap_or_default()).collect())
+        };
+        let texture = match (&self.imported, &self.tailored) {
+            (Some(imported), _) => of_file(imported),
+            (None, Some(Tailored { pattern, put_on })) => Some(put_on.garment.laid_out(pattern)),
+            (None, None) => None,
+        };
+        let body = with_body.then(|| self.scene.body.mesh());
+        let (imported, texture) = (self.imported.as_ref(), texture.as_deref());
+        Export { mesh: &mesh, imported, texture, colours, body }.write(path)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::base::files::{has_ending, names_a_file, read_text, stem};
 use crate::body::BodySpec;
 use crate::body::distance::{Body, DistanceError};
 use crate::garment::fabric::Fabric;
-use crate::garment::pattern::{self, DEFAULT_EDGE_M, SewnGarment};
+use crate::garment::pattern::{self, DEFAULT_EDGE_M, SewnGarment, dxf};
 use crate::garment::sewing::{draw_shut, put_on};
 use crate::garment::{GarmentRequest, GarmentSpec, MeshCache};
 use crate::mesh::flat_pattern::FlatPattern;
@@ -151,7 +151,17 @@ impl SceneSpec {
             // `files_of_fabrics` finds these and the files that they name.
             !matches!(role, FileRole::Fabric | FileRole::FabricsFile)
         });
-        named.map(|(_, name)| PathBuf::from(name)).chain(self.files_of_fabrics()).collect()
+        named
+            .map(|(_, name)| PathBuf::from(name))
+            .chain(self.files_of_fabrics())
+            .chain(self.files_of_sewing())
+            .collect()
+    }
+
+    /// The files that say how patterns of pieces are sewn.
+    fn files_of_sewing(&self) -> impl Iterator<Item = PathBuf> {
+        let patterns = std::iter::once(&self.garment).chain(&self.over).map(Path::new).filter(|path| dxf::is_dxf(path));
+        patterns.map(dxf::sewing_file).filter(|path| path.is_file())
     }
 
     /// Every value that the loader opens as a file, with its field. A new field does not compile until it is listed here, because
@@ -265,7 +275,7 @@ impl SceneSpec {
     }
 
     fn is_a_pattern(&self) -> bool {
-        has_ending(self.garment.as_ref(), "json")
+        has_ending(self.garment.as_ref(), "json") || dxf::is_dxf(self.garment.as_ref())
     }
 
     /// Whether the garment is a mesh from a file: any file that is neither a description nor a pattern. The reader detects the

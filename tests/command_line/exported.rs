@@ -41,7 +41,8 @@ fn a_coloured_export_has_the_colours_of_parts_and_of_strain() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let all = colours(&fs::read(bench.path("out.glb")).unwrap());
         let different: BTreeSet<_> = all.iter().collect();
-        assert!(all.len() == 169 && different.len() >= least, "{what}: {} colours", different.len());
+        // A vertex of several texture coordinates is there once for each.
+        assert!(all.len() > 169 && different.len() >= least, "{what}: {} colours", different.len());
     }
     let scene = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--no-save"];
     bench
@@ -84,4 +85,33 @@ fn a_preview_is_exported_with_its_folds() {
     assert!(tube_m < 1.5 && (2.4..2.8).contains(&folded_m), "{tube_m} and {folded_m} m");
     let converged = [&scene[..], &["--folds", "--export", "skirt.obj"]].concat();
     bench.refuses(&converged, &["--folds", "expected --refine 0"]);
+}
+
+#[test]
+fn every_format_reads_back_with_its_groups() {
+    let bench = Bench::new();
+    for ending in ["ply", "glb", "usda"] {
+        let out = format!("out.{ending}");
+        let output = bench.drape(&["--no-save", "--export", &out, "--export-colours", "strain"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let bytes = fs::read(bench.path(&out)).unwrap();
+        if ending == "usda" {
+            let text = String::from_utf8(bytes).unwrap();
+            for part in ["upAxis = \"Z\"", "def GeomSubset \"front\"", "primvars:st = [", "primvars:displayColor"] {
+                assert!(text.contains(part), "no {part}");
+            }
+            continue;
+        }
+        let output = bench.run(&["check", "body.obj", &out, "--body-unit", "m", "--body-up", "z", "--format", "json"]);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["garment"]["vertices"], 169, "{ending}: {report}");
+    }
+    let scene = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--no-save"];
+    let export = |file: &'static str| [&scene[..], &["--export", file, "--export-body"]].concat();
+    bench.refuses(&export("out.ply"), &["out.ply", "--export-body", "`.glb`"]);
+    bench.refuses(&[&scene[..], &["--export", "out.stl"]].concat(), &["`.stl`", "`.usda`"]);
+    let output = bench.run(&export("both.glb"));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = bench.run(&["check", "both.glb", "both.glb", "--body-group", "body", "--garment-group", "garment"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("169"), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -29,9 +29,13 @@ use readers::Outcome;
 /// Time limit for one input; far above the usual milliseconds, so that a busy machine does not exceed it.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
+/// Number of kinds of changes to texts, and to binary files, whose bytes are the characters.
+const OF_TEXT: u8 = 16;
+const OF_BYTES: u8 = 24;
+
 /// A seed and up to three changes.
-fn mutated() -> impl Strategy<Value = (u32, Vec<mutate::Mutation>)> {
-    (any::<u32>(), prop::collection::vec((0_u8..16, any::<u32>(), any::<u32>()), 0..4))
+fn mutated(kinds: u8) -> impl Strategy<Value = (u32, Vec<mutate::Mutation>)> {
+    (any::<u32>(), prop::collection::vec((0..kinds, any::<u32>(), any::<u32>()), 0..4))
 }
 
 /// Reads an input and returns its outcome, or the description of a fault in the reader.
@@ -58,11 +62,32 @@ fn judge(reader: &Reader, text: &str) -> Result<Outcome, String> {
     Ok(outcome)
 }
 
+/// [`fuzz`] for binary files. Seeds and corpus have a character for each byte.
+fn fuzz_bytes(
+    class: &'static str,
+    share: f64,
+    seeds: &[Vec<u8>],
+    reader: impl Fn(&[u8]) -> Result<Outcome, String> + Send + Sync + 'static,
+) {
+    let text = |bytes: &Vec<u8>| bytes.iter().copied().map(char::from).collect();
+    let bytes = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<u8>>();
+    fuzz_kinds(class, share, (seeds.iter().map(text).collect(), OF_BYTES), move |text| reader(&bytes(text)));
+}
+
 /// Runs `reader` on the seeds, on the stored corpus, and on mutations of both; `share` scales the number of mutations.
 fn fuzz(
     class: &'static str,
     share: f64,
     seeds: Vec<String>,
+    reader: impl Fn(&str) -> Result<Outcome, String> + Send + Sync + 'static,
+) {
+    fuzz_kinds(class, share, (seeds, OF_TEXT), reader);
+}
+
+fn fuzz_kinds(
+    class: &'static str,
+    share: f64,
+    (seeds, kinds): (Vec<String>, u8),
     reader: impl Fn(&str) -> Result<Outcome, String> + Send + Sync + 'static,
 ) {
     let cases = std::env::var("PARTWISE_FUZZ_CASES").ok().map_or(300, |text| text.parse::<u32>().unwrap());
@@ -93,7 +118,7 @@ fn fuzz(
         seed[31] = std::env::var("PARTWISE_FUZZ_SEED").map_or(7, |text| text.parse().unwrap());
         let mut runner = TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &seed));
         let counted = Mutex::new(&mut counts);
-        let outcome = runner.run(&mutated(), |case| {
+        let outcome = runner.run(&mutated(kinds), |case| {
             let text = input(&case);
             *reading.lock().unwrap() = (Instant::now(), text.clone());
             let outcome = judge(&reader, &text).map_err(TestCaseError::fail)?;

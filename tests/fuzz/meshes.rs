@@ -1,6 +1,8 @@
 //! Readers of meshes and of a sweep's folder: files are written, read, draped and written back.
 
 use std::fs;
+use std::io::{Cursor, Read as _, Write as _};
+use std::path::Path;
 
 use glam::DVec3;
 use partwise::drape::{drape, unobserved};
@@ -11,8 +13,8 @@ use partwise::study::metrics::Metrics;
 use partwise::study::sweep::{Existing, Manifest, Plan, Row, Store, Timing, csv_text, join};
 use partwise::{Job, SceneSpec};
 
-use super::fuzz;
 use super::readers::{Outcome, check, refused};
+use super::{fuzz, fuzz_bytes};
 
 /// A cube's eight corners and six quads, half a metre wide, a metre up.
 const CUBE: &str = "v -0.25 -0.25 1\nv 0.25 -0.25 1\nv -0.25 0.25 1\nv 0.25 0.25 1\nv -0.25 -0.25 1.5\nv 0.25 -0.25 1.5\n\
@@ -60,30 +62,103 @@ fn named(mesh: &TriMesh) -> (&[DVec3], &[[u32; 3]], Vec<&str>) {
     (&mesh.positions, &mesh.triangles, names.collect())
 }
 
+/// Reads a file as a body and as a garment, and writes the garment as OBJ, which must read back as the same mesh.
+fn read_and_write(folder: &Path, bytes: &[u8]) -> Result<Outcome, String> {
+    let path = folder.join("input");
+    fs::write(&path, bytes).map_err(|e| e.to_string())?;
+    let metres = ImportOptions { unit: Some(Unit::M), up: Some(Axis::Z), ..ImportOptions::default() };
+    let open_body = bytes.len() % 2 == 0;
+    if let Ok(body) = import_body(&path, &ImportOptions { open_body, ..ImportOptions::default() }) {
+        whole(&body)?;
+    }
+    let garment = match import_garment(&path, &metres, &Beside::File(&Frame::given(Unit::M, Axis::Z))) {
+        Ok(garment) => garment,
+        Err(e) => return refused(&e),
+    };
+    whole(&garment)?;
+    let out = folder.join("out.obj");
+    write_imported(&out, &garment, &garment.mesh.positions).map_err(|e| e.to_string())?;
+    let again = import_garment(&out, &metres, &Beside::File(&Frame::given(Unit::M, Axis::Z)));
+    let again = again.map_err(|e| format!("written and refused: {e}"))?;
+    check(named(&again.mesh) == named(&garment.mesh), "it reads back as another")?;
+    Ok(Outcome::Taken)
+}
+
 #[test]
 fn meshes() {
     let folder = tempfile::tempdir().unwrap();
-    fuzz("obj", 1.0, objs(), move |text| {
-        let path = folder.path().join("input.obj");
-        fs::write(&path, text).map_err(|e| e.to_string())?;
-        let metres = ImportOptions { unit: Some(Unit::M), up: Some(Axis::Z), ..ImportOptions::default() };
-        if let Ok(body) =
-            import_body(&path, &ImportOptions { open_body: text.len() % 2 == 0, ..ImportOptions::default() })
-        {
-            whole(&body)?;
+    fuzz("obj", 1.0, objs(), move |text| read_and_write(folder.path(), text.as_bytes()));
+}
+
+/// The files of other programs with this ending, up to 9 kB: larger ones take as long and find no more.
+fn files(ending: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats/files");
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == ending) && path.metadata().unwrap().len() < 9_000);
+    paths.sort();
+    assert!(!paths.is_empty(), "no .{ending}");
+    paths.iter().map(|path| fs::read(path).unwrap()).collect()
+}
+
+fn read_binary(class: &'static str, seeds: &[Vec<u8>]) {
+    let folder = tempfile::tempdir().unwrap();
+    fuzz_bytes(class, 1.0, seeds, move |bytes| read_and_write(folder.path(), bytes));
+}
+
+#[test]
+fn plys() {
+    read_binary("ply", &files("ply"));
+}
+
+#[test]
+fn stls() {
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 1.5\nvertex 1 0 1.5\nvertex 0 1 1.5\nendloop\nendfacet\n";
+    let text = format!("solid one\n{facet}endsolid one\nsolid two\n{facet}endsolid two\n");
+    read_binary("stl", &[files("stl"), vec![text.into_bytes()]].concat());
+}
+
+#[test]
+fn glbs() {
+    read_binary("glb", &files("glb"));
+}
+
+#[test]
+fn gltfs() {
+    let seeds = files("gltf").into_iter().map(|bytes| String::from_utf8(bytes).unwrap()).collect();
+    let folder = tempfile::tempdir().unwrap();
+    fuzz("gltf", 1.0, seeds, move |text| read_and_write(folder.path(), text.as_bytes()));
+}
+
+#[test]
+fn archives() {
+    read_binary("npz", &files("npz"));
+}
+
+/// Arrays within an archive whose checksums are right.
+#[test]
+fn arrays() {
+    let mut seeds = Vec::new();
+    for bytes in files("npz") {
+        let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
+        for number in 0..archive.len() {
+            let mut array = Vec::new();
+            archive.by_index(number).unwrap().read_to_end(&mut array).unwrap();
+            seeds.push(array);
         }
-        let garment = import_garment(&path, &metres, &Beside::File(&Frame::given(Unit::M, Axis::Z)));
-        let garment = match garment {
-            Ok(garment) => garment,
-            Err(e) => return refused(&e),
-        };
-        whole(&garment)?;
-        let out = folder.path().join("out.obj");
-        write_imported(&out, &garment, &garment.mesh.positions).map_err(|e| e.to_string())?;
-        let again = import_garment(&out, &metres, &Beside::File(&Frame::given(Unit::M, Axis::Z)));
-        let again = again.map_err(|e| format!("written and refused: {e}"))?;
-        check(named(&again.mesh) == named(&garment.mesh), "it reads back as another")?;
-        Ok(Outcome::Taken)
+    }
+    let mut faces = b"\x93NUMPY\x01\0\x3c\0{'descr': '|u1', 'fortran_order': False, 'shape': (2, 3), }\n".to_vec();
+    faces.extend([0, 1, 2, 2, 1, 3]);
+    let folder = tempfile::tempdir().unwrap();
+    fuzz_bytes("npy", 1.0, &seeds, move |array| {
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        // As vertices, or as vertices and as faces.
+        for name in ["v.npy", "f.npy"] {
+            archive.start_file(name, options).map_err(|e| e.to_string())?;
+            let bytes = if name == "f.npy" && array.len() % 2 == 0 { &faces } else { array };
+            archive.write_all(bytes).map_err(|e| e.to_string())?;
+        }
+        read_and_write(folder.path(), &archive.finish().map_err(|e| e.to_string())?.into_inner())
     });
 }
 

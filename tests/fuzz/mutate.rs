@@ -146,6 +146,20 @@ pub(crate) fn mutate(text: &str, others: &[String], (what, a, b): Mutation) -> S
             tokens[at] = &again;
             tokens.concat()
         }
+        16.. => {
+            // Bytes of a number, in either order, that often breaks readers.
+            let value: u64 = [0, 1, 0x7f, 0xff, 0x7fff_ffff, 0xffff_ffff, 0x7fc0_0000, u64::MAX][b % 8];
+            let mut bytes = value.to_le_bytes()[..1 << (b / 8 % 4)].to_vec();
+            if b / 32 % 2 == 1 {
+                bytes.reverse();
+            }
+            let mut chars: Vec<char> = text.chars().collect();
+            // The header of a binary file is short, so half of the changes are there.
+            let reach = if b / 64 % 2 == 1 { chars.len().min(400) } else { chars.len() };
+            let place = a % reach;
+            chars[place..].iter_mut().zip(bytes).for_each(|(c, byte)| *c = char::from(byte));
+            chars.into_iter().collect()
+        }
         _ => {
             let odd = char::from_u32(b as u32 % 0x300).unwrap_or('\0');
             let mut chars: Vec<char> = text.chars().collect();

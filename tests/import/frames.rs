@@ -106,7 +106,7 @@ fn a_body_in_millimetres_and_a_garment_in_metres_meet_and_options_name_each_fram
     let close = |(low, high): (DVec3, DVec3)| low.distance(expected.0) + high.distance(expected.1) < 1e-5;
     assert!(close(placed(&spec).unwrap()));
     let notes = spec.load().unwrap().notes().join("\n");
-    assert!(notes.contains("in m, z up") && notes.contains("0 in the body's own frame"), "{notes}");
+    assert!(notes.contains("in m, z up") && notes.contains("0 in mm, y up, as the body)"), "{notes}");
     // Each frame has options of its own; those of both files apply where they have none.
     let given = SceneSpec {
         body_unit: Some(Unit::Mm),

@@ -156,7 +156,7 @@ impl RunArgs {
         let mut served = Some(self.record_method(&draped, &report)?);
         report.timings_ms.insert("record", 1e3 * recording.elapsed().as_secs_f64());
         if let Some(path) = &self.export {
-            loaded.write(path, &drape.positions)?;
+            loaded.write_with(path, &drape.positions, None, self.export_body)?;
             report.outputs.push(format!("draped garment: {}", path.display()));
         }
         if let Some(recorder) = served.take_if(|recorder| recorder.web_url().is_none()) {

@@ -6,9 +6,12 @@
 //! | quadratic | (1−t)² a + 2 t (1−t) c + t² b |
 //! | cubic | (1−t)³ a + 3 t (1−t)² c + 3 t² (1−t) d + t³ b |
 //! | arc | m + r (cos φ, sin φ), φ = φ₀ + t Δφ |
+//! | polyline | the point at the share t of its length |
 //!
 //! Béziers are kurbo's: their lengths, the points at given lengths, and their areas. kurbo approximates arcs by Béziers, so arcs
 //! are exact here. All in metres.
+
+use std::sync::Arc;
 
 use glam::DVec2;
 use kurbo::{CubicBez, Line, ParamCurve, ParamCurveArclen, ParamCurveArea, PathSeg, Point, QuadBez};
@@ -19,7 +22,7 @@ use crate::base::math;
 const ACCURACY: f64 = 1e-12;
 
 /// A curve in the plane of its panel, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "the table above says what each field is")]
 pub enum Curve {
     /// A straight edge.
@@ -30,6 +33,8 @@ pub enum Curve {
     Cubic { a: DVec2, c: DVec2, d: DVec2, b: DVec2 },
     /// An arc of a circle; `turn` (radians) is positive counter-clockwise.
     Arc { a: DVec2, b: DVec2, centre: DVec2, radius: f64, from: f64, turn: f64 },
+    /// Points joined by lines, two at least; t is the share of the length.
+    Polyline { points: Arc<[DVec2]> },
 }
 
 impl Curve {
@@ -58,42 +63,56 @@ impl Curve {
 
     /// Its first point.
     pub(crate) fn start(&self) -> DVec2 {
-        match *self {
-            Self::Line { a, .. } | Self::Quadratic { a, .. } | Self::Cubic { a, .. } | Self::Arc { a, .. } => a,
+        match self {
+            Self::Line { a, .. } | Self::Quadratic { a, .. } | Self::Cubic { a, .. } | Self::Arc { a, .. } => *a,
+            Self::Polyline { points } => points[0],
         }
     }
 
     /// Its last point.
     pub(crate) fn end(&self) -> DVec2 {
-        match *self {
-            Self::Line { b, .. } | Self::Quadratic { b, .. } | Self::Cubic { b, .. } | Self::Arc { b, .. } => b,
+        match self {
+            Self::Line { b, .. } | Self::Quadratic { b, .. } | Self::Cubic { b, .. } | Self::Arc { b, .. } => *b,
+            Self::Polyline { points } => points[points.len() - 1],
         }
     }
 
     /// p(t); the ends are exact.
     pub(crate) fn at(&self, t: f64) -> DVec2 {
-        match *self {
+        match self {
             _ if t <= 0.0 => self.start(),
             _ if t >= 1.0 => self.end(),
-            Self::Arc { centre, radius, from, turn, .. } => centre + radius * math::unit(from + t * turn),
+            Self::Arc { centre, radius, from, turn, .. } => *centre + *radius * math::unit(from + t * turn),
+            Self::Polyline { points } => {
+                let mut left = t * self.length();
+                for side in points.windows(2) {
+                    let length = side[0].distance(side[1]);
+                    if left <= length && length > 0.0 {
+                        return side[0].lerp(side[1], left / length);
+                    }
+                    left -= length;
+                }
+                self.end()
+            }
             _ => vector(self.segment().eval(t)),
         }
     }
 
-    /// The curve as kurbo's; an arc, which kurbo only approximates, as its chord.
+    /// The curve as kurbo's; an arc, which kurbo only approximates, and a polyline as their chords.
     fn segment(&self) -> PathSeg {
         match *self {
-            Self::Line { a, b } | Self::Arc { a, b, .. } => Line::new(point(a), point(b)).into(),
             Self::Quadratic { a, c, b } => QuadBez::new(point(a), point(c), point(b)).into(),
             Self::Cubic { a, c, d, b } => CubicBez::new(point(a), point(c), point(d), point(b)).into(),
+            _ => Line::new(point(self.start()), point(self.end())).into(),
         }
     }
 
     /// Length, m.
     pub(crate) fn length(&self) -> f64 {
-        match *self {
-            Self::Line { a, b } => a.distance(b),
+        match self {
+            Self::Line { a, b } => a.distance(*b),
             Self::Arc { radius, turn, .. } => radius * turn.abs(),
+            Self::Polyline { points } => points.windows(2).map(|side| side[0].distance(side[1])).sum(),
             _ => self.segment().arclen(ACCURACY),
         }
     }
@@ -102,7 +121,7 @@ impl Curve {
     pub(crate) fn divided(&self, count: usize) -> Vec<DVec2> {
         let length = self.length();
         let parameter = |share: f64| match self {
-            Self::Line { .. } | Self::Arc { .. } => share,
+            Self::Line { .. } | Self::Arc { .. } | Self::Polyline { .. } => share,
             _ if share == 1.0 => 1.0,
             _ => self.segment().inv_arclen(share * length, ACCURACY),
         };
@@ -111,8 +130,9 @@ impl Curve {
 
     /// ½ ∫ p × dp along it. The edges of a loop add up to its area, m², positive counter-clockwise.
     pub(crate) fn area(&self) -> f64 {
-        match *self {
-            Self::Arc { centre, radius, turn, a, b, .. } => 0.5 * (centre.perp_dot(b - a) + radius * radius * turn),
+        match self {
+            Self::Arc { centre, radius, turn, a, b, .. } => 0.5 * (centre.perp_dot(*b - *a) + radius * radius * turn),
+            Self::Polyline { points } => points.windows(2).map(|side| 0.5 * side[0].perp_dot(side[1])).sum(),
             _ => self.segment().signed_area(),
         }
     }
@@ -164,6 +184,16 @@ mod tests {
             assert!((p.y - p.x * p.x).abs() < 1e-14);
             assert!((to(p.x) - to(-1.0) - exact * i as f64 / 7.0).abs() < 1e-11, "{p}");
         }
+    }
+
+    #[test]
+    fn a_polyline_is_divided_by_length_and_not_by_points() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [1.0, 2.0]].map(DVec2::from_array);
+        let line = Curve::Polyline { points: points.into() };
+        assert_eq!((line.length(), line.start(), line.end()), (3.0, points[0], points[3]));
+        assert_eq!(line.divided(3), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 2.0]].map(DVec2::from_array));
+        let back = Curve::Line { a: points[3], b: points[0] };
+        assert_eq!(line.area() + back.area(), 1.0);
     }
 
     #[test]

@@ -84,7 +84,7 @@ fn in_rows(sizes: &[DVec2], width: f64) -> Rows {
 }
 
 /// The pattern as an SVG drawing in its true size (a millimetre of the drawing is a millimetre of cloth): panels with grain and
-/// labels, edges as the curves they are, and seams with a number and a colour that are the same on both sides. The longer side
+/// labels, edges as the curves they are with small grey numbers, and seams with a number and a colour that are the same on both sides. The longer side
 /// of a gathered seam has its excess length in per cent.
 #[must_use]
 pub fn to_svg(pattern: &SewingPattern) -> String {
@@ -134,7 +134,15 @@ pub fn to_svg(pattern: &SewingPattern) -> String {
             if low { 9 } else { 14 },
             escaped(&panel.name)
         );
-        for edge in panel.edges.iter() {
+        for line in &panel.drawn {
+            let points: Vec<String> =
+                line.iter().map(|p| onto(*p + offset)).map(|p| format!("{:.3} {:.3}", p.x, p.y)).collect();
+            let _ =
+                writeln!(out, "<path d=\"M{}\" fill=\"none\" stroke=\"#999\" stroke-width=\"0.6\"/>", points.join("L"));
+        }
+        for (number, edge) in panel.edges.iter().enumerate() {
+            // As `panel.edge` in the lists of seams.
+            text(&mut out, inward(&outline, &edge.curve, 6e-3) + offset, &onto, 10.0, "#777", &number.to_string());
             if let Some(label) = &edge.label {
                 text(&mut out, inward(&outline, &edge.curve, 24e-3) + offset, &onto, 8.0, "#777", &escaped(label));
             }
@@ -186,14 +194,15 @@ fn command(curve: &Curve, offset: DVec2, onto: &impl Fn(DVec2) -> DVec2) -> Stri
         let p = onto(p + offset);
         format!("{:.3} {:.3}", p.x, p.y)
     };
-    match *curve {
-        Curve::Line { b, .. } => format!("L{}", at(b)),
-        Curve::Quadratic { c, b, .. } => format!("Q{} {}", at(c), at(b)),
-        Curve::Cubic { c, d, b, .. } => format!("C{} {} {}", at(c), at(d), at(b)),
+    match curve {
+        Curve::Line { b, .. } => format!("L{}", at(*b)),
+        Curve::Quadratic { c, b, .. } => format!("Q{} {}", at(*c), at(*b)),
+        Curve::Cubic { c, d, b, .. } => format!("C{} {} {}", at(*c), at(*d), at(*b)),
+        Curve::Polyline { points } => points[1..].iter().map(|p| format!("L{}", at(*p))).collect(),
         Curve::Arc { b, radius, turn, .. } => {
             // y points down on the page, which inverts the sweep flag.
-            let (large, sweep) = (u8::from(turn.abs() > std::f64::consts::PI), u8::from(turn < 0.0));
-            format!("A{0:.3} {0:.3} 0 {large} {sweep} {1}", 1e3 * radius, at(b))
+            let (large, sweep) = (u8::from(turn.abs() > std::f64::consts::PI), u8::from(*turn < 0.0));
+            format!("A{0:.3} {0:.3} 0 {large} {sweep} {1}", 1e3 * radius, at(*b))
         }
     }
 }

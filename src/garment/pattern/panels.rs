@@ -26,6 +26,8 @@ pub struct PatternPanel {
     pub rotation: DMat3,
     /// The translation after it, m.
     pub translation: DVec3,
+    /// Lines in its plane that a drawing shows and nothing else uses, m: notches, internal lines, the cut line around the sew line.
+    pub drawn: Vec<Vec<DVec2>>,
 }
 
 impl PatternPanel {

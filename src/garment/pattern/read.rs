@@ -14,6 +14,7 @@ use serde_json::{Map, Value};
 
 use super::check;
 use super::curve::Curve;
+use super::dxf;
 use super::error::PatternError;
 use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
 use crate::base::files::{listed, read_text, stem};
@@ -37,12 +38,27 @@ struct Properties {
     relative: bool,
 }
 
-/// Reads and checks the pattern in a file.
+/// Reads and checks the pattern in a file: GarmentCode's JSON, or a DXF with the TOML file beside it that says how it is sewn.
 ///
 /// # Errors
 /// [`PatternError`] names the file, the panel and the edge.
 pub fn read(path: &Path) -> Result<SewingPattern, PatternError> {
+    read_as(path, true)
+}
+
+/// [`read`], also of a DXF that nothing says how to sew; its pieces are panels then.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_unsewn(path: &Path) -> Result<SewingPattern, PatternError> {
+    read_as(path, false)
+}
+
+fn read_as(path: &Path, must_be_sewn: bool) -> Result<SewingPattern, PatternError> {
     let file = path.display().to_string();
+    if dxf::is_dxf(path) {
+        return dxf::read(path, must_be_sewn).map_err(|source| PatternError::In { file, source: Box::new(source) });
+    }
     let name = stem(&file);
     let name = name.strip_suffix("_specification").unwrap_or(&name);
     parse(&read_text(path)?, name).map_err(|source| PatternError::In { file, source: Box::new(source) })
@@ -206,7 +222,7 @@ fn panel(name: &str, value: &Value, of: &Properties, notes: &mut Vec<String>) ->
     }
     let label = label(object, &place)?;
     let (rotation, translation) = upright(angles, translation * of.metres_per_unit);
-    Ok(PatternPanel { name: name.to_owned(), label, edges, rotation, translation })
+    Ok(PatternPanel { name: name.to_owned(), label, edges, rotation, translation, drawn: Vec::new() })
 }
 
 fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, PatternError> {
@@ -216,7 +232,7 @@ fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, Pat
 }
 
 /// The placement with z up and the front at −y.
-fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
+pub(super) fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
     let [a, b, c] = degrees.to_array().map(f64::to_radians);
     let rotation = math::rotation(DVec3::Z, c) * math::rotation(DVec3::Y, b) * math::rotation(DVec3::X, a);
     let turn = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y);

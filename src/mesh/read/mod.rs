@@ -69,9 +69,12 @@ fn format_of(file: &Path, bytes: &[u8]) -> Format {
         (text.starts_with("ply\n") || text.starts_with("ply\r"), Format::Ply),
         (starts(b"PK\x03\x04") && npz::has_arrays(bytes), Format::Npz),
         (starts(b"\x93NUMPY"), Format::Other("a single NumPy array; save vertices and faces together by numpy.savez")),
-        (starts(b"\x80") && bytes.get(1).is_some_and(|version| *version <= 5), Format::Other(
-            "a Python pickle, which can run programs when it is read; save its v_template and f by numpy.savez",
-        )),
+        (
+            starts(b"\x80") && bytes.get(1).is_some_and(|version| *version <= 5),
+            Format::Other(
+                "a Python pickle, which can run programs when it is read; save its v_template and f by numpy.savez",
+            ),
+        ),
         (starts(b"Kaydara FBX"), Format::Other("an FBX scene")),
         (is_dxf, Format::Other("a DXF drawing, which is read as a sewing pattern (--pattern), never as a mesh")),
         (starts(b"PK\x03\x04"), Format::Other("a ZIP archive (3MF, USDZ, or a packed file)")),

@@ -47,8 +47,10 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
 }
 
 fn read(file: &Path, bytes: &[u8]) -> Result<MeshSource, String> {
-    let mut archive = Archive::new(Cursor::new(bytes)).map_err(|e| format!("the archive is invalid: {e}; expected it whole"))?;
-    let mut names: Vec<String> = archive.file_names().filter_map(|n| n.strip_suffix(".npy")).map(str::to_owned).collect();
+    let mut archive =
+        Archive::new(Cursor::new(bytes)).map_err(|e| format!("the archive is invalid: {e}; expected it whole"))?;
+    let mut names: Vec<String> =
+        archive.file_names().filter_map(|n| n.strip_suffix(".npy")).map(str::to_owned).collect();
     names.sort();
     let named = |known: &[&'static str]| known.iter().copied().find(|known| names.iter().any(|name| name == known));
     let (Some(vertices), Some(faces)) = (named(&VERTICES), named(&FACES)) else {
@@ -71,19 +73,25 @@ fn read(file: &Path, bytes: &[u8]) -> Result<MeshSource, String> {
     let at = |name: &'static str| move |problem| format!("array {name}: {problem}");
     let Array { shape, numbers } = Array::read(&mut archive, vertices).map_err(at(vertices))?;
     let ([_, 3] | [1, _, 3]) = shape[..] else {
-        return Err(format!("array {vertices}: found the shape {shape:?}, expected (n, 3); save one mesh, not a sequence"));
+        return Err(format!(
+            "array {vertices}: found the shape {shape:?}, expected (n, 3); save one mesh, not a sequence"
+        ));
     };
     for (row, &position) in numbers.as_chunks::<3>().0.iter().enumerate() {
         source.push_position(DVec3::from_array(position)).map_err(|e| format!("array {vertices}, row {row}: {e}"))?;
     }
     let Array { shape, numbers } = Array::read(&mut archive, faces).map_err(at(faces))?;
     let [_, corners @ 3..=MAX_CORNERS] = shape[..] else {
-        return Err(format!("array {faces}: found the shape {shape:?}, expected (m, 3), or another number of corners up to {MAX_CORNERS}"));
+        return Err(format!(
+            "array {faces}: found the shape {shape:?}, expected (m, 3), or another number of corners up to {MAX_CORNERS}"
+        ));
     };
     let count = source.positions.len();
     for (row, face) in numbers.chunks_exact(corners).enumerate() {
         if let Some(found) = face.iter().find(|&&v| !(v >= 0.0 && v < count as f64 && v.fract() == 0.0)) {
-            return Err(format!("array {faces}, row {row}: found vertex {found}, expected a whole number from 0 to below {count}"));
+            return Err(format!(
+                "array {faces}, row {row}: found vertex {found}, expected a whole number from 0 to below {count}"
+            ));
         }
         source.push_face(face.iter().map(|&v| Corner { vertex: v as u32, texture: NONE }), NONE, NONE);
     }
@@ -99,7 +107,8 @@ struct Array {
 impl Array {
     /// Reads `NAME.npy` of an archive (NumPy's format, versions 1 to 3).
     fn read(archive: &mut Archive<'_>, name: &str) -> Result<Self, String> {
-        let mut entry = archive.by_name(&format!("{name}.npy")).map_err(|e| format!("{e}; expected it in the archive"))?;
+        let mut entry =
+            archive.by_name(&format!("{name}.npy")).map_err(|e| format!("{e}; expected it in the archive"))?;
         let mut bytes = |count: usize| {
             let mut bytes = Vec::new();
             match (&mut entry).take(count as u64).read_to_end(&mut bytes) {
@@ -136,7 +145,9 @@ impl Array {
         if let (true, [rows, columns]) = (header.by_columns, &shape[..]) {
             numbers = (0..rows * columns).map(|i| numbers[i % columns * rows + i / columns]).collect();
         } else if header.by_columns && shape.len() > 2 {
-            return Err(format!("found the shape {shape:?} in Fortran's order, expected C's; save numpy.ascontiguousarray of it"));
+            return Err(format!(
+                "found the shape {shape:?} in Fortran's order, expected C's; save numpy.ascontiguousarray of it"
+            ));
         }
         Ok(Self { shape, numbers })
     }
@@ -156,7 +167,9 @@ struct Header {
 impl Header {
     fn parse(text: &str) -> Result<Self, String> {
         let wrong = || format!("found the header \"{}\", expected a type, an order and a shape", excerpt(text.trim()));
-        let value = |key: &str| text.split_once(key).and_then(|(_, rest)| rest.split_once(':')).map(|(_, rest)| rest.trim_start());
+        let value = |key: &str| {
+            text.split_once(key).and_then(|(_, rest)| rest.split_once(':')).map(|(_, rest)| rest.trim_start())
+        };
         let descr = value("'descr'").ok_or_else(wrong)?;
         let descr = descr.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).map(|(descr, _)| descr);
         let (kind, size, is_big) = match descr.map(str::as_bytes) {
@@ -165,11 +178,16 @@ impl Header {
                 (kind, usize::from(size - b'0'), order == b'>')
             }
             Some([_, b'O', ..]) => {
-                return Err("found pickled Python objects, which are not read, expected numbers; save an array of floats".to_owned());
+                return Err(
+                    "found pickled Python objects, which are not read, expected numbers; save an array of floats"
+                        .to_owned(),
+                );
             }
             _ => {
                 let found = excerpt(descr.unwrap_or("of several fields"));
-                return Err(format!("found the type {found}, expected float32, float64 or integers; save it by astype"));
+                return Err(format!(
+                    "found the type {found}, expected float32, float64 or integers; save it by astype"
+                ));
             }
         };
         let by_columns = value("'fortran_order'").ok_or_else(wrong)?.starts_with("True");

@@ -84,8 +84,8 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
         let all = Element { rows: &mut rows, meanings: &meanings, numbers: [f64::NAN; 5], is_strip };
         (&mut &mut reader).next_value_seed(all).map_err(|e| {
             let reason = match e.0.kind() {
-                ErrorKind::UnexpectedEof => "the file ends there; it is cut off".to_owned(),
-                _ => format!("{}; the export that wrote it went wrong, make it again", e.0),
+                ErrorKind::UnexpectedEof => "the file ends there, expected all rows; it is cut off".to_owned(),
+                _ => format!("{}; expected the numbers that the header describes, so make the export again", e.0),
             };
             broken(file, format!("{} {} of {}: {reason}", element.name, rows.row + 1, element.count))
         })?;
@@ -95,7 +95,10 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
     if let Some(face) = source.faces.iter().find(|f| source.corners_of(f).iter().any(|c| c.vertex as usize >= count)) {
         let found = source.corners_of(face).iter().map(|c| c.vertex).max().unwrap_or_default();
         let number = face.number + 1;
-        return Err(broken(file, format!("face {number}: found vertex {found}, expected one below {count}, their number")));
+        return Err(broken(
+            file,
+            format!("face {number}: found vertex {found}, expected one below {count}, their number"),
+        ));
     }
     // A vertex with texture coordinates stands in the file once for each of them.
     if has_textures {
@@ -114,8 +117,7 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
 /// Names the properties of an element that lacks its shape.
 fn meanings(element: &ElementDef) -> Result<Vec<Meaning>, String> {
     let name = element.name.as_str();
-    let meanings: Vec<Meaning> =
-        element.properties.iter().map(|p| meaning(name, &p.name, &p.property_type)).collect();
+    let meanings: Vec<Meaning> = element.properties.iter().map(|p| meaning(name, &p.name, &p.property_type)).collect();
     let (needed, expected): (&[Meaning], _) = match name {
         "vertex" => (&[Meaning::Number(0), Meaning::Number(1), Meaning::Number(2)], "x, y and z"),
         "face" | "tristrips" => (&[Meaning::Corners], "a list vertex_indices"),
@@ -147,7 +149,9 @@ fn check_count(element: &ElementDef, format: PlyFormat, left: usize) -> Result<(
         return Ok(());
     }
     let (name, count) = (&element.name, element.count);
-    Err(format!("found {count} rows of {name} in the header, expected {most} at most in the rest of the file, which is cut off"))
+    Err(format!(
+        "found {count} rows of {name} in the header, expected {most} at most in the rest of the file, which is cut off"
+    ))
 }
 
 /// The mesh while its rows are read.

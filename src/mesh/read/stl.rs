@@ -64,7 +64,11 @@ fn text(source: &mut MeshSource, text: &str) -> Result<(), MeshError> {
                     _ => return Err(wrong(format!("found \"{}\", expected vertex and three numbers", excerpt(line)))),
                 };
                 let file = source.file.clone();
-                source.push_position(position).map_err(|problem| MeshError::Line { file, line: number + 1, problem })?;
+                source.push_position(position).map_err(|problem| MeshError::Line {
+                    file,
+                    line: number + 1,
+                    problem,
+                })?;
                 count += 1;
             }
             Some("endloop") => push_last(source, std::mem::take(&mut count), object),

@@ -26,7 +26,9 @@ impl<'a> Buffers<'a> {
     pub(super) fn new(document: &'a Document, length: usize, binary: Option<&'a [u8]>) -> Self {
         let content = |(number, buffer): (usize, &'a Buffer)| match (&buffer.uri, binary) {
             (None, Some(binary)) if number == 0 => Ok(binary.into()),
-            (None, _) => Err(format!("buffer {number}: found no data in the file, expected the binary chunk of a .glb")),
+            (None, _) => {
+                Err(format!("buffer {number}: found no data in the file, expected the binary chunk of a .glb"))
+            }
             (Some(uri), _) => embedded(uri).map(Cow::from).map_err(|problem| format!("buffer {number}: {problem}")),
         };
         let contents = document.buffers.iter().enumerate().map(content).collect();
@@ -87,7 +89,13 @@ impl<'a> Buffers<'a> {
     }
 
     /// `count` pieces of `size` bytes of a view, from an offset on.
-    fn slices(&self, view: usize, offset: usize, count: usize, size: usize) -> Result<impl Iterator<Item = &[u8]>, String> {
+    fn slices(
+        &self,
+        view: usize,
+        offset: usize,
+        count: usize,
+        size: usize,
+    ) -> Result<impl Iterator<Item = &[u8]>, String> {
         let views = &self.document.buffer_views;
         let view = views.get(view).ok_or_else(|| missing("views", views.len()))?;
         let buffer = self.contents.get(view.buffer).ok_or_else(|| missing("buffers", self.contents.len()))?;
@@ -98,7 +106,8 @@ impl<'a> Buffers<'a> {
         }
         let end = view.byte_offset.checked_add(view.byte_length);
         let bytes = end.and_then(|end| buffer.get(view.byte_offset..end)).and_then(|bytes| bytes.get(offset..));
-        let needed = if count == 0 { Some(0) } else { (count - 1).checked_mul(stride).and_then(|all| all.checked_add(size)) };
+        let needed =
+            if count == 0 { Some(0) } else { (count - 1).checked_mul(stride).and_then(|all| all.checked_add(size)) };
         match (bytes, needed) {
             (Some(bytes), Some(needed)) if needed <= bytes.len() => {
                 Ok((0..count).map(move |i| &bytes[i * stride..i * stride + size]))
@@ -120,7 +129,9 @@ pub(super) fn missing(what: &str, count: usize) -> String {
 fn embedded(uri: &str) -> Result<Vec<u8>, String> {
     let Some(data) = uri.strip_prefix("data:") else {
         let found = excerpt(uri);
-        return Err(format!("its data is in another file, \"{found}\", which is not opened; export everything in one .glb"));
+        return Err(format!(
+            "found its data in another file, \"{found}\", which is not opened; export everything in one .glb"
+        ));
     };
     let data = data.split_once(";base64,").map(|(_, data)| data).ok_or("found a data URI, expected one in base64")?;
     STANDARD.decode(data).map_err(|e| format!("the base64 of its data URI is invalid: {e}; expected it whole"))

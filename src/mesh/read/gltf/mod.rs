@@ -187,7 +187,8 @@ impl Loader<'_> {
             return Ok(positions.into_iter().map(|p| matrix.transform_point3(p)).collect());
         };
         let matrices = self.skin(skin)?;
-        let influences = self.buffers.read::<4>(joints, "VEC4")?.into_iter().zip(self.buffers.read::<4>(weights, "VEC4")?);
+        let influences =
+            self.buffers.read::<4>(joints, "VEC4")?.into_iter().zip(self.buffers.read::<4>(weights, "VEC4")?);
         let mut posed = Vec::with_capacity(positions.len());
         for (p, (joints, weights)) in positions.into_iter().zip(influences) {
             let mut x = DVec4::ZERO;
@@ -242,7 +243,8 @@ impl Loader<'_> {
         if let Some(found) = indices.iter().find(|&&i| i >= count) {
             return Err(format!("found vertex {found}, expected one below {count}, their number"));
         }
-        let corner = |i: u32| Corner { vertex: first + i, texture: if i < textures { first_texture + i } else { NONE } };
+        let corner =
+            |i: u32| Corner { vertex: first + i, texture: if i < textures { first_texture + i } else { NONE } };
         let mut push = |[a, b, c]: [u32; 3], turned: bool| {
             let corners = if turned { [a, c, b] } else { [a, b, c] };
             source.push_face(corners.map(corner), group, object);
