@@ -56,6 +56,8 @@ pub mod mechanics;
 pub mod mesh;
 pub mod methods;
 pub mod parts;
+#[cfg(feature = "cli")]
+mod picture;
 #[cfg(feature = "python")]
 mod python;
 #[cfg(feature = "viewer")]

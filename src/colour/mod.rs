@@ -1,6 +1,7 @@
 //! Colours of PARTs and of values on the mesh. Recordings, exports and Python show the same ones.
 
 pub(crate) mod cells;
+pub(crate) mod legend;
 pub(crate) mod map;
 pub(crate) mod palette;
 mod values;

@@ -18,13 +18,14 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::console::{self, RowFormat};
+use super::pictures::PictureArgs;
 use super::runtime::{UserError, keep_results, reference_cache, refuse, use_threads, write};
 use super::sinks::SinkArgs;
 use super::stages::ModelArgs;
-use super::sweep::record_all;
 use super::sweep::recording::MAX_SIDE_BY_SIDE;
 use super::sweep::report::{recording_line, rows_text};
 use super::sweep::store::{PointStore, StoringBench};
+use super::sweep::{NOT_STORED, record_all};
 
 /// Arguments of `compare`.
 #[derive(Debug, Clone, Args)]
@@ -56,6 +57,8 @@ pub(crate) struct CompareArgs {
     cache: Option<PathBuf>,
     #[command(flatten)]
     sinks: SinkArgs,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Also write the comparison to this CSV file, one line per level
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     csv: Option<PathBuf>,
@@ -74,7 +77,8 @@ impl CompareArgs {
             refuse!("found {found} range tables, expected 2 to {MAX_SIDE_BY_SIDE}; `partwise sweep` accepts more");
         }
         use_threads(self.threads)?;
-        self.sinks.check_outputs(&[("--csv", self.csv.as_deref())])?;
+        self.picture.check_before(&NOT_STORED)?;
+        self.sinks.check_outputs(&[("--csv", self.csv.as_deref()), self.picture.output()])?;
         keep_results();
         let plan = self.plan()?;
         let store = PointStore::in_memory();
@@ -99,6 +103,7 @@ impl CompareArgs {
         }
         let folder = Path::new("recordings").join("compare");
         let recordings = record_all(&rows, &store, "compare", &folder, &self.sinks, Tab::SideBySide)?;
+        console::notes(self.picture.draw_sweep("compare", &rows, &store)?.as_slice());
         let recordings: String = recordings.iter().map(recording_line).collect();
         match self.format {
             RowFormat::Text => console::prose(&(text(&compared) + &recordings)),

@@ -9,6 +9,7 @@ mod cusick;
 mod inputs;
 mod live;
 mod pattern;
+mod pictures;
 mod run;
 mod runtime;
 mod shell;

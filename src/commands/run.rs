@@ -13,6 +13,7 @@ use crate::colour::of_drape;
 use crate::drape::{self, Refine, Release};
 use crate::mechanics::refine::{Observer, Step};
 use crate::methods::METHODS;
+use crate::picture::Quantity;
 use crate::record::Recorder;
 use crate::study::certificate::certify;
 use crate::study::evaluate::EvaluateError;
@@ -22,6 +23,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser as _};
 
 use super::console::{self, Format};
 use super::inputs::InputArgs;
+use super::pictures::PictureArgs;
 use super::runtime::{interrupted, reference_cache, refuse, use_threads, wait_for_interrupt, with_progress};
 use super::sinks::{SinkArgs, mesh_file};
 use super::solved::{Iteration, Solved, folded_preview};
@@ -46,6 +48,8 @@ pub(crate) struct RunArgs {
     stages: StageArgs,
     #[command(flatten)]
     sinks: SinkArgs,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Drape again and stream another step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
@@ -112,8 +116,11 @@ const MESH_INTERVAL: usize = 8;
 impl RunArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         use_threads(self.threads)?;
-        self.sinks.check_outputs(&[("--export", self.export.as_deref())])?;
+        self.sinks.check_outputs(&[("--export", self.export.as_deref()), self.picture.output()])?;
         self.check_export()?;
+        if !self.accuracy {
+            self.picture.check_before(&[(Quantity::Error, "no --accuracy")])?;
+        }
         if self.method != TWO_STAGE {
             if self.strict {
                 refuse!("--strict: found --method {}, expected {TWO_STAGE}, the method that is certified", self.method);
@@ -135,6 +142,7 @@ impl RunArgs {
         let mut recorder = solved.open(&self.sinks, !self.no_iterations, false)?;
         solved.record(&mut recorder, 0, !self.no_iterations)?;
         self.export(&mut solved)?;
+        self.draw(&mut solved)?;
         if self.sinks.serve {
             self.print(&solved)?;
             serve(recorder)?;
@@ -164,6 +172,15 @@ impl RunArgs {
             refuse!(
                 "{name}: found --export-body for a file of one mesh, expected a name that ends in `.glb` or `.usda`"
             );
+        }
+        Ok(())
+    }
+
+    fn draw(&self, solved: &mut Solved) -> anyhow::Result<()> {
+        let began = Instant::now();
+        if let Some(line) = self.picture.draw_run(solved)? {
+            solved.summary.outputs.push(line);
+            solved.summary.add_time("picture", began.elapsed());
         }
         Ok(())
     }

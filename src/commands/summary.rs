@@ -57,7 +57,7 @@ pub(crate) struct Summary {
     let_go: Option<String>,
     /// The errors against the drape's own continuation, under `--accuracy`.
     accuracy: Option<Value>,
-    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, and `total`.
+    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, `picture`, and `total`.
     timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
     /// The certificate, under `--certify`.
@@ -202,7 +202,7 @@ impl Summary {
 
     /// Milliseconds of the stages that ran, in their order.
     fn times(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "total"]
+        ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "picture", "total"]
             .into_iter()
             .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
     }

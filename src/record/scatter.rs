@@ -14,8 +14,8 @@ use rerun::{Color, LineStrips2D, Points2D};
 use super::error::RecordError;
 use super::legend::texts;
 use super::open_recording::OpenRecording;
-use super::panel::number;
 use super::{meshes, paths};
+use crate::colour::legend::number;
 use crate::colour::palette;
 
 /// Path and axis titles of a scatter plot.

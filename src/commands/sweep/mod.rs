@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::Job;
+use crate::picture::Quantity;
 use crate::record::{RecordSummary, Tab};
 use crate::study::job::Against;
 use crate::study::sweep::{self, Existing, Outcome, Plan, Point, Row, Run, Shard, Status, SweepProgress};
@@ -18,6 +19,7 @@ use clap::Args;
 use self::report::Report;
 use self::store::{PointStore, StoringBench};
 use super::console::{self, RowFormat};
+use super::pictures::PictureArgs;
 use super::runtime::{
     MAX_THREADS, interrupt_flag, interrupted, keep_results, reference_cache, refuse, unwritable, use_threads,
 };
@@ -53,6 +55,8 @@ pub(crate) struct SweepArgs {
     cache: Option<PathBuf>,
     #[command(flatten)]
     sinks: SinkArgs,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Format of the result on stdout
     #[arg(long, value_enum, default_value_t = RowFormat::Text, help_heading = "Output")]
     format: RowFormat,
@@ -60,6 +64,13 @@ pub(crate) struct SweepArgs {
     #[arg(long, value_name = "N", help_heading = "Output")]
     threads: Option<usize>,
 }
+
+/// Colours that points have no values for: a stored point keeps what the recording shows.
+pub(crate) const NOT_STORED: [(Quantity, &str); 3] = [
+    (Quantity::Strain, "points without it"),
+    (Quantity::Pressure, "points without it"),
+    (Quantity::Folds, "points without it"),
+];
 
 impl SweepArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
@@ -69,7 +80,8 @@ impl SweepArgs {
             refuse!("--jobs {found}: found {found}, expected 1 to {MAX_THREADS} points in parallel");
         }
         keep_results();
-        self.sinks.check_outputs(&[])?;
+        self.picture.check_before(&NOT_STORED)?;
+        self.sinks.check_outputs(&[self.picture.output()])?;
         let plan = self.plan()?;
         let folder = self.folder();
         let store = PointStore::in_folder(&folder);
@@ -106,6 +118,7 @@ impl SweepArgs {
         self.restore(&plan, &outcome.rows, &store, &bench);
         let seconds = started.elapsed().as_secs_f64();
         let recordings = record_all(&outcome.rows, &store, &plan.name, &folder, &self.sinks, Tab::Stages)?;
+        console::notes(self.picture.draw_sweep(&plan.name, &outcome.rows, &store)?.as_slice());
         let report = Report {
             name: &plan.name,
             folder: &folder,
@@ -204,6 +217,8 @@ pub(crate) struct MergeArgs {
     out: PathBuf,
     #[command(flatten)]
     sinks: SinkArgs,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Format of the result on stdout
     #[arg(long, value_enum, default_value_t = RowFormat::Text, help_heading = "Output")]
     format: RowFormat,
@@ -212,7 +227,8 @@ pub(crate) struct MergeArgs {
 impl MergeArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let started = Instant::now();
-        self.sinks.check_outputs(&[])?;
+        self.picture.check_before(&NOT_STORED)?;
+        self.sinks.check_outputs(&[self.picture.output()])?;
         let rows = sweep::merge(&self.shards, &self.out)?;
         let (manifest, _) = sweep::store::read(&self.out)?;
         let store = PointStore::in_folder(&self.out);
@@ -225,6 +241,7 @@ impl MergeArgs {
             }
         }
         let recordings = record_all(&rows, &store, &manifest.name, &self.out, &self.sinks, Tab::Stages)?;
+        console::notes(self.picture.draw_sweep(&manifest.name, &rows, &store)?.as_slice());
         let report = Report {
             name: &manifest.name,
             folder: &self.out,
