@@ -12,6 +12,7 @@ pub mod dress_form;
 pub mod girth;
 pub(crate) mod jet;
 pub(crate) mod measures;
+mod sizes;
 pub(crate) mod solid;
 
 pub use dress_form::dress_form;

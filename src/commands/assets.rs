@@ -34,6 +34,7 @@ const KEPT: &[(&str, &str)] = kept![
     "sweeps/extents-and-refinement.toml"
     "sweeps/figure-8.toml"
     "sweeps/held-out.toml"
+    "sweeps/sizes.toml"
     "sweeps/table-3-variations.toml"
     "sweeps/tables-by-kind.toml"
     "tables/table-3-12cm.toml"

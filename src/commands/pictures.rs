@@ -197,9 +197,17 @@ fn captions(rows: &[&Row]) -> Vec<String> {
         words.extend(garments.then(|| stem(&row.garment)));
         // Without a setting that differs the label is the table's name.
         words.extend((!(garments || bodies) || label != row.table).then_some(label));
-        if let Some(metrics) = &row.metrics {
-            words.push(format!("{} PARTs", metrics.part_count));
-            words.extend(metrics.error_mm().map(|mm| format!("{mm:.1} mm")));
+        match &row.metrics {
+            // On several bodies the fit counts.
+            Some(metrics) if bodies => {
+                let eases = metrics.eases_cm().into_iter().filter_map(|(at, cm)| Some(format!("{at} {:+.0}", cm?)));
+                words.extend(eases.take(3));
+            }
+            Some(metrics) => {
+                words.push(format!("{} PARTs", metrics.part_count));
+                words.extend(metrics.error_mm().map(|mm| format!("{mm:.1} mm")));
+            }
+            None => (),
         }
         words.join(", ")
     };

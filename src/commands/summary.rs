@@ -48,7 +48,7 @@ pub(crate) struct Summary {
     vertices_per_level: Vec<usize>,
     #[serde(skip)]
     levels: Vec<LevelCount>,
-    /// Garment and body at bust, waist and hip.
+    /// Garment and body at bust, waist, hip and hem.
     ease: Vec<GirthEase>,
     /// The change since the previous save, under `--watch`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -78,7 +78,7 @@ impl Summary {
         let levels = LevelCount::all(&drape.table, &drape.parts);
         let finite = |x: f64| x.is_finite().then_some(x);
         let accuracy = measured.evaluation.as_ref().map(|a| without_state(&a.accuracy)).transpose()?;
-        let ease = GirthEase::all(&loaded.scene, loaded.girths_at_m, &drape.positions);
+        let ease = measured.ease.clone();
         let mut warnings = [loaded.warnings(), drape.warnings.clone(), measured.warnings.clone()].concat();
         if measured.metrics.is_torn() {
             let small = ease.iter().filter(|e| e.ease_cm.is_some_and(|cm| cm < 0.0));

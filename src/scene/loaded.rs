@@ -32,8 +32,6 @@ pub struct Loaded {
     pub tailored: Option<Tailored>,
     /// The flat pattern found in the texture coordinates.
     pub flat_pattern: Option<FlatPattern>,
-    /// Heights at which the built-in form has its bust, waist and hip girths, m.
-    pub girths_at_m: Option<[f64; 3]>,
     /// The fabrics that were assigned.
     pub swatches: Vec<Swatch>,
     pub(super) imported: Option<Imported>,

@@ -53,6 +53,8 @@ pub struct Scene {
     pub layers: Vec<Layer>,
     /// The surface that distances are measured to.
     pub distance_to: DistanceTo,
+    /// Heights at which the built-in form has its bust, waist and hip girths, m.
+    pub girths_at_m: Option<[f64; 3]>,
     /// The fabrics that the rest shape numbers; `None` is the fabric of the settings, and the only one by default.
     pub own_fabrics: Vec<Option<Fabric>>,
 }
@@ -129,6 +131,7 @@ impl Scene {
             releases_held: false,
             layers: vec![layer],
             distance_to: DistanceTo::Body,
+            girths_at_m: None,
             own_fabrics: vec![None],
         }
     }

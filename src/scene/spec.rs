@@ -375,6 +375,7 @@ impl SceneSpec {
             pushed_out.protrusion_move_m = scene.pull_off_protrusions();
         }
         let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
+        scene.girths_at_m = form.map(|m| [m.bust_height, m.waist_height, m.hip_height]);
         let reports = imported_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
         let hold_notes = self.hold.as_ref().map(|names| scene.ambiguous_edges(names)).unwrap_or_default();
         Ok(Loaded {
@@ -386,7 +387,6 @@ impl SceneSpec {
             tailored: unplaced.tailored,
             flat_pattern: unplaced.flat_pattern,
             swatches: unplaced.cut.swatches,
-            girths_at_m: form.map(|m| [m.bust_height, m.waist_height, m.hip_height]),
             imported: unplaced.imported,
             hold_notes,
         })

@@ -20,7 +20,7 @@ use crate::parts::range_table::TABLE_3;
 use crate::scene::{FileRole, Scene, SceneSpec};
 use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
 use crate::study::evaluate::{EvaluateError, EvaluateOptions, Evaluation, canonical, evaluate, perturbed};
-use crate::study::metrics::Metrics;
+use crate::study::metrics::{GirthEase, Metrics};
 
 /// Reference that a drape is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -143,6 +143,8 @@ fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
 pub struct Measured {
     /// Metrics of the drape.
     pub metrics: Metrics,
+    /// Ease at bust, waist, hip and hem.
+    pub(crate) ease: Vec<GirthEase>,
     /// Distance of each vertex to its reference, mm; empty without a reference.
     pub error_mm: Vec<f64>,
     /// Comparison with the own continuation, with [`Against::Own`].
@@ -194,13 +196,14 @@ impl Job {
         cache: Option<&ReferenceCache>,
         observer: Observer<'_>,
     ) -> Result<Measured, EvaluateError> {
-        let metrics = Metrics::of(scene, drape);
+        let ease = GirthEase::all(scene, &drape.positions);
+        let metrics = Metrics::of(scene, drape).with_ease(&ease);
         let of_fabrics = scene.fabrics(&self.settings.fabric).iter().flat_map(Fabric::warnings).collect();
         let warnings = [metrics.warnings(scene), of_fabrics].concat();
         let options = EvaluateOptions { cache: cache.cloned(), spread_starts: self.spread_starts };
         let (reference, evaluation, of_reference) = match self.accuracy {
             Against::None => {
-                return Ok(Measured { metrics, error_mm: Vec::new(), evaluation: None, warnings });
+                return Ok(Measured { metrics, ease, error_mm: Vec::new(), evaluation: None, warnings });
             }
             Against::Canonical => {
                 let (reference, warnings) = canonical(scene, &self.settings.fabric, &options, observer)?;
@@ -226,7 +229,7 @@ impl Job {
             }
             None => accuracy::vertex_errors_mm(&drape.positions, &reference),
         };
-        Ok(Measured { metrics, error_mm, evaluation, warnings: [warnings, of_reference].concat() })
+        Ok(Measured { metrics, ease, error_mm, evaluation, warnings: [warnings, of_reference].concat() })
     }
 }
 

@@ -1,5 +1,6 @@
 //! The report of a sweep as text, JSON or CSV: its rows, and the size and time of its recordings.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::record::RecordSummary;
@@ -64,7 +65,7 @@ impl Report<'_> {
             "{done} of {total} points done, {failed} failed; {skipped} from an earlier run, the others in {seconds:.1} s"
         );
         let recordings: String = self.recordings.iter().map(recording_line).collect();
-        let mut out = format!("{}{points}\nrows: {folder}/rows.csv\n{recordings}", rows_text(rows));
+        let mut out = format!("{}{}{points}\nrows: {folder}/rows.csv\n{recordings}", rows_text(rows), fit_text(rows));
         if !self.recordings.is_empty() {
             out += &format!("storing and recording the points took {:.1} s\n", self.logging_ms() / 1e3);
         }
@@ -99,6 +100,43 @@ pub(crate) fn rows_text(rows: &[Row]) -> String {
     let table = console::table(console::OPEN, header, [0].into_iter().chain(3..), cells);
     let measured = rows.iter().filter_map(|row| row.metrics.as_ref()).any(|metrics| metrics.canonical_rms_mm.is_some());
     format!("{table}\n{}", if measured { ERRORS } else { "" })
+}
+
+/// The fit of one garment on several bodies: a line for each row with its eases and its verdict; empty for rows of a single body.
+fn fit_text(rows: &[Row]) -> String {
+    let bodies: BTreeSet<&str> = rows.iter().map(|row| row.body.as_str()).collect();
+    if bodies.len() < 2 {
+        return String::new();
+    }
+    let garments = rows.windows(2).any(|pair| pair[0].garment != pair[1].garment);
+    let refs: Vec<&Row> = rows.iter().collect();
+    let settings = labels(&refs);
+    let varies = settings.windows(2).any(|pair| pair[0] != pair[1]);
+    let cells = rows.iter().zip(&settings).map(|(row, setting)| {
+        let mut cells = vec![row.body.clone()];
+        cells.extend(garments.then(|| row.garment.clone()));
+        cells.extend(varies.then(|| setting.clone()));
+        let Some(m) = &row.metrics else {
+            cells.extend([const { String::new() }; 5]);
+            cells.push(row.error.clone());
+            return cells;
+        };
+        let eases = m.eases_cm();
+        cells.extend(eases.map(|(_, cm)| cm.map_or_else(|| "–".to_owned(), |cm| format!("{cm:+.1}"))));
+        cells.push(m.strain_max.map_or_else(|| "–".to_owned(), |strain| format!("{:.0}", 100.0 * strain)));
+        let small = eases.into_iter().filter_map(|(at, cm)| Some((at, cm.filter(|cm| *cm < 0.0)?)));
+        let small: Vec<String> = small.map(|(at, cm)| format!("{at} by {:.1} cm", -cm)).collect();
+        let small = if small.is_empty() { String::new() } else { format!("too small at {}; ", small.join(", ")) };
+        cells.push(small + &m.verdict);
+        cells
+    });
+    let mut header = vec!["body"];
+    header.extend(garments.then_some("garment"));
+    header.extend(varies.then_some("setting"));
+    let first = header.len();
+    header.extend(["bust", "waist", "hip", "hem", "strain %", "verdict"]);
+    let table = console::table(console::OPEN, header, first..first + 5, cells);
+    format!("\nFit: ease in cm, the garment as cut less the body\n{table}\n")
 }
 
 /// Definitions of the errors in [`rows_text`].

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ease::GirthEase;
 use super::faults::{SANK_MM, SlidPart, TightestOpening, begins_above_the_bust, bridges, sinking};
 use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
@@ -91,6 +92,18 @@ pub struct Metrics {
     pub folds_p95_percent: Option<f64>,
     /// Rank correlation of the excess length with the mean curvature of the own continuation, over the vertices.
     pub fold_rank_correlation: Option<f64>,
+    /// Girth of the garment as cut less the body's at the bust, cm.
+    #[serde(default)]
+    pub ease_bust_cm: Option<f64>,
+    /// The same at the waist.
+    #[serde(default)]
+    pub ease_waist_cm: Option<f64>,
+    /// The same at the hip.
+    #[serde(default)]
+    pub ease_hip_cm: Option<f64>,
+    /// Length of the hem as cut less a tape around the body inside it, cm.
+    #[serde(default)]
+    pub ease_hem_cm: Option<f64>,
     /// `rests`, or the criteria that the drape fails, by the limits of the certificate.
     #[serde(default)]
     pub verdict: String,
@@ -133,6 +146,28 @@ impl Metrics {
             ..Self::default()
         };
         Self { verdict: metrics.faults(scene, drape), ..metrics }
+    }
+
+    /// Adds the eases.
+    pub(crate) fn with_ease(self, ease: &[GirthEase]) -> Self {
+        let at = |name| ease.iter().find(|ease| ease.at == name).and_then(|ease| ease.ease_cm);
+        Self {
+            ease_bust_cm: at("bust"),
+            ease_waist_cm: at("waist"),
+            ease_hip_cm: at("hip"),
+            ease_hem_cm: at("hem"),
+            ..self
+        }
+    }
+
+    /// The eases, cm, by the place of each.
+    pub(crate) fn eases_cm(&self) -> [(&'static str, Option<f64>); 4] {
+        [
+            ("bust", self.ease_bust_cm),
+            ("waist", self.ease_waist_cm),
+            ("hip", self.ease_hip_cm),
+            ("hem", self.ease_hem_cm),
+        ]
     }
 
     /// Adds the errors of an evaluation. A model without a state takes energy and strain from it.

@@ -1,4 +1,4 @@
-//! Ease: difference of the girths of garment and body at bust, waist and hip.
+//! Ease: difference of the girths of garment and body at bust, waist, hip and hem.
 //!
 //! A level plane cuts the draped garment at the height of the body's bust, waist and hip (from its measurements, else from
 //! [`Landmarks`]). The shortest closed curve around the trunk is measured in the triangles' rest shapes: the length of the cloth as cut,
@@ -9,13 +9,16 @@
 //! With negative ease the cloth must stretch. If the curve encloses an arm, as at the bust of a pullover whose sleeves join lower, the
 //! plane is lowered until the curve encloses the trunk alone. A garment that is open at the bust, as a low neckline is, or that begins a
 //! little below the waist, as a skirt on the hips does, is measured at the highest plane below at which it is closed, against the body at
-//! that height. Limits: the body's landmarks must be found; a garment that ends at the height on one side, or encloses the arms as a cape
+//! that height. The hem is the lowest edge that runs around the trunk; its length as cut is compared with a tape around all of the body
+//! inside it, both legs for a skirt. Limits: the body's landmarks must be found; a garment that ends at the height on one side, or encloses the arms as a cape
 //! does, has no girth; of layered garments only the innermost is measured.
+
+use std::collections::BTreeSet;
 
 use glam::DVec2;
 use serde::Serialize;
 
-use crate::body::girth::{Cut, Plane, SectionLoop, cuts, section};
+use crate::body::girth::{Cut, Plane, SectionLoop, cuts, hull_length, section};
 use crate::garment::sewing::Landmarks;
 use crate::mesh::TriMesh;
 use crate::scene::Scene;
@@ -23,7 +26,7 @@ use crate::scene::Scene;
 /// Body and garment at one height.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct GirthEase {
-    /// `bust`, `waist` or `hip`.
+    /// `bust`, `waist`, `hip` or `hem`.
     pub at: &'static str,
     /// Height above the body's lowest point, cm; below bust or waist if the garment is open or begins lower.
     pub height_cm: f64,
@@ -38,12 +41,13 @@ pub(crate) struct GirthEase {
 }
 
 impl GirthEase {
-    /// Ease at bust, waist and hip of a scene draped to `positions` (m), at `heights_m` or else at the body's landmarks.
-    pub(crate) fn all(scene: &Scene, heights_m: Option<[f64; 3]>, positions: &[glam::DVec3]) -> Vec<Self> {
+    /// Ease at bust, waist, hip and hem of a scene draped to `positions` (m), at the heights of its measurements or else at the body's
+    /// landmarks.
+    pub(crate) fn all(scene: &Scene, positions: &[glam::DVec3]) -> Vec<Self> {
         let body = scene.body.mesh();
         let Some((low, _)) = body.bounds() else { return Vec::new() };
         let marks = Landmarks::of(body);
-        let heights = heights_m.map_or([marks.bust_z, marks.waist_z, marks.hip_z], |all| all.map(Some));
+        let heights = scene.girths_at_m.map_or([marks.bust_z, marks.waist_z, marks.hip_z], |all| all.map(Some));
         let garment = scene.garment.with_positions(positions.to_vec());
         let at = |(at, z): (&'static str, Option<f64>)| {
             let marked = z?;
@@ -76,8 +80,48 @@ impl GirthEase {
             let ease_cm = garment_cm.map(|cm| cm - body_cm);
             Some(Self { at, height_cm: 100.0 * (of_mark - low.z), body_cm, garment_cm, garment_height_cm, ease_cm })
         };
-        ["bust", "waist", "hip"].into_iter().zip(heights).filter_map(at).collect()
+        let girths = ["bust", "waist", "hip"].into_iter().zip(heights).filter_map(at);
+        girths.chain(Self::at_hem(scene, &garment, low.z, &marks)).collect()
     }
+
+    /// The ease at the lowest edge around the trunk; `low_z` is the lowest point of the body (m).
+    fn at_hem(scene: &Scene, garment: &TriMesh, low_z: f64, marks: &Landmarks) -> Option<Self> {
+        let at = |v: &u32| garment.positions[*v as usize];
+        let around = |edge: &Vec<u32>| {
+            let on: Vec<DVec2> = edge.iter().map(|v| at(v).truncate()).collect();
+            encloses(&on, marks.middle).then(|| (edge.iter().map(|v| at(v).z).sum::<f64>() / edge.len() as f64, on))
+        };
+        // Of several layers, the innermost.
+        let own = &scene.layers.first()?.vertices;
+        let edges = scene.topology.boundary_loops().into_iter().filter(|edge| own.contains(&(edge[0] as usize)));
+        let all = edges.filter_map(|edge| around(&edge).map(|(z, on)| (z, on, edge)));
+        let (z, on, edge) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let sides: BTreeSet<[u32; 2]> =
+            edge.iter().zip(edge.iter().cycle().skip(1)).map(|(&a, &b)| sorted(a, b)).collect();
+        let mut as_cut = 0.0;
+        for (triangle, rest) in scene.garment.triangles.iter().zip(&scene.rest.corners) {
+            for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                if sides.contains(&sorted(triangle[i], triangle[j])) {
+                    as_cut += rest[i].distance(rest[j]);
+                }
+            }
+        }
+        let within = |curve: &SectionLoop| curve.closed && encloses(&on, curve.centre().truncate());
+        let curves = section(scene.body.mesh(), Plane::horizontal(z));
+        let body: Vec<DVec2> =
+            curves.iter().filter(|c| within(c)).flat_map(|c| c.points.iter().map(|p| p.truncate())).collect();
+        if body.is_empty() {
+            return None;
+        }
+        let (height_cm, body_cm, garment_cm) = (100.0 * (z - low_z), 100.0 * hull_length(body), 100.0 * as_cut);
+        let ease_cm = Some(garment_cm - body_cm);
+        let (garment_cm, garment_height_cm) = (Some(garment_cm), Some(height_cm));
+        Some(Self { at: "hem", height_cm, body_cm, garment_cm, garment_height_cm, ease_cm })
+    }
+}
+
+fn sorted(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
 }
 
 /// Distance by which a plane is lowered, m.
@@ -196,30 +240,38 @@ mod tests {
         }
         let measures = spec.measures().unwrap();
         let heights = [measures.bust_height, measures.waist_height, measures.hip_height];
-        let found = GirthEase::all(&scene, Some(heights), &placed);
+        scene.girths_at_m = Some(heights);
+        let found = GirthEase::all(&scene, &placed);
         let girth = 0.7 * 2.0 * f64::from(n) * 24.0 * (std::f64::consts::PI / f64::from(n)).sin();
         let named: Vec<&str> = found.iter().map(|e| e.at).collect();
-        assert_eq!(named, ["bust", "waist", "hip"]);
+        assert_eq!(named, ["bust", "waist", "hip", "hem"]);
+        // The tube ends above the crotch: its hem goes around the trunk there.
+        let hem = &found[3];
+        assert!(
+            (hem.height_cm - 80.0).abs() < 0.1 && (hem.garment_cm.unwrap() - girth).abs() < 0.05,
+            "{hem:?}, {girth}"
+        );
         for (ease, body_cm) in found.iter().zip([spec.bust_cm, spec.waist_cm, spec.hip_cm]) {
             assert!((ease.body_cm - body_cm).abs() < 0.5, "{ease:?}");
         }
         // Without given heights the landmarks of the body are used.
-        for (ease, found) in found.iter().zip(GirthEase::all(&scene, None, &placed)) {
+        scene.girths_at_m = None;
+        for (ease, found) in found.iter().zip(GirthEase::all(&scene, &placed)) {
             assert!((ease.height_cm - found.height_cm).abs() < 8.0, "{ease:?}, {found:?}");
             assert!((ease.body_cm - found.body_cm).abs() < 5.0, "{ease:?}, {found:?}");
         }
         // A pullover whose sleeves join below the bust is measured below them, not round the arms.
         let pullover = crate::SceneSpec::new("form", "pullover-1@1500").load().unwrap().scene;
         let cut = crate::garment::GarmentSpec::by_name("pullover-1").unwrap().ease;
-        let worn = GirthEase::all(&pullover, Some(heights), &pullover.garment.positions);
-        let lower: Vec<bool> = worn.iter().map(|e| e.garment_height_cm.unwrap() < e.height_cm - 0.5).collect();
+        let worn = GirthEase::all(&pullover, &pullover.garment.positions);
+        let lower: Vec<bool> = worn[..3].iter().map(|e| e.garment_height_cm.unwrap() < e.height_cm - 0.5).collect();
         assert_eq!(lower, [true, false, false]);
         for (ease, cut) in worn.iter().zip([cut.bust_cm, cut.waist_cm, cut.hip_cm]) {
             assert!((ease.ease_cm.unwrap() - cut).abs() < 8.0, "{ease:?}, {cut} cm as cut");
         }
         // The tube begins under the bust.
         assert_eq!(found[0].garment_cm, None);
-        for ease in &found[1..] {
+        for ease in &found[1..3] {
             assert!((ease.garment_cm.unwrap() - girth).abs() < 0.05, "{ease:?}, {girth}");
             assert!((ease.ease_cm.unwrap() - (ease.garment_cm.unwrap() - ease.body_cm)).abs() < 1e-12);
         }
@@ -228,11 +280,10 @@ mod tests {
     #[test]
     fn a_low_neckline_and_a_skirt_below_the_waist_have_an_ease_against_the_body_there() {
         let measures = BodySpec::default().measures().unwrap();
-        let heights = Some([measures.bust_height, measures.waist_height, measures.hip_height]);
         let worn = |name: &str, lowered_m: f64| {
             let scene = crate::SceneSpec::new("form", name).load().unwrap().scene;
             let placed = scene.garment.positions.iter().map(|p| *p - lowered_m * glam::DVec3::Z).collect::<Vec<_>>();
-            GirthEase::all(&scene, heights, &placed)
+            GirthEase::all(&scene, &placed)
         };
         // The neckline sinks below the bust, as it does in the drape.
         let dress = worn("low-cut-dress@1500", 0.04);

@@ -4,8 +4,8 @@
 
 use toml::Value;
 
-use super::bodies::body;
-use super::file::{At, Axis, Grid, Single, Source, number};
+use super::bodies::{body, sizes};
+use super::file::{At, Axis, Grid, Single, Sizes, Source, number};
 use super::garments::garments;
 use super::inputs::Inputs;
 use super::point::{Edit, one};
@@ -25,11 +25,22 @@ const MAX_POINTS: usize = 100_000;
 pub(super) struct Axes(Vec<Vec<Edit>>);
 
 impl Axes {
-    /// Reads the axes of a grid. An axis that the grid lacks has the value of `base`, if any.
-    pub(super) fn read(source: Source<'_>, base: &Single, grid: &Grid, inputs: &mut Inputs) -> Result<Self, PlanError> {
+    /// Reads the axes of a grid. An axis that the grid lacks has the value of `base`, if any; `sizes` are bodies in place of those of
+    /// both.
+    pub(super) fn read(
+        source: Source<'_>,
+        base: &Single,
+        grid: &Grid,
+        of_sizes: Option<&Sizes>,
+        inputs: &mut Inputs,
+    ) -> Result<Self, PlanError> {
         let axis = Axis { source, base, grid };
+        let bodies = match of_sizes {
+            Some(list) => sizes(source, list)?,
+            None => axis.edits(["body", "bodies"], |v| body(source, v, inputs))?,
+        };
         Ok(Self(vec![
-            axis.edits(["body", "bodies"], |v| body(source, v, inputs))?,
+            bodies,
             garments(axis, inputs)?,
             axis.edits(["fabric", "fabrics"], |v| fabric(source, v, inputs))?,
             axis.edits(["model", "models"], |v| {

@@ -3,7 +3,7 @@
 use toml::Value;
 
 use super::error::PlanError;
-use super::file::{At, Source, number};
+use super::file::{At, Sizes, Source, number};
 use super::inputs::{Input, Inputs};
 use super::point::{Edit, one};
 use crate::base::files::{has_ending, names_a_file};
@@ -15,6 +15,51 @@ pub(super) fn body(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Resul
     let (input, measurements) = chosen(source, value, inputs)?;
     Ok(one(move |point| {
         point.set_body(&input);
+        point.job.scene.measurements = measurements.clone();
+    }))
+}
+
+/// The bodies of `[sizes]`, each an edit of the body. An empty list has none.
+pub(super) fn sizes(source: Source<'_>, sizes: &Sizes) -> Result<Vec<Edit>, PlanError> {
+    sizes.list.iter().map(|value| size(source, value)).collect()
+}
+
+/// One size: the number of a European size, or measurements with a name.
+fn size(source: Source<'_>, value: &At) -> Result<Edit, PlanError> {
+    let place = source.place(value);
+    let known = || BodySpec::eu_sizes().map(|size| size.to_string()).collect::<Vec<_>>().join(", ");
+    let wrong = || {
+        let expected = format!(
+            "a European size ({}), or {{ name = \"...\", bust = 92, waist = 76, hip = 100 }} in centimetres, with any other measurement",
+            known()
+        );
+        source.wrong(value, "sizes", expected)
+    };
+    let (label, measurements) = match value.get_ref() {
+        Value::Integer(number) => {
+            let spec = u32::try_from(*number).ok().and_then(BodySpec::eu_size).ok_or_else(wrong)?;
+            (format!("EU {number}"), spec)
+        }
+        Value::Table(table) => {
+            let name = table.get("name").and_then(Value::as_str).ok_or_else(wrong)?;
+            let default = BodySpec::default();
+            let of = |key: &str, default: f64| table.get(key).map_or(Some(default), number).ok_or_else(wrong);
+            let girths = [of("bust", default.bust_cm)?, of("waist", default.waist_cm)?, of("hip", default.hip_cm)?];
+            let mut spec = default.graded(girths);
+            for (measure, entry) in
+                table.iter().filter(|(key, _)| !["name", "bust", "waist", "hip"].contains(&key.as_str()))
+            {
+                spec =
+                    spec.with(measure, number(entry).ok_or_else(wrong)?).map_err(PlanError::input(&place, "sizes"))?;
+            }
+            (name.to_owned(), spec)
+        }
+        _ => return Err(wrong()),
+    };
+    measurements.measures().map_err(PlanError::input(&place, "sizes"))?;
+    let form = Input { label, ..Input::built_in(DRESS_FORM) };
+    Ok(Box::new(move |point| {
+        point.set_body(&form);
         point.job.scene.measurements = measurements.clone();
     }))
 }

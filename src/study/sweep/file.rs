@@ -15,6 +15,9 @@
 //! [[points]]                       # single points beside the grid, or instead of it
 //! table = { scale = 0.5 }
 //! refine = "converged"
+//!
+//! [sizes]                          # in place of bodies: every point on each of these bodies
+//! list = [36, 38, 40, { name = "curvy", bust = 96, waist = 74, hip = 108 }]
 //! ```
 //!
 //! | in `[base]`, `[[points]]` | in `[grid]` | values | default |
@@ -82,6 +85,14 @@ pub(super) struct SweepFile {
     pub(super) grid: Option<Grid>,
     #[serde(default)]
     pub(super) points: Vec<Single>,
+    pub(super) sizes: Option<Sizes>,
+}
+
+/// `[sizes]`: bodies by European size, or by measurements to which the others are graded.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sizes {
+    pub(super) list: Vec<At>,
 }
 
 /// The text of a sweep file and its name, for messages.

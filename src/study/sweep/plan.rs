@@ -58,14 +58,25 @@ impl Plan {
         let (repeats, warm_up) = (passes(&file.repeats, "repeats", 1)?, passes(&file.warm_up, "warm_up", 0)?);
         let mut inputs = Inputs::new(folder);
         let mut points = Vec::new();
-        if let Some(grid) = &file.grid {
-            Axes::read(source, &file.base, grid, &mut inputs)?.expand(&mut points, start, name)?;
+        let sizes = file.sizes.as_ref();
+        let named = file.points.iter().chain([&file.base]).find_map(|single| single.get("body"));
+        let listed = file.grid.as_ref().and_then(|grid| grid.get("bodies")).map(|list| list.span());
+        if let (Some(_), Some(span)) = (sizes, named.map(|body| body.span()).or(listed)) {
+            let (place, found) = (source.line(span.start), "a body beside [sizes]".to_owned());
+            let expected = "one of the two: [sizes] are the bodies of all points".to_owned();
+            return Err(PlanError::Value { place, key: "body", found, expected });
+        }
+        // Sizes alone are a grid of one point each.
+        let alone = (sizes.is_some() && file.points.is_empty()).then(Grid::default);
+        if let Some(grid) = file.grid.as_ref().or(alone.as_ref()) {
+            Axes::read(source, &file.base, grid, sizes, &mut inputs)?.expand(&mut points, start, name)?;
         }
         for single in &file.points {
             let mut all = file.base.clone();
             all.extend(single.clone());
-            let axes = Axes::read(source, &all, &Grid::default(), &mut inputs)?;
-            if let (Some(table), true) = (single.get("table"), axes.count() > 1) {
+            let axes = Axes::read(source, &all, &Grid::default(), sizes, &mut inputs)?;
+            let bodies = sizes.map_or(1, |sizes| sizes.list.len());
+            if let (Some(table), true) = (single.get("table"), axes.count() > bodies) {
                 let expected = "one table for one point; lists belong into [grid] as tables";
                 return Err(source.wrong(table, "table", expected));
             }

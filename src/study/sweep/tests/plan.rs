@@ -73,6 +73,41 @@ fn the_papers_sizes_go_by_name() {
 }
 
 #[test]
+fn sizes_are_the_bodies_of_all_points_and_grade_the_girths_that_are_left_out() {
+    let plan = parse(
+        r#"
+        name = "sizes"
+        [base]
+        garment = "flared-skirt@900"
+        [grid]
+        fabrics = ["interlock", "cotton"]
+        [sizes]
+        list = [36, { name = "curvy", bust = 94.7, hip = 102.1, stature = 170 }]
+        "#,
+    );
+    let found: Vec<_> = plan.points.iter().map(|p| (p.body.as_str(), p.job.settings.fabric.name.as_str())).collect();
+    assert_eq!(found, [("EU 36", "interlock"), ("EU 36", "cotton"), ("curvy", "interlock"), ("curvy", "cotton")]);
+    let of = |index: usize| &plan.points[index].job.scene.measurements;
+    assert_eq!((of(0).bust_cm, of(0).waist_cm, of(0).hip_cm), (84.0, 68.0, 92.0));
+    let curvy = of(2);
+    assert_eq!((curvy.stature_cm, curvy.waist_cm), (170.0, 72.0));
+    assert!((curvy.thigh_cm - 61.6).abs() < 1e-9 && (curvy.biceps_cm - 30.6).abs() < 1e-9);
+    // Sizes alone are a grid.
+    assert_eq!(parse("name = \"s\"\n[sizes]\nlist = [34, 36, 38]").points.len(), 3);
+    for (text, expected) in [
+        ("[sizes]\nlist = [35]", "s.toml:3: sizes: found 35, expected a European size (32, 34"),
+        ("[sizes]\nlist = [{ bust = 90 }]", "name = "),
+        ("[sizes]\nlist = [{ name = \"a\", bust = 900 }]", "bust is 900 cm"),
+        ("[base]\nbody = \"form\"\n[sizes]\nlist = [36]", "found a body beside [sizes]"),
+        ("[grid]\nbodies = [\"form\"]\n[sizes]\nlist = [36]", "s.toml:3: body: found a body beside [sizes]"),
+        ("[sizes]\nlist = []", "found no points"),
+    ] {
+        let error = error_text_of(&format!("name = \"s\"\n{text}"));
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
 fn points_of_one_garment_and_body_share_a_scene() {
     let plan = parse(
         "name = \"n\"\n[grid]\nbodies = [\"form\", { bust = 99 }]\ngarments = [\"flared-skirt\", \"pullover-1\"]\nseeds = [0, 1, 2]\noptions = [{}, { weld = true }]",
@@ -239,9 +274,13 @@ fn bad_files_are_refused_with_place_cause_and_remedy() {
 
 #[test]
 fn the_sweeps_that_come_along_are_sound() {
-    for (file, count) in
-        [("table-3-variations", 50), ("extents-and-refinement", 49), ("tables-by-kind", 52), ("figure-8", 10)]
-    {
+    for (file, count) in [
+        ("table-3-variations", 50),
+        ("extents-and-refinement", 49),
+        ("tables-by-kind", 52),
+        ("figure-8", 10),
+        ("sizes", 8),
+    ] {
         let plan = Plan::read(Path::new(&format!("assets/sweeps/{file}.toml")), &Job::preview()).unwrap();
         assert_eq!((plan.points.len(), plan.notes.len()), (count, 0), "{file}: {:?}", plan.notes);
         assert!(plan.about.contains(&format!("= {count} points")), "{file}");
