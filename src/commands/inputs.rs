@@ -18,7 +18,8 @@ use super::runtime::{self, refuse};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Body and garment")]
 pub(crate) struct InputArgs {
-    /// Body: `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file
+    /// Body: `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file; for `run` also a folder of OBJ files, the
+    /// poses of one body
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress or long-sleeved-dress, each optionally with @VERTICES; a TOML
@@ -120,6 +121,11 @@ impl InputArgs {
             measurements: self.measurements.spec()?,
             ..SceneSpec::default()
         })
+    }
+
+    /// The body as it was given.
+    pub(crate) fn body(&self) -> &str {
+        &self.body
     }
 
     /// Whether vertices that start inside the body are moved out of it.

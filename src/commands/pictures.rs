@@ -72,12 +72,36 @@ impl PictureArgs {
         let Some(path) = &self.picture else { return Ok(None) };
         let subject = subject_of_run(solved);
         self.check(&subject)?;
-        let figure = |quantity, eye| subject.figure(quantity, eye, None);
+        let figure = |quantity, eye| self.named(subject.figure(quantity, eye, None), eye);
         let rows: Vec<Vec<Figure<'_>>> =
             self.picture_of.iter().map(|&q| self.eye.iter().map(|&eye| figure(q, eye)).collect()).collect();
         // One list of eyes or quantities is one row.
         let rows = if self.eye.len() == 1 { vec![rows.into_iter().flatten().collect()] } else { rows };
         let title = format!("{} on {}", solved.loaded.garment_name, solved.loaded.body_name);
+        write_sheet(&Sheet { title, rows }, path).map(Some)
+    }
+
+    /// Draws a garment in several poses, a row for each eye and quantity, if a picture was requested.
+    pub(crate) fn draw_runs(&self, all: &[Solved]) -> anyhow::Result<Option<String>> {
+        let Some(path) = self.picture.as_ref().filter(|_| !all.is_empty()) else { return Ok(None) };
+        let facing = Landmarks::of(all[0].loaded.scene.body.mesh()).facing;
+        let subjects: Vec<Subject<'_>> =
+            all.iter().map(|solved| Subject { facing, ..subject_of_run(solved) }).collect();
+        subjects.iter().try_for_each(|subject| self.check(subject))?;
+        let mut rows = Vec::new();
+        for &quantity in &self.picture_of {
+            let high = Subject::common_high(&subjects, quantity);
+            for &eye in &self.eye {
+                // Every figure is seen from the same side, whichever way a pose turns the body.
+                let row = subjects.iter().zip(all).map(|(subject, solved)| {
+                    let mut figure = self.named(subject.figure(quantity, eye, high), eye);
+                    figure.caption = format!("{}: {}", solved.loaded.body_name, figure.caption);
+                    figure
+                });
+                rows.push(row.collect());
+            }
+        }
+        let title = all[0].loaded.garment_name.clone();
         write_sheet(&Sheet { title, rows }, path).map(Some)
     }
 
@@ -137,6 +161,15 @@ impl PictureArgs {
         Ok(Some(line))
     }
 
+    /// A figure whose caption names the side only where there are several.
+    fn named<'a>(&self, mut figure: Figure<'a>, eye: Viewpoint) -> Figure<'a> {
+        if self.eye.len() == 1 {
+            let side = format!(", {eye}");
+            figure.caption = figure.caption.strip_suffix(&side).unwrap_or(&figure.caption).to_owned();
+        }
+        figure
+    }
+
     /// Refuses a quantity or a side that a subject has not.
     fn check(&self, subject: &Subject<'_>) -> anyhow::Result<()> {
         if self.eye.contains(&Viewpoint::Flat) && subject.flat.is_none() {
@@ -172,7 +205,12 @@ fn subject_of_run(solved: &Solved) -> Subject<'_> {
 }
 
 fn subject_of_point<'a>(scene: &'a StoredScene, point: &'a StoredPoint, facing: f64) -> Subject<'a> {
-    let error = Overlay { name: "error", unit: "mm", values: &point.error_mm, positions: None };
+    let overlay = |name, unit, values| Overlay { name, unit, values, positions: None };
+    let overlays = [
+        overlay("error", "mm", &point.error_mm[..]),
+        overlay("strain", "%", &point.strain_percent),
+        overlay("pressure", "kPa", &point.pressure_kpa),
+    ];
     Subject {
         body: &scene.body,
         placed: &scene.garment,
@@ -182,7 +220,7 @@ fn subject_of_point<'a>(scene: &'a StoredScene, point: &'a StoredPoint, facing: 
         levels: point.levels.clone(),
         part_of_vertex: &point.part_of_vertex,
         part_force_n: (&point.force_n[..]).into(),
-        overlays: if point.error_mm.is_empty() { Vec::new() } else { vec![error] },
+        overlays: overlays.into_iter().filter(|overlay| !overlay.values.is_empty()).collect(),
         flat: None,
     }
 }

@@ -1,20 +1,22 @@
 //! `partwise run`: drapes a garment, records every stage and prints a summary; with `--watch`, again after each change of a file.
 
 mod method;
+mod poses;
 mod watch;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::Job;
 use crate::base::files::has_ending;
 use crate::colour::of_drape;
-use crate::drape::{self, Refine, Release};
+use crate::drape::{self, Drape, Refine, Release};
 use crate::mechanics::refine::{Observer, Step};
 use crate::methods::METHODS;
 use crate::picture::Quantity;
 use crate::record::Recorder;
+use crate::scene::Loaded;
 use crate::study::certificate::certify;
 use crate::study::evaluate::EvaluateError;
 use crate::study::job::Against;
@@ -50,6 +52,10 @@ pub(crate) struct RunArgs {
     sinks: SinkArgs,
     #[command(flatten)]
     picture: PictureArgs,
+    /// Body on which the garment is placed and draped first: the same mesh as --body in another pose. The drape is carried along to
+    /// --body and settles there; with a folder as --body, from pose to pose in the order of the numbers in the file names
+    #[arg(long, value_name = "form|FILE", help_heading = "Body and garment")]
+    from_body: Option<String>,
     /// Drape again and stream another step whenever the table, fabric, body or garment file changes
     #[arg(long, help_heading = "Recording")]
     watch: bool,
@@ -99,6 +105,14 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
+/// What precedes the measurements of a drape.
+struct Origin {
+    /// Time spent loading.
+    load: Duration,
+    /// States of the solver by iteration.
+    iterations: BTreeMap<usize, Iteration>,
+}
+
 /// Prints the address of a served recording, and ends the recording after Ctrl-C.
 fn serve(recorder: Recorder) -> anyhow::Result<()> {
     if let Some(url) = recorder.web_url() {
@@ -120,6 +134,9 @@ impl RunArgs {
         self.check_export()?;
         if !self.accuracy {
             self.picture.check_before(&[(Quantity::Error, "no --accuracy")])?;
+        }
+        if self.has_poses() {
+            return self.run_poses();
         }
         if self.method != TWO_STAGE {
             if self.strict {
@@ -253,11 +270,17 @@ impl RunArgs {
                 progress(step)
             })
         })?;
+        self.measured(&mut job, loaded, drape, Origin { load, iterations })
+    }
+
+    /// A drape with its measurements and its summary.
+    fn measured(&self, job: &mut Job, loaded: Loaded, drape: Drape, origin: Origin) -> anyhow::Result<Solved> {
+        let Origin { load, iterations } = origin;
         let cache = reference_cache(self.cache.as_ref());
         if interrupted() {
             job.accuracy = Against::None;
         }
-        let title = format!("{name}: references");
+        let title = format!("{}: references", loaded.garment_name);
         let draped = Instant::now();
         let measure = |progress: Observer<'_>| job.measure(&loaded.scene, &drape, cache.as_ref(), progress);
         let measured = match with_progress(&title, measure) {
@@ -285,7 +308,7 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        let folded = folded_preview(&loaded, &job, &drape)?;
+        let folded = folded_preview(&loaded, job, &drape)?;
         Ok(Solved { loaded, drape, measured, folded, iterations, summary })
     }
 

@@ -57,7 +57,7 @@ pub(crate) struct Summary {
     let_go: Option<String>,
     /// The errors against the drape's own continuation, under `--accuracy`.
     accuracy: Option<Value>,
-    /// Milliseconds of `load`, `sew`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, `picture`, and `total`.
+    /// Milliseconds of `load`, `sew`, `carry`, `distance`, `segment`, `mechanics`, `refine`, `other`, `measure`, `certify`, `record`, `picture`, and `total`.
     timings_ms: BTreeMap<&'static str, f64>,
     pub(crate) warnings: Vec<String>,
     /// The certificate, under `--certify`.
@@ -124,6 +124,11 @@ impl Summary {
         ];
         stages.into_iter().for_each(|(stage, time)| summary.add_time(stage, time));
         Ok(summary)
+    }
+
+    /// The name of the body.
+    pub(crate) fn body(&self) -> &str {
+        &self.body
     }
 
     /// Fails, for exit code 3, unless the verdict and every criterion of the certificate are good.
@@ -202,9 +207,22 @@ impl Summary {
 
     /// Milliseconds of the stages that ran, in their order.
     fn times(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        ["load", "sew", "distance", "segment", "mechanics", "refine", "other", "measure", "record", "picture", "total"]
-            .into_iter()
-            .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
+        [
+            "load",
+            "sew",
+            "carry",
+            "distance",
+            "segment",
+            "mechanics",
+            "refine",
+            "other",
+            "measure",
+            "record",
+            "picture",
+            "total",
+        ]
+        .into_iter()
+        .filter_map(|stage| Some((stage, *self.timings_ms.get(stage)?)))
     }
 
     /// The girths at which the garment surrounds the body: garment girth and ease, cm.

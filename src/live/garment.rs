@@ -1,12 +1,17 @@
 //! The garment of a snapshot as OBJ, and each PART of it.
 
+use std::ops::RangeInclusive;
+
 use axum::http::{StatusCode, Uri};
 use glam::DVec3;
 use serde_json::{Value, json};
 
+use super::pieces::{Pieces, shown_pins};
 use crate::base::files::read_own;
+use crate::base::math;
+use crate::colour::map::ColourMap;
 use crate::parts::UNASSIGNED;
-use crate::record::{Refused, outlines, query};
+use crate::record::{Overlay, Refused, eyes, outlines, query, rest_colours};
 use crate::session::{LoadedScene, Segmented, Snapshot};
 
 /// The garment as OBJ: `of=rest`, `of=preview`, `pin=ID`, or by default the newest drape.
@@ -48,6 +53,49 @@ pub(super) fn outline(snapshot: &Snapshot, uri: &Uri, recording: (&str, &str)) -
     let shapes = [Some(scene.garment.positions.as_slice()), preview, rest];
     let made = outlines(recording, &scene.garment, &scene.topology, &chosen, shapes);
     made.map_err(|e| (StatusCode::INTERNAL_SERVER_ERROR, e.to_string()))
+}
+
+/// Largest elevation of the eye, degrees: straight from above a view has no upright direction.
+const MAX_ELEVATION_DEG: f64 = 85.0;
+
+/// The layout with all views seen from one direction: `azimuth` and `elevation` in degrees, from the front towards the wearer's left and
+/// upwards, RRD.
+pub(super) fn eye(snapshot: &Snapshot, uri: &Uri, pieces: &Pieces) -> Result<Vec<u8>, Refused> {
+    let degrees = |name: &str, range: RangeInclusive<f64>| {
+        let text = query(uri, name).unwrap_or_default();
+        text.parse().ok().filter(|found| range.contains(found)).ok_or_else(|| {
+            let (low, high) = range.clone().into_inner();
+            (StatusCode::BAD_REQUEST, format!("found {name}={text}, expected degrees from {low} to {high}"))
+        })
+    };
+    let azimuth: f64 = degrees("azimuth", -360.0..=360.0)?;
+    let elevation: f64 = degrees("elevation", -MAX_ELEVATION_DEG..=MAX_ELEVATION_DEG)?;
+    let scene = &part_list(snapshot)?.loaded_scene.input.scene;
+    let (sin, cos) = math::sin_cos(elevation.to_radians());
+    let toward = math::rotation(DVec3::Z, azimuth.to_radians()) * pieces.front * cos + DVec3::Z * sin;
+    let made = eyes(pieces.recording(), &scene.garment, toward, shown_pins(snapshot).len());
+    made.map_err(|e| (StatusCode::INTERNAL_SERVER_ERROR, e.to_string()))
+}
+
+/// The garment at rest coloured by its fit: `of=strain`, `pressure` or `none`, RRD; and the value (% or kPa) of the last colour.
+pub(super) fn fit(snapshot: &Snapshot, uri: &Uri, recording: (&str, &str)) -> Result<(Vec<u8>, f64), Refused> {
+    let of = query(uri, "of").unwrap_or_default();
+    let rest = || {
+        let none = || (StatusCode::CONFLICT, "no drape at rest yet; wait for an event that has one".to_owned());
+        let state = snapshot.rest.as_ref().and_then(|rest| rest.cloth_state.as_deref());
+        state.map(|state| &state.fit).ok_or_else(none)
+    };
+    let (name, unit, values) = match of.as_str() {
+        "none" => ("", "", &[][..]),
+        "strain" => ("strain", "%", &rest()?.strain_percent[..]),
+        "pressure" => ("pressure", "kPa", &rest()?.pressure_kpa[..]),
+        _ => return Err((StatusCode::BAD_REQUEST, format!("found of={of}, expected strain, pressure or none"))),
+    };
+    let overlay = Overlay { name, unit, values, positions: None };
+    let range = overlay.own_range();
+    let colours = ColourMap::ALARM.colours(values, range);
+    let made = rest_colours(recording, &colours);
+    made.map(|bytes| (bytes, range.high)).map_err(|e| (StatusCode::INTERNAL_SERVER_ERROR, e.to_string()))
 }
 
 /// Stage one of the newest state.

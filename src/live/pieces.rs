@@ -27,6 +27,8 @@ pub(super) struct Pieces {
     name: String,
     /// Viewers keep one recording for each identifier.
     id: String,
+    /// Direction from the body to the eye in the first layout.
+    pub(super) front: DVec3,
     slots: Mutex<Slots>,
     newest: watch::Sender<u64>,
     /// Cloned by each viewer.
@@ -45,11 +47,12 @@ struct Encoded {
 }
 
 impl Pieces {
-    /// No pieces yet, of a session of this name.
-    pub(super) fn new(name: &str) -> Self {
+    /// No pieces yet, of a session of this name, whose views are seen from `front` at first.
+    pub(super) fn new(name: &str, front: DVec3) -> Self {
         Self {
             name: name.to_owned(),
             id: random_token().unwrap_or_default(),
+            front,
             slots: Mutex::default(),
             newest: watch::Sender::default(),
             viewers: Arc::default(),
@@ -107,13 +110,13 @@ impl Pieces {
     }
 
     /// Encodes changes until the server stops.
-    pub(super) fn encode(&self, session: &Session, front: DVec3) {
-        let made = self.keep_encoding(session, front);
+    pub(super) fn encode(&self, session: &Session) {
+        let made = self.keep_encoding(session);
         *self.error.lock().unwrap_or_else(PoisonError::into_inner) = made.err().map(|e| e.to_string());
     }
 
-    fn keep_encoding(&self, session: &Session, front: DVec3) -> Result<(), RecordError> {
-        let mut encoder = LiveEncoder::new(&self.name, &self.id, front)?;
+    fn keep_encoding(&self, session: &Session) -> Result<(), RecordError> {
+        let mut encoder = LiveEncoder::new(&self.name, &self.id, self.front)?;
         let mut encoded = Encoded::default();
         let (mut serial, mut number) = (0, 0);
         while !self.stopped.load(Ordering::SeqCst) {

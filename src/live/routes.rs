@@ -36,7 +36,7 @@ const MAX_BODY: usize = 1 << 20;
 const BODY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The page's own files.
-const FILES: [(&str, &str, &str); 8] = [
+const FILES: [(&str, &str, &str); 9] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/main.js", "text/javascript; charset=utf-8", include_str!("page/main.js")),
@@ -44,6 +44,7 @@ const FILES: [(&str, &str, &str); 8] = [
     ("/fields.js", "text/javascript; charset=utf-8", include_str!("page/fields.js")),
     ("/dial.js", "text/javascript; charset=utf-8", include_str!("page/dial.js")),
     ("/numbers.js", "text/javascript; charset=utf-8", include_str!("page/numbers.js")),
+    ("/views.js", "text/javascript; charset=utf-8", include_str!("page/views.js")),
     ("/viewer.js", "text/javascript; charset=utf-8", include_str!("page/viewer.js")),
 ];
 
@@ -80,7 +81,16 @@ pub(super) fn router(site: Arc<Site>) -> Router {
         .route("/api/redo", post(async |State(site): State<Arc<Site>>| changed(site, Session::redo).await))
         .route("/api/pins", post(pin))
         .route("/api/pins/{id}", delete(unpin));
-    for path in ["/api/drape.obj", "/api/part", "/api/outline", "/api/job.toml", "/api/table.toml", "/api/sweep.toml"] {
+    for path in [
+        "/api/drape.obj",
+        "/api/part",
+        "/api/outline",
+        "/api/eye",
+        "/api/fit",
+        "/api/job.toml",
+        "/api/table.toml",
+        "/api/sweep.toml",
+    ] {
         router = router.route(path, get(read));
     }
     router = router.route_layer(from_fn_with_state(Arc::clone(&site), authorise));
@@ -242,6 +252,17 @@ async fn read(State(site): State<Arc<Site>>, uri: Uri) -> Answer {
             "/api/outline" => {
                 let bytes = garment::outline(&snapshot, &uri, site.pieces.recording())?;
                 Ok(whole(StatusCode::OK, "application/octet-stream", bytes))
+            }
+            "/api/eye" => {
+                let bytes = garment::eye(&snapshot, &uri, &site.pieces)?;
+                Ok(whole(StatusCode::OK, "application/octet-stream", bytes))
+            }
+            "/api/fit" => {
+                let (bytes, high) = garment::fit(&snapshot, &uri, site.pieces.recording())?;
+                let mut response = whole(StatusCode::OK, "application/octet-stream", bytes);
+                let high = HeaderValue::from_str(&format!("{high}")).unwrap_or(HeaderValue::from_static("0"));
+                response.headers_mut().insert("Fit-High", high);
+                Ok(response)
             }
             "/api/job.toml" => Ok(toml(toml::to_string(&*snapshot.job).map_err(|e| unusable(&e))?)),
             "/api/sweep.toml" => {

@@ -38,7 +38,7 @@ impl LiveServer {
             // Clients then read the newest state.
             serial.send_replace(known);
         });
-        let pieces = Arc::new(Pieces::new(&options.name));
+        let pieces = Arc::new(Pieces::new(&options.name, options.front));
         let site = Arc::new(Site {
             session: session.clone(),
             access,
@@ -51,8 +51,8 @@ impl LiveServer {
         let failed = |error: std::io::Error| LiveError::Server(error.to_string());
         let server = Server::start("live", listener, router(site), options.limits).map_err(failed)?;
         let encode = {
-            let (session, pieces, front) = (session.clone(), Arc::clone(&pieces), options.front);
-            move || pieces.encode(&session, front)
+            let (session, pieces) = (session.clone(), Arc::clone(&pieces));
+            move || pieces.encode(&session)
         };
         let encoder = std::thread::Builder::new().name("pieces".to_owned()).spawn(encode);
         let encoder = encoder.map_err(failed)?;

@@ -7,7 +7,7 @@ use super::text::{Pixels, Size};
 use crate::colour::legend::ColourBar;
 
 /// Height of a figure for sheets of at most so many figures, pixels.
-const HEIGHTS: [(usize, usize); 3] = [(6, 860), (16, 560), (usize::MAX, 360)];
+const HEIGHTS: [(usize, usize); 3] = [(6, 720), (16, 480), (usize::MAX, 320)];
 /// Space between figures and around all, pixels.
 const GAP: usize = 24;
 /// Least width of a figure, pixels: a colour bar with its numbers fits.
@@ -54,7 +54,7 @@ impl<'a> Sheet<'a> {
         let count = figures().count();
         let tallest = figures().map(|figure| figure.frame().half.y).fold(1e-3, f64::max);
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let height = HEIGHTS.iter().find(|(most, _)| count <= *most).map_or(360, |(_, height)| *height);
+        let height = HEIGHTS.iter().find(|(most, _)| count <= *most).map_or(HEIGHTS[2].1, |(_, height)| *height);
         let half_width = |column: usize| {
             let of_column = self.rows.iter().filter_map(|row| row.get(column));
             of_column.map(|figure| figure.frame().half.x).fold(0.0, f64::max)
@@ -131,9 +131,9 @@ mod tests {
         let mut drawn = 0;
         let pixels = sheet.draw(&mut || drawn += 1);
         assert_eq!(drawn, 7);
-        // 16 figures and fewer: 560 pixels for the height of the taller box.
+        // 16 figures and fewer: 480 pixels for the height of the taller box.
         let [_, height] = pixels.size;
-        assert_eq!(height, GAP + 24 + GAP / 2 + 2 * (560 + 28 + GAP));
+        assert_eq!(height, GAP + 24 + GAP / 2 + 2 * (480 + 28 + GAP));
         assert!(Sheet::arranged(String::new(), Vec::new()).png(&mut || ()).is_ok());
     }
 }

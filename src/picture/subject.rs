@@ -165,7 +165,6 @@ impl Subject<'_> {
     pub(crate) fn figure(&self, quantity: Quantity, view: Viewpoint, high: Option<f64>) -> Figure<'_> {
         let (paint, bar) = self.paint(quantity, high);
         let caption = match view {
-            Viewpoint::Front | Viewpoint::Flat => quantity.caption().to_owned(),
             Viewpoint::From(_) => format!("{} from {view}", quantity.caption()),
             side => format!("{}, {side}", quantity.caption()),
         };

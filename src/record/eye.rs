@@ -46,7 +46,11 @@ impl Eye {
         let (sin, cos) = AZIMUTH_DEG.to_radians().sin_cos();
         let flat = forward * cos + side * sin;
         let (sin, cos) = ELEVATION_DEG.to_radians().sin_cos();
-        let toward = flat * cos + DVec3::Z * sin;
+        Self::seen_from(garment, flat * cos + DVec3::Z * sin, aspect)
+    }
+
+    /// The eye for a garment in the direction `toward` (unit, not vertical). `None` for a garment without vertices.
+    pub(crate) fn seen_from(garment: &TriMesh, toward: DVec3, aspect: f64) -> Option<Self> {
         let right = DVec3::Z.cross(toward).try_normalize()?;
         let up = toward.cross(right);
         let extent = |axis: DVec3| {

@@ -25,7 +25,7 @@ use super::open_recording::application;
 use super::{part_marks, paths};
 use crate::colour::FORCE_QUANTILE;
 use crate::colour::cells::CellMesh;
-use crate::colour::map::Range;
+use crate::colour::map::{Range, Rgb};
 use crate::colour::palette::{self, colour_parts, with_outside};
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
@@ -113,8 +113,9 @@ impl LiveEncoder {
         }
         let (stream, storage) = open(&self.name, &self.id)?;
         // The layout first: a slow viewer takes seconds to read the triangles, and would meanwhile lay out the views itself.
-        let views = Node::Row("Live", self.views(pins.len()));
-        blueprint::send(&stream, &views, TimePanel { timeline: paths::TABLE, follow: false })?;
+        let seen = |aspect: f64| Eye::on(&self.garment, self.front, aspect).unwrap_or_default();
+        let (views, eye) = views(&seen, pins.len());
+        lay_out(&stream, views)?;
         stream.log_static(paths::BODY, &meshes::plain(body, palette::BODY))?;
         stream.log_static(format!("{PARTS}/garment"), &self.cells.shape())?;
         for (shape, colour) in [(LiveShape::Preview, palette::CLOTH), (LiveShape::Rest, palette::DRAPED)] {
@@ -131,32 +132,8 @@ impl LiveEncoder {
             let preview = pin.garment.with_positions(pin.preview.to_vec());
             stream.log_static(format!("/pin/{i}/preview"), &meshes::plain(&preview, palette::CLOTH))?;
         }
+        self.eye = eye;
         drain(&storage)
-    }
-
-    /// The three views of the newest state side by side. Beside pinned states, its PARTs stand over its two stages as theirs do.
-    fn views(&mut self, pins: usize) -> Vec<(f32, Node)> {
-        let seen = |aspect: f64| Eye::on(&self.garment, self.front, aspect).unwrap_or_default();
-        let [parts, preview, rest] = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")];
-        if pins == 0 {
-            self.eye = seen(ASPECT / 3.0);
-            return [parts, preview, rest].map(|(name, path)| View::with_body(name, path, &self.eye)).into();
-        }
-        let width = ASPECT / (pins + 2) as f64;
-        let eye_on_rest = seen(width);
-        // Lower views show less below the hem, to which the garment sinks.
-        self.eye = seen(2.0 * width).farther(1.1);
-        let column = |views: [(f32, Node); 2]| (1.0, Node::Column("State", views.into()));
-        let mut row = vec![column([parts, preview].map(|(name, path)| View::with_body(name, path, &self.eye)))];
-        row.extend((0..pins).map(|i| {
-            let of_pin = |name: &str, leaf: &str| {
-                let paths = ["body", leaf].map(|leaf| format!("/pin/{i}/{leaf}"));
-                (1.0, View::spatial(name, &[&paths[0], &paths[1]], &self.eye).into())
-            };
-            column([of_pin(parts.0, "parts"), of_pin(preview.0, "preview")])
-        }));
-        row.push(View::with_body(rest.0, rest.1, &eye_on_rest));
-        row
     }
 
     /// The PART of each vertex, the levels, and the body's reaction on each PART, N; an empty slice gives no arrows.
@@ -192,6 +169,57 @@ impl LiveEncoder {
         self.stream.log_static(shape.path(), &meshes::shape(&moved))?;
         drain(&self.storage)
     }
+}
+
+/// The three views of the newest state side by side, and the eye of its PARTs. Beside pinned states, its PARTs stand over its two stages as
+/// theirs do. `seen` is the eye of a view of this width over height.
+fn views(seen: &dyn Fn(f64) -> Eye, pins: usize) -> (Vec<(f32, Node)>, Eye) {
+    let [parts, preview, rest] = [("PARTs", PARTS), ("Two stages", "/preview"), ("At rest", "/rest")];
+    if pins == 0 {
+        let eye = seen(ASPECT / 3.0);
+        return ([parts, preview, rest].map(|(name, path)| View::with_body(name, path, &eye)).into(), eye);
+    }
+    let width = ASPECT / (pins + 2) as f64;
+    // Lower views show less below the hem, to which the garment sinks.
+    let eye = seen(2.0 * width).farther(1.1);
+    let column = |views: [(f32, Node); 2]| (1.0, Node::Column("State", views.into()));
+    let mut row = vec![column([parts, preview].map(|(name, path)| View::with_body(name, path, &eye)))];
+    row.extend((0..pins).map(|i| {
+        let of_pin = |name: &str, leaf: &str| {
+            let paths = ["body", leaf].map(|leaf| format!("/pin/{i}/{leaf}"));
+            (1.0, View::spatial(name, &[&paths[0], &paths[1]], &eye).into())
+        };
+        column([of_pin(parts.0, "parts"), of_pin(preview.0, "preview")])
+    }));
+    row.push(View::with_body(rest.0, rest.1, &seen(width)));
+    (row, eye)
+}
+
+fn lay_out(stream: &RecordingStream, views: Vec<(f32, Node)>) -> Result<(), RecordError> {
+    blueprint::send(stream, &Node::Row("Live", views), TimePanel { timeline: paths::TABLE, follow: false })
+}
+
+/// The layout with all views seen from the direction `toward` (unit, not vertical), beside this number of pinned states.
+pub(crate) fn eyes(
+    (name, id): (&str, &str),
+    garment: &TriMesh,
+    toward: DVec3,
+    pins: usize,
+) -> Result<Vec<u8>, RecordError> {
+    let (stream, storage) = open(name, id)?;
+    let seen = |aspect: f64| Eye::seen_from(garment, toward, aspect).unwrap_or_default();
+    lay_out(&stream, views(&seen, pins).0)?;
+    drain(&storage)
+}
+
+/// The garment at rest in these colours, one per vertex; without any in the colour of cloth.
+pub(crate) fn rest_colours((name, id): (&str, &str), colours: &[Rgb]) -> Result<Vec<u8>, RecordError> {
+    let (stream, storage) = open(name, id)?;
+    let [r, g, b] = if colours.is_empty() { palette::DRAPED } else { [255; 3] };
+    let tint = rerun::components::AlbedoFactor::from(rerun::Rgba32::from_rgb(r, g, b));
+    let mesh = meshes::colours(colours.iter().copied()).with_albedo_factor(tint);
+    stream.log_static(LiveShape::Rest.path(), &mesh)?;
+    drain(&storage)
 }
 
 /// The outlines of a set of vertices on the garment as placed, after both stages, and at rest: a section of its own, drawn in addition to the

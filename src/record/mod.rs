@@ -36,7 +36,7 @@ pub(crate) use compare::{Colours, Compared};
 pub(crate) use drape_tests::{DrapeTestRecording, NamedOutline};
 pub use error::RecordError;
 pub use layout::{Layout, Tab};
-pub(crate) use live::{LiveEncoder, LiveShape, PinnedView, outlines};
+pub(crate) use live::{LiveEncoder, LiveShape, PinnedView, eyes, outlines, rest_colours};
 pub(crate) use method::MethodView;
 pub use open_recording::{RecordOptions, RecordSummary};
 pub(crate) use overlay::PatternView;

@@ -1,5 +1,7 @@
 //! Errors of loading a scene; the user can correct all of them.
 
+use std::path::PathBuf;
+
 use super::materials::CutError;
 use crate::base::files::{Unreadable, listed};
 use crate::body::ShapeError;
@@ -74,6 +76,12 @@ pub enum SceneError {
     /// A group that does not exist.
     #[error("--hold: found no group \"{found}\" in the garment, expected `top`, `top:N`{}", or_one_of(known))]
     UnknownGroup { found: String, known: Vec<String> },
+    /// A folder of poses that cannot be read.
+    #[error("{folder}: the folder of poses cannot be read: {source}")]
+    PoseFolder { folder: PathBuf, source: std::io::Error },
+    /// A folder without poses.
+    #[error("{folder}: found no body in this folder, expected mesh files of one body in several poses")]
+    NoPoses { folder: PathBuf },
     /// Any of these, with the name of the body, garment or file it concerns.
     #[error("{name}: {source}")]
     In { name: String, source: Box<SceneError> },

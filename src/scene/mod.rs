@@ -4,12 +4,14 @@
 //! oriented to face away from the body, its rest shape is taken before anything moves, the garment must be near the body,
 //! and vertices that start inside the body are pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
+mod carry;
 mod error;
 mod layering;
 mod loaded;
 mod materials;
 mod outfit;
 mod placement;
+mod poses;
 mod spec;
 
 pub use crate::body::distance::push_out::{PushOutReport, push_out};
@@ -18,4 +20,5 @@ pub use loaded::{Loaded, Tailored};
 pub use materials::{CutError, PanelFabrics, Swatch};
 pub use outfit::{DistanceTo, Layer, Scene};
 pub use placement::{Placement, closeness, facing_body};
+pub(crate) use poses::{PoseReader, pose_files};
 pub use spec::{DRESS_FORM, FileRole, SceneSpec};

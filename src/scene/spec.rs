@@ -308,7 +308,7 @@ impl SceneSpec {
     }
 
     /// The options of the body's file.
-    fn body_options(&self) -> ImportOptions {
+    pub(super) fn body_options(&self) -> ImportOptions {
         ImportOptions {
             group: self.body_group.clone(),
             unit: self.body_unit.or(self.unit),
@@ -410,7 +410,7 @@ impl SceneSpec {
         Ok(unplaced)
     }
 
-    fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
+    pub(super) fn load_body(&self, meshes: &MeshCache) -> Result<(Body, Option<Imported>), SceneError> {
         let new = if self.open_body { Body::new_open } else { Body::new };
         if self.body_is_a_mesh() {
             let imported = import_body(self.body.as_ref(), &self.body_options())?;

@@ -11,7 +11,6 @@ use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented, Snapsh
 use super::state::{SessionState, ms_since};
 use crate::drape::{Drape, ENOUGH, Levels, Settings};
 use crate::mechanics::coupled::{self, CoupledOptions, Known, Method, Motion};
-use crate::mechanics::energy::{Cloth, Contacts};
 use crate::parts::Parts;
 use crate::scene::Scene;
 use crate::study::accuracy::representable::representable;
@@ -138,13 +137,4 @@ impl Refinement<'_> {
             held_positions: Arc::default(),
         }
     }
-}
-
-/// Force of the body on each vertex in contact where the cloth rests, friction included, N: the gradient of the cloth's own
-/// energy, which contact balances.
-pub(super) fn reactions(cloth: &Cloth, positions: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
-    let mut gradient = Vec::new();
-    cloth.gradient(positions, &Contacts::none(), &mut gradient);
-    let carried = cloth.held.iter().zip(pressure_kpa).map(|(held, kpa)| !held && *kpa > 0.0);
-    gradient.iter().zip(carried).map(|(g, carried)| if carried { *g } else { DVec3::ZERO }).collect()
 }

@@ -11,11 +11,11 @@ use super::edit::EditError;
 use super::handle::Session;
 use super::results::{AtRest, Finished, LoadedScene, Preview, Segmented};
 use super::state::{SessionState, ms_since, sum_by_part};
-use super::task::{COARSE_STEPS, Refinement, Target, Task, reactions};
+use super::task::{COARSE_STEPS, Refinement, Target, Task};
 use crate::base::error_text::with_causes;
 use crate::drape::{
     ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, StageResults, StageTimes, StageTwo,
-    StartsFrom, approach, drape, folds_of, let_go, outcome, refine_from, settled, stage_two,
+    StartsFrom, approach, drape, folds_of, let_go, outcome, reactions, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;

@@ -65,12 +65,8 @@ pub(crate) struct SweepArgs {
     threads: Option<usize>,
 }
 
-/// Colours that points have no values for: a stored point keeps what the recording shows.
-pub(crate) const NOT_STORED: [(Quantity, &str); 3] = [
-    (Quantity::Strain, "points without it"),
-    (Quantity::Pressure, "points without it"),
-    (Quantity::Folds, "points without it"),
-];
+/// Colours that points have no values for.
+pub(crate) const NOT_STORED: [(Quantity, &str); 1] = [(Quantity::Folds, "points without excess length")];
 
 impl SweepArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {

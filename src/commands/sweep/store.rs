@@ -30,7 +30,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::commands::runtime::interrupt_flag;
 
-const POINT: &Tag = b"PWPOINT6";
+const POINT: &Tag = b"PWPOINT7";
 const SCENE: &Tag = b"PWSCENE3";
 
 /// Body and garment of a recording.
@@ -65,6 +65,12 @@ pub(crate) struct StoredPoint {
     /// Distance of each vertex to the reference drape, mm; empty if not measured.
     #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
     pub(crate) error_mm: Vec<f64>,
+    /// Largest strain at each vertex, %; empty without a state at full resolution.
+    #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
+    pub(crate) strain_percent: Vec<f64>,
+    /// Pressure on the body at each vertex, kPa; empty without a state at full resolution.
+    #[serde(serialize_with = "write_numbers", deserialize_with = "read_numbers")]
+    pub(crate) pressure_kpa: Vec<f64>,
 }
 
 impl StoredScene {
@@ -83,6 +89,7 @@ impl StoredScene {
 impl StoredPoint {
     /// The point of a drape in the scene with id `scene`.
     pub(crate) fn of(scene: String, drape: &Drape, error_mm: &[f64]) -> Self {
+        let fit = drape.state.as_ref().map(|state| &state.fit);
         Self {
             scene,
             levels: LevelCount::all(&drape.table, &drape.parts),
@@ -90,6 +97,8 @@ impl StoredPoint {
             part_of_vertex: drape.parts.part_of_vertex.clone(),
             positions: drape.positions.clone(),
             error_mm: error_mm.to_vec(),
+            strain_percent: fit.map_or_else(Vec::new, |fit| fit.strain_percent.clone()),
+            pressure_kpa: fit.map_or_else(Vec::new, |fit| fit.pressure_kpa.clone()),
         }
     }
 
@@ -108,7 +117,9 @@ impl StoredPoint {
             && counted == Some(parts)
             && self.part_of_vertex.len() == self.positions.len()
             && self.part_of_vertex.iter().all(|&part| (part as usize) < parts || part == UNASSIGNED)
-            && (self.error_mm.is_empty() || self.error_mm.len() == self.positions.len())
+            && [&self.error_mm, &self.strain_percent, &self.pressure_kpa]
+                .iter()
+                .all(|values| values.is_empty() || values.len() == self.positions.len())
     }
 }
 
@@ -319,6 +330,8 @@ mod tests {
             part_of_vertex: vec![0, 0, UNASSIGNED],
             positions: scene().garment.positions,
             error_mm: vec![0.5, 1.0, 2.0],
+            strain_percent: vec![1.0, 2.0, 4.0],
+            pressure_kpa: vec![0.0, 0.5, 0.25],
         }
     }
 
@@ -341,13 +354,14 @@ mod tests {
     fn indices_out_of_range_and_ids_that_are_paths_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let store = PointStore::in_folder(folder.path());
-        let spoil: [fn(&mut StoredPoint); 6] = [
+        let spoil: [fn(&mut StoredPoint); 7] = [
             |p| p.scene = "outside".to_owned(),
             |p| p.levels[0].level = 7,
             |p| p.levels[0].parts = 2,
             |p| p.part_of_vertex[0] = 3,
             |p| p.force_n.clear(),
             |p| p.error_mm.truncate(1),
+            |p| p.strain_percent.truncate(1),
         ];
         for (i, spoil) in spoil.into_iter().enumerate() {
             let mut spoilt = point();

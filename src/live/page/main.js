@@ -5,6 +5,7 @@ import { acceptAll, centimetres, isRefused, onTyped, refuse, several } from "./f
 import { showNumbers, showPart, showPins } from "./numbers.js";
 import { Session, ask } from "./session.js";
 import { draw, start } from "./viewer.js";
+import { showViews } from "./views.js";
 
 const at = (id) => document.getElementById(id);
 const session = new Session();
@@ -47,7 +48,9 @@ function showChoices(state) {
   options(at("fabric"), choices.fabrics, typeof job.fabric === "string" ? job.fabric : job.fabric.name);
   const name = job.table.name ?? `${job.table.quantile} quantile levels`;
   const preset = choices.tables.find((known) => known === name || (known === "table-3" && name.toLowerCase() === "table 3"));
-  options(at("preset"), [...choices.tables, "5 quantile levels", "10 quantile levels", "20 quantile levels"], preset ?? name);
+  const tables = [...choices.tables, "5 quantile levels", "10 quantile levels", "20 quantile levels"];
+  options(at("preset"), tables, preset ?? name);
+  options(at("beside"), ["no table", ...tables], at("beside").value || "no table");
   if (document.activeElement !== at("gap")) at("gap").value = job.table.gap ?? "extend-lower";
   write(at("extent"), kept.extent());
   for (const measure of MEASURES) {
@@ -137,6 +140,7 @@ function show() {
   showChoices(state);
   showLevels(state);
   showNumbers(state);
+  showViews(state);
   showPins(state, (id) => session.send(`api/pins/${id}`, "DELETE"));
   if (!selected) return;
   // The outline lies on each shape, which moves until the state is complete.
@@ -207,9 +211,38 @@ at("garment").addEventListener("change", () => {
 at("vertices").addEventListener("change", garment);
 at("fabric").addEventListener("change", () => session.edit({ fabric: at("fabric").value }));
 at("gap").addEventListener("change", () => session.edit({ gap: at("gap").value }));
-at("preset").addEventListener("change", () => {
-  const quantile = /^(\d+) quantile levels$/.exec(at("preset").value);
-  session.edit({ table: quantile ? { quantile: Number(quantile[1]) } : at("preset").value });
+const tableOf = (name) => {
+  const quantile = /^(\d+) quantile levels$/.exec(name);
+  return quantile ? { quantile: Number(quantile[1]) } : name;
+};
+at("preset").addEventListener("change", () => session.edit({ table: tableOf(at("preset").value) }));
+
+// Resolves once the two stages of the newest state are done.
+const previewed = () =>
+  new Promise((done) => {
+    const look = () => {
+      const { state, preview } = session.state;
+      if (preview?.state !== state || preview.warm || preview.done === false) return;
+      session.removeEventListener("state", look);
+      done();
+    };
+    session.addEventListener("state", look);
+    look();
+  });
+
+// A second table beside the first: its state is pinned, and the first one is the newest again.
+at("beside").addEventListener("change", async () => {
+  const name = at("beside").value;
+  if (name === "no table") return;
+  at("beside").disabled = true;
+  const before = session.state.state;
+  await session.send("api/state", "PATCH", JSON.stringify({ table: tableOf(name) }), "application/json");
+  const changed = session.state.state !== before;
+  if (changed) await previewed();
+  await session.send("api/pins", "POST", JSON.stringify({ label: name }), "application/json");
+  if (changed) await session.send("api/undo", "POST");
+  at("beside").disabled = false;
+  at("beside").value = "no table";
 });
 const extent = (text) => {
   const given = several(text, /[,;\s]+/);

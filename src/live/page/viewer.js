@@ -120,10 +120,12 @@ function release() {
 
 let viewer = null;
 
-// Draws what the server answers, in addition to the pieces.
+// Draws what the server answers, in addition to the pieces; returns the answer's headers, or null if there was nothing to draw.
 export async function draw(path) {
   const response = await ask(path).catch(() => null);
-  if (response?.ok && viewer) viewer.send_rrd_to_channel(CHANNEL, new Uint8Array(await response.arrayBuffer()));
+  if (!response?.ok || !viewer) return null;
+  viewer.send_rrd_to_channel(CHANNEL, new Uint8Array(await response.arrayBuffer()));
+  return response.headers;
 }
 
 function heard(event, picked) {

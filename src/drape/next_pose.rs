@@ -1,0 +1,84 @@
+//! A drape carried to another pose of its body, and settled there.
+//!
+//! The garment was at rest before, so it starts from where it was carried ([`Scene::in_pose`]) with Newton's method at full resolution:
+//! neither stage runs again. Its PARTs are those of the first pose; the force on each is the sum of the body's reactions on its vertices.
+//!
+//! Limits: the cloth forgets friction from before the motion, and passes through no pose between the two.
+
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use super::error::DrapeError;
+use super::parts::StageTwo;
+use super::release::Release;
+use super::result::{Drape, PartOutcome, StageTimes};
+use super::settings::Settings;
+use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
+use crate::mechanics::energy::{Cloth, Contacts};
+use crate::mechanics::refine::Observer;
+use crate::parts::UNASSIGNED;
+use crate::scene::Scene;
+
+/// The drape of a scene in another pose, whose garment lies where it was carried; `before` is its drape in the last one.
+///
+/// # Errors
+/// [`DrapeError`] where a constant of the fabric cannot be used.
+pub fn next_pose(
+    scene: &Scene,
+    settings: &Settings,
+    before: &Drape,
+    observer: Observer<'_>,
+) -> Result<Drape, DrapeError> {
+    rayon::scope(|_| settle(scene, settings, before, observer))
+}
+
+fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    let began = Instant::now();
+    let ground = Distances::of(scene)?;
+    let distance = began.elapsed();
+    // What was released in the first pose and stayed up is not held again.
+    let released = matches!(before.let_go, Some(Release::Stays { .. }));
+    let held: &[u32] = if released { &[] } else { &scene.held };
+    let fabrics = scene.fabrics(&settings.fabric);
+    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabrics, held)?;
+    let carried = scene.garment.positions.clone();
+    let start = (carried.clone(), StartsFrom::Rest);
+    let refined = refine_from(scene, settings, &cloth, Some(&ground), start, observer)?;
+    let (positions, state) = settled(scene, settings, &cloth, Some(&ground), refined);
+    let forces = reactions(&cloth, &positions, &state.fit.pressure_kpa);
+    let mut outcomes: Vec<PartOutcome> = Vec::with_capacity(before.parts.len());
+    for part in &before.parts.parts {
+        let all = || part.vertices.iter().map(|&v| v as usize);
+        let force_n = all().map(|v| forces[v]).sum();
+        let moved = all().map(|v| positions[v] - carried[v]).sum::<DVec3>();
+        let contact = all().any(|v| state.fit.pressure_kpa[v] > 0.0);
+        outcomes.push(PartOutcome { force_n, displacement: moved / part.vertices.len().max(1) as f64, contact });
+    }
+    debug_assert!(before.parts.part_of_vertex.iter().all(|&p| p == UNASSIGNED || (p as usize) < outcomes.len()));
+    let stage = StageTwo { parts: before.parts.clone(), outcomes, positions: carried, warnings: Vec::new() };
+    let made = StageResults {
+        ground,
+        table: before.table.clone(),
+        level_part_count: before.level_part_count,
+        stage,
+        folds: None,
+        state: Some((positions, state)),
+        let_go: before.let_go,
+    };
+    let refine = began.elapsed() - distance;
+    let times =
+        StageTimes { distance, refine, segment: Duration::ZERO, mechanics: Duration::ZERO, total: Duration::ZERO };
+    let mut drape = made.judged(scene, settings, times);
+    drape.times.total = began.elapsed();
+    Ok(drape)
+}
+
+/// Force of the body on each vertex in contact where the cloth rests, friction included, N: the gradient of the cloth's own
+/// energy, which contact balances.
+pub(crate) fn reactions(cloth: &Cloth, positions: &[DVec3], pressure_kpa: &[f64]) -> Vec<DVec3> {
+    let mut gradient = Vec::new();
+    cloth.gradient(positions, &Contacts::none(), &mut gradient);
+    let carried = cloth.held.iter().zip(pressure_kpa).map(|(held, kpa)| !held && *kpa > 0.0);
+    gradient.iter().zip(carried).map(|(g, carried)| if carried { *g } else { DVec3::ZERO }).collect()
+}

@@ -1,0 +1,53 @@
+//! A body in several poses: the garment is carried from one to the next and rests there.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use partwise::body::distance::Body;
+use partwise::body::{BodySpec, dress_form};
+use partwise::drape::{next_pose, unobserved};
+use partwise::mechanics::refine::Stop;
+use partwise::study::metrics::{Metrics, RESTS};
+use partwise::{SceneSpec, Settings};
+
+#[path = "fixtures/poses.rs"]
+mod poses;
+
+#[test]
+fn a_garment_follows_the_form_through_five_poses_and_rests_in_each() {
+    let form = dress_form(&BodySpec::default()).unwrap();
+    let settings = Settings::default();
+    for garment in ["pullover-2@1200", "low-cut-dress@1500"] {
+        let mut scene = SceneSpec::new("form", garment).load().unwrap().scene;
+        let mut drape = scene.drape(&settings).unwrap();
+        for (arms_deg, step_deg) in &poses::FIVE[1..] {
+            let body = Body::new(&poses::posed(&form, *arms_deg, *step_deg)).unwrap();
+            scene = scene.in_pose(body, &drape.positions);
+            let inside =
+                scene.body.nearest_all(&scene.garment.positions).iter().filter(|q| q.signed_distance < 0.0).count();
+            assert_eq!(inside, 0, "{garment}, arms {arms_deg}, step {step_deg}: carried into the body");
+            drape = next_pose(&scene, &settings, &drape, &mut unobserved).unwrap();
+            let metrics = Metrics::of(&scene, &drape);
+            assert_eq!(metrics.verdict, RESTS, "{garment}, arms {arms_deg}, step {step_deg}");
+            assert_eq!(drape.state.as_ref().unwrap().stop, Stop::Converged);
+            assert!(metrics.strain_max.unwrap() < 0.4, "{garment}, arms {arms_deg}, step {step_deg}: {metrics:?}");
+            // The body carries the garment: the forces on its PARTs balance its weight.
+            let force: f64 = drape.outcomes.iter().map(|outcome| outcome.force_n.z).sum();
+            let area: f64 = scene.rest.areas().iter().map(|area| area.abs()).sum();
+            let weight = partwise::GRAVITY * settings.fabric.density_kg_per_m2 * area;
+            assert!((force / weight - 1.0).abs() < 0.05, "{garment}, arms {arms_deg}: {force} N for {weight} N");
+        }
+    }
+}
+
+#[test]
+fn the_same_pose_leaves_a_garment_where_it_rests() {
+    let settings = Settings::default();
+    let scene = SceneSpec::new("form", "pullover-2@1200").load().unwrap().scene;
+    let drape = scene.drape(&settings).unwrap();
+    let again = scene.in_pose(scene.body.clone(), &drape.positions);
+    let moved =
+        |a: &[partwise::DVec3], b: &[partwise::DVec3]| a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(moved(&again.garment.positions, &drape.positions) < 1e-3, "carried by nothing");
+    let settled = next_pose(&again, &settings, &drape, &mut unobserved).unwrap();
+    assert!(moved(&settled.positions, &drape.positions) < 5e-3);
+}
