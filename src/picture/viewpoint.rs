@@ -60,7 +60,7 @@ impl FromStr for Viewpoint {
             let numbers: Vec<f64> = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<_>>()?;
             let [x, y, z] = numbers[..] else { return None };
             let direction = DVec3::new(x, y, z);
-            (direction.is_finite() && direction.length() > 0.0).then(|| Self::From(direction))
+            (direction.is_finite() && direction.length() > 0.0).then_some(Self::From(direction))
         };
         match text {
             "front" => Ok(Self::Front),

@@ -60,8 +60,8 @@ impl Plan {
         let mut points = Vec::new();
         let sizes = file.sizes.as_ref();
         let named = file.points.iter().chain([&file.base]).find_map(|single| single.get("body"));
-        let listed = file.grid.as_ref().and_then(|grid| grid.get("bodies")).map(|list| list.span());
-        if let (Some(_), Some(span)) = (sizes, named.map(|body| body.span()).or(listed)) {
+        let listed = file.grid.as_ref().and_then(|grid| grid.get("bodies")).map(toml::Spanned::span);
+        if let (Some(_), Some(span)) = (sizes, named.map(toml::Spanned::span).or(listed)) {
             let (place, found) = (source.line(span.start), "a body beside [sizes]".to_owned());
             let expected = "one of the two: [sizes] are the bodies of all points".to_owned();
             return Err(PlanError::Value { place, key: "body", found, expected });
