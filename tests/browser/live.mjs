@@ -231,6 +231,67 @@ try {
   assert.match(await page.locator("#columns").textContent(), /pinned: .*PARTs/);
   said(`pinned: ${pinned}`);
 
+  // The sides: all three views change, and change back.
+  const settled = async () => {
+    await page.waitForTimeout(2500);
+    return picture(page);
+  };
+  const front = await settled();
+  const shots = { front };
+  for (const side of ["side", "back"]) {
+    await page.locator(`#eye-${side}`).click();
+    shots[side] = await settled();
+    assert.ok(!shots[side].equals(front), `${side} shows another side`);
+  }
+  assert.ok(!shots.side.equals(shots.back));
+  said("turned to the side and the back by buttons");
+
+  // One eye for all while Alt is held: a drag in the last view turns the first one too.
+  await page.locator("#eye-front").click();
+  const still = firstView(await settled());
+  const box = await page.locator("#viewer").boundingBox();
+  const [fromX, fromY] = [box.x + 0.9 * box.width, box.y + 0.5 * box.height];
+  await page.keyboard.down("Alt");
+  await page.mouse.move(fromX, fromY);
+  await page.mouse.down();
+  for (let i = 1; i <= 8; i += 1) await page.mouse.move(fromX - 12 * i, fromY - 4 * i);
+  await page.mouse.up();
+  await page.keyboard.up("Alt");
+  const turned = await settled();
+  assert.notEqual(firstView(turned), still, "a drag with Alt in one view turns the others");
+  said("one eye for all views while Alt is held");
+  if (pictures) {
+    mkdirSync(pictures, { recursive: true });
+    for (const [side, png] of Object.entries({ ...shots, turned })) writeFileSync(join(pictures, `live-${side}.png`), png);
+  }
+  await page.locator("#eye-front").click();
+
+  // The fit colours the garment at rest, and cloth takes the colours off.
+  const cloth = await settled();
+  await page.locator("#fit").selectOption("strain");
+  await page.waitForSelector("#fit-key:not([hidden])");
+  assert.match(await page.locator("#fit-key").textContent(), /^\d+(\.\d+)? %$/);
+  const strain = await settled();
+  assert.ok(!strain.equals(cloth), "the fit is seen");
+  if (pictures) writeFileSync(join(pictures, "live-strain.png"), await page.screenshot());
+  await page.locator("#fit").selectOption("none");
+  await settled();
+  assert.equal(await page.locator("#fit-key").isVisible(), false);
+  said("strain on the garment at rest, and off again");
+
+  // A second table beside the first, which stays the edited one.
+  const one = await state(page);
+  await page.locator("#beside").selectOption("5 quantile levels");
+  await until(page, (now) => now.pins.length === one.pins.length + 1 && now.idle);
+  const two = await state(page);
+  assert.deepEqual(two.job.table, one.job.table, "the first table is edited further");
+  assert.equal(two.pins.at(-1).label, "5 quantile levels");
+  assert.equal(await page.locator("#columns > div").count(), 4, "newest, two pinned, at rest");
+  said("a second table beside the first");
+  if (pictures) writeFileSync(join(pictures, "live-beside.png"), await page.screenshot());
+  await page.locator("#pins tbody tr button").last().click();
+  await until(page, (now) => now.pins.length === one.pins.length && now.idle);
+
   // A PART is picked where the garment is in the middle of the first view.
   const scene = await page.locator("#scene").boundingBox();
   for (const [across, down] of [[0.1, 0.45], [0.12, 0.5], [0.13, 0.4], [0.125, 0.6], [0.1, 0.55], [0.12, 0.55]]) {
