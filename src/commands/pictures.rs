@@ -92,7 +92,7 @@ impl PictureArgs {
         for &quantity in &self.picture_of {
             let high = Subject::common_high(&subjects, quantity);
             for &eye in &self.eye {
-                // Every figure is seen from the same side, whichever way a pose turns the body.
+                // All figures are seen from the front of the first pose.
                 let row = subjects.iter().zip(all).map(|(subject, solved)| {
                     let mut figure = self.named(subject.figure(quantity, eye, high), eye);
                     figure.caption = format!("{}: {}", solved.loaded.body_name, figure.caption);

@@ -105,7 +105,7 @@ pub(crate) struct RunArgs {
     threads: Option<usize>,
 }
 
-/// What precedes the measurements of a drape.
+/// The data of a drape from before its measurements.
 struct Origin {
     /// Time spent loading.
     load: Duration,

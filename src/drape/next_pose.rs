@@ -37,7 +37,7 @@ fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer
     let began = Instant::now();
     let ground = Distances::of(scene)?;
     let distance = began.elapsed();
-    // What was released in the first pose and stayed up is not held again.
+    // An edge that stayed up after its release in the first pose is not held again.
     let released = matches!(before.let_go, Some(Release::Stays { .. }));
     let held: &[u32] = if released { &[] } else { &scene.held };
     let fabrics = scene.fabrics(&settings.fabric);

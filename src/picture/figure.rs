@@ -24,7 +24,7 @@ pub(crate) struct Figure<'a> {
     pub(super) bar: Option<ColourBar>,
 }
 
-/// What a view must contain.
+/// The extent of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame {
     /// Middle of the garment, m.

@@ -1,8 +1,8 @@
 //! Pictures of a draped garment, drawn by the processor alone and written as PNG. They need no viewer, no window and no graphics card,
 //! and have the same pixels on every machine.
 //!
-//! [`Figure`] is one view of a body and its garment with caption and colour bar; [`Sheet`] sets figures in rows. [`Subject`] is the data
-//! that figures are made of: positions, PARTs, and values per vertex in the colours of a recording.
+//! [`Figure`] is one view of a body and its garment with caption and colour bar; [`Sheet`] sets figures in rows. [`Subject`] holds the data
+//! of a figure: positions, PARTs, and values per vertex in the colours of a recording.
 
 mod figure;
 mod raster;

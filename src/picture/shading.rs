@@ -122,7 +122,7 @@ pub(super) fn draw(surfaces: &[Surface<'_>], camera: &Camera, lit: bool) -> Vec<
     let pixel = |at: usize| {
         let [column, row] = [at % columns, at / columns];
         let mut sum = Vec3::ZERO;
-        // What reaches a sample differs little within a pixel, up to a border.
+        // Within a pixel the light that is not blocked varies little, except at a border.
         let mut reached: Option<(f32, Reached)> = None;
         for (dy, dx) in (0..SAMPLES).flat_map(|dy| (0..SAMPLES).map(move |dx| (dy, dx))) {
             let at = [column * SAMPLES + dx, row * SAMPLES + dy];

@@ -6,7 +6,7 @@ use super::figure::Figure;
 use super::text::{Pixels, Size};
 use crate::colour::legend::ColourBar;
 
-/// Height of a figure for sheets of at most so many figures, pixels.
+/// Largest number of figures, and the height of each of them, pixels.
 const HEIGHTS: [(usize, usize); 3] = [(6, 720), (16, 480), (usize::MAX, 320)];
 /// Space between figures and around all, pixels.
 const GAP: usize = 24;
