@@ -77,7 +77,7 @@ impl CompareArgs {
             refuse!("found {found} range tables, expected 2 to {MAX_SIDE_BY_SIDE}; `partwise sweep` accepts more");
         }
         use_threads(self.threads)?;
-        self.picture.check_before(&NOT_STORED)?;
+        self.picture.check_before(false, &NOT_STORED)?;
         self.sinks.check_outputs(&[("--csv", self.csv.as_deref()), self.picture.output()])?;
         keep_results();
         let plan = self.plan()?;

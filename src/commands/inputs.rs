@@ -123,6 +123,11 @@ impl InputArgs {
         })
     }
 
+    /// Whether the garment is a single sewing pattern.
+    pub(crate) fn is_a_pattern(&self) -> bool {
+        self.pattern.is_some() || matches!(&self.garment[..], [one] if has_ending(one.as_ref(), "json"))
+    }
+
     /// The body as it was given.
     pub(crate) fn body(&self) -> &str {
         &self.body

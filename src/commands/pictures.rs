@@ -57,8 +57,12 @@ impl PictureArgs {
         ("--picture", self.picture.as_deref())
     }
 
-    /// Refuses, before anything is computed, colours that a run or a sweep will not have: `without` are those.
-    pub(crate) fn check_before(&self, without: &[(Quantity, &str)]) -> anyhow::Result<()> {
+    /// Refuses, before anything is computed, colours that a run or a sweep will not have, `without`, and panels of a garment that is no
+    /// `pattern`.
+    pub(crate) fn check_before(&self, pattern: bool, without: &[(Quantity, &str)]) -> anyhow::Result<()> {
+        if self.picture.is_some() && self.eye.contains(&Viewpoint::Flat) && !pattern {
+            refuse!("--eye flat: found no sewing pattern, expected a run with a single --pattern FILE.json");
+        }
         let missing = without.iter().find(|(quantity, _)| self.picture.is_some() && self.picture_of.contains(quantity));
         if let Some((quantity, why)) = missing {
             let name = quantity.name();
@@ -170,11 +174,8 @@ impl PictureArgs {
         figure
     }
 
-    /// Refuses a quantity or a side that a subject has not.
+    /// Refuses a quantity that a subject has not.
     fn check(&self, subject: &Subject<'_>) -> anyhow::Result<()> {
-        if self.eye.contains(&Viewpoint::Flat) && subject.flat.is_none() {
-            refuse!("--eye flat: found a garment without a sewing pattern, expected --pattern FILE.json");
-        }
         if let Some(missing) = self.picture_of.iter().find(|&&quantity| !subject.has(quantity)) {
             let with: Vec<&str> = Quantity::ALL.into_iter().filter(|&q| subject.has(q)).map(Quantity::name).collect();
             refuse!(

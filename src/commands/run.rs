@@ -132,8 +132,11 @@ impl RunArgs {
         use_threads(self.threads)?;
         self.sinks.check_outputs(&[("--export", self.export.as_deref()), self.picture.output()])?;
         self.check_export()?;
-        if !self.accuracy {
-            self.picture.check_before(&[(Quantity::Error, "no --accuracy")])?;
+        let without: &[_] = if self.accuracy { &[] } else { &[(Quantity::Error, "no --accuracy")] };
+        self.picture.check_before(self.input.is_a_pattern(), without)?;
+        if self.picture.picture.is_some() && (self.watch || self.method != TWO_STAGE) {
+            let found = if self.watch { "--watch" } else { "--method" };
+            refuse!("--picture: found {found}, expected a run of the two stages that ends; leave one of the two out");
         }
         if self.has_poses() {
             return self.run_poses();

@@ -5,6 +5,7 @@
 mod beside;
 mod exported;
 mod fabrics;
+mod pictures;
 mod verdict;
 
 use std::fs;

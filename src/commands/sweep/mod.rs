@@ -76,7 +76,7 @@ impl SweepArgs {
             refuse!("--jobs {found}: found {found}, expected 1 to {MAX_THREADS} points in parallel");
         }
         keep_results();
-        self.picture.check_before(&NOT_STORED)?;
+        self.picture.check_before(false, &NOT_STORED)?;
         self.sinks.check_outputs(&[self.picture.output()])?;
         let plan = self.plan()?;
         let folder = self.folder();
@@ -223,7 +223,7 @@ pub(crate) struct MergeArgs {
 impl MergeArgs {
     pub(crate) fn execute(&self) -> anyhow::Result<()> {
         let started = Instant::now();
-        self.picture.check_before(&NOT_STORED)?;
+        self.picture.check_before(false, &NOT_STORED)?;
         self.sinks.check_outputs(&[self.picture.output()])?;
         let rows = sweep::merge(&self.shards, &self.out)?;
         let (manifest, _) = sweep::store::read(&self.out)?;

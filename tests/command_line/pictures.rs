@@ -1,0 +1,66 @@
+//! `--picture`, and a garment on a body in several poses.
+
+use std::fs;
+
+use super::{Bench, cube, sheet};
+
+const SCENE: [&str; 9] = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--no-save"];
+
+/// Width and height of a PNG.
+fn size(bench: &Bench, name: &str) -> [u32; 2] {
+    let bytes = fs::read(bench.path(name)).unwrap();
+    assert_eq!(&bytes[1..4], b"PNG");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+}
+
+#[test]
+fn eyes_are_columns_and_quantities_are_rows_and_bad_ones_are_refused() {
+    let bench = Bench::new();
+    let draws = |more: &[&str]| {
+        let output = bench.drape(&[&["--no-save", "--refine", "0", "--picture", "out.png"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        size(&bench, "out.png")
+    };
+    let one = draws(&[]);
+    let two = draws(&["--eye", "front", "--eye", "back"]);
+    let four = draws(&["--eye", "front", "--eye", "back", "--picture-of", "parts", "--picture-of", "strain"]);
+    assert!(two[0] > one[0] && two[1] == one[1], "{one:?} {two:?}");
+    assert!(four[0] == two[0] && four[1] > 3 * two[1] / 2, "{two:?} {four:?}");
+    for (more, pieces) in [
+        (&["--picture", "out.jpg"][..], &["out.jpg", "`.png`"][..]),
+        (&["--picture", "a.png", "--eye", "left"], &["`left`", "front, side, back"]),
+        (&["--picture", "a.png", "--picture-of", "heat"], &["`heat`", "drape, placed"]),
+        (&["--picture", "a.png", "--picture-of", "error"], &["--picture-of error", "no --accuracy"]),
+        (&["--picture", "a.png", "--eye", "flat"], &["--eye flat", "--pattern"]),
+    ] {
+        bench.refuses(&[&SCENE[..], more].concat(), pieces);
+    }
+}
+
+#[test]
+fn a_sheet_on_a_cube_follows_it_and_another_mesh_is_refused() {
+    let bench = Bench::new();
+    for (name, z) in [("pose-2.obj", 1.05), ("pose-10.obj", 1.1)] {
+        fs::create_dir_all(bench.path("poses")).unwrap();
+        bench.write(&format!("poses/{name}"), &cube(z));
+    }
+    let poses = |body: &str| {
+        let arguments = ["--from-body", "body.obj", "--body", body, "--format", "json", "--refine", "2"];
+        let output = bench.run(&[&SCENE[2..], &arguments].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        found["poses"].as_array().unwrap().clone()
+    };
+    let found = poses("poses");
+    let bodies: Vec<&str> = found.iter().map(|pose| pose["body"].as_str().unwrap()).collect();
+    assert_eq!(bodies, ["body", "pose-2", "pose-10"], "numbers count by value");
+    for pose in &found[1..] {
+        assert_eq!(pose["penetrating_vertices"], 0, "{pose}");
+        assert!(pose["preview_rms_mm"].as_f64().unwrap() < 5.0, "{pose}");
+    }
+    bench.write("other.obj", &sheet(2, 1.0));
+    bench.write("bigger.obj", &(cube(1.0) + "f 1 3 4\n"));
+    let moved = |body| [&SCENE[2..], &["--from-body", "body.obj", "--body", body]].concat();
+    bench.refuses(&moved("bigger.obj"), &["bigger.obj", "7 faces, expected 6"]);
+    bench.refuses(&[&moved("poses")[..], &["--method", "zhu2016"]].concat(), &["--method", "several poses"]);
+}
