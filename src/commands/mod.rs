@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod console;
 mod cusick;
+mod fabric;
 mod inputs;
 mod live;
 mod pattern;
@@ -19,6 +20,7 @@ mod stages;
 mod summary;
 mod sweep;
 mod tune;
+mod validate;
 mod view;
 
 use std::process::ExitCode;
@@ -64,6 +66,20 @@ enum Command {
     Check(Box<check::CheckArgs>),
     /// Simulate the Cusick drape test of fabrics and compare it with the published ranges
     Cusick(cusick::CusickArgs),
+    /// Convert a laboratory's KES or FAST sheet to a fabric file
+    ///
+    /// The sheet is CSV with a line for each quantity: its name, the value along the warp, the value along the weft; a single value stands
+    /// for both. Values that no cloth has are refused, with the mistake of units that would explain them. What the sheet does not have is
+    /// assumed, and every assumption is printed and written into the file.
+    Fabric(fabric::FabricArgs),
+    /// Simulate every case that others measured, and every closed form, and compare
+    ///
+    /// The cases are drape tests of fabrics whose constants and whose drape were both measured, by other people; drape tests with published
+    /// bands; and strips with a closed form. Each case has a tolerance, the scatter between drapes of one fabric. Cases to which a
+    /// constant was set are listed apart.
+    ///
+    /// The exit code is 0 whether or not cases pass; read `pass` of --format json or csv.
+    Validate(validate::ValidateArgs),
     /// Run every point of a sweep file (tables, garments, fabrics); write a row after each, and a recording of all
     ///
     /// The points are range tables, and any other setting, over garments, sizes and fabrics.
@@ -130,6 +146,8 @@ pub fn main() -> ExitCode {
         Some(Command::Live(args)) => args.execute(),
         Some(Command::Check(args)) => args.execute(),
         Some(Command::Cusick(args)) => args.execute(),
+        Some(Command::Fabric(args)) => args.execute(),
+        Some(Command::Validate(args)) => args.execute(),
         Some(Command::Sweep(args)) => args.execute(),
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),

@@ -59,6 +59,7 @@ fn is_users(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<crate::base::files::Unreadable>()
         || cause.is::<crate::body::ShapeError>()
         || cause.is::<crate::garment::fabric::FabricError>()
+        || cause.is::<crate::garment::lab_sheet::LabSheetError>()
         || cause.is::<crate::garment::pattern::PatternError>()
         || cause.is::<crate::mechanics::energy::EnergyError>()
         || cause.is::<crate::mechanics::paper::PaperError>()

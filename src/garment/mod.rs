@@ -3,6 +3,7 @@
 pub mod builtin;
 mod cache;
 pub mod fabric;
+pub(crate) mod lab_sheet;
 pub mod pattern;
 pub mod sewing;
 

@@ -9,4 +9,5 @@ pub mod metrics;
 pub mod sweep;
 pub(crate) mod table4;
 pub(crate) mod table_search;
+pub(crate) mod validation;
 pub(crate) mod wrinkles;

@@ -23,7 +23,7 @@
 //! | B_u, B_45, B_v | bending stiffness along weft, bias and warp | N·m |
 //! | x_uu, x_uv, x_vv | second derivatives of the position | 1/m |
 //!
-//! Limits: flat rest; one stiffness at all curvatures. The friction between yarns is a term of its own (`bending_friction`).
+//! Limits: flat rest; one stiffness at all curvatures. Friction between yarns is a separate term (`bending_friction`).
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
