@@ -377,10 +377,10 @@ mod tests {
     fn wrong_units_are_recognised_by_their_factor() {
         for (line, wrong, unit, value) in [
             ("B,0.118,0.09", "B,11.6,8.8", "µN·m, a factor of 98.0665", "0.1183 gf·cm²/cm"),
-            ("2HB,0.124,0.1", "2HB,12.16,9.8", "mN·m/m, a factor of 9.8067", "1.2400 gf·cm/cm"),
+            ("2HB,0.124,0.1", "2HB,12.16,9.8", "mN·m/m, a factor of 9.806", "1.2400 gf·cm/cm"),
             ("G,0.8,0.7", "G,45.0,39.0", "N/m, a factor of 56.19", "0.8009 gf/(cm·deg)"),
             ("W,12.38", "W,1238", "g/m², a factor of 10", "123.8000 mg/cm²"),
-            ("WT,12.0,15.0", "WT,400,147", "mN·cm/cm², a factor of 9.8067", "40.7886"),
+            ("WT,12.0,15.0", "WT,400,147", "mN·cm/cm², a factor of 9.806", "40.7886"),
             ("T,0.497", "T,497", "µm", "0.4970 mm"),
         ] {
             let text = error(&SHEET.replace(line, wrong));
