@@ -118,6 +118,7 @@ impl Summary {
         let stages = [
             ("distance", times.distance),
             ("segment", times.segment),
+            ("cloth", times.cloth),
             ("mechanics", times.mechanics),
             ("refine", times.refine),
             ("other", times.other()),
@@ -213,6 +214,7 @@ impl Summary {
             "carry",
             "distance",
             "segment",
+            "cloth",
             "mechanics",
             "refine",
             "other",

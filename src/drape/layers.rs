@@ -111,10 +111,9 @@ impl LayerState<'_> {
     ) -> Result<(), DrapeError> {
         let layer = &self.scene.layers[k];
         let mut own = StageTimes::default();
-        let levels = timed(&mut own.mechanics, || {
-            needs_cloth(settings).then(|| Levels::new(alone, &settings.fabric)).transpose()
-        })?;
-        times.mechanics += own.mechanics;
+        let levels =
+            timed(&mut own.cloth, || needs_cloth(settings).then(|| Levels::new(alone, &settings.fabric)).transpose())?;
+        times.cloth += own.cloth;
         let ground = Distances::to_body(alone);
         let steps = self.history.last().map_or(0, |r| r.iteration);
         let mut all = self.positions.clone();

@@ -17,6 +17,8 @@ mod stages;
 
 use std::ops::ControlFlow;
 
+use pipeline::drape_prepared;
+
 use crate::mechanics::refine::{Observer, Step};
 pub use crate::scene::Scene;
 pub use error::DrapeError;
@@ -25,6 +27,7 @@ pub(crate) use nested_iteration::approach;
 pub use next_pose::next_pose;
 pub(crate) use next_pose::reactions;
 pub(crate) use parts::{ENOUGH, StageTwo, outcome, stage_one, stage_two};
+pub use pipeline::Prepared;
 pub use release::Release;
 pub(crate) use release::{ReleasedDrape, let_go};
 pub use result::{ClothState, Drape, PartOutcome, StageTimes};
@@ -38,8 +41,20 @@ pub(crate) use stages::{Distances, StageResults, StartsFrom, folds_of, refine_fr
 /// [`DrapeError`] where a constant of the fabric or an option cannot be used.
 pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     // Inside the pool: each of hundreds of short joins from outside it would suspend the caller.
-    let run = if scene.layers.len() > 1 { layers::in_order } else { pipeline::drape_one };
-    rayon::scope(|_| run(scene, settings, observer))
+    rayon::scope(|_| drape_prepared(scene, &Prepared::new(scene, settings)?, settings, observer))
+}
+
+/// [`drape`] with distances and cloth of earlier drapes of the same scene in the same fabric, to the same bits.
+///
+/// # Errors
+/// As there.
+pub fn drape_again(
+    scene: &Scene,
+    prepared: &Prepared,
+    settings: &Settings,
+    observer: Observer<'_>,
+) -> Result<Drape, DrapeError> {
+    rayon::scope(|_| drape_prepared(scene, prepared, settings, observer))
 }
 
 impl Scene {

@@ -1,4 +1,5 @@
-//! The pipeline for one layer: distance → PARTs → mechanics → draped garment, each stage timed.
+//! The pipeline for one layer: distance → PARTs → mechanics → draped garment, each stage timed. Distances and cloth, which no range
+//! table changes, can be kept ([`Prepared`]).
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -6,6 +7,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::error::DrapeError;
+use super::layers;
 use super::levels::Levels;
 use super::nested_iteration::approach;
 use super::parts::{StageTwo, stage_one, stage_two};
@@ -18,33 +20,62 @@ use crate::mechanics::refine::Observer;
 use crate::parts::Parts;
 use crate::scene::Scene;
 
-/// Both stages and the steps after them for a scene of one layer.
-pub(super) fn drape_one(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
-    let began = Instant::now();
-    let mut times = StageTimes::default();
-    let StageTimes { distance: distance_time, segment: segment_time, .. } = &mut times;
-    let (first, cloth) = rayon::join(
-        || -> Result<_, DrapeError> {
-            let ground = timed(distance_time, || Distances::of(scene))?;
-            let table = settings.table.resolve(&ground.unsigned_m)?;
-            let parts = timed(segment_time, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
-            Ok((ground, table, parts))
-        },
-        || {
-            let began = Instant::now();
-            let cloth = needs_cloth(settings).then(|| Levels::new(scene, &settings.fabric)).transpose();
-            cloth.map(|cloth| (cloth, began.elapsed()))
-        },
-    );
-    let (ground, table, parts) = first?;
-    let (cloth, cloth_time) = cloth?;
+/// What a drape needs of a scene and a fabric whatever the range table: distances to the body, and the cloth. Many tables of one
+/// garment share it. Several layers are prepared one by one as they are draped, and have an empty one.
+#[derive(Debug)]
+pub struct Prepared {
+    layer: Option<PreparedLayer>,
+}
+
+#[derive(Debug)]
+struct PreparedLayer {
+    distances: Distances,
+    cloth: Option<Levels>,
+    /// `distance`, `cloth` and `total` alone.
+    times: StageTimes,
+}
+
+impl Prepared {
+    /// Prepares `scene` for drapes by `settings`, of which the fabric counts, the model, and whether steps follow.
+    ///
+    /// # Errors
+    /// [`DrapeError`] where a constant of the fabric cannot be used.
+    pub fn new(scene: &Scene, settings: &Settings) -> Result<Self, DrapeError> {
+        if scene.layers.len() > 1 {
+            return Ok(Self { layer: None });
+        }
+        let began = Instant::now();
+        let mut times = StageTimes::default();
+        let (distances, cloth) = rayon::join(
+            || timed(&mut times.distance, || Distances::of(scene)),
+            || needs_cloth(settings).then(|| Levels::new(scene, &settings.fabric)).transpose(),
+        );
+        let (distances, cloth) = (distances?, cloth?);
+        times.total = began.elapsed();
+        times.cloth = times.total.saturating_sub(times.distance);
+        Ok(Self { layer: Some(PreparedLayer { distances, cloth, times }) })
+    }
+}
+
+/// Both stages and the steps after them. The times include those of the preparation.
+pub(super) fn drape_prepared(
+    scene: &Scene,
+    prepared: &Prepared,
+    settings: &Settings,
+    observer: Observer<'_>,
+) -> Result<Drape, DrapeError> {
+    let Some(PreparedLayer { distances: ground, cloth, times }) = &prepared.layer else {
+        return layers::in_order(scene, settings, observer);
+    };
+    let (began, mut times) = (Instant::now(), *times);
+    let table = settings.table.resolve(&ground.unsigned_m)?;
+    let parts = timed(&mut times.segment, || stage_one(scene, settings.min_part, &table, &ground.unsigned_m));
     let level_part_count = parts.len();
     let Moved { stage, folds, state, let_go } =
-        moved(scene, settings, &ground, parts, cloth.as_ref(), &mut times, observer)?;
-    times.mechanics += cloth_time;
-    let made = StageResults { ground, table, level_part_count, stage, folds, state, let_go };
+        moved(scene, settings, ground, parts, cloth.as_ref(), &mut times, observer)?;
+    let made = StageResults { ground: ground.clone(), table, level_part_count, stage, folds, state, let_go };
     let mut drape = made.judged(scene, settings, times);
-    drape.times.total = began.elapsed();
+    drape.times.total = times.total + began.elapsed();
     Ok(drape)
 }
 

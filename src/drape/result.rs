@@ -24,6 +24,9 @@ pub struct StageTimes {
     pub distance: Duration,
     /// Equation (1): levels to connected PARTs.
     pub segment: Duration,
+    /// Masses, elements and offsets of the cloth, as far as they take longer than the distances, which are computed at the same time.
+    /// With `distance`, the part that does not depend on the range table.
+    pub cloth: Duration,
     /// Stage two.
     pub mechanics: Duration,
     /// Newton steps at full resolution, and the part of their setup that does not overlap stage two; zero if no steps are requested,
@@ -37,7 +40,7 @@ impl StageTimes {
     /// Time between the stages.
     #[must_use]
     pub(crate) fn other(self) -> Duration {
-        self.total.saturating_sub(self.distance + self.segment + self.mechanics + self.refine)
+        self.total.saturating_sub(self.distance + self.segment + self.cloth + self.mechanics + self.refine)
     }
 }
 

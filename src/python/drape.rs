@@ -174,11 +174,12 @@ impl Drape {
 
     #[getter]
     fn times_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let StageTimes { distance, segment, mechanics, refine, total } = self.result.times;
+        let StageTimes { distance, segment, cloth, mechanics, refine, total } = self.result.times;
         let times = PyDict::new(py);
         let named = [
             ("distance", distance),
             ("segment", segment),
+            ("cloth", cloth),
             ("mechanics", mechanics),
             ("refine", refine),
             ("total", total),

@@ -381,11 +381,12 @@ impl Worker {
         let mut times = StageTimes {
             distance: ms(loaded_scene.distance_ms),
             segment: ms(segmented.segment_ms),
-            mechanics: took + cloth_time,
+            cloth: cloth_time,
+            mechanics: took,
             refine: self.progress.refined.unwrap_or_default(),
             total: Duration::ZERO,
         };
-        times.total = times.distance + times.segment + times.mechanics + times.refine;
+        times.total = times.distance + times.segment + times.cloth + times.mechanics + times.refine;
         let state = rest.and_then(|rest| {
             let cloth_state: &ClothState = rest.cloth_state.as_deref()?;
             Some((rest.positions.to_vec(), ClothState { steps: rest.steps, ..cloth_state.clone() }))

@@ -11,7 +11,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::base::serde_name;
-use crate::drape::{Drape, DrapeError, Model, Refine, Settings, drape};
+use crate::drape::{Drape, DrapeError, Model, Prepared, Refine, Settings, drape, drape_again};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::CoupledOptions;
 use crate::mechanics::paper::{BodyForce, LineForce, PaperOptions};
@@ -183,6 +183,18 @@ impl Job {
         let positions = perturbed(&scene.garment.positions, &scene.held, self.seed);
         let moved = Scene { garment: scene.garment.with_positions(positions), ..scene.clone() };
         drape(&moved, &settings, observer)
+    }
+
+    /// [`Job::drape`] with distances and cloth of an earlier drape; a perturbed start has its own.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn drape_again(&self, scene: &Scene, prepared: &Prepared, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+        if self.seed == 0 {
+            drape_again(scene, prepared, &self.settings, observer)
+        } else {
+            self.drape(scene, observer)
+        }
     }
 
     /// Measures a drape of `scene`. References are cached in `cache`.

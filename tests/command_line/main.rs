@@ -123,7 +123,7 @@ fn one_json_object_with_the_promised_keys() {
     ] {
         assert!(!report[key].is_null(), "{key} is missing: {report}");
     }
-    for stage in ["load", "distance", "segment", "mechanics", "other", "measure", "record"] {
+    for stage in ["load", "distance", "segment", "cloth", "mechanics", "other", "measure", "record"] {
         assert!(report["timings_ms"][stage].as_f64().unwrap() >= 0.0, "{stage}");
     }
     let times = report["timings_ms"].as_object().unwrap();

@@ -143,7 +143,7 @@ fn the_times_of_a_row_add_up() {
         let column = lines[0].iter().position(|title| title == format!("time_{name}_ms")).unwrap();
         lines[1][column].parse::<f64>().unwrap()
     };
-    let stages: f64 = ["distance", "segment", "mechanics", "refine", "other"].map(time).iter().sum();
+    let stages: f64 = ["distance", "segment", "cloth", "mechanics", "refine", "other"].map(time).iter().sum();
     assert!((stages - time("total")).abs() < 1e-3 * time("total"), "{stages} of {} ms", time("total"));
 }
 

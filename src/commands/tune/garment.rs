@@ -1,6 +1,6 @@
 //! A garment of the search: its distances, its reference drape, and the errors of a range table on it.
 
-use crate::drape::{Drape, DrapeError, Refine, Settings, drape, unobserved};
+use crate::drape::{Drape, DrapeError, Prepared, Refine, Settings, drape_again, unobserved};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::Motion;
 use crate::mechanics::refine::SolveError;
@@ -52,6 +52,7 @@ pub(crate) struct Garment {
     /// Displacement from the undraped garment to the canonical drape, m.
     pub(crate) displacement: Vec<DVec3>,
     fabric: Fabric,
+    prepared: Prepared,
     options: EvaluateOptions,
     /// Motion of PARTs in the search.
     pub(crate) motion: Motion,
@@ -94,7 +95,9 @@ impl Garment {
         let scene = loaded.scene;
         let start = &scene.garment.positions;
         let displacement = reference.positions.iter().zip(start).map(|(a, b)| *a - *b).collect();
+        let settings = Settings { fabric: fabric.clone(), refine: Refine::Steps(0), ..Settings::default() };
         let mut garment = Self {
+            prepared: Prepared::new(&scene, &settings)?,
             name: name.to_owned(),
             grain: Grain::new(&scene.garment, &scene.topology, &scene.rest),
             distances_m: scene.distances_m()?,
@@ -191,7 +194,7 @@ impl Garment {
     fn preview(&self, table: &RangeTable) -> Result<(Settings, Drape), DrapeError> {
         let (fabric, table) = (self.fabric.clone(), table.clone().into());
         let settings = Settings { fabric, table, refine: Refine::Steps(0), ..Settings::default() };
-        let draped = drape(&self.scene, &settings, &mut unobserved)?;
+        let draped = drape_again(&self.scene, &self.prepared, &settings, &mut unobserved)?;
         Ok((settings, draped))
     }
 }

@@ -1,7 +1,7 @@
 //! Runs the points of a sweep: loads each scene once, times the passes and measures the result. A failure becomes a row.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::{Point, Row, Timing};
 use crate::base::error_text::{panic_text, with_causes};
-use crate::drape::{Drape, StageTimes};
+use crate::drape::{Drape, Prepared, Refine, Settings, StageTimes};
 use crate::garment::MeshCache;
 use crate::mechanics::refine::{Step, Stop};
 use crate::scene::Loaded;
@@ -109,7 +109,11 @@ pub struct Bench<'a> {
     meshes: MeshCache,
     stop: &'a AtomicBool,
     scenes: Arc<Scenes>,
+    prepared: Mutex<VecDeque<(String, Arc<Prepared>)>>,
 }
+
+/// Garments whose distances and cloth are kept: a grid that changes several fabrics before tables needs each again.
+const KEPT: usize = 4;
 
 /// Loaded scenes by the id of [`Point::scene_id`].
 pub(crate) type Scenes = Mutex<BTreeMap<String, Arc<Loaded>>>;
@@ -118,7 +122,7 @@ impl<'a> Bench<'a> {
     /// A bench that stores references in `cache`, if there is one, and interrupts its work once `stop` is set.
     #[must_use]
     pub fn new(cache: Option<ReferenceCache>, stop: &'a AtomicBool) -> Self {
-        Self { cache, meshes: MeshCache::default(), stop, scenes: Arc::default() }
+        Self { cache, meshes: MeshCache::default(), stop, scenes: Arc::default(), prepared: Mutex::default() }
     }
 
     /// The same with a cache of built-in meshes.
@@ -142,6 +146,23 @@ impl<'a> Bench<'a> {
         let loaded = Arc::new(point.job.scene.load_with(&self.meshes).map_err(|e| PointError::failed(&e))?);
         made.insert(id, loaded.clone());
         Ok(loaded)
+    }
+
+    /// Distances and cloth of a point, from another point of the same garment if there was one.
+    fn prepared(&self, point: &Point, loaded: &Loaded) -> Result<Arc<Prepared>, PointError> {
+        let Settings { model, refine, fabric, .. } = &point.job.settings;
+        // Only these settings count, and serialising plain data cannot fail.
+        let of = serde_json::to_string(&(point.scene_id(), model.name(), *refine == Refine::Steps(0), fabric));
+        let of = of.map_err(|e| PointError::failed(&e))?;
+        let mut kept = self.prepared.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, prepared)) = kept.iter().find(|(kept, _)| *kept == of) {
+            return Ok(prepared.clone());
+        }
+        let prepared = Prepared::new(&loaded.scene, &point.job.settings).map_err(|e| PointError::failed(&e))?;
+        let prepared = Arc::new(prepared);
+        kept.truncate(KEPT - 1);
+        kept.push_front((of, prepared.clone()));
+        Ok(prepared)
     }
 
     /// Warnings of the loaded scenes, by garment.
@@ -180,7 +201,8 @@ impl<'a> Bench<'a> {
             return Err(PointError::Interrupted);
         }
         let loaded = self.scene(point)?;
-        let drape = point.job.drape(&loaded.scene, &mut |_: &Step<'_>| self.listen());
+        let prepared = self.prepared(point, &loaded)?;
+        let drape = point.job.drape_again(&loaded.scene, &prepared, &mut |_: &Step<'_>| self.listen());
         let drape = drape.map_err(|e| PointError::failed(&e))?;
         if drape.state.as_ref().is_some_and(|s| s.stop == Stop::Interrupted) {
             // A garment that falls past the feet ends its own solve, not the sweep.

@@ -22,6 +22,10 @@ pub struct Timing {
     pub time_distance_spread_ms: Option<f64>,
     pub time_segment_ms: f64,
     pub time_segment_spread_ms: Option<f64>,
+    #[serde(default)]
+    pub time_cloth_ms: f64,
+    #[serde(default)]
+    pub time_cloth_spread_ms: Option<f64>,
     pub time_mechanics_ms: f64,
     pub time_mechanics_spread_ms: Option<f64>,
     pub time_refine_ms: f64,
@@ -50,6 +54,8 @@ impl Timing {
             time_distance_spread_ms: spread(|t| t.distance),
             time_segment_ms: median(|t| t.segment),
             time_segment_spread_ms: spread(|t| t.segment),
+            time_cloth_ms: median(|t| t.cloth),
+            time_cloth_spread_ms: spread(|t| t.cloth),
             time_mechanics_ms: median(|t| t.mechanics),
             time_mechanics_spread_ms: spread(|t| t.mechanics),
             time_refine_ms: median(|t| t.refine),
@@ -62,10 +68,11 @@ impl Timing {
     }
 
     /// Medians of the stages, of the time between them, and of the total, ms.
-    pub(crate) fn stages(&self) -> [(&'static str, f64); 6] {
+    pub(crate) fn stages(&self) -> [(&'static str, f64); 7] {
         [
             ("distance", self.time_distance_ms),
             ("segment", self.time_segment_ms),
+            ("cloth", self.time_cloth_ms),
             ("mechanics", self.time_mechanics_ms),
             ("refine", self.time_refine_ms),
             ("other", self.time_other_ms),

@@ -93,7 +93,7 @@ impl ComparedMethod {
         let model = Model::by_name(model).unwrap_or_default();
         let settings = Settings { model, refine, fabric: fabric.clone(), ..Settings::default() };
         let drape = drape(scene, &settings, &mut |_| go_on()).map_err(|e| e.to_string())?;
-        let StageTimes { distance, segment, mechanics, refine, .. } = drape.times;
+        let StageTimes { distance, segment, cloth, mechanics, refine, .. } = drape.times;
         let ended = match (self, drape.state.as_ref().map(|s| s.stop)) {
             (_, Some(Stop::Interrupted)) => "interrupted",
             (Self::Converged, Some(Stop::Converged)) => "converged",
@@ -104,7 +104,7 @@ impl ComparedMethod {
         };
         Ok(Outcome {
             positions: drape.positions,
-            time: distance + segment + mechanics + refine,
+            time: distance + segment + cloth + mechanics + refine,
             ended: ended.to_owned(),
             steps: drape.state.map_or(0, |s| s.steps),
             simulated_s: None,
