@@ -61,7 +61,7 @@ fn a_bound_moves_parts_at_once_and_keeps_distances_cloth_and_rest() {
     let finished = done.finished.as_ref().unwrap();
     assert!(finished.state == 2 && Arc::ptr_eq(&finished.loaded_scene, before.loaded_scene.as_ref().unwrap()));
     let preview = done.preview.as_ref().unwrap();
-    assert!(preview.state == 2 && !preview.warm && preview.done);
+    assert!(preview.state == 2 && preview.done);
     assert!((total(&done) - total(&at_once)).abs() < 1e-12);
     assert!(finished.preview_error_mm.unwrap() > 0.1);
     assert_eq!(done.trail.iter().map(|p| p.state).collect::<Vec<_>>(), [1, 2]);

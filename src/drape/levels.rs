@@ -1,18 +1,15 @@
 //! The garment at several resolutions: a drape goes from coarse to fine, so that full resolution is left to polish.
 //!
-//! Each level has a quarter of the vertices of the one before ([`Coarse`]). PARTs are those of the full garment, as far as they have
-//! vertices there. Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985).
+//! Each level has a quarter of the vertices of the one before ([`Coarse`]). Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985).
 
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use crate::garment::fabric::Fabric;
-use crate::mechanics::coupled::Garment;
 use crate::mechanics::energy::{Cloth, EnergyError};
+use crate::mesh::TriMesh;
 use crate::mesh::coarse::Coarse;
-use crate::mesh::{Topology, TriMesh};
-use crate::parts::{Parts, UNASSIGNED};
 use crate::scene::Scene;
 
 /// Vertices of a level over those of the next coarser.
@@ -28,8 +25,8 @@ pub(crate) struct Level {
     cloth: Cloth,
 }
 
-/// The full garment's cloth and the coarser ones, fine to coarse. The coarser ones are made at the first use: stage two of wide PARTs
-/// needs none.
+/// The full garment's cloth and the coarser ones, fine to coarse. The coarser ones are made at the first use: stage two needs
+/// none.
 #[derive(Debug)]
 pub(crate) struct Levels {
     pub(crate) cloth: Cloth,
@@ -87,14 +84,6 @@ impl Levels {
             .rev()
             .fold(to, |to, (finer, l)| l.coarse.prolong(&self.restrict(finer, from), &to))
     }
-
-    /// PARTs of the full garment on a level.
-    pub(crate) fn parts(&self, level: usize, parts: &Parts) -> Parts {
-        let label = self.made(level).iter().fold(parts.part_of_vertex.clone(), |p, l| l.coarse.restrict(&p));
-        let level_of = |label: u32| if label == UNASSIGNED { 0 } else { parts.parts[label as usize].level };
-        let Some(coarsest) = self.made(level).last() else { return parts.clone() };
-        Parts::from_labels(&coarsest.coarse.topology, &label, level_of, parts.own_extent.clone(), 0)
-    }
 }
 
 impl Level {
@@ -118,15 +107,8 @@ impl Level {
         &self.coarse.mesh
     }
 
-    /// Mean length of an edge, m.
-    pub(super) fn edge_m(&self) -> f64 {
-        let Topology { edges, .. } = &self.coarse.topology;
-        let at = |v: u32| self.coarse.mesh.positions[v as usize];
-        edges.iter().map(|&[a, b]| at(a).distance(at(b))).sum::<f64>() / edges.len().max(1) as f64
-    }
-
-    /// The garment at this level.
-    pub(crate) fn garment(&self) -> Garment<'_> {
-        Garment { mesh: &self.coarse.mesh, topology: &self.coarse.topology, cloth: &self.cloth }
+    /// Its cloth.
+    pub(crate) fn cloth(&self) -> &Cloth {
+        &self.cloth
     }
 }

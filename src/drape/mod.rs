@@ -26,7 +26,7 @@ pub(crate) use levels::Levels;
 pub(crate) use nested_iteration::approach;
 pub use next_pose::next_pose;
 pub(crate) use next_pose::reactions;
-pub(crate) use parts::{ENOUGH, StageTwo, outcome, stage_one, stage_two};
+pub(crate) use parts::{StageTwo, stage_one, stage_two};
 pub use pipeline::Prepared;
 pub use release::Release;
 pub(crate) use release::{ReleasedDrape, let_go};

@@ -1,6 +1,6 @@
-//! The way from PARTs to full resolution: finer PARTs, and for a large garment its rest on coarser cloth.
+//! The way from PARTs to full resolution: for a large garment its rest on coarser cloth.
 //!
-//! PARTs of half a fold go on from the table's. A garment whose coarser ones ([`Levels`]) still have some thousand vertices is brought to rest
+//! A garment whose coarser ones ([`Levels`]) still have some thousand vertices is brought to rest
 //! on those first, from the coarsest to the finest, so that full resolution begins near a rest that lasts: nested iteration. A step costs a
 //! little more than in proportion to the vertices, and how far cloth goes does not shrink with them.
 //!
@@ -11,21 +11,10 @@
 use glam::DVec3;
 
 use super::levels::{Level, Levels};
-use super::parts::Asked;
 use super::settings::{Model, Refine, Settings};
-use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::{self, CoupledOptions, Garment, Known, Method, Motion};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
-use crate::parts::Parts;
 use crate::scene::Scene;
-
-/// Extent of the finer PARTs, m: about half a fold, so that they make the folds which rings leave to tension field theory. Without them a
-/// skirt takes 21 steps from Table 3 and a dress 12; with them 12 and 2, each dearer than ten of these.
-const FINE_EXTENT_M: f64 = 0.12;
-
-/// Steps of these PARTs: the later ones bring less than a step at full resolution does.
-const FINE_STEPS: usize = 10;
 
 /// Vertices that a coarser garment must have to be brought to rest first. On one machine within hours, without and with: a knit skirt of 64,000
 /// vertices 77 and 20 s, a dress of 16,000 19.6 and 6.8 s (cotton 23 and 16), a jumpsuit of 9,330 in cotton 40 and 13; a pullover of 5,000, whose
@@ -36,68 +25,50 @@ const MIN_COARSE_VERTICES: usize = 1500;
 /// With eighty, five stiff garments of 16,000 take 239 steps at full resolution for 213.
 const COARSE_STEPS: usize = 20;
 
-/// Moves the result of stage two towards its rest by finer PARTs and coarser garments. Where that fails, the result of stage two is returned.
-/// `observer` receives the steps on coarser garments as step 0 of the full garment.
+/// The start of the steps at full resolution: stage two's positions, or for a large garment its rest on coarser cloth. A garment that stage
+/// two lets fall off the body starts as placed: it may stay on by shorter steps. `observer` receives the steps on coarser garments as step 0
+/// of the full garment.
 pub(crate) fn approach(
     scene: &Scene,
     settings: &Settings,
     levels: &Levels,
-    surface: &[SurfacePoint],
-    parts: &Parts,
-    start: &[DVec3],
-    (asked, observer): (Asked<'_>, Observer<'_>),
+    preview: &[DVec3],
+    observer: Observer<'_>,
 ) -> Vec<DVec3> {
-    let Model::Coupled(options) = &settings.model else { return start.to_vec() };
-    if settings.refine != Refine::Converged {
+    let fallen = settings.refine != Refine::Steps(0) && scene.fallen(preview).is_some();
+    let start = if fallen { &scene.garment.positions } else { preview };
+    if settings.refine != Refine::Converged || !matches!(settings.model, Model::Coupled(_)) {
         return start.to_vec();
     }
-    let Scene { garment: mesh, topology, body, .. } = scene;
-    let finer = parts.cut_to_extent(mesh, topology, FINE_EXTENT_M);
-    let distance: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
-    let by_parts = |garment: &Garment<'_>, finer: &Parts, distance_m: &[f64], start: Vec<DVec3>| {
-        let (motion, method) = (Motion::Affine, Method::Newton);
-        let options = CoupledOptions { max_steps: FINE_STEPS, motion, method, ..options.clone() };
-        let given = Known { distance_m, least_share: 0.0 };
-        let solved = coupled::solve_given(garment, body, finer, &start, given, &options, &mut |_| asked());
-        solved.map_or(start, |result| result.positions)
-    };
+    let Scene { garment: mesh, body, .. } = scene;
     let large = |level: &&Level| level.mesh().vertex_count() >= MIN_COARSE_VERTICES;
     let coarsest = levels.coarser(scene).iter().take_while(large).count();
     let self_contact = settings.self_contact;
     let at_most = RefineOptions { max_steps: Some(COARSE_STEPS), self_contact, ..RefineOptions::default() };
     let mut reached = start.to_vec();
     for number in (1..=coarsest).rev() {
-        let garment = levels.coarser(scene)[number - 1].garment();
-        let mut from = levels.restrict(number, &reached);
-        if number == coarsest {
-            from = by_parts(&garment, &levels.parts(number, &finer), &levels.restrict(number, &distance), from);
-        }
-        let contacts = garment.cloth.contacts(body, &from);
-        let rested = refine::refine_with(garment.cloth, contacts, from, &at_most, &mut |step| {
+        let cloth = levels.coarser(scene)[number - 1].cloth();
+        let from = levels.restrict(number, &reached);
+        let contacts = cloth.contacts(body, &from);
+        let rested = refine::refine_with(cloth, contacts, from, &at_most, &mut |step| {
             observer(&Step { iteration: 0, positions: start, at_rest: false, ..*step })
         });
-        let Ok(rested) = rested else { break };
+        let Ok(rested) = rested else { return start.to_vec() };
         if rested.stop == Stop::Interrupted {
             return start.to_vec();
         }
         let mut prolonged = levels.prolong(number, &reached, rested.positions);
         let (next, cloth) = match number.checked_sub(2) {
-            Some(finer) => (levels.coarser(scene)[finer].mesh(), levels.coarser(scene)[finer].garment().cloth),
+            Some(finer) => (levels.coarser(scene)[finer].mesh(), levels.coarser(scene)[finer].cloth()),
             None => (mesh, &levels.cloth),
         };
         let there = next.with_positions(levels.restrict(number - 1, &prolonged));
         if self_contact && !self_intersecting_pairs(&there).is_empty() {
             let contacts = cloth.contacts(body, &there.positions);
-            let Some(apart) = refine::untangled(cloth, contacts, there.positions) else { break };
+            let Some(apart) = refine::untangled(cloth, contacts, there.positions) else { return start.to_vec() };
             prolonged = levels.prolong(number - 1, &prolonged, apart);
         }
         reached = prolonged;
-        if number == 1 {
-            return reached;
-        }
     }
-    if finer.len() == parts.len() {
-        return start.to_vec();
-    }
-    by_parts(&Garment { mesh, topology, cloth: &levels.cloth }, &finer, &distance, start.to_vec())
+    reached
 }

@@ -103,12 +103,13 @@ pub(super) fn moved(
     observer: Observer<'_>,
 ) -> Result<Moved, DrapeError> {
     let on = || ControlFlow::Continue(());
-    let stage = timed(&mut times.mechanics, || stage_two(scene, settings, &ground.surface, parts, cloth, &on))?;
+    let stage = timed(&mut times.mechanics, || {
+        stage_two(scene, settings, &ground.surface, parts, cloth.map(|levels| &levels.cloth), &on)
+    })?;
     let folds = folds_of(settings, cloth, &stage);
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
     let ReleasedDrape { cloth, refined, let_go } = timed(&mut times.refine, || {
-        let start =
-            approach(scene, settings, levels, &ground.surface, &stage.parts, &stage.positions, (&on, &mut *observer));
+        let start = approach(scene, settings, levels, &stage.positions, observer);
         let refined = refine_from(scene, settings, &levels.cloth, Some(ground), (start, StartsFrom::Parts), observer)?;
         let_go(scene, settings, refined, observer)
     })?;

@@ -133,7 +133,7 @@ fn segmented(found: &Segmented) -> Value {
 
 fn preview(found: &Preview) -> Value {
     json!({
-        "state": found.state, "warm": found.warm, "done": found.done, "count": found.parts.len(),
+        "state": found.state, "done": found.done, "count": found.parts.len(),
         "ms": found.ms, "after_ms": found.after_ms,
     })
 }

@@ -15,6 +15,7 @@
 //! 1987). Limits: depth and number of the folds are unknown; cloth that is held or pressed flat shows none.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::energy::Cloth;
 use super::linear_algebra::eigen;
@@ -50,7 +51,7 @@ pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
         let largest = (0..3).fold(0, |best, k| if values[k] > values[best] { k } else { best });
         (100.0 * values[largest].max(0.0), vectors[largest])
     };
-    let (excess_percent, across) = sum.iter().zip(&area).map(of_vertex).unzip();
+    let (excess_percent, across) = sum.par_iter().zip(&area).with_min_len(256).map(of_vertex).unzip();
     Folds { excess_percent, across }
 }
 

@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::energy::{Cloth, Contacts, FaceUpdate};
-use super::newton::{FullSpace, NewtonState, RestCheck, StepLimits, Tangent, check_rest};
+use super::newton::{FullSpace, NewtonState, RestCheck, StepLimits, check_rest};
 pub use super::newton::{Record, SolveError, Solver};
 use crate::GRAVITY;
 use crate::body::distance::Body;

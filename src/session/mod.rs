@@ -10,10 +10,9 @@
 //! | the fabric | cloth, stage two, the drape at rest unless it rested in that fabric before | body, garment, distances, PARTs |
 //! | a measurement, the garment | all | nothing |
 //!
-//! **Warm starts.** Stage two first continues from the previous preview, which takes a few steps ([`Preview::warm`]). The drape
-//! at rest continues from the previous one. A rest does not depend on the range table, so an edit of the table keeps it, and a fabric
-//! of the last few reuses its own ([`AtRest::reused`]). At the end both stages are computed from the undraped garment, as
-//! `run` does; the metrics are of that result. Without warm starts every result is the same as that of `run`, bit for bit.
+//! **Warm starts.** Both stages are always computed from the undraped garment, in milliseconds, as `run` does. The drape at rest
+//! continues from the previous one. A rest does not depend on the range table, so an edit of the table keeps it, and a fabric
+//! of the last few reuses its own ([`AtRest::reused`]). Without warm starts every result is the same as that of `run`, bit for bit.
 //!
 //! An impossible edit is refused with an error message, at once or when its computation fails, and the last good state remains.
 //! The session uses no socket, viewer or file. Limits: an edit of measurements or garment starts cold, because the meshes differ.

@@ -69,8 +69,6 @@ pub struct Segmented {
 pub struct Preview {
     pub state: u64,
     pub loaded_scene: Arc<LoadedScene>,
-    /// Whether it continued from the previous preview. Both stages from the undraped garment are then still to come.
-    pub warm: bool,
     /// Whether its last step is done.
     pub done: bool,
     /// The PARTs that moved: those of stage one, or cut to the extent of the run.

@@ -9,14 +9,11 @@ use glam::DVec3;
 use super::handle::Session;
 use super::results::{AtRest, LoadedScene, Preview, RestInputs, Segmented, Snapshot};
 use super::state::{SessionState, ms_since};
-use crate::drape::{Drape, ENOUGH, Levels, Settings};
-use crate::mechanics::coupled::{self, CoupledOptions, Known, Method, Motion};
+use crate::drape::{Drape, Settings};
+use crate::mechanics::coupled::Motion;
 use crate::parts::Parts;
 use crate::scene::Scene;
 use crate::study::accuracy::representable::representable;
-
-/// Steps of a warm preview on the coarser cloth.
-pub(super) const COARSE_STEPS: usize = 2;
 
 /// The newest state. Its snapshot has stage one and the drape at rest of this state only.
 pub(super) struct Target {
@@ -60,12 +57,11 @@ impl<'a> Task<'a> {
         self.session.publish(self.target.snapshot.state, add);
     }
 
-    /// A cold preview that is not done, of `parts` at `positions` (m) after `ms` milliseconds.
+    /// A preview that is not done, of `parts` at `positions` (m) after `ms` milliseconds.
     pub(super) fn preview(self, parts: Arc<Parts>, positions: Vec<DVec3>, ms: f64) -> Preview {
         Preview {
             state: self.target.snapshot.state,
             loaded_scene: Arc::clone(self.loaded_scene()),
-            warm: false,
             done: false,
             parts,
             outcomes: Arc::default(),
@@ -74,25 +70,6 @@ impl<'a> Task<'a> {
             after_ms: ms_since(self.target.accepted),
             warnings: Vec::new(),
         }
-    }
-
-    /// Coarse steps of the preview on a cloth of a quarter of the vertices, which take a quarter of the time. None if that
-    /// cloth has too few vertices for each PART, or the steps fail.
-    pub(super) fn coarse_steps(
-        self,
-        levels: &Levels,
-        parts: &Parts,
-        start: &[DVec3],
-        options: &CoupledOptions,
-    ) -> Option<Vec<DVec3>> {
-        let level =
-            levels.coarser(self.scene()).first().filter(|level| level.mesh().vertex_count() >= ENOUGH * parts.len())?;
-        let options = CoupledOptions { max_steps: COARSE_STEPS, method: Method::Newton, ..options.clone() };
-        let (coarse, parts) = (levels.restrict(1, start), levels.parts(1, parts));
-        let (garment, body) = (level.garment(), &self.scene().body);
-        let mut check = |_: &[DVec3]| self.check();
-        let solved = coupled::solve_given(&garment, body, &parts, &coarse, Known::default(), &options, &mut check);
-        solved.ok().map(|solved| levels.prolong(1, start, solved.positions))
     }
 
     /// Least RMS distance from the drape at rest, mm, that the PARTs' maps could reach.

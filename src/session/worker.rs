@@ -10,23 +10,20 @@ use glam::DVec3;
 use super::edit::EditError;
 use super::handle::Session;
 use super::results::{AtRest, Finished, LoadedScene, Preview, Segmented};
-use super::state::{SessionState, ms_since, sum_by_part};
-use super::task::{COARSE_STEPS, Refinement, Target, Task};
+use super::state::{SessionState, ms_since};
+use super::task::{Refinement, Target, Task};
 use crate::base::error_text::with_causes;
 use crate::drape::{
     ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, StageResults, StageTimes, StageTwo,
-    StartsFrom, approach, drape, folds_of, let_go, outcome, reactions, refine_from, settled, stage_two,
+    StartsFrom, approach, drape, folds_of, let_go, reactions, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;
-use crate::mechanics::coupled::{self, CoupledError, CoupledOptions, Garment, Known, Method};
+use crate::mechanics::coupled::CoupledError;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{Step, Stop};
 use crate::study::accuracy;
 use crate::study::metrics::Metrics;
-
-/// Newton steps of a warm preview.
-const WARM_STEPS: usize = 6;
 
 /// The refusal of an edit whose computation panicked. The panic's own message goes to the terminal alone: it may quote a file.
 const PANICKED: &str = "computing this edit failed by a fault of the program, and the last good state stands; please report the edit with the \
@@ -37,8 +34,6 @@ pub struct Worker {
     meshes: MeshCache,
     generations: u64,
     cloth: Option<CachedCloth>,
-    /// The last preview.
-    preview: Option<WarmStart>,
     /// The last drape at full resolution, done or interrupted.
     rest: Option<WarmStart>,
     progress: Progress,
@@ -62,7 +57,6 @@ struct WarmStart {
 #[derive(Default)]
 struct Progress {
     state: u64,
-    warm_preview_done: bool,
     both_stages: Option<(StageTwo, Duration)>,
     refined: Option<Duration>,
     finished: bool,
@@ -72,7 +66,7 @@ impl Worker {
     /// A worker that takes built-in meshes from the cache.
     #[must_use]
     pub fn new(meshes: MeshCache) -> Self {
-        Self { meshes, generations: 0, cloth: None, preview: None, rest: None, progress: Progress::default() }
+        Self { meshes, generations: 0, cloth: None, rest: None, progress: Progress::default() }
     }
 
     /// Computes until the session is closed. A session has one worker.
@@ -107,7 +101,7 @@ impl Worker {
             Ok(Err(error)) => Some((with_causes(&error, "; because "), matches!(error, EditError::Scene(_)))),
             Err(_) => {
                 // A panic may leave any of these half done.
-                (self.cloth, self.preview, self.rest, self.progress) = (None, None, None, Progress::default());
+                (self.cloth, self.rest, self.progress) = (None, None, Progress::default());
                 Some((PANICKED.to_owned(), false))
             }
         };
@@ -146,33 +140,15 @@ impl Worker {
             let start = start.as_ref().filter(|start| target.warm && start.generation == generation);
             start.map(|start| Arc::clone(&start.positions))
         };
-        let preview = usable(&self.preview);
         let rest = usable(&self.rest).filter(|_| settings.refine == Refine::Converged);
-        if let (Some(levels), Model::Coupled(options), false) =
-            (&levels, &settings.model, self.progress.warm_preview_done)
-        {
-            self.progress.warm_preview_done = true;
-            // From the placed garment, and before any drape at rest: this takes milliseconds, and does not depend on the last preview.
-            if options.extents_m.is_empty()
-                && coupled::solved_by_admm(&task.scene().garment, &segmented.table_parts, &levels.cloth, options.method)
-            {
-                return self.both_stages(task, Some(&**levels));
-            }
-            let Some(start) = preview else { return Ok(()) };
-            let rest_follows = rest.is_some() && target.snapshot.rest.is_none();
-            return self.warm_preview(task, levels, options, &start, rest_follows);
-        }
+        // Before a drape at rest: both stages take milliseconds.
+        let Some((stage, _)) = &self.progress.both_stages else { return self.both_stages(task, levels.as_deref()) };
         let to_refine = levels.as_ref().filter(|_| target.snapshot.rest.is_none() && self.progress.refined.is_none());
         if let (Some(levels), Some(start)) = (to_refine, rest) {
             return self.refine(task, levels, start.to_vec(), true);
         }
-        let Some((stage, _)) = &self.progress.both_stages else { return self.both_stages(task, levels.as_deref()) };
         if let Some(levels) = to_refine {
-            let check = || task.check();
-            let observer = &mut |_: &Step<'_>| check();
-            let surface = &segmented.loaded_scene.distances.surface;
-            let (parts, positions) = (&stage.parts, &stage.positions);
-            let start = approach(task.scene(), settings, levels, surface, parts, positions, (&check, observer));
+            let start = approach(task.scene(), settings, levels, &stage.positions, &mut |_: &Step<'_>| task.check());
             return self.refine(task, levels, start, false);
         }
         self.finish(task, levels.as_deref());
@@ -212,73 +188,13 @@ impl Worker {
         Ok(())
     }
 
-    /// Stage two from the previous preview, published at every step. If a drape at rest follows, a few steps suffice.
-    fn warm_preview(
-        &mut self,
-        task: Task<'_>,
-        levels: &Levels,
-        options: &CoupledOptions,
-        start: &[DVec3],
-        rest_follows: bool,
-    ) -> Result<(), EditError> {
-        let began = Instant::now();
-        let (scene, generation) = (task.scene(), task.loaded_scene().generation);
-        let parts = Arc::clone(&task.segmented.parts);
-        let preview = |positions: &[DVec3]| Preview {
-            warm: true,
-            ..task.preview(Arc::clone(&parts), positions.to_vec(), ms_since(began))
-        };
-        let mut reached = start.to_vec();
-        if let Some(coarse) = task.coarse_steps(levels, &parts, start, options) {
-            reached = coarse;
-            let shown = Arc::new(preview(&reached));
-            task.publish(|state| state.snapshot.preview = Some(shown));
-            if rest_follows {
-                self.preview = Some(WarmStart { generation, positions: Arc::new(reached) });
-                return Ok(());
-            }
-        }
-        let start = reached.clone();
-        let max_steps = if rest_follows { COARSE_STEPS } else { WARM_STEPS };
-        let options = CoupledOptions { max_steps, method: Method::Newton, ..options.clone() };
-        let garment = Garment { mesh: &scene.garment, topology: &scene.topology, cloth: &levels.cloth };
-        let mut observer = |positions: &[DVec3]| {
-            reached.clear();
-            reached.extend_from_slice(positions);
-            let step = Arc::new(preview(positions));
-            task.publish(|state| state.snapshot.preview = Some(step));
-            task.check()
-        };
-        let solved =
-            coupled::solve_given(&garment, &scene.body, &parts, &start, Known::default(), &options, &mut observer);
-        let mut solved = match solved {
-            Ok(solved) => solved,
-            Err(CoupledError::Interrupted) => {
-                self.preview = Some(WarmStart { generation, positions: Arc::new(reached) });
-                return Ok(());
-            }
-            Err(error) => return Err(DrapeError::from(error).into()),
-        };
-        // The displacement of a PART counts from the garment as placed.
-        let placed = &scene.garment.positions;
-        let displacements: Vec<DVec3> = solved.positions.iter().zip(placed).map(|(x, before)| *x - *before).collect();
-        let sums = sum_by_part(&parts, &displacements);
-        for ((part, result), sum) in parts.parts.iter().zip(&mut solved.parts).zip(sums) {
-            result.displacement = sum / part.vertices.len() as f64;
-        }
-        let outcomes = Arc::new(solved.parts.iter().map(outcome).collect());
-        let shown = Arc::new(Preview { done: true, outcomes, ..preview(&solved.positions) });
-        self.preview = Some(WarmStart { generation, positions: Arc::clone(&shown.positions) });
-        task.publish(|state| state.snapshot.preview = Some(shown));
-        Ok(())
-    }
-
     /// Both stages from the undraped garment, as `run` computes them.
     fn both_stages(&mut self, task: Task<'_>, levels: Option<&Levels>) -> Result<(), EditError> {
         let began = Instant::now();
         let surface = &task.loaded_scene().distances.surface;
         let parts = (*task.segmented.table_parts).clone();
-        let stage = match stage_two(task.scene(), task.settings(), surface, parts, levels, &|| task.check()) {
+        let cloth = levels.map(|levels| &levels.cloth);
+        let stage = match stage_two(task.scene(), task.settings(), surface, parts, cloth, &|| task.check()) {
             Ok(stage) => stage,
             Err(DrapeError::Coupled(CoupledError::Interrupted)) => return Ok(()),
             Err(error) => return Err(error.into()),
@@ -290,8 +206,6 @@ impl Worker {
             warnings: stage.warnings.clone(),
             ..task.preview(Arc::new(stage.parts.clone()), stage.positions.clone(), 1e3 * took.as_secs_f64())
         });
-        let (generation, positions) = (task.loaded_scene().generation, Arc::clone(&preview.positions));
-        self.preview = Some(WarmStart { generation, positions });
         self.progress.both_stages = Some((stage, took));
         task.publish(|state| {
             state.update_trail(|point| point.two_stages_ms = Some(preview.ms));

@@ -126,7 +126,7 @@ function show() {
   const done = (what) => (what?.state === state.state && what.done !== false ? "✓" : "…");
   const lasts = rest?.state === state.state && rest.balanced && !rest.done ? "✓, looking whether it lasts" : done(rest);
   at("status").textContent =
-    `state ${state.state} · PARTs ${parts?.count ?? "–"} ${done(parts)} · two stages ${preview?.warm ? "…" : done(preview)} · ` +
+    `state ${state.state} · PARTs ${parts?.count ?? "–"} ${done(parts)} · two stages ${done(preview)} · ` +
     `at rest ${lasts}${state.idle ? "" : " · working"}`;
   document.body.classList.toggle("read-only", state.may_steer === false);
   at("undo").disabled = state.undo === 0 || state.may_steer === false;

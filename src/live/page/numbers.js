@@ -39,7 +39,7 @@ export function showNumbers(state) {
     ["PARTs", parts ? `${parts.count}${cut ? `, cut from ${parts.table_count}` : ""}` : "–", old(parts)],
     ["stage one", ms(parts?.segment_ms), old(parts)],
     ["strongest force on a PART", force(parts?.force_max_n), old(parts)],
-    ["two stages", preview ? `${ms(preview.ms)}${preview.warm ? " (continued)" : ""}` : "–", old(preview)],
+    ["two stages", preview ? ms(preview.ms) : "–", old(preview)],
     ["at rest", rest ? (rest.kept ? "as before" : `${rest.steps} steps, ${ms(rest.ms)}`) : "–", old(rest)],
     ["residual over weight", rest ? rest.residual_over_weight.toExponential(1) : "–", old(rest)],
     ["two stages, distance to this rest", mm(figures?.preview_error_mm), old(figures)],

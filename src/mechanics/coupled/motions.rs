@@ -4,9 +4,7 @@
 //!
 //! with blending weights w_p and, for each PART, a displacement D_p and a displacement gradient A_p. About positions x it is linear in
 //! the unknowns, four vectors a PART: D_p and the columns of A_p along the PART's own axes, each divided by the PART's spread along
-//! it. Every Newton step takes x, c_p and axes as they are by then, so turns add up as turns do, and a PART can be turned
-//! by any angle without being stretched. A PART of three vertices or fewer has its displacement alone, as every PART does with one
-//! [`Motion::Translation`] each: the paper's.
+//! it. A PART of three vertices or fewer has its displacement alone, as every PART does with [`Motion::Translation`]: the paper's.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -14,40 +12,20 @@
 //! | D_p, A_p | displacement and its gradient | m, – |
 //! | c_p | middle of the PART, by its weights | m |
 //!
-//! Limits: within a PART nothing bends; what the blend strains at the seams is relaxed vertex by vertex.
+//! Limits: within a PART nothing bends, and the blend strains the cloth at the seams.
 
 use glam::{DMat3, DVec3};
 
 use super::options::Motion;
+use super::part_matrix::PartMatrix;
 use super::weights::Weights;
-use crate::base::simd::{Four, Lanes, Pack, Vectors};
-use crate::mechanics::energy::sparsity::Pattern;
 use crate::mechanics::linear_algebra::eigen;
-use crate::mechanics::newton::{SolveError, Solver};
-use crate::mesh::{Csr, each_once, outer};
+use crate::mechanics::newton::SolveError;
+use crate::mesh::{Csr, outer};
 use crate::parts::Parts;
 
 /// Numbers of the functions that a PART moves by: its weight, and that times its coordinates.
 pub(super) type Values = [f64; 4];
-
-/// The functions of a PART in one register: its weight, and that times its coordinates.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Functions {
-    centre: DVec3,
-    /// x, y and z of the axes, after a zero.
-    axes: [Four; 3],
-}
-
-impl Functions {
-    /// Their values at x, where the PART's weight is w.
-    #[inline(always)]
-    pub(super) fn at<L: Lanes>(&self, l: L, w: f64, x: DVec3) -> Pack<L> {
-        let y = x - self.centre;
-        let Vectors { x: ax, y: ay, z: az } = Vectors::load(l, &self.axes);
-        let one = Pack::load(l, &Four([1.0, 0.0, 0.0, 0.0]));
-        (one + ax * y.x + ay * y.y + az * y.z) * w
-    }
-}
 
 /// Vertices of a PART that has its displacement alone.
 const MAX_TRANSLATED: usize = 3;
@@ -57,9 +35,6 @@ const MIN_SPREAD_RATIO: f64 = 0.05;
 
 /// No PART is smaller than this, m.
 const MIN_SPREAD_M: f64 = 1e-4;
-
-/// Share of a diagonal block's trace that is added to it: flat PARTs leave some of their functions nearly alike.
-pub(super) const RIDGE: f64 = 1e-6;
 
 /// Blended motions of PARTs about the positions they were last centred at.
 #[derive(Debug, Clone)]
@@ -167,15 +142,6 @@ impl Motions {
         functions
     }
 
-    /// The functions of all PARTs, by fours.
-    pub(super) fn functions(&self) -> Vec<Functions> {
-        let of = |(centre, [a, b, c]): (&DVec3, &[DVec3; 3])| Functions {
-            centre: *centre,
-            axes: [Four([0.0, a.x, b.x, c.x]), Four([0.0, a.y, b.y, c.y]), Four([0.0, a.z, b.z, c.z])],
-        };
-        self.centre.iter().zip(&self.axes).map(of).collect()
-    }
-
     /// From a force (or any covector) at each vertex to that of each unknown.
     pub(crate) fn restrict(&self, x: &[DVec3], force: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
@@ -213,30 +179,18 @@ impl Motions {
     /// # Errors
     /// [`SolveError`] where positions are not finite.
     pub fn nearest(&self, x: &[DVec3], u: &[DVec3]) -> Result<Vec<DVec3>, SolveError> {
-        let of = |v: usize| self.weights.of(v).iter().map(|&(p, _)| p);
-        let pairs = each_once((0..x.len()).flat_map(|v| of(v).flat_map(move |p| of(v).map(move |q| (p, q)))));
-        let span = |p: u32| (self.first[p as usize]..).take(self.count[p as usize] as usize);
-        let all = pairs.iter().flat_map(|&(p, q)| span(p).flat_map(move |i| span(q).map(move |j| (i, j))));
-        let pattern = Pattern::new(self.unknowns, all);
-        let mut blocks = vec![0.0; pattern.rows.len()];
-        for (v, x) in x.iter().enumerate() {
-            let functions: Vec<(u32, f64)> =
-                self.weights.of(v).iter().flat_map(|&(p, w)| span(p).zip(self.values(p, w, *x))).collect();
-            for (k, &(i, a)) in functions.iter().enumerate() {
-                for &(j, b) in &functions[..=k] {
-                    blocks[pattern.slot(i, j).block as usize] += a * b;
-                }
-            }
-        }
-        let mut blocks: Vec<DMat3> = blocks.into_iter().map(|b| DMat3::from_diagonal(DVec3::splat(b))).collect();
-        for &diagonal in &pattern.starts[..self.unknowns] {
-            let block = &mut blocks[diagonal as usize];
-            *block += *block * RIDGE + DMat3::from_diagonal(DVec3::splat(f64::MIN_POSITIVE.sqrt()));
+        let functions = self.functions_at(x);
+        let mut matrix = PartMatrix::new(self);
+        let mut own = Vec::new();
+        for v in 0..x.len() {
+            let terms = functions.of(v);
+            own.clear();
+            own.extend(terms.iter().map(|term| term.0));
+            matrix.add(&own, |i, j| terms[i].1 * terms[j].1);
         }
         let mut unknowns = Vec::new();
         self.restrict(x, u, &mut unknowns);
-        let none = vec![0.0; self.unknowns];
-        Solver::new(&pattern).solve(&pattern, &blocks, &none, true, &mut unknowns)?;
+        matrix.factor(&vec![0.0; self.unknowns])?.solve(&mut unknowns);
         let mut out = Vec::new();
         self.prolong(x, &unknowns, &mut out);
         Ok(out)

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use crate::base::serde_name;
 use crate::mechanics::energy::EnergyError;
 use crate::mechanics::newton::SolveError;
-use crate::mechanics::refine::Record;
 
 /// Why PARTs could not be solved together.
 #[derive(Debug, thiserror::Error)]
@@ -67,65 +66,24 @@ impl std::str::FromStr for Motion {
     }
 }
 
-/// How the equilibrium of the PARTs is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// ADMM where most of the garment lies in PARTs wider than two folds, Newton's method otherwise.
-    #[default]
-    Auto,
-    /// Local and global steps on sampled elements with one factor: milliseconds, and no folds.
-    Admm,
-    /// Newton's method on all elements, with vertices relaxed after every step.
-    Newton,
-}
-
 /// How PARTs are solved together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CoupledOptions {
     /// How a PART moves.
     pub motion: Motion,
-    /// How the equilibrium is found.
-    pub method: Method,
-    /// Iterations of ADMM at most.
+    /// Iterations at most.
     pub max_iterations: usize,
-    /// A root mean square change of the maps below this, m, ends ADMM.
+    /// A root mean square change of the maps below this, m, ends the iterations.
     pub least_change_m: f64,
     /// Largest extents of PARTs along the cloth, m, coarse to fine: one solve each, from where the one before ended. Empty: the
     /// PARTs as the range table makes them.
     pub extents_m: Vec<f64>,
-    /// Newton steps at most.
-    pub max_steps: usize,
-    /// A whole step that moves no vertex by more than this, m, ends the solve, once the damping is low.
-    pub least_move_m: f64,
-    /// Damping ε to begin with, 1/s².
-    pub damping: f64,
-    /// Strain that the cloth may have where it hangs by its whole height: its membrane stiffness is at most ρ g H over this.
-    /// Stiff cloth lets a step go a millimetre.
-    pub soft_strain: f64,
-    /// Iterations of a relaxation after each step.
-    pub relaxing: usize,
-    /// Iterations of a relaxation of a step that failed.
-    pub relaxing_trial: usize,
 }
 
 impl Default for CoupledOptions {
     fn default() -> Self {
-        Self {
-            motion: Motion::Affine,
-            method: Method::Auto,
-            max_iterations: 40,
-            least_change_m: 1e-4,
-            extents_m: Vec::new(),
-            max_steps: 40,
-            least_move_m: 3e-3,
-            damping: 30.0,
-            // A 60 cm skirt then hangs at most 1.5 mm too long.
-            soft_strain: 0.005,
-            relaxing: 20,
-            relaxing_trial: 60,
-        }
+        Self { motion: Motion::Affine, max_iterations: 40, least_change_m: 1e-4, extents_m: Vec::new() }
     }
 }
 
@@ -155,18 +113,14 @@ pub struct CoupledResult {
     pub positions: Vec<DVec3>,
     /// Displacement and forces of each PART.
     pub parts: Vec<PartResult>,
-    /// Every Newton step, the start first.
-    pub history: Vec<Record>,
     /// Unknown vectors: four a PART that moves by an affine map.
     pub unknowns: usize,
     /// Residual force over weight in the PARTs' own coordinates.
     pub residual_over_weight: f64,
     /// Vertices that were left within the cloth's thickness of the body and pushed out.
     pub pushed_out: usize,
-    /// Time for the weights and the pattern.
+    /// Time for the weights and the factor.
     pub setup: Duration,
-    /// Time for Newton's steps.
+    /// Time for the iterations.
     pub solve: Duration,
-    /// Warnings for the user.
-    pub warnings: Vec<String>,
 }

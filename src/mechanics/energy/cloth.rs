@@ -132,8 +132,6 @@ pub struct Cloth {
     pub fabrics: Arc<Vec<Fabric>>,
     /// Rest data of the triangles.
     pub triangles: Arc<Vec<Triangle>>,
-    /// Compression ratio of each triangle: the share of its stiffness left under compression.
-    pub(crate) compression_ratios: Arc<Vec<f64>>,
     /// The bending elements.
     pub(crate) bending: Arc<Bending>,
     /// Membrane stiffness of each fabric.
@@ -222,7 +220,6 @@ impl Cloth {
             friction: Arc::new(at_vertices(mesh, rest, fabrics, |fabric| fabric.friction)),
             fabrics: Arc::new(fabrics.to_vec()),
             triangles: Arc::new(triangles),
-            compression_ratios: Arc::new(ratios),
             bending: Arc::new(bending),
             stiffness: fabrics.iter().map(Stiffness::new).collect(),
             clear: Arc::clone(&placed),
@@ -266,15 +263,6 @@ impl Cloth {
         }
         let stiffness = softer.iter().zip(&self.stiffness).map(|(softer, own)| softer.unwrap_or(*own)).collect();
         Some(Self { stiffness, ..self.clone() })
-    }
-
-    /// The same cloth with other compression ratios of its triangles; slivers keep zero.
-    #[must_use]
-    pub(crate) fn with_compression_ratios(mut self, mut ratios: Vec<f64>) -> Self {
-        ratios.iter_mut().zip(&*self.triangles).filter(|(_, t)| t.sliver).for_each(|(ratio, _)| *ratio = 0.0);
-        self.packed_ratios = Arc::new(packed(&self.triangles, &ratios));
-        self.compression_ratios = Arc::new(ratios);
-        self
     }
 
     /// The same cloth with `x` (m) in place of the placement as the positions that an intersecting start returns to.
@@ -414,8 +402,8 @@ impl Cloth {
     ) {
         blocks.clear();
         blocks.extend(layout.bending_blocks.iter().map(|&b| DMat3::from_diagonal(DVec3::splat(b))));
-        for ((t, &ratio), slots) in self.triangles.iter().zip(&*self.compression_ratios).zip(&layout.triangle_slots) {
-            let parts = t.hessian(self.stiffness_of(t), ratio, x, kind);
+        for (t, slots) in self.triangles.iter().zip(&layout.triangle_slots) {
+            let parts = t.hessian(self.stiffness_of(t), t.compression_ratio(), x, kind);
             for (slot, part) in slots.iter().zip(&parts) {
                 if slot.block != HELD {
                     blocks[slot.block as usize] += if slot.transposed { part.transpose() } else { *part };
@@ -441,8 +429,9 @@ impl Cloth {
         let scalar = |(v, mass): (usize, &f64)| self.bending.matrix.diagonal(v) + damping * mass;
         blocks.clear();
         blocks.extend(self.masses.iter().enumerate().map(scalar).map(|s| DMat3::from_diagonal(DVec3::splat(s))));
-        for (t, &ratio) in self.triangles.iter().zip(&*self.compression_ratios) {
-            for (&v, block) in t.vertices.iter().zip(t.diagonal_blocks(self.stiffness_of(t), ratio, x)) {
+        for t in &*self.triangles {
+            for (&v, block) in t.vertices.iter().zip(t.diagonal_blocks(self.stiffness_of(t), t.compression_ratio(), x))
+            {
                 blocks[v as usize] += block;
             }
         }

@@ -8,7 +8,6 @@ use glam::{DMat3, DVec3};
 use super::bending::Bending;
 use super::membrane::Triangle;
 use super::ordering::{Adjacency, nested_dissection};
-use crate::mesh::each_once;
 
 /// Marks a held vertex, and a block that does not exist because of one.
 pub(crate) const HELD: u32 = u32::MAX;
@@ -32,20 +31,6 @@ pub(crate) struct Slot {
 }
 
 impl Pattern {
-    /// The pattern of these pairs (row, column) of unknowns, in any order, repeated or not, and of every diagonal block.
-    #[must_use]
-    pub(crate) fn new(unknowns: usize, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
-        let own = (0..unknowns as u32).map(|i| (i, i));
-        let all = each_once(pairs.map(|(i, j)| (i.min(j), i.max(j))).chain(own));
-        let mut pattern = Self { starts: vec![0], rows: Vec::with_capacity(all.len()) };
-        // No column is empty: each has its diagonal.
-        for column in all.chunk_by(|a, b| a.0 == b.0) {
-            pattern.rows.extend(column.iter().map(|(_, row)| row));
-            pattern.starts.push(pattern.rows.len() as u32);
-        }
-        pattern
-    }
-
     /// The pattern of neighbouring vertices; `order` has the vertex of each unknown, `unknown` the unknown of each vertex.
     #[must_use]
     fn of_neighbours(order: &[u32], unknown: &[u32], neighbours: &Adjacency) -> Self {

@@ -7,11 +7,20 @@ use glam::{DMat3, DVec3};
 
 use super::factor::SolveError;
 use super::solver::Solver;
-use super::state::{State, Tangent};
-use crate::mechanics::energy::{Cloth, HessianKind, HessianLayout};
+use crate::mechanics::energy::{Cloth, Contacts, HessianKind, HessianLayout};
 
 /// Most steps with the projected Hessian after one whose true Hessian was indefinite.
 const MAX_PROJECTED_STEPS: usize = 4;
+
+/// The inputs of a Newton step.
+pub(crate) struct State<'a> {
+    pub(crate) cloth: &'a Cloth,
+    pub(crate) x: &'a [DVec3],
+    pub(crate) contacts: &'a Contacts<'a>,
+    pub(crate) gradient: &'a [DVec3],
+    /// ε, 1/s².
+    pub(crate) damping: f64,
+}
 
 /// The Hessian of all free vertices, and its factor.
 #[derive(Debug, Default)]
@@ -59,10 +68,14 @@ impl FullSpace {
             self.solver = None;
         }
     }
-}
 
-impl Tangent for FullSpace {
-    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError> {
+    /// The step of every vertex, m, zero where held, and every free vertex's own block of a positive H + ε M, N/m.
+    pub(super) fn step(
+        &mut self,
+        here: &State<'_>,
+        d: &mut Vec<DVec3>,
+        own: &mut Vec<DMat3>,
+    ) -> Result<(), SolveError> {
         let State { cloth, x, .. } = *here;
         self.couple(here);
         let mut solved = false;
@@ -89,7 +102,8 @@ impl Tangent for FullSpace {
         Ok(())
     }
 
-    fn fall_back(&mut self) -> bool {
+    /// After a rejected step: switches to the projected Hessian; returns whether the step had the true one.
+    pub(crate) fn fall_back(&mut self) -> bool {
         self.projected_left = MAX_PROJECTED_STEPS;
         std::mem::take(&mut self.is_true)
     }

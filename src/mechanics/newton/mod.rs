@@ -1,15 +1,13 @@
-//! Newton's method with a line search, Levenberg's damping and relaxed steps: one loop for the whole cloth and for its PARTs.
+//! Newton's method with a line search, Levenberg's damping and relaxed steps: one loop for the whole cloth.
 //!
-//! An iteration takes a step d from its [`Tangent`], which solves (H + ε M) d = −∇E in the coordinates it has: all vertices
-//! ([`FullSpace`]), or the motions of the PARTs ([`coupled`](super::coupled)). It goes along d as far as Armijo's condition
+//! An iteration takes a step d that solves (H + ε M) d = −∇E over all vertices ([`FullSpace`]). It goes along d as far as Armijo's condition
 //! allows, so the energy never rises; ε (Levenberg, Marquardt) falls while whole steps succeed and grows where they do not.
 //!
 //! **Steps are relaxed.** A step also stretches what it turns, and carries vertices into the body that did not touch before.
 //! Both are local and stiff, so a trial that fails for them is first relaxed by a few iterations without a factorisation
 //! ([`relax`]) and judged again, and every step that is taken is relaxed as well.
 //!
-//! When to stop, and what to change between iterations, is the caller's: [`refine`](super::refine) goes on to a residual,
-//! [`coupled`](super::coupled) until its steps are short.
+//! When to stop, and what to change between iterations, is the caller's: [`refine`](super::refine) goes on to a residual.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -36,4 +34,4 @@ pub(crate) use full_space::FullSpace;
 pub(crate) use saddle_escape::{RestCheck, check_rest};
 pub use solver::Solver;
 pub use state::Record;
-pub(crate) use state::{NewtonState, State, StepLimits, Tangent};
+pub(crate) use state::{NewtonState, StepLimits};

@@ -33,9 +33,6 @@ const FIRST_SCALE: f64 = 0.3;
 /// The share of the predicted decrease that an iteration must bring.
 const ARMIJO: f64 = 1e-4;
 
-/// Number of the last iterations whose contribution decides on the end of a relaxation.
-const LAST_ITERATIONS: usize = 3;
-
 /// Shorter than this share of an iteration is rounding.
 const MIN_STEP_LENGTH: f64 = 1e-3;
 
@@ -54,10 +51,7 @@ pub(crate) struct Relaxation {
     direction: Flat,
     trial: Vec<DVec3>,
     gradient: Vec<DVec3>,
-    energies: Vec<f64>,
     scratch: Scratch,
-    /// A call ends where its last iterations contribute less than this share of the energy decrease; 0 never ends one.
-    pub(super) end_share: f64,
 }
 
 impl Relaxation {
@@ -91,12 +85,7 @@ impl Relaxation {
             self.known[v as usize] = false;
         }
         let mut scale = FIRST_SCALE;
-        self.energies.clear();
-        self.energies.push(energy);
         for _ in 0..iterations {
-            if self.has_converged() {
-                break;
-            }
             self.touch(contacts);
             let [slope, longest] = vectors::turn(&self.pairs, &self.inverse, scale, &self.down, &mut self.direction);
             let mut t = (MAX_MOVE_M / longest).min(1.0);
@@ -106,7 +95,6 @@ impl Relaxation {
                 let there = cloth.evaluate(&self.trial, contacts, &mut self.gradient, &mut self.scratch);
                 if there <= energy + ARMIJO * t * slope {
                     energy = there;
-                    self.energies.push(energy);
                     break;
                 }
                 t *= 0.3;
@@ -122,14 +110,6 @@ impl Relaxation {
             std::mem::swap(&mut self.down, &mut self.trial_down);
         }
         energy
-    }
-
-    /// Whether the last [`LAST_ITERATIONS`] of these energies fell by too little to go on.
-    fn has_converged(&self) -> bool {
-        let energies = &self.energies;
-        let [first, .., last] = energies[..] else { return false };
-        energies.len() > 2 * LAST_ITERATIONS
-            && energies[energies.len() - 1 - LAST_ITERATIONS] - last < self.end_share * (first - last)
     }
 
     /// Adds κ A n nᵀ to the D of vertices that have come to touch (Sherman and Morrison's formula).

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::extrapolation::Extrapolation;
 use super::factor::SolveError;
+use super::full_space::{FullSpace, State};
 use super::relax::Relaxation;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch, StepCheck};
 use crate::mechanics::linear_algebra::{dot, norm};
@@ -20,25 +21,6 @@ const MAX_RELAXED_TRIALS: usize = 2;
 /// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that starts
 /// far from its rest shape is moved as far by its relaxation however short the step.
 const MAX_REJECTED_RELAXATIONS: usize = 8;
-
-/// The inputs of a Newton step.
-pub(crate) struct State<'a> {
-    pub(crate) cloth: &'a Cloth,
-    pub(crate) x: &'a [DVec3],
-    pub(crate) contacts: &'a Contacts<'a>,
-    pub(crate) gradient: &'a [DVec3],
-    /// ε, 1/s².
-    pub(crate) damping: f64,
-}
-
-/// Coordinates to take Newton steps in, and the Hessian in them.
-pub(crate) trait Tangent {
-    /// The step of every vertex, m, zero where held, and every free vertex's own block of a positive H + ε M, N/m.
-    fn step(&mut self, here: &State<'_>, d: &mut Vec<DVec3>, own: &mut Vec<DMat3>) -> Result<(), SolveError>;
-
-    /// After a rejected step: switches to another Hessian, if there is one; returns whether there was.
-    fn fall_back(&mut self) -> bool;
-}
 
 /// Limits of a step and of its relaxations.
 #[derive(Debug, Clone, Copy)]
@@ -138,18 +120,6 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         state
     }
 
-    /// The same with relaxations that end where the last iterations contribute less than this share of the decrease.
-    pub(crate) fn with_relaxation_end(mut self, share: f64) -> Self {
-        self.relaxation.end_share = share;
-        self
-    }
-
-    /// The inputs of a Newton step.
-    pub(crate) fn state(&self) -> State<'_> {
-        let Self { cloth, x, contacts, gradient, damping, .. } = self;
-        State { cloth, x, contacts, gradient, damping: *damping }
-    }
-
     /// Evaluates energy and residual, after positions, contacts or the cloth have changed.
     pub(crate) fn evaluate(&mut self) {
         let Self { cloth, x, contacts, gradient, scratch, .. } = self;
@@ -178,7 +148,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
     }
 
     /// One iteration. The damping is the caller's to change afterwards.
-    pub(crate) fn advance(&mut self, tangent: &mut dyn Tangent, limits: StepLimits) -> Result<Advance, SolveError> {
+    pub(crate) fn advance(&mut self, tangent: &mut FullSpace, limits: StepLimits) -> Result<Advance, SolveError> {
         let Self { cloth, x, contacts, gradient, direction, blocks, damping, .. } = self;
         tangent.step(&State { cloth, x, contacts, gradient, damping: *damping }, direction, blocks)?;
         let Self {
