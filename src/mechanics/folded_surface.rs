@@ -35,7 +35,7 @@ use glam::{DVec2, DVec3};
 use super::coupled::push_out;
 use super::energy::Cloth;
 use super::energy::membrane::Triangle;
-use super::folds::Folds;
+use super::folds::{Folds, compression};
 use crate::GRAVITY;
 use crate::base::math;
 use crate::body::distance::Body;
@@ -58,6 +58,9 @@ const MIN_SECTORS: usize = 22;
 
 /// Least mean |cos| between the direction across the folds and ∇θ: with less, folds do not run along the axis. Heuristic.
 const MIN_ALIGNMENT: f64 = 0.8;
+
+/// Times that the waves are drawn: after each but the last their excess length is corrected by the length that is missing across them.
+const PASSES: usize = 3;
 
 /// Edges of the mesh that a fold needs at least.
 const EDGES_PER_FOLD: f64 = 6.0;
@@ -96,26 +99,39 @@ pub(crate) fn folded_surface(
             room[v as usize] = (near.signed_distance - cloth.offsets[v as usize]).max(0.0);
         }
         let mut reach = vec![0.0; x.len()];
-        for &v in &region {
-            let e = excess[v as usize].min(MAX_EXCESS);
-            let grown = ((e - MIN_EXCESS) / MIN_EXCESS).clamp(0.0, 1.0);
-            reach[v as usize] = grown * wave.slope((1.0 - e).recip()) / ring.gradient[v as usize];
-        }
+        ring.reach(&region, &excess, &wave, &mut reach);
         let Some(count) = ring.count(cloth, x, &excess, &reach, &room, &wave) else { continue };
         let n = count as f64;
         let phase = ring.phase(cloth, &region, &room, n);
-        for &v in &region {
-            let v = v as usize;
-            let amplitude = reach[v] / n;
-            moves[v] = amplitude * math::cos(n * ring.angle[v] - phase) + (amplitude - room[v]).max(0.0);
+        for pass in 0..PASSES {
+            if pass > 0 {
+                ring.reach(&region, &excess, &wave, &mut reach);
+            }
+            for &v in &region {
+                let v = v as usize;
+                let amplitude = reach[v] / n;
+                moves[v] = amplitude * math::cos(n * ring.angle[v] - phase) + (amplitude - room[v]).max(0.0);
+            }
+            if pass + 1 < PASSES {
+                let drawn = ring.drawn_share(x, &drawn(x, &normals, &moves));
+                for &v in &region {
+                    let e = &mut excess[v as usize];
+                    *e = 1.0 - (1.0 - *e) * drawn.at(x[v as usize].z);
+                }
+            }
         }
         counts.push(count);
     }
-    let mut positions: Vec<DVec3> = x.iter().zip(&normals).zip(&moves).map(|((x, n), d)| *x + *n * *d).collect();
+    let mut positions = drawn(x, &normals, &moves);
     let still: Vec<bool> = moves.iter().zip(&cloth.held).map(|(&d, &held)| held || d == 0.0).collect();
     positions.iter_mut().zip(x).zip(&still).filter(|(_, still)| **still).for_each(|((moved, x), _)| *moved = *x);
     push_out(body, &still, &cloth.offsets, &mut positions);
     FoldedSurface { positions, counts }
+}
+
+/// The surface moved along its normals, m.
+fn drawn(x: &[DVec3], normals: &[DVec3], moves: &[f64]) -> Vec<DVec3> {
+    x.iter().zip(normals).zip(moves).map(|((x, n), d)| *x + *n * *d).collect()
 }
 
 /// Half of each value and half of the mean over its neighbours.
@@ -158,8 +174,9 @@ struct Ring<'a> {
     angle: Vec<f64>,
     /// |∇θ|, 1/m, at its vertices.
     gradient: Vec<f64>,
-    /// z of its lowest vertex, m.
+    /// z of its lowest vertex, m, and slices for each metre above it.
     low: f64,
+    scale: f64,
     /// Most folds that the mesh can show.
     max_count: f64,
 }
@@ -202,7 +219,7 @@ impl<'a> Ring<'a> {
         }
         let whole = |t: &&Triangle| !t.sliver && t.vertices.iter().all(|&v| inside[v as usize]);
         let triangles: Vec<&Triangle> = cloth.triangles.iter().filter(whole).collect();
-        let mut ring = Self { triangles, angle, gradient: vec![0.0; x.len()], low, max_count: 0.0 };
+        let mut ring = Self { triangles, angle, gradient: vec![0.0; x.len()], low, scale, max_count: 0.0 };
         let mut areas = vec![0.0; x.len()];
         let (mut aligned, mut all) = (0.0, 0.0);
         for t in &ring.triangles {
@@ -230,6 +247,30 @@ impl<'a> Ring<'a> {
         let steps: Vec<f64> = topology.edges.iter().filter_map(across).collect();
         ring.max_count = TAU / (EDGES_PER_FOLD * steps.iter().sum::<f64>() / steps.len().max(1) as f64);
         Some(ring)
+    }
+
+    /// N a at each vertex of the region, m.
+    fn reach(&self, region: &[u32], excess: &[f64], wave: &Wave, out: &mut [f64]) {
+        for &v in region {
+            let e = excess[v as usize].min(MAX_EXCESS);
+            let grown = ((e - MIN_EXCESS) / MIN_EXCESS).clamp(0.0, 1.0);
+            out[v as usize] = grown * wave.slope((1.0 - e).recip()) / self.gradient[v as usize];
+        }
+    }
+
+    /// Length across the folds in `drawn` over that at rest, by the height of the preview x. Waves of few edges are shorter than sine waves.
+    fn drawn_share(&self, x: &[DVec3], drawn: &[DVec3]) -> BySlice {
+        let mut share = BySlice { low: self.low, scale: self.scale, sums: [(0.0, 0.0); SLICES] };
+        for t in &self.triangles {
+            let (excess, v2) = compression(t.deformation(x));
+            if excess < MIN_EXCESS {
+                continue;
+            }
+            let [fu, fv] = t.deformation(drawn);
+            let z = t.vertices.iter().map(|&v| x[v as usize].z).sum::<f64>() / 3.0;
+            share.add(z, (fu * v2.x + fv * v2.y).length(), t.area);
+        }
+        share
     }
 
     /// ∇θ in a triangle at x, 1/m.
@@ -283,6 +324,37 @@ impl<'a> Ring<'a> {
             (re, im) = (re + cloth.areas[v] * room[v] * cos, im + cloth.areas[v] * room[v] * sin);
         }
         math::atan2(im, re) + PI
+    }
+}
+
+/// Mean values of the slices of a region.
+struct BySlice {
+    low: f64,
+    scale: f64,
+    /// Weighted sum and weight.
+    sums: [(f64, f64); SLICES],
+}
+
+impl BySlice {
+    /// The slice at height z, and the share of the next one.
+    fn slice(&self, z: f64) -> (usize, f64) {
+        let at = ((z - self.low) * self.scale).clamp(0.0, (SLICES - 1) as f64);
+        let below = (at as usize).min(SLICES - 2);
+        (below, at - below as f64)
+    }
+
+    fn add(&mut self, z: f64, value: f64, weight: f64) {
+        let (below, share) = self.slice(z);
+        for (k, part) in [(below, 1.0 - share), (below + 1, share)] {
+            self.sums[k] = (self.sums[k].0 + part * weight * value, self.sums[k].1 + part * weight);
+        }
+    }
+
+    /// The mean at height z; 1 where nothing was added.
+    fn at(&self, z: f64) -> f64 {
+        let (below, share) = self.slice(z);
+        let mean = |k: usize| if self.sums[k].1 > 0.0 { self.sums[k].0 / self.sums[k].1 } else { 1.0 };
+        (1.0 - share) * mean(below) + share * mean(below + 1)
     }
 }
 

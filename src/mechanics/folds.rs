@@ -14,7 +14,7 @@
 //! Source: own, after the wrinkle strain of tension field theory (Roddeman and others: "The wrinkling of membranes", J. Appl. Mech. 54,
 //! 1987). Limits: depth and number of the folds are unknown; cloth that is held or pressed flat shows none.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::energy::Cloth;
@@ -57,14 +57,18 @@ pub(crate) fn folds(cloth: &Cloth, x: &[DVec3]) -> Folds {
 
 /// 1 − σ₂, at least zero, and its unit direction in space.
 fn excess([fu, fv]: [DVec3; 2]) -> (f64, DVec3) {
+    let (excess, v2) = compression([fu, fv]);
+    let across = (fu * v2.x + fv * v2.y).normalize_or_zero();
+    (excess, if across == DVec3::ZERO { fu.normalize_or_zero() } else { across })
+}
+
+/// 1 − σ₂, at least zero, and v₂ in the rest shape: the weft for equal compression in every direction.
+pub(super) fn compression([fu, fv]: [DVec3; 2]) -> (f64, DVec2) {
     let (a, b, c) = (fu.length_squared(), fv.length_squared(), fu.dot(fv));
     let least = (0.5 * (a + b) - math::hypot(0.5 * (a - b), c)).max(0.0);
-    let excess = (1.0 - least.sqrt()).max(0.0);
     // (C − σ₂²) v₂ = 0 for C = [[a, c], [c, b]]; the longer of the two rows is better conditioned.
     let (p, q) = if math::hypot(a - least, c) >= math::hypot(c, b - least) { (-c, a - least) } else { (b - least, -c) };
-    let across = (fu * p + fv * q).normalize_or_zero();
-    // Equal compression in every direction, or compression to zero: the weft.
-    (excess, if across == DVec3::ZERO { fu.normalize_or_zero() } else { across })
+    ((1.0 - least.sqrt()).max(0.0), DVec2::new(p, q).try_normalize().unwrap_or(DVec2::X))
 }
 
 #[cfg(test)]

@@ -78,6 +78,11 @@ pub fn solve(
     solve_with_distances(garment, body, parts, (start, &distance_m), options, &|| ControlFlow::Continue(()))
 }
 
+/// PARTs up to which [`CoupledOptions::max_iterations`] holds. An iteration carries a change from one PART to the next, and a garment of n
+/// PARTs is about √n of them across, so the limit grows with √n beyond. With 40 iterations a woven pullover in 934 PARTs ends 9.1 mm from
+/// the canonical drape, with 100 5.0 mm; one in 150 PARTs ends no nearer with more.
+const PARTS_OF_LIMIT: f64 = 150.0;
+
 /// Iterations after which vertices in the body are pushed out and the maps restart from there: an affine map does not follow the
 /// body, so the few vertices that touch hold the others off it. With one push-out at the end, pullovers end up to 4 mm farther from the
 /// canonical drape. The cloth sinks at each push-out, so their number is limited by [`CoupledOptions::max_iterations`].
@@ -116,8 +121,10 @@ pub(crate) fn solve_with_distances(
     let clear = |x: &[DVec3]| -> Vec<bool> {
         (0..x.len()).map(|v| cloth.held[v] || distance_m[v] - x[v].distance(start[v]) > cloth.offsets[v]).collect()
     };
-    for iteration in 1..=options.max_iterations {
-        let ends = admm.iterate() < options.least_change_m || iteration == options.max_iterations;
+    let limit = options.max_iterations as f64 * (parts.len() as f64 / PARTS_OF_LIMIT).sqrt().max(1.0);
+    let limit = limit as usize;
+    for iteration in 1..=limit {
+        let ends = admm.iterate() < options.least_change_m || iteration == limit;
         if asked().is_break() {
             return Err(CoupledError::Interrupted);
         }

@@ -72,7 +72,7 @@ impl std::str::FromStr for Motion {
 pub struct CoupledOptions {
     /// How a PART moves.
     pub motion: Motion,
-    /// Iterations at most.
+    /// Iterations at most, of up to 150 PARTs; more in proportion to the square root of their number.
     pub max_iterations: usize,
     /// A root mean square change of the maps below this, m, ends the iterations.
     pub least_change_m: f64,
