@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::levels::{Level, Levels};
 use super::settings::{Model, Refine, Settings};
+use crate::mechanics::coupled::is_flat;
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::Scene;
@@ -26,7 +27,8 @@ const MIN_COARSE_VERTICES: usize = 1500;
 const COARSE_STEPS: usize = 20;
 
 /// The start of the steps at full resolution: stage two's positions, or for a large garment its rest on coarser cloth. A garment that stage
-/// two lets fall off the body starts as placed: it may stay on by shorter steps. `observer` receives the steps on coarser garments as step 0
+/// two lets fall off the body starts as placed: it may stay on by shorter steps. So does one laid flat: it has far to go, and its PARTs
+/// pierce the corners of what they fall on. `observer` receives the steps on coarser garments as step 0
 /// of the full garment.
 pub(crate) fn approach(
     scene: &Scene,
@@ -35,8 +37,8 @@ pub(crate) fn approach(
     preview: &[DVec3],
     observer: Observer<'_>,
 ) -> Vec<DVec3> {
-    let fallen = settings.refine != Refine::Steps(0) && scene.fallen(preview).is_some();
-    let start = if fallen { &scene.garment.positions } else { preview };
+    let as_placed = settings.refine != Refine::Steps(0) && (is_flat(&scene.garment) || scene.fallen(preview).is_some());
+    let start = if as_placed { &scene.garment.positions } else { preview };
     if settings.refine != Refine::Converged || !matches!(settings.model, Model::Coupled(_)) {
         return start.to_vec();
     }

@@ -47,6 +47,11 @@ pub(super) fn buckling_loads(mesh: &TriMesh, parts: &Parts, cloth: &Cloth) -> Ve
     cloth.triangles.iter().map(load).collect()
 }
 
+/// Whether a garment is laid flat: less high than a share of its extent.
+pub(crate) fn is_flat(mesh: &TriMesh) -> bool {
+    mesh.bounds().is_some_and(|(low, high)| high.z - low.z < FLAT_HEIGHT_SHARE * (high - low).max_element())
+}
+
 /// Height of the garment, m; of one laid flat, which hangs later, a share of its extent: its cloth would have no stiffness otherwise.
 pub(super) fn hanging_height_m(mesh: &TriMesh) -> f64 {
     mesh.bounds().map_or(0.0, |(low, high)| (high.z - low.z).max(FLAT_HEIGHT_SHARE * (high - low).max_element()))

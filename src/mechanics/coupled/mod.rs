@@ -32,6 +32,7 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
+pub(crate) use folding::is_flat;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
 pub use weights::Weights;
