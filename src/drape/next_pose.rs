@@ -5,7 +5,7 @@
 //!
 //! Limits: the cloth forgets friction from before the motion, and passes through no pose between the two.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DVec3;
 
@@ -67,8 +67,7 @@ fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer
         let_go: before.let_go,
     };
     let refine = began.elapsed() - distance;
-    let times =
-        StageTimes { distance, refine, segment: Duration::ZERO, mechanics: Duration::ZERO, total: Duration::ZERO };
+    let times = StageTimes { distance, refine, ..StageTimes::default() };
     let mut drape = made.judged(scene, settings, times);
     drape.times.total = began.elapsed();
     Ok(drape)
