@@ -6,7 +6,7 @@
 //! centimetres, as in the paper. A name that carries another unit says so (`_mm`, `_cm`, `_kpa`, `_ms`).
 //!
 //! # Draping a mesh
-//! A [`SceneSpec`] names a body and a garment: built-in ones, as here, or OBJ files (`SceneSpec::new("me.obj",
+//! A [`SceneSpec`] names a body and a garment: built-in ones, as here, or mesh files (`SceneSpec::new("me.obj",
 //! "shirt.obj")`), whose unit and up axis are guessed and reported in the notes.
 //!
 //! ```
@@ -26,7 +26,7 @@
 //!
 //! `Settings::default()` continues until the garment is at rest. [`drape::drape`] takes an observer as well, which is
 //! called after each step and can stop the run; `rayon::ThreadPool::install` chooses the threads. A [`Job`] holds the
-//! same as plain data, with the metrics to compute. `examples/` drapes an OBJ file, sweeps tables, and records into an
+//! same as plain data, with the metrics to compute. `examples/` drapes a mesh file, sweeps tables, and records into an
 //! existing Rerun stream.
 //!
 //! # Modules

@@ -16,7 +16,7 @@ use super::summary::{print_certificate, require_pass};
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Body: `form` or an OBJ file; the same as --body
+    /// Body: `form` or a mesh file; the same as --body
     #[arg(value_name = "BODY")]
     body_file: Option<String>,
     /// Garment: a name or a file; the same as --garment
@@ -26,7 +26,7 @@ pub(crate) struct CheckArgs {
     input: InputArgs,
     /// Certify that this file, an export of the draped garment, is in equilibrium: forces, curvature, contact and strain are computed
     /// from its positions, with the rest shape and the held edges of the undraped garment; exit code 1 if a criterion fails
-    #[arg(long, value_name = "DRAPED.obj", help_heading = "Certificate")]
+    #[arg(long, value_name = "DRAPED.obj|.ply", help_heading = "Certificate")]
     certificate: Option<String>,
     #[command(flatten, next_help_heading = "Certificate")]
     fabric: FabricArgs,

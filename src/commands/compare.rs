@@ -37,7 +37,7 @@ pub(crate) struct CompareArgs {
     /// Garment, as in `partwise run`; of several, each is compared separately
     #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
     garment: Vec<String>,
-    /// Body: `form`, an OBJ file, or a TOML file of measurements
+    /// Body: `form`, a mesh file, or a TOML file of measurements
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     #[command(flatten)]

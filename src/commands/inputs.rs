@@ -18,12 +18,12 @@ use super::runtime::{self, refuse};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Body and garment")]
 pub(crate) struct InputArgs {
-    /// Body: `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file; for `run` also a folder of OBJ files, the
-    /// poses of one body
+    /// Body: `form` (the built-in dress form), a TOML file of its measurements, or a mesh file (OBJ, PLY, STL, glTF, .npz); for `run` also
+    /// a folder of OBJ files, the poses of one body
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress or long-sleeved-dress, each optionally with @VERTICES; a TOML
-    /// specification, an OBJ file, or a sewing pattern (JSON). Several garments are layered in the given order, innermost first
+    /// specification, a mesh file, or a sewing pattern (JSON, DXF). Several garments are layered in the given order, innermost first
     #[arg(long, value_name = "NAME[@VERTICES]|FILE", default_values_t = [SceneSpec::default().garment])]
     garment: Vec<String>,
     /// Distances of layered garments: to the `body`, or to the nearest surface `below`, body or garment
@@ -75,9 +75,9 @@ pub(crate) struct InputArgs {
     /// Merge vertices of a mesh that have exactly the same position
     #[arg(long)]
     weld: bool,
-    /// Rest shape of the garment: its `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces, or `auto`:
+    /// Rest shape of the garment: its `own` edges, its `texture` coordinates in metres, a mesh file of the same faces, or `auto`:
     /// the texture coordinates if they are the flat sewing pattern, in any unit, otherwise the garment's own edges
-    #[arg(long, value_name = "auto|own|texture|FILE.obj", default_value_t = SceneSpec::default().rest)]
+    #[arg(long, value_name = "auto|own|texture|FILE", default_value_t = SceneSpec::default().rest)]
     rest: String,
     /// Edges of the garment that stay fixed: `top` (its highest edge, such as a waistband), `top:2` (the highest edge of its second
     /// connected part) or the edges of a group; several with commas [default: the waistband of a built-in skirt, otherwise nothing]

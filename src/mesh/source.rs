@@ -1,4 +1,4 @@
-//! The polygons of a mesh file, whatever its format: in the unit and axes of the file, with groups and texture coordinates.
+//! The polygons of a mesh file of any format, in the unit and axes of the file, with groups and texture coordinates.
 //!
 //! Every reader of [`read`](super::read) makes one, the import repairs it, and an export is written from it.
 

@@ -69,7 +69,7 @@ impl Mesh {
     }
 }
 
-/// Reads an OBJ file, with its groups and texture coordinates.
+/// Reads a mesh file (OBJ, PLY, STL, glTF, `.npz`), with its groups and texture coordinates.
 #[pyfunction]
 pub(super) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Mesh> {
     let source = call::run(py, |_| MeshSource::read(&path).map_err(|e| exception(&e)))?;

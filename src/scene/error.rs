@@ -37,12 +37,12 @@ pub enum SceneError {
     Unreadable(#[from] Unreadable),
     /// An unknown name of a body.
     #[error(
-        "no body is called `{found}`; expected `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file"
+        "no body is called `{found}`; expected `form` (the built-in dress form), a TOML file of its measurements, or a mesh file (OBJ, PLY, STL, glTF, NumPy)"
     )]
     UnknownBody { found: String },
     /// A built-in garment on a body from a file.
     #[error(
-        "the built-in garments are cut for the dress form, not for {body}; give --garment an OBJ file placed around that \
+        "the built-in garments are cut for the dress form, not for {body}; give --garment a mesh file placed around that \
          body, or leave --body out and give its measurements (--bust, --waist, ...)"
     )]
     NotCutForIt { body: String },

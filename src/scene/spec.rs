@@ -48,9 +48,9 @@ pub enum FileRole {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneSpec {
-    /// `form` (the built-in dress form), a TOML file of its measurements, or an OBJ file.
+    /// `form` (the built-in dress form), a TOML file of its measurements, or a mesh file.
     pub body: String,
-    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, an OBJ file placed around the body, or a
+    /// A built-in garment, `name` or `name@vertices`, a TOML file that describes one, a mesh file placed around the body, or a
     /// sewing pattern (JSON as GarmentCode writes it).
     pub garment: String,
     /// Garments worn over it, inner to outer, each given like `garment`.
@@ -92,7 +92,7 @@ pub struct SceneSpec {
     pub open_body: bool,
     /// Whether vertices at exactly the same position are merged.
     pub weld: bool,
-    /// Rest shape of a garment from a file: its `own` edges, its `texture` coordinates in metres, an OBJ file of the same faces,
+    /// Rest shape of a garment from a file: its `own` edges, its `texture` coordinates in metres, a mesh file of the same faces,
     /// or `auto`: the texture coordinates where they are the flat pattern, in any unit, else its own edges.
     pub rest: String,
     /// Edges whose vertices keep their positions, separated by commas: `top` (the highest), `top:2` (the highest of the second

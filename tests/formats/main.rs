@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on stops")]
 
 mod hostile;
+mod large;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -126,7 +127,7 @@ fn the_metre_of_gltf_is_tried_first_and_not_taken_for_granted() {
     assert!(wrong.report.to_string().contains("glTF is in m, y up, and this file is not"), "{}", wrong.report);
     let right = import_body(&path("scene-blender.glb"), &group("avatar")).unwrap();
     assert!(right.report.frame.reason.starts_with("as glTF prescribes"), "{}", right.report);
-    // A given unit counts, whatever the format prescribes.
+    // A given unit overrides the one that the format prescribes.
     let given = ImportOptions { unit: Some(Unit::Mm), up: Some(Axis::Y), ..group("avatar") };
     assert_eq!(import_body(&path("scene-blender.glb"), &given).unwrap().report.frame.unit, Unit::Mm);
 }

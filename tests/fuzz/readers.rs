@@ -243,6 +243,42 @@ fn patterns() {
     });
 }
 
+/// A small drawing, whose text a mutation changes more often than the much longer ones of programs.
+const PIECES: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n5\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nfront\n\
+    0\nTEXT\n8\n1\n1\nSize: 38\n0\nPOLYLINE\n8\n14\n70\n1\n0\nVERTEX\n10\n0\n20\n0\n42\n0.2\n0\nVERTEX\n10\n40\n20\n0\n\
+    0\nVERTEX\n10\n40\n20\n50\n0\nVERTEX\n10\n0\n20\n50\n0\nSEQEND\n0\nLINE\n8\n7\n10\n5\n20\n5\n11\n9\n21\n40\n\
+    0\nPOINT\n8\n4\n10\n40\n20\n30\n0\nENDBLK\n0\nBLOCK\n2\nback\n0\nLWPOLYLINE\n8\n1\n70\n1\n10\n0\n20\n0\n10\n20\n20\n0\n\
+    10\n20\n20\n50\n10\n0\n20\n50\n0\nLINE\n8\n6\n10\n0\n20\n0\n11\n0\n21\n50\n0\nENDBLK\n0\nENDSEC\n0\nEOF\n";
+const SEWN: &str = "unit = \"cm\"\nstitches = [[\"front.1\", \"back.0\"]]\n[panels.front]\nat_cm = [0, 110, 20]\nnotches = true\n\
+    [panels.back]\nat_cm = [0, 110, -18]\nside = \"back\"\nmirror = true\nturn = 10\n[labels]\nhem = [\"back.1\"]\n";
+
+#[test]
+fn pieces() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pattern/dxf");
+    let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    let seeds =
+        ["skirt", "top"].map(|name| text(&format!("{name}.dxf")) + "=====\n" + &text(&format!("{name}.sewing.toml")));
+    let small = format!("{PIECES}=====\n{SEWN}");
+    fuzz("dxf", 0.2, [&seeds[..], &[small.clone(), small]].concat(), |text| {
+        let (drawing, sewing) = text.split_once("=====\n").unwrap_or((text, ""));
+        let sewing = (text.len() % 5 > 0).then_some(sewing);
+        let pattern = match pattern::dxf::parse(drawing, sewing, "input") {
+            Err(e) => return refused(&e),
+            Ok(pattern) => pattern,
+        };
+        check(pattern.panels.iter().all(|panel| panel.signed_area() > 0.0), "a panel is turned over")?;
+        check(pattern::to_svg(&pattern).ends_with("</svg>\n"), "its drawing has no end")?;
+        match pattern::sew(&pattern, 0.06) {
+            Err(e) => refused(&e),
+            Ok(sewn) => {
+                check(sewn.mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite")?;
+                check(sewn.rest.areas().iter().all(|a| *a > 0.0), "a triangle has no area at rest")?;
+                Ok(Outcome::Taken)
+            }
+        }
+    });
+}
+
 #[test]
 fn names() {
     let seeds = BUILT_IN.iter().map(|name| format!("{name}@900")).chain(fabric::BUILT_IN.map(str::to_owned)).collect();

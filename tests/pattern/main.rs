@@ -6,6 +6,7 @@ mod bad;
 mod closed_forms;
 mod curves;
 mod cut;
+mod dxf;
 mod seams;
 mod worn;
 

@@ -159,7 +159,7 @@ fn an_input_beyond_its_bound_is_refused_before_it_fills_the_memory() {
         fs::File::create(bench.path(name)).unwrap().set_len(mb << 20).unwrap();
     }
     bench.run(&["--pattern", "large.json", "--no-save"]).with(2, &["large.json", "more than 64 MB"]);
-    bench.run(&["--pattern", "large.obj", "--no-save"]).with(2, &["large.obj", "ends in `.json`"]);
+    bench.run(&["--pattern", "large.obj", "--no-save"]).with(2, &["large.obj", "ends in `.json` or `.dxf`"]);
     bench.run(&["--garment", "large.obj", "--no-save"]).with(2, &["large.obj", "more than 2048 MB"]);
     for flag in ["--table", "--fabric", "--measurements"] {
         bench.run(&[flag, "large.toml", "--no-save"]).with(2, &["large.toml", "more than 64 MB"]);

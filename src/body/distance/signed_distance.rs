@@ -122,16 +122,19 @@ impl std::fmt::Debug for Body {
 impl Body {
     /// Builds the hierarchy over a closed surface.
     pub fn new(mesh: &TriMesh) -> Result<Self, DistanceError> {
-        let topology = Topology::new(mesh);
-        let mut open = topology.boundary_edges();
-        if let Some([a, b]) = open.next() {
-            return Err(DistanceError::Open { count: open.count() + 1, a, b });
-        }
-        let (component, components) = topology.components();
-        let volume: f64 = signed_volumes(mesh, &component, components).iter().map(|v| v.abs()).sum();
-        let area: f64 = mesh.triangle_areas().iter().sum();
-        if !mesh.triangles.is_empty() && volume <= MIN_VOLUME_RATIO * area * area.sqrt() {
-            return Err(DistanceError::Flat { area_m2: area, litres: 1e3 * volume });
+        {
+            // Freed before the hierarchy is built, which takes as much memory.
+            let topology = Topology::new(mesh);
+            let mut open = topology.boundary_edges();
+            if let Some([a, b]) = open.next() {
+                return Err(DistanceError::Open { count: open.count() + 1, a, b });
+            }
+            let (component, components) = topology.components();
+            let volume: f64 = signed_volumes(mesh, &component, components).iter().map(|v| v.abs()).sum();
+            let area: f64 = mesh.triangle_areas().iter().sum();
+            if !mesh.triangles.is_empty() && volume <= MIN_VOLUME_RATIO * area * area.sqrt() {
+                return Err(DistanceError::Flat { area_m2: area, litres: 1e3 * volume });
+            }
         }
         Self::new_open(mesh)
     }

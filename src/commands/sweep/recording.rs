@@ -59,7 +59,8 @@ pub(crate) fn groups<'a>(rows: &'a [Row], store: &PointStore) -> (Vec<Group<'a>>
 /// A label as the name of a file.
 fn file_stem(label: &str) -> String {
     let stem = Path::new(label).file_name().map_or(label.into(), std::ffi::OsStr::to_string_lossy);
-    let stem = stem.strip_suffix(".obj").or(stem.strip_suffix(".toml")).unwrap_or(&stem);
+    let endings = [".obj", ".ply", ".stl", ".glb", ".gltf", ".npz", ".toml"];
+    let stem = endings.iter().find_map(|ending| stem.strip_suffix(ending)).unwrap_or(&stem);
     stem.chars().map(|c| if c.is_alphanumeric() || "-_@=. ".contains(c) { c } else { '-' }).collect()
 }
 

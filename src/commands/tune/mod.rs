@@ -41,8 +41,8 @@ pub(crate) struct TuneArgs {
     /// Garment excluded from the search, on which the tables are evaluated
     #[arg(long, value_name = "NAME[@VERTICES]|FILE")]
     hold_out: Vec<String>,
-    /// Body: `form`, or an OBJ file with garments placed around it
-    #[arg(long, value_name = "form|FILE.obj", default_value = DRESS_FORM)]
+    /// Body: `form`, or a mesh file with garments placed around it
+    #[arg(long, value_name = "form|FILE", default_value = DRESS_FORM)]
     body: String,
     #[command(flatten)]
     fabric: FabricArgs,

@@ -1,4 +1,4 @@
-//! Reads mesh files into [`MeshSource`]. The format is recognised by the content, whatever the file is called.
+//! Reads mesh files into [`MeshSource`]. The format is recognised by the content, not by the name of the file.
 //!
 //! | format | read |
 //! |---|---|

@@ -121,7 +121,7 @@ class Drape:
         ``quantity`` is ``distance``, ``parts``, ``force``, ``strain``, ``pressure`` or ``folds``.
         """
     def export(self, path: str | PathLike[str]) -> None:
-        """Writes the draped garment as OBJ with the input's faces, groups and texture coordinates, or as ``.glb``."""
+        """Writes the draped garment with its groups and texture coordinates: as OBJ or ``.ply`` with the input's faces, or as ``.glb`` or ``.usda``."""
     def _cells(
         self,
     ) -> tuple[tuple[NDArray[np.float64], NDArray[np.uint32]], NDArray[np.float64], NDArray[np.uint32]]: ...
@@ -151,7 +151,7 @@ class Store:
     def finish(self) -> None: ...
 
 def load(path: str | PathLike[str]) -> Mesh:
-    """Reads an OBJ file, with its groups and texture coordinates."""
+    """Reads a mesh file (OBJ, PLY, STL, glTF, ``.npz``), with its groups and texture coordinates."""
 
 def drape(keywords: str, meshes: Mapping[str, Mesh]) -> Drape: ...
 def run_point(point: str, passes: tuple[int, int]) -> str: ...

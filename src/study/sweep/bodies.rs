@@ -65,7 +65,7 @@ fn size(source: Source<'_>, value: &At) -> Result<Edit, PlanError> {
 }
 
 fn chosen(source: Source<'_>, value: &At, inputs: &mut Inputs) -> Result<(Input, BodySpec), PlanError> {
-    let expected = "\"form\", an OBJ file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
+    let expected = "\"form\", a mesh file, a TOML file of measurements, or { bust = 92, ... } in centimetres with an \
                     optional name = \"...\" and of = (one of these)";
     let place = source.place(value);
     let wrong = || source.wrong(value, "body", expected);

@@ -22,7 +22,7 @@
 //!
 //! | in `[base]`, `[[points]]` | in `[grid]` | values | default |
 //! |---|---|---|---|
-//! | `body` | `bodies` | `form`, OBJ, TOML of measurements, or `{ bust = 92, ... }` in cm with `of`, `name` | `form` |
+//! | `body` | `bodies` | `form`, a mesh file, TOML of measurements, or `{ bust = 92, ... }` in cm with `of`, `name` | `form` |
 //! | `garment` | `garments` | `name@vertices` or file | `low-cut-dress` |
 //! | `size` | `sizes` | vertices, or `larger`, `smaller` of Table 4; for a garment built in and named without | – |
 //! | `fabric` | `fabrics` | built-in name, file, or all its constants as a table | `interlock` |

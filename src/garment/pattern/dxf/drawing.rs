@@ -18,7 +18,7 @@ const MAX_NUMBER: f64 = 1e6;
 /// Largest angle of a piece of an arc, radians: 3 degrees, which is 0.03 mm off an arc of 10 cm.
 const ARC_STEP: f64 = TAU / 120.0;
 
-/// What is drawn.
+/// The geometry or the text of an entity.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
     /// A line through points; the first stands again at the end of a closed one.

@@ -284,7 +284,7 @@ fn quantities(pieces: &[Piece], sewing: &Sewing) -> Vec<String> {
         let quantity: usize = quantity?.into_iter().fold(0, usize::saturating_add);
         let name = &piece.name;
         (panels != quantity)
-            .then(|| format!("piece {name}: its quantity is {quantity}, and {panels} panels are made of it"))
+            .then(|| format!("piece {name}: its quantity is {quantity}, expected {panels}, the number of its panels"))
     };
     pieces.iter().filter_map(|piece| of(&piece)).collect()
 }
@@ -317,7 +317,7 @@ impl Placed {
             PatternError::Invalid(format!("panel {name}: found no piece {wanted}, expected one of {}", names(pieces)))
         })?;
         let numbers = self.at_cm.iter().chain(self.rotation.iter().flatten()).chain([&self.turn]);
-        if let Some(found) = numbers.copied().find(|x| !(x.abs() <= 1e4)) {
+        if let Some(found) = numbers.copied().find(|x| x.is_nan() || x.abs() > 1e4) {
             return Err(PatternError::unexpected(
                 &format!("panel {name}"),
                 &found.to_string(),

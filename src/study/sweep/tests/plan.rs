@@ -258,7 +258,7 @@ fn bad_files_are_refused_with_place_cause_and_remedy() {
         (format!("{point}options = {{ fabrics_file = \"a\" }}"), "s.toml:3: options: found", "beside the garment"),
         (format!("{point}body = {{ chest = 92 }}"), "s.toml:3: body: the spec", "chest"),
         (format!("{point}body = {{ bust = 920 }}"), "s.toml:3: body: bust is 920 cm", "from 60 to 150"),
-        (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", an OBJ"),
+        (format!("{point}body = \"mannequin\""), "s.toml:3: body: found \"mannequin\"", "\"form\", a mesh file"),
         ("name = \"n\"\nrepeats = 0\n[grid]".to_owned(), "s.toml:2: repeats: found 0", "at least 1"),
         ("name = \"n\"\nrepeats = 1000000\n[grid]".to_owned(), "s.toml:2: repeats: found 1000000", "at most 100"),
         ("name = \"n\"\nwarm_up = 101\n[grid]".to_owned(), "s.toml:2: warm_up: found 101", "0 and at most 100"),
