@@ -1,7 +1,7 @@
 //! Friction between yarns in bending: the hysteresis that a KES-FB2 test reports as 2HB.
 //!
 //! A yarn slides over the yarns that it crosses once the moment of the cloth exceeds HB, half the width of the hysteresis loop. On the
-//! way from the flat cloth to a curvature κ the friction dissipates HB κ per area, whatever the speed. A drape is one such increment, so
+//! way from the flat cloth to a curvature κ the friction dissipates HB κ per area, at any speed. A drape is one such increment, so
 //! the dissipation is a potential beside the elastic energy ½ B κ² (`bending`):
 //!
 //! E = Σ A_i (√(q² + m²) − m), q² = H_u² |x_uu|² + 2 H_u H_v |x_uv|² + H_v² |x_vv|², m = ½ (H_u + H_v) w.
