@@ -41,16 +41,16 @@ pub(crate) enum DrapeTestError {
         /// Rows asked for.
         rows: usize,
     },
-    /// The radii are not those of a specimen that overhangs a disc.
+    /// The diameters are not those of a specimen that overhangs a disc.
     #[error(
-        "found a specimen of {specimen_cm} cm on a disc of {disc_cm} cm (radii), expected a disc of at least {} cm, a specimen of at most {} cm \
-         and {} cm between them; are the numbers diameters?",
-        100.0 * MIN_RIM_M, 100.0 * MAX_SPECIMEN_M, 100.0 * MIN_RIM_M
+        "found a specimen {specimen_cm} cm across on a disc {disc_cm} cm across, expected a disc of at least {} cm and a specimen at least {} cm \
+         wider, of at most {} cm; are the two exchanged, or in another unit?",
+        200.0 * MIN_RIM_M, 200.0 * MIN_RIM_M, 200.0 * MAX_SPECIMEN_M
     )]
     Radii {
-        /// Radius of the specimen, cm.
+        /// Diameter of the specimen, cm.
         specimen_cm: f64,
-        /// Radius of the disc, cm.
+        /// Diameter of the disc, cm.
         disc_cm: f64,
     },
     /// No such fabric.
@@ -105,6 +105,6 @@ impl DrapeTest {
         if rim >= MIN_RIM_M && self.disc_m >= MIN_RIM_M && self.specimen_m <= MAX_SPECIMEN_M {
             return Ok(());
         }
-        Err(DrapeTestError::Radii { specimen_cm: 100.0 * self.specimen_m, disc_cm: 100.0 * self.disc_m })
+        Err(DrapeTestError::Radii { specimen_cm: 200.0 * self.specimen_m, disc_cm: 200.0 * self.disc_m })
     }
 }
