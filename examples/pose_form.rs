@@ -1,4 +1,4 @@
-//! Writes the dress form in five poses, arms raised stepwise and a step forward, as OBJ files of the same mesh:
+//! Writes the dress form in four further poses, arms raised stepwise and a step forward, as OBJ files of the same mesh:
 //! `cargo run --no-default-features --example pose_form -- poses`, then
 //! `partwise --from-body form --body poses --garment pullover-2`
 
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).ok_or("found no argument, expected a folder for the poses")?;
     std::fs::create_dir_all(&folder)?;
     let form = dress_form(&BodySpec::default())?;
-    for (number, (arms_deg, step_deg)) in (1..).zip(poses::FIVE) {
+    for (number, (arms_deg, step_deg)) in (1..).zip(poses::FIVE).skip(1) {
         write_mesh(&Path::new(&folder).join(format!("pose-{number}.obj")), &poses::posed(&form, arms_deg, step_deg))?;
     }
     Ok(())

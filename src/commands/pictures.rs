@@ -239,7 +239,10 @@ fn captions(rows: &[&Row]) -> Vec<String> {
         match &row.metrics {
             // On several bodies the fit counts.
             Some(metrics) if bodies => {
-                let eases = metrics.eases_cm().into_iter().filter_map(|(at, cm)| Some(format!("{at} {:+.0}", cm?)));
+                let eases = metrics
+                    .eases_cm()
+                    .into_iter()
+                    .filter_map(|(at, cm)| Some(format!("{at} {:+.0}", cm?.round() + 0.0)));
                 words.extend(eases.take(3));
             }
             Some(metrics) => {
