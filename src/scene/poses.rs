@@ -12,8 +12,8 @@ use crate::base::files::{has_ending, stem};
 use crate::body::distance::push_out::push_out;
 use crate::body::distance::{Body, pull_off_protrusions};
 use crate::garment::MeshCache;
-use crate::mesh::TriMesh;
 use crate::mesh::import::{ImportOptions, Imported, import_body};
+use crate::mesh::{MeshError, TriMesh};
 
 /// Endings of the files in a folder that are bodies.
 const BODIES: [&str; 6] = ["obj", "ply", "stl", "glb", "gltf", "npz"];
@@ -52,6 +52,15 @@ impl PoseReader {
     pub(crate) fn read(&self, file: &Path) -> Result<Body, SceneError> {
         let options = ImportOptions { source: None, ..self.options.clone() };
         let pose = import_body(file, &options)?;
+        let counts =
+            |mesh: &TriMesh| format!("{} vertices and {} triangles", mesh.vertex_count(), mesh.triangles.len());
+        let [found, expected] = [&pose.mesh, &self.body].map(counts);
+        if found != expected {
+            let (file, other) = (file.to_owned(), PathBuf::from(&self.name));
+            return Err(
+                MeshError::OtherTopology { file, other, difference: format!("{found}, expected {expected}") }.into()
+            );
+        }
         let mesh = match &self.first {
             Some(first) => first.in_the_shape_of(&pose)?,
             None => self.body.with_positions(pose.positions_of(&self.body.triangles, &self.name)?),
