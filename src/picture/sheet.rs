@@ -72,7 +72,7 @@ impl<'a> Sheet<'a> {
         let top = if self.title.is_empty() { GAP } else { GAP + Size::Title.height() + GAP / 2 };
         let width = widths.iter().sum::<usize>() + GAP * (columns + 1);
         let mut sheet = Pixels::white([width, top + self.rows.len() * (height + below + GAP)]);
-        sheet.write(&Size::Title.shortened(&self.title, width - 2 * GAP), [GAP, GAP], Size::Title);
+        sheet.write(&Size::Title.shortened(&self.title, width.saturating_sub(2 * GAP)), [GAP, GAP], Size::Title);
         for (row, figures) in self.rows.iter().enumerate() {
             let top = top + row * (height + below + GAP);
             let mut left = GAP;

@@ -4,8 +4,8 @@
 //!
 //! T_k(x) = q_k + R_k (x − p_k),
 //!
-//! p_k and q_k its centres before and after, R_k the polar factor of Σ (b_i − q_k)(a_i − p_k)ᵀ + ρ² Σ m_i n_iᵀ over its vertices
-//! (Kabsch, Acta Cryst. A32, 1976; the normals make a flat patch determinate). A point of the garment moves by their blend
+//! p_k and q_k its centres before and after, R_k the polar factor of Σ (b_i − q)(a_i − p)ᵀ + ρ² Σ m_i n_iᵀ over its vertices and their
+//! neighbours, p and q their centres (Kabsch, Acta Cryst. A32, 1976; the normals make a flat patch determinate). A point of the garment moves by their blend
 //!
 //! y = Σ w_k T_k(x) / Σ w_k,  w_k = (|x − p_k|² + ε²)^−p  (Shepard, "A two-dimensional interpolation function", 1968).
 //!
@@ -25,7 +25,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::mesh::{Topology, TriMesh, outer};
+use crate::mesh::{Topology, TriMesh, each_once, outer};
 
 /// ρ, m: half the width of a limb, so that a patch lies on one side of it. Smaller patches follow the skin more closely and cost time.
 const PATCH_M: f64 = 0.035;
@@ -54,17 +54,24 @@ impl Motion {
     pub(crate) fn new(body: &TriMesh, after: &[DVec3]) -> Self {
         let moved = body.with_positions(after.to_vec());
         let (normals, moved_normals) = (body.vertex_normals(), moved.vertex_normals());
-        let patch = |vertices: &Vec<u32>| {
-            let all = || vertices.iter().map(|&v| v as usize);
-            let mean = |of: &[DVec3]| all().map(|v| of[v]).sum::<DVec3>() / vertices.len() as f64;
-            let (p, q) = (mean(&body.positions), mean(after));
-            let covariance = all().fold(DMat3::ZERO, |sum, v| {
+        let topology = Topology::new(body);
+        let patch = |own: &Vec<u32>| {
+            // With the neighbours a patch of one vertex has a rotation, too.
+            let around = own.iter().flat_map(|&v| topology.neighbours(v)).chain(own).copied();
+            let all: Vec<usize> = each_once(around).into_iter().map(|v| v as usize).collect();
+            let own: Vec<usize> = own.iter().map(|&v| v as usize).collect();
+            let mean = |of: &[DVec3], vertices: &[usize]| {
+                vertices.iter().map(|&v| of[v]).sum::<DVec3>() / vertices.len() as f64
+            };
+            let (p, q) = (mean(&body.positions, &all), mean(after, &all));
+            let covariance = all.iter().fold(DMat3::ZERO, |sum, &v| {
                 let turned = outer(moved_normals[v], normals[v]) * (PATCH_M * PATCH_M);
                 sum + outer(after[v] - q, body.positions[v] - p) + turned
             });
-            Patch { before: p, after: q, rotation: nearest_rotation(covariance) }
+            let rotation = nearest_rotation(covariance);
+            Patch { before: mean(&body.positions, &own), after: mean(after, &own), rotation }
         };
-        Self(patches(body).iter().map(patch).collect())
+        Self(patches(body, &topology).iter().map(patch).collect())
     }
 
     /// The points (m) after the motion.
@@ -89,8 +96,7 @@ impl Motion {
 }
 
 /// Connected patches of vertices within [`PATCH_M`] of their first one, which cover the surface.
-fn patches(body: &TriMesh) -> Vec<Vec<u32>> {
-    let topology = Topology::new(body);
+fn patches(body: &TriMesh, topology: &Topology) -> Vec<Vec<u32>> {
     let mut taken = vec![false; body.vertex_count()];
     let mut patches = Vec::new();
     for seed in 0..body.vertex_count() as u32 {
@@ -173,7 +179,7 @@ mod tests {
         let worst =
             carried.positions.iter().zip(&sleeve.positions).map(|(y, x)| y.distance(bend(*x))).fold(0.0, f64::max);
         // The bend itself stretches the outer side by a third; the blend stays within a few millimetres of it.
-        assert!(worst < 0.008, "{worst}");
+        assert!(worst < 0.004, "{worst}");
     }
 
     #[test]
@@ -193,7 +199,7 @@ mod tests {
         let row: Vec<DVec3> = (0..=80).map(|i| DVec3::new(-0.2 + 0.005 * f64::from(i), -0.07, 0.2)).collect();
         let carried = motion.carry(&row);
         let longest = carried.windows(2).map(|pair| pair[0].distance(pair[1])).fold(0.0, f64::max);
-        assert!(longest < 0.03, "{longest}");
+        assert!(longest < 0.04, "{longest}");
         assert!((carried[20].y - row[20].y + 0.16).abs() < 0.03 && (carried[60].y - row[60].y - 0.16).abs() < 0.03);
     }
 
