@@ -112,7 +112,7 @@ pub(crate) enum LabSheetError {
     #[error("{file}: found no {missing}, which a fabric needs; add a line `{missing},WARP,WEFT`")]
     Missing { file: String, missing: &'static str },
     /// A value that no cloth has.
-    #[error("{file}, line {line}: {name} {direction} is {found}, expected {low} to {high} {unit}{}", mistake.as_deref().unwrap_or_default())]
+    #[error("{file}, line {line}: {name} {direction} is {found}, expected {low} to {high} {unit}{mistake}")]
     Range {
         file: String,
         line: u64,
@@ -122,7 +122,7 @@ pub(crate) enum LabSheetError {
         low: f64,
         high: f64,
         unit: &'static str,
-        mistake: Option<String>,
+        mistake: Box<str>,
     },
     /// Values that contradict each other.
     #[error("{file}: {what}")]
@@ -309,6 +309,9 @@ fn check(quantity: &Quantity, direction: &'static str, value: f64, file: &str, l
         (low..=high).contains(&converted).then_some((converted, *size, *unit))
     };
     let best = quantity.others.iter().find_map(explains);
+    let mistake = best.map_or_else(String::new, |(converted, size, unit)| {
+        format!("; is it in {unit}, a factor of {size:.4}? That would be {converted:.4} {}", quantity.unit)
+    });
     Err(LabSheetError::Range {
         file: file.to_owned(),
         line,
@@ -318,9 +321,7 @@ fn check(quantity: &Quantity, direction: &'static str, value: f64, file: &str, l
         low,
         high,
         unit: quantity.unit,
-        mistake: best.map(|(converted, size, unit)| {
-            format!("; is it in {unit}, a factor of {size:.4}? That would be {converted:.4} {}", quantity.unit)
-        }),
+        mistake: mistake.into(),
     })
 }
 

@@ -182,7 +182,7 @@ mod tests {
         let outline = Outline::of(&TriMesh::new(corners.to_vec(), triangles), 0.05);
         for (k, r) in outline.radius_m.iter().enumerate() {
             let direction = math::unit(TAU * k as f64 / DIRECTIONS as f64);
-            let sides = (0..5).map(|i| [corners[i], corners[(i + 1) % 5]].map(|p| p.truncate()));
+            let sides = (0..5).map(|i| [corners[i], corners[(i + 1) % 5]].map(glam::DVec3::truncate));
             let near = sides.filter_map(|[p, q]| {
                 let along = q - p;
                 let distance = p.perp_dot(along) / direction.perp_dot(along);
