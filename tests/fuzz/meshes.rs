@@ -67,7 +67,7 @@ fn read_and_write(folder: &Path, bytes: &[u8]) -> Result<Outcome, String> {
     let path = folder.join("input");
     fs::write(&path, bytes).map_err(|e| e.to_string())?;
     let metres = ImportOptions { unit: Some(Unit::M), up: Some(Axis::Z), ..ImportOptions::default() };
-    let open_body = bytes.len() % 2 == 0;
+    let open_body = bytes.len().is_multiple_of(2);
     if let Ok(body) = import_body(&path, &ImportOptions { open_body, ..ImportOptions::default() }) {
         whole(&body)?;
     }

@@ -107,13 +107,16 @@ fn pairs(text: &str) -> Result<Vec<Pair<'_>>, PatternError> {
     Ok(pairs)
 }
 
+/// A polyline that is being read: its entity, its points with their bulges, and whether it is closed.
+type Polyline = (Entity, Vec<(DVec2, f64)>, bool);
+
 impl Drawing {
     /// Parses a DXF text.
     pub(super) fn parse(text: &str) -> Result<Self, PatternError> {
         let mut drawing = Self::default();
         let pairs = pairs(text)?;
         let mut block: Option<Block> = None;
-        let mut polyline: Option<(Entity, Vec<(DVec2, f64)>, bool)> = None;
+        let mut polyline: Option<Polyline> = None;
         let mut section = "";
         let mut rest = &pairs[..];
         while let [first, others @ ..] = rest {

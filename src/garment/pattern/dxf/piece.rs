@@ -319,7 +319,9 @@ impl Open {
 
 /// The loop of largest area that lines form, and the widest gap that was closed in it, m; `None` without lines.
 fn closed(mut lines: Vec<Vec<DVec2>>) -> Option<Result<(Vec<DVec2>, f64), Open>> {
-    let (mut best, mut open): (Option<(f64, Vec<DVec2>, f64)>, Option<Open>) = (None, None);
+    // Area, points and widest gap.
+    let mut best: Option<(f64, Vec<DVec2>, f64)> = None;
+    let mut open: Option<Open> = None;
     while let Some(mut chain) = lines.pop() {
         let mut widest = 0.0_f64;
         loop {
