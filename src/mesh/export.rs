@@ -1,4 +1,4 @@
-//! Writes meshes, in the format that the ending of the file names ([`Export`]), and OBJ files: a draped garment with the faces, groups,
+//! Writes meshes, in the format that the ending of the file names (`Export`), and OBJ files: a draped garment with the faces, groups,
 //! texture coordinates, unit and axes of its file, or any mesh.
 //!
 //! Vertices that no face uses are left out, so a file without any keeps its numbers. Normals are left out, as those of the
