@@ -35,8 +35,10 @@ fn errors_of_the_user_exit_with_code_2() {
     let tables = ["compare", "table-3", "table-3", "--body", "body.obj", "--garment", "nowhere.obj", "--no-save"];
     bench.run(&tables).with(2, &["nowhere.obj"]);
     // A garment file of another program is named as such, for every body.
-    bench.write("shirt.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
-    bench.run(&["--body", "body.obj", "--garment", "shirt.ply", "--no-save"]).with(2, &["shirt.ply", "PLY", "OBJ"]);
+    bench.write("shirt.off", "OFF\n3 1 0\n");
+    bench
+        .run(&["--body", "body.obj", "--garment", "shirt.off", "--no-save"])
+        .with(2, &["shirt.off", "an OFF mesh", "OBJ, PLY"]);
     bench.drape(&["--no-save", "--rest", "texture"]).with(2, &["garment.obj", "texture coordinates"]);
     bench.write("large.toml", "bust_cm = 900\n");
     bench.run(&["--no-save", "--measurements", "large.toml"]).with(2, &["large.toml", "900"]);

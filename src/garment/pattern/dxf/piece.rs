@@ -24,8 +24,9 @@ const NOTCH_REACH: f64 = 5e-3;
 const CORNER: f64 = 0.44;
 /// Points of an outline closer than this, m, are one.
 const SAME: f64 = 1e-6;
-/// Most points of an outline.
+/// Most points of an outline, and most lines of which one is made; each is compared with the others.
 const MAX_POINTS: usize = 20_000;
+const MAX_LINES: usize = 4_000;
 
 /// A piece, whose panels may be several.
 #[derive(Debug, Clone)]
@@ -89,6 +90,11 @@ impl Piece {
         let (cut, sew) = (lines("1"), lines("14"));
         if cut.is_empty() && sew.is_empty() {
             return Ok(None);
+        }
+        if let Some(found) = [cut.len(), sew.len()].into_iter().find(|&count| count > MAX_LINES) {
+            return Err(wrong(format!(
+                "found {found} lines on layer 1 or 14, expected {MAX_LINES} at most; join them to polylines"
+            )));
         }
         let mut notes = Vec::new();
         let (cut, sew) = (closed(cut), closed(sew));
@@ -337,7 +343,8 @@ fn closed(mut lines: Vec<Vec<DVec2>>) -> Option<Result<(Vec<DVec2>, f64), Open>>
             if last.distance(line[0]) > last.distance(line[line.len() - 1]) {
                 line.reverse();
             }
-            chain.extend(line);
+            // The ends are one point.
+            chain.extend(line.drain(1..));
         }
         let (first, last) = (chain[0], chain[chain.len() - 1]);
         if first.distance(last) > MAX_GAP || chain.len() < 3 {
@@ -345,6 +352,10 @@ fn closed(mut lines: Vec<Vec<DVec2>>) -> Option<Result<(Vec<DVec2>, f64), Open>>
             continue;
         }
         widest = widest.max(first.distance(last));
+        if first.distance(last) > TOUCHING {
+            // A side across the gap could run back over the first one.
+            chain.pop();
+        }
         chain.dedup_by(|a, b| a.distance(*b) < SAME);
         while chain.len() > 1 && chain[0].distance(chain[chain.len() - 1]) <= TOUCHING {
             chain.pop();
