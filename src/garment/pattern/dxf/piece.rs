@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::drawing::{Block, Shape};
+use crate::base::math;
 use crate::garment::pattern::PatternError;
 use crate::garment::pattern::curve::Curve;
 
@@ -377,7 +378,7 @@ fn closed(mut lines: Vec<Vec<DVec2>>) -> Option<Result<(Vec<DVec2>, f64), Open>>
 fn is_corner(outline: &[DVec2], i: usize) -> bool {
     let n = outline.len();
     let (before, after) = (outline[i] - outline[(i + n - 1) % n], outline[(i + 1) % n] - outline[i]);
-    before.angle_to(after).abs() >= CORNER
+    math::atan2(before.perp_dot(after), before.dot(after)).abs() >= CORNER
 }
 
 /// The points nearest to the turn points of a piece, or its corners where fewer than two lie on the outline.
