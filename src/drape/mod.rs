@@ -41,7 +41,7 @@ pub(crate) use stages::{Distances, StageResults, StartsFrom, folds_of, refine_fr
 /// [`DrapeError`] where a constant of the fabric or an option cannot be used.
 pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     // Inside the pool: each of hundreds of short joins from outside it would suspend the caller.
-    rayon::scope(|_| drape_prepared(scene, &Prepared::new(scene, settings)?, settings, observer))
+    rayon::scope(|_| run(scene, &Prepared::new(scene, settings)?, settings, observer))
 }
 
 /// [`drape`] with distances and cloth of earlier drapes of the same scene in the same fabric, to the same bits.
@@ -54,7 +54,15 @@ pub fn drape_again(
     settings: &Settings,
     observer: Observer<'_>,
 ) -> Result<Drape, DrapeError> {
-    rayon::scope(|_| drape_prepared(scene, prepared, settings, observer))
+    rayon::scope(|_| run(scene, prepared, settings, observer))
+}
+
+fn run(scene: &Scene, prepared: &Prepared, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
+    if scene.layers.len() > 1 {
+        layers::in_order(scene, settings, observer)
+    } else {
+        drape_prepared(scene, prepared, settings, observer)
+    }
 }
 
 impl Scene {

@@ -68,6 +68,10 @@ pub(crate) fn stage_two(
     }
 }
 
+/// Stage two of a garment laid flat: affine maps about the flat garment slide off what it will hang on.
+const FLAT: &str = "the garment is laid flat, and PARTs cannot tell how it will hang: the two stages leave it as placed, and its drape takes \
+     steps at full resolution";
+
 /// Stage two by the coupled model: the PARTs of the table, or those cut to one extent after the other.
 fn couple(
     scene: &Scene,
@@ -79,6 +83,12 @@ fn couple(
 ) -> Result<StageTwo, DrapeError> {
     let Scene { garment: mesh, topology, body, .. } = scene;
     let placed = &mesh.positions;
+    if coupled::is_flat(mesh) {
+        let outcome = PartOutcome { force_n: DVec3::ZERO, displacement: DVec3::ZERO, contact: false };
+        let outcomes = vec![outcome; parts.len()];
+        let warnings = vec![FLAT.to_owned()];
+        return Ok(StageTwo { parts, outcomes, positions: placed.clone(), warnings });
+    }
     let garment = Garment { mesh, topology, cloth };
     let mut distance_m: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
     let mut stage = StageTwo { parts, outcomes: Vec::new(), positions: placed.clone(), warnings: Vec::new() };

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::error::DrapeError;
-use super::layers;
 use super::levels::Levels;
 use super::nested_iteration::approach;
 use super::parts::{StageTwo, stage_one, stage_two};
@@ -41,9 +40,13 @@ impl Prepared {
     /// # Errors
     /// [`DrapeError`] where a constant of the fabric cannot be used.
     pub fn new(scene: &Scene, settings: &Settings) -> Result<Self, DrapeError> {
-        if scene.layers.len() > 1 {
-            return Ok(Self { layer: None });
-        }
+        let layer = if scene.layers.len() > 1 { None } else { Some(PreparedLayer::new(scene, settings)?) };
+        Ok(Self { layer })
+    }
+}
+
+impl PreparedLayer {
+    fn new(scene: &Scene, settings: &Settings) -> Result<Self, DrapeError> {
         let began = Instant::now();
         let mut times = StageTimes::default();
         let (distances, cloth) = rayon::join(
@@ -53,7 +56,7 @@ impl Prepared {
         let (distances, cloth) = (distances?, cloth?);
         times.total = began.elapsed();
         times.cloth = times.total.saturating_sub(times.distance);
-        Ok(Self { layer: Some(PreparedLayer { distances, cloth, times }) })
+        Ok(Self { distances, cloth, times })
     }
 }
 
@@ -64,8 +67,13 @@ pub(super) fn drape_prepared(
     settings: &Settings,
     observer: Observer<'_>,
 ) -> Result<Drape, DrapeError> {
-    let Some(PreparedLayer { distances: ground, cloth, times }) = &prepared.layer else {
-        return layers::in_order(scene, settings, observer);
+    let made;
+    let PreparedLayer { distances: ground, cloth, times } = match &prepared.layer {
+        Some(layer) => layer,
+        None => {
+            made = PreparedLayer::new(scene, settings)?;
+            &made
+        }
     };
     let (began, mut times) = (Instant::now(), *times);
     let table = settings.table.resolve(&ground.unsigned_m)?;

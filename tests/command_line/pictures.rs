@@ -45,7 +45,7 @@ fn a_sheet_on_a_cube_follows_it_and_another_mesh_is_refused() {
         bench.write(&format!("poses/{name}"), &cube(z));
     }
     let poses = |body: &str| {
-        let arguments = ["--from-body", "body.obj", "--body", body, "--format", "json", "--refine", "2"];
+        let arguments = ["--from-body", "body.obj", "--body", body, "--format", "json"];
         let output = bench.run(&[&SCENE[2..], &arguments].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
