@@ -239,8 +239,9 @@ fn a_held_edge_stays_and_an_unknown_one_is_refused() {
 #[test]
 fn the_table_alone_makes_the_parts_and_the_option_their_motion() {
     let bench = Bench::new();
-    let preview =
-        |more: &[&str]| json(&bench.drape(&[&["--refine", "0", "--no-save", "--format", "json"], more].concat()));
+    // A garment laid flat would stay as placed.
+    let skirt = ["--garment", "flared-skirt@400", "--refine", "0", "--no-save", "--format", "json"];
+    let preview = |more: &[&str]| json(&bench.run(&[&skirt[..], more].concat()));
     let plain = preview(&[]);
     assert_eq!((&plain["part_count"], &plain["motion"]), (&plain["level_part_count"], &"affine".into()));
     let same = preview(&["--max-extent", "0", "--motion", "affine"]);

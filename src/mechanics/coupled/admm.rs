@@ -159,7 +159,7 @@ impl<'a> Admm<'a> {
         let parts = motions.first.len();
         let functions = motions.functions_at(start);
         let (penalty, contact_penalty) = (MEMBRANE_PENALTY * tension, CONTACT_PENALTY * tension);
-        let mut matrix = PartMatrix::new(motions);
+        let mut matrix = PartMatrix::new(&motions.first, &motions.count);
         let rate = |per_root: f64| move |size: f64| per_root / size.sqrt();
 
         let of_triangle = parts_of(&motions.weights, cloth.triangles.iter().map(|t| &t.vertices[..]));

@@ -180,7 +180,7 @@ impl Motions {
     /// [`SolveError`] where positions are not finite.
     pub fn nearest(&self, x: &[DVec3], u: &[DVec3]) -> Result<Vec<DVec3>, SolveError> {
         let functions = self.functions_at(x);
-        let mut matrix = PartMatrix::new(self);
+        let mut matrix = PartMatrix::new(&self.first, &self.count);
         let mut own = Vec::new();
         for v in 0..x.len() {
             let terms = functions.of(v);

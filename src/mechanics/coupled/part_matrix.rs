@@ -7,7 +7,6 @@ use faer::sparse::{SparseColMat, Triplet};
 use faer::{Conj, MatMut, Par, Side};
 use glam::DVec3;
 
-use super::motions::Motions;
 use crate::mechanics::newton::SolveError;
 
 /// Share of the diagonal that is added to it, against functions that no sample sees.
@@ -50,13 +49,13 @@ pub(super) struct PartMatrix {
 }
 
 impl PartMatrix {
-    pub(super) fn new(motions: &Motions) -> Self {
-        let Motions { first, count, .. } = motions;
-        let mut part_of_unknown = vec![0; motions.unknowns()];
+    /// `first` is the first unknown of each PART, `count` their number.
+    pub(super) fn new(first: &[u32], count: &[u8]) -> Self {
+        let mut part_of_unknown = vec![0; count.iter().map(|&count| usize::from(count)).sum()];
         for (p, (&first, &count)) in (0..).zip(first.iter().zip(count)) {
             part_of_unknown[first as usize..first as usize + usize::from(count)].fill(p);
         }
-        Self { first: first.clone(), count: count.clone(), part_of_unknown, rows: vec![Vec::new(); first.len()] }
+        Self { first: first.to_vec(), count: count.to_vec(), part_of_unknown, rows: vec![Vec::new(); first.len()] }
     }
 
     /// Adds `value(i, j)` for every pair of an element's unknowns, listed PART by PART.
