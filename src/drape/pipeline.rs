@@ -19,7 +19,7 @@ use crate::mechanics::refine::Observer;
 use crate::parts::Parts;
 use crate::scene::Scene;
 
-/// What a drape needs of a scene and a fabric whatever the range table: distances to the body, and the cloth. Many tables of one
+/// The part of a drape that no range table changes: distances to the body, and the cloth in one fabric. Many tables of one
 /// garment share it. Several layers are prepared one by one as they are draped, and have an empty one.
 #[derive(Debug)]
 pub struct Prepared {

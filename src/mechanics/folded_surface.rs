@@ -36,6 +36,7 @@ use super::coupled::push_out;
 use super::energy::Cloth;
 use super::energy::membrane::Triangle;
 use super::folds::{Folds, compression};
+use super::sine_waves::SineWaves;
 use crate::GRAVITY;
 use crate::base::math;
 use crate::body::distance::Body;
@@ -87,7 +88,7 @@ pub(crate) fn folded_surface(
     for _ in 0..SMOOTHING {
         excess = averaged(topology, &excess);
     }
-    let wave = Wave::new();
+    let waves = SineWaves::new();
     let normals = preview.vertex_normals();
     let mut moves = vec![0.0; x.len()];
     let mut counts = Vec::new();
@@ -99,26 +100,25 @@ pub(crate) fn folded_surface(
             room[v as usize] = (near.signed_distance - cloth.offsets[v as usize]).max(0.0);
         }
         let mut reach = vec![0.0; x.len()];
-        ring.reach(&region, &excess, &wave, &mut reach);
-        let Some(count) = ring.count(cloth, x, &excess, &reach, &room, &wave) else { continue };
+        ring.reach(&region, &excess, &waves, &mut reach);
+        let Some(count) = ring.count(cloth, x, &excess, &reach, &room, &waves) else { continue };
         let n = count as f64;
         let phase = ring.phase(cloth, &region, &room, n);
         for pass in 0..PASSES {
-            if pass > 0 {
-                ring.reach(&region, &excess, &wave, &mut reach);
-            }
             for &v in &region {
                 let v = v as usize;
                 let amplitude = reach[v] / n;
                 moves[v] = amplitude * math::cos(n * ring.angle[v] - phase) + (amplitude - room[v]).max(0.0);
             }
-            if pass + 1 < PASSES {
-                let drawn = ring.drawn_share(x, &drawn(x, &normals, &moves));
-                for &v in &region {
-                    let e = &mut excess[v as usize];
-                    *e = 1.0 - (1.0 - *e) * drawn.at(x[v as usize].z);
-                }
+            if pass + 1 == PASSES {
+                break;
             }
+            let drawn = ring.drawn_share(x, &drawn(x, &normals, &moves));
+            for &v in &region {
+                let e = &mut excess[v as usize];
+                *e = 1.0 - (1.0 - *e) * drawn.at(x[v as usize].z);
+            }
+            ring.reach(&region, &excess, &waves, &mut reach);
         }
         counts.push(count);
     }
@@ -174,9 +174,7 @@ struct Ring<'a> {
     angle: Vec<f64>,
     /// |∇θ|, 1/m, at its vertices.
     gradient: Vec<f64>,
-    /// z of its lowest vertex, m, and slices for each metre above it.
-    low: f64,
-    scale: f64,
+    slices: Slices,
     /// Most folds that the mesh can show.
     max_count: f64,
 }
@@ -188,16 +186,10 @@ impl<'a> Ring<'a> {
         region.iter().for_each(|&v| inside[v as usize] = true);
         let heights = region.iter().map(|&v| x[v as usize].z);
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
-        let scale = (SLICES - 1) as f64 / (high - low).max(f64::MIN_POSITIVE);
-        // Middles of the slices, each vertex shared by two.
-        let slice = |z: f64| {
-            let at = ((z - low) * scale).clamp(0.0, (SLICES - 1) as f64);
-            let below = (at as usize).min(SLICES - 2);
-            (below, at - below as f64)
-        };
+        let slices = Slices { low, scale: (SLICES - 1) as f64 / (high - low).max(f64::MIN_POSITIVE) };
         let mut sums = [(DVec2::ZERO, 0.0); SLICES];
         for &v in region {
-            let (below, share) = slice(x[v as usize].z);
+            let (below, share) = slices.at(x[v as usize].z);
             for (k, part) in [(below, 1.0 - share), (below + 1, share)] {
                 let weight = part * cloth.areas[v as usize];
                 sums[k] = (sums[k].0 + x[v as usize].truncate() * weight, sums[k].1 + weight);
@@ -208,7 +200,7 @@ impl<'a> Ring<'a> {
         let mut occupied = [false; SECTORS];
         for &v in region {
             let p = x[v as usize];
-            let (below, share) = slice(p.z);
+            let (below, share) = slices.at(p.z);
             let from = p.truncate() - middles[below].lerp(middles[below + 1], share);
             let theta = math::atan2(from.y, from.x);
             angle[v as usize] = theta;
@@ -219,7 +211,7 @@ impl<'a> Ring<'a> {
         }
         let whole = |t: &&Triangle| !t.sliver && t.vertices.iter().all(|&v| inside[v as usize]);
         let triangles: Vec<&Triangle> = cloth.triangles.iter().filter(whole).collect();
-        let mut ring = Self { triangles, angle, gradient: vec![0.0; x.len()], low, scale, max_count: 0.0 };
+        let mut ring = Self { triangles, angle, gradient: vec![0.0; x.len()], slices, max_count: 0.0 };
         let mut areas = vec![0.0; x.len()];
         let (mut aligned, mut all) = (0.0, 0.0);
         for t in &ring.triangles {
@@ -250,17 +242,17 @@ impl<'a> Ring<'a> {
     }
 
     /// N a at each vertex of the region, m.
-    fn reach(&self, region: &[u32], excess: &[f64], wave: &Wave, out: &mut [f64]) {
+    fn reach(&self, region: &[u32], excess: &[f64], waves: &SineWaves, out: &mut [f64]) {
         for &v in region {
             let e = excess[v as usize].min(MAX_EXCESS);
             let grown = ((e - MIN_EXCESS) / MIN_EXCESS).clamp(0.0, 1.0);
-            out[v as usize] = grown * wave.slope((1.0 - e).recip()) / self.gradient[v as usize];
+            out[v as usize] = grown * waves.slope((1.0 - e).recip()) / self.gradient[v as usize];
         }
     }
 
     /// Length across the folds in `drawn` over that at rest, by the height of the preview x. Waves of few edges are shorter than sine waves.
     fn drawn_share(&self, x: &[DVec3], drawn: &[DVec3]) -> BySlice {
-        let mut share = BySlice { low: self.low, scale: self.scale, sums: [(0.0, 0.0); SLICES] };
+        let mut share = BySlice { slices: self.slices, sums: [(0.0, 0.0); SLICES] };
         for t in &self.triangles {
             let (excess, v2) = compression(t.deformation(x));
             if excess < MIN_EXCESS {
@@ -287,7 +279,7 @@ impl<'a> Ring<'a> {
         excess: &[f64],
         reach: &[f64],
         room: &[f64],
-        wave: &Wave,
+        waves: &SineWaves,
     ) -> Option<usize> {
         let (mut bending, mut lifting, mut amplitude, mut space) = (0.0, 0.0, 0.0, 0.0);
         for t in &self.triangles {
@@ -299,10 +291,10 @@ impl<'a> Ring<'a> {
             let [a, b, c] = vertices.map(|v| reach[v]);
             let slope = gradient(x, t, b - a, c - a);
             let along = slope.reject_from(around);
-            let height = vertices.iter().map(|&v| x[v].z).sum::<f64>() / 3.0 - self.low;
+            let height = vertices.iter().map(|&v| x[v].z).sum::<f64>() / 3.0 - self.slices.low;
             let tension = fabric.density_kg_per_m2 * GRAVITY * height;
             let k = mean(reach) * size;
-            bending += 0.5 * fabric.mean_bending_nm() * wave.square_curvature(k) * size * size * t.area;
+            bending += 0.5 * fabric.mean_bending_nm() * waves.square_curvature(k) * size * size * t.area;
             // Of the preview's area: ¼ is the mean of ½ cos².
             lifting += 0.25 * tension * along.length_squared() * (1.0 - mean(excess).min(MAX_EXCESS)) * t.area;
             amplitude += mean(reach) * t.area;
@@ -327,24 +319,34 @@ impl<'a> Ring<'a> {
     }
 }
 
+/// Horizontal slices of a region, each vertex shared by two.
+#[derive(Clone, Copy)]
+struct Slices {
+    /// z of its lowest vertex, m.
+    low: f64,
+    /// Slices for each metre above it.
+    scale: f64,
+}
+
+impl Slices {
+    /// The slice at height z, and the share of the next one.
+    fn at(&self, z: f64) -> (usize, f64) {
+        let at = ((z - self.low) * self.scale).clamp(0.0, (SLICES - 1) as f64);
+        let below = (at as usize).min(SLICES - 2);
+        (below, at - below as f64)
+    }
+}
+
 /// Mean values of the slices of a region.
 struct BySlice {
-    low: f64,
-    scale: f64,
+    slices: Slices,
     /// Weighted sum and weight.
     sums: [(f64, f64); SLICES],
 }
 
 impl BySlice {
-    /// The slice at height z, and the share of the next one.
-    fn slice(&self, z: f64) -> (usize, f64) {
-        let at = ((z - self.low) * self.scale).clamp(0.0, (SLICES - 1) as f64);
-        let below = (at as usize).min(SLICES - 2);
-        (below, at - below as f64)
-    }
-
     fn add(&mut self, z: f64, value: f64, weight: f64) {
-        let (below, share) = self.slice(z);
+        let (below, share) = self.slices.at(z);
         for (k, part) in [(below, 1.0 - share), (below + 1, share)] {
             self.sums[k] = (self.sums[k].0 + part * weight * value, self.sums[k].1 + part * weight);
         }
@@ -352,7 +354,7 @@ impl BySlice {
 
     /// The mean at height z; 1 where nothing was added.
     fn at(&self, z: f64) -> f64 {
-        let (below, share) = self.slice(z);
+        let (below, share) = self.slices.at(z);
         let mean = |k: usize| if self.sums[k].1 > 0.0 { self.sums[k].0 / self.sums[k].1 } else { 1.0 };
         (1.0 - share) * mean(below) + share * mean(below + 1)
     }
@@ -373,55 +375,6 @@ fn gradient(x: &[DVec3], t: &Triangle, by_u: f64, by_v: f64) -> DVec3 {
         return DVec3::ZERO;
     }
     (u * (vv * by_u - uv * by_v) + v * (uu * by_v - uv * by_u)) / determinant
-}
-
-/// Sine waves k sin t by their largest slope k, tabulated: arc length over chord, and mean square curvature along the arc.
-struct Wave {
-    lengths: Vec<f64>,
-    square_curvatures: Vec<f64>,
-}
-
-impl Wave {
-    /// Largest slope, and interval of the table.
-    const MAX_SLOPE: f64 = 12.0;
-    const INTERVAL: f64 = 0.05;
-    /// Points of the midpoint rule over a period.
-    const POINTS: usize = 64;
-
-    fn new() -> Self {
-        let squares: Vec<f64> = (0..Self::POINTS)
-            .map(|i| {
-                let cos = math::cos((i as f64 + 0.5) * TAU / Self::POINTS as f64);
-                cos * cos
-            })
-            .collect();
-        let row = |i: usize| {
-            let k = i as f64 * Self::INTERVAL;
-            let (mut length, mut curvature) = (0.0, 0.0);
-            for cos2 in &squares {
-                let arc2 = 1.0 + k * k * cos2;
-                length += arc2.sqrt();
-                // κ² = k² sin² / arc⁶ over an arc of that length.
-                curvature += k * k * (1.0 - cos2) / (arc2 * arc2 * arc2.sqrt());
-            }
-            (length / Self::POINTS as f64, curvature / length)
-        };
-        let (lengths, square_curvatures) = (0..=(Self::MAX_SLOPE / Self::INTERVAL) as usize).map(row).unzip();
-        Self { lengths, square_curvatures }
-    }
-
-    /// The slope at which the arc is `ratio` times its chord.
-    fn slope(&self, ratio: f64) -> f64 {
-        let above = self.lengths.partition_point(|&length| length < ratio).clamp(1, self.lengths.len() - 1);
-        let (low, high) = (self.lengths[above - 1], self.lengths[above]);
-        Self::INTERVAL * ((above - 1) as f64 + ((ratio - low) / (high - low)).clamp(0.0, 1.0))
-    }
-
-    fn square_curvature(&self, slope: f64) -> f64 {
-        let at = (slope / Self::INTERVAL).clamp(0.0, (self.lengths.len() - 2) as f64);
-        let (below, share) = (at as usize, at.fract());
-        self.square_curvatures[below] * (1.0 - share) + self.square_curvatures[below + 1] * share
-    }
 }
 
 #[cfg(test)]
@@ -499,13 +452,5 @@ mod tests {
         assert!(excess.excess_percent.iter().all(|&e| e > 40.0));
         let drawn = folded_surface(&cloth, &topology, &body, &squeezed, &excess);
         assert!(drawn.counts.is_empty() && drawn.positions == squeezed.positions);
-    }
-
-    #[test]
-    fn the_slope_of_a_wave_gives_its_length() {
-        let wave = Wave::new();
-        assert!(wave.slope(1.0) < 1e-12);
-        // ∫ √(1 + cos² t) dt over a period is 7.640396 (1.2160067 of it).
-        assert!((wave.slope(1.216_006_7) - 1.0).abs() < 1e-3);
     }
 }

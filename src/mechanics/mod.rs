@@ -12,3 +12,4 @@ pub mod paper;
 pub mod reactions;
 pub mod refine;
 pub mod rest;
+mod sine_waves;

@@ -1,6 +1,6 @@
 //! Errors of mesh files: file, line, found, expected, remedy.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -80,6 +80,13 @@ pub enum MeshError {
     /// Positions for another mesh.
     #[error("{found} positions for a mesh of {expected} vertices; pass one position a vertex")]
     WrongCount { found: usize, expected: usize },
+}
+
+impl MeshError {
+    /// A fault of a file without lines, by the element in which it is.
+    pub(super) fn broken(file: &Path, problem: impl Into<String>) -> Self {
+        Self::Broken { file: file.to_owned(), problem: problem.into() }
+    }
 }
 
 /// "0.4 × 0.3 × 1.7".

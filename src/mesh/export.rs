@@ -11,6 +11,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 
 use super::error::MeshError;
+use super::exported::{Export, write};
 use super::glb::write_glb;
 use super::import::Imported;
 use super::ply::write_ply;
@@ -18,58 +19,40 @@ use super::source::MeshSource;
 use super::topology::NONE;
 use super::usda::write_usda;
 use super::{TriMesh, renumbered};
-use crate::base::atomic_file::AtomicFile;
 use crate::base::files::has_ending;
 
 /// The endings of files that are written; others are written as OBJ.
 pub(crate) const ENDINGS: [&str; 4] = ["obj", "ply", "glb", "usda"];
 
-/// A mesh with everything that a format may hold.
-#[derive(Clone, Copy)]
-pub(crate) struct Export<'a> {
-    /// The mesh, m, z up.
-    pub(crate) mesh: &'a TriMesh,
-    /// The file that it comes from: OBJ and PLY keep its polygons, unit and axes.
-    pub(crate) imported: Option<&'a Imported>,
-    /// Texture coordinates of each triangle's corners.
-    pub(crate) texture: Option<&'a [[DVec2; 3]]>,
-    /// Colour of each vertex: red, green, blue, opacity. OBJ has none.
-    pub(crate) colours: Option<&'a [[u8; 4]]>,
-    /// The body, m, z up, for formats that hold several meshes: glTF and USD.
-    pub(crate) body: Option<&'a TriMesh>,
-}
-
-impl Export<'_> {
-    /// Writes it as glTF, PLY or USD where the path ends in `.glb`, `.ply` or `.usda`, else as OBJ.
-    ///
-    /// # Errors
-    /// [`MeshError::WrongCount`] where there are not as many colours as vertices, [`MeshError::Unwritable`].
-    pub(crate) fn write(&self, path: &Path) -> Result<(), MeshError> {
-        let expected = self.mesh.vertex_count();
-        if let Some(found) = self.colours.map(<[_]>::len).filter(|&found| found != expected) {
-            return Err(MeshError::WrongCount { found, expected });
+/// Writes it as glTF, PLY or USD where the path ends in `.glb`, `.ply` or `.usda`, else as OBJ.
+///
+/// # Errors
+/// [`MeshError::WrongCount`] where there are not as many colours as vertices, [`MeshError::Unwritable`].
+pub(crate) fn export(path: &Path, export: &Export<'_>) -> Result<(), MeshError> {
+    let expected = export.mesh.vertex_count();
+    if let Some(found) = export.colours.map(<[_]>::len).filter(|&found| found != expected) {
+        return Err(MeshError::WrongCount { found, expected });
+    }
+    match (export.imported, export.texture) {
+        _ if has_ending(path, "glb") => write_glb(path, export),
+        _ if has_ending(path, "usda") => write_usda(path, export),
+        (Some(imported), _) if has_ending(path, "ply") => {
+            let positions = imported.in_file(&export.mesh.positions);
+            let mut source = imported.source.clone();
+            source.positions = positions;
+            let frame = format!("{}, {} up", imported.report.frame.unit, imported.report.frame.up);
+            let of_file = |colours: &[[u8; 4]]| -> Vec<[u8; 4]> {
+                let of = |v: &u32| colours.get(*v as usize).copied().unwrap_or([255; 4]);
+                imported.mesh_vertex.iter().map(of).collect()
+            };
+            write_ply(path, &source, &frame, export.colours.map(of_file).as_deref())
         }
-        match (self.imported, self.texture) {
-            _ if has_ending(path, "glb") => write_glb(path, self),
-            _ if has_ending(path, "usda") => write_usda(path, self),
-            (Some(imported), _) if has_ending(path, "ply") => {
-                let positions = imported.in_file(&self.mesh.positions);
-                let mut source = imported.source.clone();
-                source.positions = positions;
-                let frame = format!("{}, {} up", imported.report.frame.unit, imported.report.frame.up);
-                let of_file = |colours: &[[u8; 4]]| -> Vec<[u8; 4]> {
-                    let of = |v: &u32| colours.get(*v as usize).copied().unwrap_or([255; 4]);
-                    imported.mesh_vertex.iter().map(of).collect()
-                };
-                write_ply(path, &source, &frame, self.colours.map(of_file).as_deref())
-            }
-            (None, texture) if has_ending(path, "ply") => {
-                write_ply(path, &MeshSource::of_mesh(self.mesh, texture), "m, z up", self.colours)
-            }
-            (Some(imported), _) => write_imported(path, imported, &self.mesh.positions),
-            (None, Some(texture)) => write_textured(path, self.mesh, texture),
-            (None, None) => write_mesh(path, self.mesh),
+        (None, texture) if has_ending(path, "ply") => {
+            write_ply(path, &MeshSource::of_mesh(export.mesh, texture), "m, z up", export.colours)
         }
+        (Some(imported), _) => write_imported(path, imported, &export.mesh.positions),
+        (None, Some(texture)) => write_textured(path, export.mesh, texture),
+        (None, None) => write_mesh(path, export.mesh),
     }
 }
 
@@ -129,11 +112,6 @@ fn text_of(mesh: &TriMesh, texture: Option<&[[DVec2; 3]]>) -> String {
         faces.push('\n');
     }
     text + &faces
-}
-
-pub(super) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), MeshError> {
-    let unwritable = |e: std::io::Error| MeshError::Unwritable { file: path.to_owned(), reason: e.to_string() };
-    AtomicFile::write(path, contents).map_err(unwritable)
 }
 
 fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, MeshError> {

@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 
 use super::box_about;
 use super::error::MeshError;
-use super::source::Declared;
 use crate::base::serde_name;
 
 /// Height of a body, m: from a toddler's torso form to a tall adult in heels.
@@ -395,6 +394,25 @@ fn overlap(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> f64 {
     }
     let shared = volume(lo, hi);
     shared / (volume(a.0, a.1) + volume(b.0, b.1) - shared)
+}
+
+/// The unit and the up axis that a format prescribes. Many files break the rule, so both are tried first and not taken for granted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Declared {
+    /// The format, as messages name it.
+    pub(super) format: &'static str,
+    pub(super) unit: Unit,
+    pub(super) up: Axis,
+}
+
+impl Declared {
+    pub(super) fn frame(self) -> Frame {
+        Frame { guessed: true, ..Frame::given(self.unit, self.up) }
+    }
+
+    pub(super) fn reason(self) -> String {
+        format!("as {} prescribes", self.format)
+    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use indexmap::IndexSet;
 use serde_json::{Value, json};
 
 use super::error::MeshError;
-use super::export::{Export, write};
+use super::exported::{Export, write};
 use super::{TriMesh, box_about};
 
 /// Codes of the format for chunk types, component types and buffer targets.

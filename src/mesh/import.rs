@@ -13,11 +13,11 @@ use glam::{DVec2, DVec3};
 use super::bridges::Bridges;
 use super::duplicates::{duplicate_parts, first_triangles, same_place};
 use super::error::MeshError;
-use super::frame::{Axis, Frame, Unit, guess_frame, guess_frame_around, guess_frame_worn};
+use super::frame::{Axis, Declared, Frame, Unit, guess_frame, guess_frame_around, guess_frame_worn};
 use super::health::Findings;
 use super::report::{MeshReport, Remark, Repair};
 use super::rest::RestShape;
-use super::source::{Corner, Declared, MeshSource};
+use super::source::{Corner, MeshSource};
 use super::topology::{NONE, Topology};
 use super::{TriMesh, box_about, longest_side, polygon, renumbered, retain, winding};
 

@@ -10,6 +10,7 @@ mod csr;
 mod duplicates;
 mod error;
 pub mod export;
+mod exported;
 pub mod flat_pattern;
 mod frame;
 mod glb;
@@ -34,6 +35,7 @@ use glam::{DMat3, DVec3};
 
 pub(crate) use csr::Csr;
 pub use error::MeshError;
+pub(crate) use exported::Export;
 pub use frame::{Axis, Frame, Front, Unit};
 pub use remesh::Density;
 pub use rest::RestShape;

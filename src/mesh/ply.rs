@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::error::MeshError;
-use super::export::write;
+use super::exported::write;
 use super::source::MeshSource;
 use super::topology::NONE;
 

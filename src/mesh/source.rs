@@ -8,9 +8,10 @@ use glam::{DVec2, DVec3};
 use indexmap::IndexSet;
 
 use super::error::MeshError;
+use super::frame::Declared;
 use super::report::Remark;
 use super::topology::NONE;
-use super::{Axis, Frame, TriMesh, Unit, each_once, retain};
+use super::{TriMesh, each_once, retain};
 
 /// Name of the triangles without a group in a file that has groups.
 const UNGROUPED: &str = "(none)";
@@ -40,25 +41,6 @@ pub struct Face {
     pub group: u32,
     /// Index of its `o` name, or [`NONE`].
     pub object: u32,
-}
-
-/// The unit and the up axis that a format prescribes. Many files break the rule, so both are tried first and not taken for granted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Declared {
-    /// The format, as messages name it.
-    pub(super) format: &'static str,
-    pub(super) unit: Unit,
-    pub(super) up: Axis,
-}
-
-impl Declared {
-    pub(super) fn frame(self) -> Frame {
-        Frame { guessed: true, ..Frame::given(self.unit, self.up) }
-    }
-
-    pub(super) fn reason(self) -> String {
-        format!("as {} prescribes", self.format)
-    }
 }
 
 /// The contents of a mesh file.

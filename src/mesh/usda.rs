@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 
 use super::error::MeshError;
-use super::export::{Export, write};
+use super::exported::{Export, write};
 use super::{TriMesh, box_about};
 use crate::base::math;
 

@@ -9,7 +9,8 @@ use super::materials::{Cut, Swatch};
 use super::{Layer, PushOutReport, Scene};
 use crate::garment::pattern::SewingPattern;
 use crate::garment::sewing::PutOn;
-use crate::mesh::export::Export;
+use crate::mesh::Export;
+use crate::mesh::export::export;
 use crate::mesh::flat_pattern::FlatPattern;
 use crate::mesh::import::Imported;
 use crate::mesh::report::{MeshReport, Repair};
@@ -134,7 +135,7 @@ impl Loaded {
         };
         let body = with_body.then(|| self.scene.body.mesh());
         let (imported, texture) = (self.imported.as_ref(), texture.as_deref());
-        Export { mesh: &mesh, imported, texture, colours, body }.write(path)
+        export(path, &Export { mesh: &mesh, imported, texture, colours, body })
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::curve::Curve;
+use crate::base::math;
 
 /// One edge of a panel.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,4 +107,12 @@ impl SewingPattern {
     pub(crate) fn edge_name(&self, at: EdgeAt) -> String {
         format!("{}.{}", self.panels[at.panel].name, at.edge)
     }
+}
+
+/// The placement with z up and the front at −y.
+pub(super) fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
+    let [a, b, c] = degrees.to_array().map(f64::to_radians);
+    let rotation = math::rotation(DVec3::Z, c) * math::rotation(DVec3::Y, b) * math::rotation(DVec3::X, a);
+    let turn = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y);
+    (turn * rotation, turn * translation)
 }

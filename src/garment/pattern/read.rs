@@ -7,7 +7,7 @@
 use std::fmt;
 use std::path::Path;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::error::Category;
 use serde_json::{Map, Value};
@@ -16,9 +16,8 @@ use super::check;
 use super::curve::Curve;
 use super::dxf;
 use super::error::PatternError;
-use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
+use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch, upright};
 use crate::base::files::{listed, read_text, stem};
-use crate::base::math;
 
 /// Longest accepted file, MB. The 115,000 patterns of the public data set have at most 60 kB.
 const MAX_MB: usize = 4;
@@ -229,14 +228,6 @@ fn label(object: &Map<String, Value>, place: &str) -> Result<Option<String>, Pat
     let Some(value) = object.get("label").filter(|v| !v.is_null()) else { return Ok(None) };
     let text = At::new(value, format!("{place}, label")).text("a text")?;
     Ok((!text.is_empty()).then(|| text.to_owned()))
-}
-
-/// The placement with z up and the front at −y.
-pub(super) fn upright(degrees: DVec3, translation: DVec3) -> (DMat3, DVec3) {
-    let [a, b, c] = degrees.to_array().map(f64::to_radians);
-    let rotation = math::rotation(DVec3::Z, c) * math::rotation(DVec3::Y, b) * math::rotation(DVec3::X, a);
-    let turn = DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y);
-    (turn * rotation, turn * translation)
 }
 
 fn curve(place: &str, value: &Value, a: DVec2, b: DVec2, of: &Properties) -> Result<Curve, PatternError> {

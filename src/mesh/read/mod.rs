@@ -38,11 +38,6 @@ impl MeshSource {
     }
 }
 
-/// A fault of a file without lines, by the element in which it is.
-fn broken(file: &Path, problem: impl Into<String>) -> MeshError {
-    MeshError::Broken { file: file.to_owned(), problem: problem.into() }
-}
-
 #[derive(Clone, Copy)]
 enum Format {
     Obj,

@@ -14,7 +14,6 @@ use std::path::Path;
 use glam::DVec3;
 use zip::ZipArchive;
 
-use super::broken;
 use super::obj::excerpt;
 use crate::base::files::listed;
 use crate::mesh::error::MeshError;
@@ -43,7 +42,7 @@ pub(super) fn has_arrays(bytes: &[u8]) -> bool {
 
 /// Reads an `.npz`.
 pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> {
-    read(file, bytes).map_err(|problem| broken(file, problem))
+    read(file, bytes).map_err(|problem| MeshError::broken(file, problem))
 }
 
 fn read(file: &Path, bytes: &[u8]) -> Result<MeshSource, String> {

@@ -16,7 +16,6 @@ use glam::{DVec2, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_ply::{ElementDef, PlyFormat, PlyReader, PropertyType, ScalarType};
 
-use super::broken;
 use crate::mesh::error::MeshError;
 use crate::mesh::report::Remark;
 use crate::mesh::source::{Corner, MeshSource};
@@ -58,12 +57,16 @@ fn meaning(element: &str, property: &str, kind: &PropertyType) -> Meaning {
 pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> {
     const END: &[u8] = b"end_header";
     let Some(end) = bytes.windows(END.len()).position(|window| window == END) else {
-        return Err(broken(file, "found no line \"end_header\", expected one after the header; the file is cut off"));
+        return Err(MeshError::broken(
+            file,
+            "found no line \"end_header\", expected one after the header; the file is cut off",
+        ));
     };
     // Comments may be in any encoding. A text need not end in a line end, which the parser asks for.
     let header = String::from_utf8_lossy(&bytes[..end]);
-    let mut reader = PlyReader::from_reader(header.as_bytes().chain(&bytes[end..]).chain(&b"\n"[..]))
-        .map_err(|e| broken(file, format!("the header is invalid: {}; expected a PLY, export it again", e.0)))?;
+    let mut reader = PlyReader::from_reader(header.as_bytes().chain(&bytes[end..]).chain(&b"\n"[..])).map_err(|e| {
+        MeshError::broken(file, format!("the header is invalid: {}; expected a PLY, export it again", e.0))
+    })?;
     let mut source = MeshSource::of(file);
     let groups = reader.header().comments.iter().filter_map(|comment| {
         let (number, name) = comment.strip_prefix("group ")?.split_once(' ')?;
@@ -72,8 +75,9 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
     let mut rows = Rows { groups: groups.collect(), has_textures: false, source: &mut source, row: 0 };
     let mut unknown = Vec::new();
     while let Some(element) = reader.current_element().cloned() {
-        let meanings = meanings(&element).map_err(|problem| broken(file, problem))?;
-        check_count(&element, reader.header().format, bytes.len() - end).map_err(|problem| broken(file, problem))?;
+        let meanings = meanings(&element).map_err(|problem| MeshError::broken(file, problem))?;
+        check_count(&element, reader.header().format, bytes.len() - end)
+            .map_err(|problem| MeshError::broken(file, problem))?;
         let without = element.properties.iter().zip(&meanings).filter(|(_, m)| **m == Meaning::Unknown);
         unknown.extend(without.map(|(property, _)| format!("{}.{}", element.name, property.name)));
         rows.row = 0;
@@ -87,7 +91,7 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
                 ErrorKind::UnexpectedEof => "the file ends there, expected all rows; it is cut off".to_owned(),
                 _ => format!("{}; expected the numbers that the header describes, so make the export again", e.0),
             };
-            broken(file, format!("{} {} of {}: {reason}", element.name, rows.row + 1, element.count))
+            MeshError::broken(file, format!("{} {} of {}: {reason}", element.name, rows.row + 1, element.count))
         })?;
     }
     let has_textures = rows.has_textures;
@@ -95,7 +99,7 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
     if let Some(face) = source.faces.iter().find(|f| source.corners_of(f).iter().any(|c| c.vertex as usize >= count)) {
         let found = source.corners_of(face).iter().map(|c| c.vertex).max().unwrap_or_default();
         let number = face.number + 1;
-        return Err(broken(
+        return Err(MeshError::broken(
             file,
             format!("face {number}: found vertex {found}, expected one below {count}, their number"),
         ));

@@ -7,7 +7,6 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::broken;
 use super::obj::excerpt;
 use crate::mesh::error::MeshError;
 use crate::mesh::source::{Corner, MeshSource};
@@ -31,7 +30,7 @@ pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> 
             let number_at = |at: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|k| triangle[at + k])));
             for corner in [12, 24, 36] {
                 let position = DVec3::new(number_at(corner), number_at(corner + 4), number_at(corner + 8));
-                let wrong = |problem| broken(file, format!("triangle {}: {problem}", number + 1));
+                let wrong = |problem| MeshError::broken(file, format!("triangle {}: {problem}", number + 1));
                 source.push_position(position).map_err(wrong)?;
             }
             push_last(&mut source, 3, NONE);

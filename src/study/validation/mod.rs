@@ -8,14 +8,14 @@
 //!
 //! Limits: the constants of a fabric that its source does not report are assumed, as the source in its file says.
 
+mod error;
 mod strips;
 
 use serde::{Deserialize, Serialize};
 
 use crate::garment::fabric::{BUILT_IN, Fabric, FabricError};
-use crate::mechanics::energy::EnergyError;
-use crate::mechanics::refine::SolveError;
-use crate::study::drape_test::{Drape, DrapeTest, DrapeTestError, Drapes, STANDARDS};
+use crate::study::drape_test::{Drape, DrapeTest, Drapes, STANDARDS};
+pub(crate) use error::ValidationError;
 use strips::Deflection;
 
 /// The cases.
@@ -50,32 +50,6 @@ const SOURCES: [(&str, &str); 3] = [
     ),
     ("ppf", "bands collected in st-tech/ppf-contact-solver, calibration/cusick_drape/targets.csv (transcription)"),
 ];
-
-/// Why a validation failed.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum ValidationError {
-    /// The cases do not parse.
-    #[error("assets/validation/cases.csv: {0}")]
-    Csv(#[from] csv::Error),
-    /// A case names no known test.
-    #[error("assets/validation/cases.csv: found the test `{test}`, expected a standard or a strip")]
-    Test {
-        /// Its name.
-        test: String,
-    },
-    /// A fabric does not parse.
-    #[error(transparent)]
-    Fabric(#[from] FabricError),
-    /// A drape test failed.
-    #[error(transparent)]
-    Drape(#[from] DrapeTestError),
-    /// A strip cannot be set up.
-    #[error(transparent)]
-    Energy(#[from] EnergyError),
-    /// A strip did not rest.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-}
 
 /// One row of the list of cases.
 #[derive(Debug, Clone, Deserialize)]

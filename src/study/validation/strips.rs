@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec2, DVec3};
 
-use super::ValidationError;
+use super::error::ValidationError;
 use crate::GRAVITY;
 use crate::base::math;
 use crate::garment::fabric::Fabric;

@@ -13,8 +13,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch};
-use super::read::upright;
+use super::panels::{EdgeAt, PanelEdge, PatternPanel, SewingPattern, Stitch, upright};
 use super::{PatternError, check};
 use crate::base::files::{Unreadable, bounded, has_ending, listed, read_text, stem};
 use crate::base::math;

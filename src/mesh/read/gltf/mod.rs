@@ -22,10 +22,10 @@ use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec2, DVec3, DVec4};
 
-use super::broken;
 use super::obj::excerpt;
 use crate::mesh::error::MeshError;
-use crate::mesh::source::{Corner, Declared, MeshSource};
+use crate::mesh::frame::Declared;
+use crate::mesh::source::{Corner, MeshSource};
 use crate::mesh::topology::NONE;
 use crate::mesh::{Axis, Unit};
 use accessor::{Buffers, missing};
@@ -43,7 +43,7 @@ const FAN: u32 = 6;
 
 /// Reads a glTF file.
 pub(super) fn parse(file: &Path, bytes: &[u8]) -> Result<MeshSource, MeshError> {
-    read(file, bytes).map_err(|problem| broken(file, problem))
+    read(file, bytes).map_err(|problem| MeshError::broken(file, problem))
 }
 
 fn read(file: &Path, bytes: &[u8]) -> Result<MeshSource, String> {
