@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Makes the recordings in this folder anew: one small file a garment, three of the five so that the folder stays small.
+# Makes the recordings in this folder anew: one small file a garment, two of the five so that the folder stays small.
 # With `rerun` (pip install rerun-sdk==0.36.3) and Pillow at hand it takes the README's first picture too.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 cargo build
 partwise="${CARGO_TARGET_DIR:-target}/debug/partwise"
-for garment in pullover-1 flared-skirt long-sleeved-dress; do
-    "$partwise" --garment "$garment@2500" --fabric jersey --no-iterations --save "recordings/gallery/$garment.rrd"
+for garment in pullover-1 flared-skirt; do
+    "$partwise" --garment "$garment@2000" --fabric jersey --no-iterations --save "recordings/gallery/$garment.rrd"
 done
 if command -v rerun >/dev/null; then
     picture=recordings/gallery/low-cut-dress.png
