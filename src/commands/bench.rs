@@ -16,6 +16,7 @@ use crate::study::table4::{
 use clap::{Args, Subcommand};
 use serde_json::json;
 
+use super::ablation::AblationArgs;
 use super::console::{self, RowFormat};
 use super::runtime::{
     UserError, check, control_flow, create_folder, keep_results, refuse, unwritable, use_threads, write,
@@ -41,6 +42,11 @@ pub(crate) enum BenchCommand {
     /// gives the reason.
     #[command(name = "table-4", after_help = include_str!("../../assets/help/bench-table-4.txt"))]
     TableFour(TableFourArgs),
+    /// What each option of the solver is good for: every one off, or halved and doubled, one at a time
+    ///
+    /// Drapes a set of garments to rest with each variant, and counts steps, time, drapes that rest, and intersections. A
+    /// variant of the 52 drapes takes over a minute on two cores; name the options with --only.
+    Ablation(AblationArgs),
 }
 
 /// Arguments of `bench table-4`.

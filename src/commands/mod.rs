@@ -1,5 +1,6 @@
 //! The command line: one module per subcommand, its arguments beside its code.
 
+mod ablation;
 mod assets;
 mod bench;
 mod check;
@@ -152,6 +153,7 @@ pub fn main() -> ExitCode {
         Some(Command::Compare(args)) => args.execute(),
         Some(Command::Tune(args)) => args.execute(),
         Some(Command::Bench(bench::BenchCommand::TableFour(args))) => args.execute(),
+        Some(Command::Bench(bench::BenchCommand::Ablation(args))) => args.execute(),
         Some(Command::Merge(args)) => args.execute(),
         Some(Command::Pattern(args)) => args.execute(),
         Some(Command::Assets(args)) => args.execute(cli.force),

@@ -14,7 +14,8 @@ use crate::base::atomic_file::{self, AtomicFile};
 use crate::base::files::read_text;
 use crate::drape::DrapeError;
 use crate::live::LiveError;
-use crate::mechanics::refine::{Observer, RefineOptions};
+use crate::mechanics::refine::Observer;
+use crate::mechanics::solver_options::NewtonOptions;
 use crate::record::RecordError;
 use crate::study::accuracy::ReferenceCache;
 use crate::study::drape_test::DrapeTestError;
@@ -214,7 +215,7 @@ pub(crate) fn create_folder(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn with_progress<T>(title: &str, work: impl FnOnce(Observer<'_>) -> T) -> T {
     keep_results();
     let bar = console::progress(None, title);
-    let rests_below = RefineOptions::default().tolerance;
+    let rests_below = NewtonOptions::default().tolerance;
     let (began, mut decay) = (Instant::now(), Decay::default());
     let out = work(&mut |step| {
         let (number, residual) = (step.iteration, step.residual_over_weight);

@@ -7,6 +7,7 @@ use crate::base::serde_name;
 use crate::drape::{Model, Refine, Settings};
 use crate::mechanics::coupled::Motion;
 use crate::mechanics::paper::PaperOptions;
+use crate::mechanics::solver_options::SolverOptions;
 use crate::parts::range_table::{GapRule, RangeTable, TABLE_3};
 use clap::Args;
 use serde_json::{Value, json};
@@ -40,6 +41,9 @@ pub(crate) struct ModelArgs {
     /// Disable contact of cloth with cloth: for comparisons, and for garments that cannot touch themselves
     #[arg(long)]
     no_self_contact: bool,
+    /// Set an option of the solver at full resolution, for experiments, e.g. newton.damping=100; `bench ablation --list` prints all
+    #[arg(long = "solver", value_name = "GROUP.KEY=VALUE", value_parser = solver_option)]
+    solver: Vec<String>,
 }
 
 /// The arguments of one drape.
@@ -72,14 +76,15 @@ impl ModelArgs {
             coupled => coupled.clone().with_extents_cm(&extents).with_motion(self.motion),
         };
         let (fabric, self_contact) = (self.fabric.first()?, !self.no_self_contact);
-        Ok(Settings { min_part: self.min_part, model, fabric, self_contact, ..base })
+        let solver = self.solver.iter().try_fold(base.solver, |solver, text| solver.assign(text))?;
+        Ok(Settings { min_part: self.min_part, model, fabric, self_contact, solver, ..base })
     }
 }
 
 impl StageArgs {
     /// The given flags of the two stages and the refinement, which the reference methods do not support.
     pub(crate) fn two_stage_flags(&self) -> Vec<&'static str> {
-        let ModelArgs { min_part, model, max_extent, motion, readings, no_self_contact, .. } = &self.model;
+        let ModelArgs { min_part, model, max_extent, motion, readings, no_self_contact, solver, .. } = &self.model;
         let all = [
             ("--table", self.table != TABLE_3),
             ("--refine", self.refine.is_some()),
@@ -90,6 +95,7 @@ impl StageArgs {
             ("--motion", *motion != Motion::default()),
             ("--reading", !readings.is_empty()),
             ("--no-self-contact", *no_self_contact),
+            ("--solver", !solver.is_empty()),
         ];
         all.into_iter().filter(|(_, given)| *given).map(|(flag, _)| flag).collect()
     }
@@ -124,6 +130,11 @@ fn extent(text: &str) -> Result<f64, String> {
 fn gap_rule(text: &str) -> Result<GapRule, String> {
     serde_name::parse(text)
         .ok_or_else(|| format!("found `{text}`, expected extend-lower, extend-upper, own-level or error"))
+}
+
+fn solver_option(text: &str) -> Result<String, String> {
+    SolverOptions::default().assign(text).map_err(|error| error.to_string())?;
+    Ok(text.to_owned())
 }
 
 const READINGS: &str = "\

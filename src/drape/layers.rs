@@ -12,13 +12,12 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::error::DrapeError;
-use super::levels::Levels;
+use super::levels::{Levels, cloth_of};
 use super::parts::{StageTwo, stage_one};
 use super::pipeline::{Moved, moved, needs_cloth, timed};
 use super::result::{Drape, PartOutcome, StageTimes};
 use super::settings::Settings;
 use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
-use crate::mechanics::energy::Cloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Observer, Record, Step};
 use crate::mesh::Topology;
@@ -67,8 +66,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
     if needs_cloth(settings) {
         let refining = Instant::now();
         // Nothing crosses with all below the last as they lie, and that one as it was put over them.
-        let Scene { garment, topology, rest, held, .. } = scene;
-        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?.clear_at(before);
+        let cloth = cloth_of(scene, settings, &scene.held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
         let start = scene.lift_layers(worn.positions.clone());
         let refined = refine_from(scene, settings, &cloth, None, (start, StartsFrom::Parts), &mut |step| {
@@ -111,8 +109,7 @@ impl LayerState<'_> {
     ) -> Result<(), DrapeError> {
         let layer = &self.scene.layers[k];
         let mut own = StageTimes::default();
-        let levels =
-            timed(&mut own.cloth, || needs_cloth(settings).then(|| Levels::new(alone, &settings.fabric)).transpose())?;
+        let levels = timed(&mut own.cloth, || needs_cloth(settings).then(|| Levels::new(alone, settings)).transpose())?;
         times.cloth += own.cloth;
         let ground = Distances::to_body(alone);
         let steps = self.history.last().map_or(0, |r| r.iteration);

@@ -6,17 +6,25 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
 use crate::mesh::TriMesh;
 use crate::mesh::coarse::Coarse;
 use crate::scene::Scene;
+
+use super::settings::Settings;
 
 /// Vertices of a level over those of the next coarser.
 const RATIO: usize = 4;
 
 /// No level is made with fewer vertices than this: there is nothing left to save.
 const MIN_LEVEL_VERTICES: usize = 400;
+
+/// The cloth of `scene` in the fabric of `settings`, for their solver, with these vertices held.
+pub(super) fn cloth_of(scene: &Scene, settings: &Settings, held: &[u32]) -> Result<Cloth, EnergyError> {
+    let Scene { garment, topology, rest, .. } = scene;
+    let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?;
+    Ok(cloth.with_solver(settings.solver))
+}
 
 /// A coarser garment.
 #[derive(Debug)]
@@ -34,21 +42,19 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// The cloth of `scene`, `fabric` being that of what names none.
-    pub(crate) fn new(scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
-        let Scene { garment, topology, rest, held, .. } = scene;
-        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(fabric), held)?;
-        Ok(Self { cloth, coarser: OnceLock::new() })
+    /// The cloth of `scene` in the fabric of `settings`, for their solver.
+    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Result<Self, EnergyError> {
+        Ok(Self { cloth: cloth_of(scene, settings, &scene.held)?, coarser: OnceLock::new() })
     }
 
     /// The same garment in another fabric: how its coarser ones are meshed does not depend on it.
-    pub(crate) fn recut(&self, scene: &Scene, fabric: &Fabric) -> Result<Self, EnergyError> {
-        let levels = Self::new(scene, fabric)?;
+    pub(crate) fn recut(&self, scene: &Scene, settings: &Settings) -> Result<Self, EnergyError> {
+        let levels = Self::new(scene, settings)?;
         if let Some(made) = self.coarser.get() {
             let mut coarser: Vec<Level> = Vec::new();
             for level in made {
                 let coarse = Arc::clone(&level.coarse);
-                coarser.extend(Level::of(scene, coarser.last(), coarse, &levels.cloth.fabrics));
+                coarser.extend(Level::of(scene, coarser.last(), coarse, &levels.cloth));
             }
             return Ok(Self { coarser: OnceLock::from(coarser), ..levels });
         }
@@ -59,7 +65,7 @@ impl Levels {
     pub(crate) fn coarser(&self, scene: &Scene) -> &[Level] {
         self.coarser.get_or_init(|| {
             let mut coarser: Vec<Level> = Vec::new();
-            while let Some(next) = Level::below(scene, coarser.last(), &self.cloth.fabrics) {
+            while let Some(next) = Level::below(scene, coarser.last(), &self.cloth) {
                 coarser.push(next);
             }
             coarser
@@ -87,20 +93,20 @@ impl Levels {
 }
 
 impl Level {
-    fn below(scene: &Scene, above: Option<&Self>, fabrics: &[Fabric]) -> Option<Self> {
+    fn below(scene: &Scene, above: Option<&Self>, full: &Cloth) -> Option<Self> {
         let (mesh, rest) = above.map_or((&scene.garment, &scene.rest), |a| (&a.coarse.mesh, &a.coarse.rest));
         let count = mesh.vertex_count() / RATIO;
         if count < MIN_LEVEL_VERTICES {
             return None;
         }
-        Self::of(scene, above, Arc::new(Coarse::new(mesh, rest, count)?), fabrics)
+        Self::of(scene, above, Arc::new(Coarse::new(mesh, rest, count)?), full)
     }
 
-    fn of(scene: &Scene, above: Option<&Self>, coarse: Arc<Coarse>, fabrics: &[Fabric]) -> Option<Self> {
+    fn of(scene: &Scene, above: Option<&Self>, coarse: Arc<Coarse>, full: &Cloth) -> Option<Self> {
         let held = above.map_or_else(|| scene.is_held(), |above| above.cloth.held.clone());
         let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
-        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, fabrics, &held).ok()?;
-        Some(Self { coarse, cloth })
+        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, &*full.fabrics, &held).ok()?;
+        Some(Self { coarse, cloth: cloth.with_solver(full.solver) })
     }
 
     pub(crate) fn mesh(&self) -> &TriMesh {

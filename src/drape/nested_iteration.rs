@@ -17,15 +17,6 @@ use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::Scene;
 
-/// Vertices that a coarser garment must have to be brought to rest first. On one machine within hours, without and with: a knit skirt of 64,000
-/// vertices 77 and 20 s, a dress of 16,000 19.6 and 6.8 s (cotton 23 and 16), a jumpsuit of 9,330 in cotton 40 and 13; a pullover of 5,000, whose
-/// coarser one has 1,275, would take 1.2 for 0.9 (cotton 3.3 for 2.4). A dress of 10,861 in cotton loses, 15 for 9, and one of 9,867 gains, 8 for 10.
-const MIN_COARSE_VERTICES: usize = 1500;
-
-/// Steps on a coarser garment, at most: a stiff one takes over a hundred to its rest, of which the first bring it into the right folds.
-/// With eighty, five stiff garments of 16,000 take 239 steps at full resolution for 213.
-const COARSE_STEPS: usize = 20;
-
 /// The start of the steps at full resolution: stage two's positions, or for a large garment its rest on coarser cloth. A garment that stage
 /// two lets fall off the body starts as placed: it may stay on by shorter steps. So does one laid flat: it has far to go, and its PARTs
 /// pierce the corners of what they fall on. `observer` receives the steps on coarser garments as step 0
@@ -43,10 +34,11 @@ pub(crate) fn approach(
         return start.to_vec();
     }
     let Scene { garment: mesh, body, .. } = scene;
-    let large = |level: &&Level| level.mesh().vertex_count() >= MIN_COARSE_VERTICES;
+    let options = settings.solver.nested_iteration;
+    let large = |level: &&Level| level.mesh().vertex_count() >= options.min_vertices;
     let coarsest = levels.coarser(scene).iter().take_while(large).count();
     let self_contact = settings.self_contact;
-    let at_most = RefineOptions { max_steps: Some(COARSE_STEPS), self_contact, ..RefineOptions::default() };
+    let at_most = RefineOptions { max_steps: Some(options.max_steps), self_contact, ..RefineOptions::default() };
     let mut reached = start.to_vec();
     for number in (1..=coarsest).rev() {
         let cloth = levels.coarser(scene)[number - 1].cloth();

@@ -10,6 +10,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::error::DrapeError;
+use super::levels::cloth_of;
 use super::parts::StageTwo;
 use super::release::Release;
 use super::result::{Drape, PartOutcome, StageTimes};
@@ -40,8 +41,7 @@ fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer
     // An edge that stayed up after its release in the first pose is not held again.
     let released = matches!(before.let_go, Some(Release::Stays { .. }));
     let held: &[u32] = if released { &[] } else { &scene.held };
-    let fabrics = scene.fabrics(&settings.fabric);
-    let cloth = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &fabrics, held)?;
+    let cloth = cloth_of(scene, settings, held)?;
     let carried = scene.garment.positions.clone();
     let start = (carried.clone(), StartsFrom::Rest);
     let refined = refine_from(scene, settings, &cloth, Some(&ground), start, observer)?;

@@ -51,7 +51,7 @@ impl PreparedLayer {
         let mut times = StageTimes::default();
         let (distances, cloth) = rayon::join(
             || timed(&mut times.distance, || Distances::of(scene)),
-            || needs_cloth(settings).then(|| Levels::new(scene, &settings.fabric)).transpose(),
+            || needs_cloth(settings).then(|| Levels::new(scene, settings)).transpose(),
         );
         let (distances, cloth) = (distances?, cloth?);
         times.total = began.elapsed();

@@ -9,6 +9,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::error::DrapeError;
+use super::levels::cloth_of;
 use super::settings::{Refine, Settings};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
@@ -72,7 +73,7 @@ pub(crate) fn let_go(
     if !asked || held.stop != Stop::Converged {
         return Ok(ReleasedDrape { cloth: None, refined: held, let_go: None });
     }
-    let free = Cloth::new(&scene.garment, &scene.topology, &scene.rest, &scene.fabrics(&settings.fabric), &[])?;
+    let free = cloth_of(scene, settings, &[])?;
     let mut contacts = free.contacts(&scene.body, &held.positions);
     contacts.stiffen(held.contact_stiffness / contacts.stiffness());
     contacts.update(&held.positions);

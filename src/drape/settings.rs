@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::{CoupledOptions, Motion};
 use crate::mechanics::paper::PaperOptions;
+use crate::mechanics::solver_options::SolverOptions;
 use crate::parts::range_table::{METRES_PER_CM, RangeTable, TableError, TableRule};
 
 /// Extents PARTs are cut to unless asked otherwise, cm: none, so that the table alone makes them.
@@ -145,6 +146,8 @@ pub struct Settings {
     pub fabric: Fabric,
     /// Whether steps at full resolution keep cloth off cloth.
     pub self_contact: bool,
+    /// Options of the solver at full resolution, for experiments.
+    pub solver: SolverOptions,
 }
 
 impl Default for Settings {
@@ -156,6 +159,7 @@ impl Default for Settings {
             refine: Refine::default(),
             fabric: Fabric::default(),
             self_contact: true,
+            solver: SolverOptions::default(),
         }
     }
 }

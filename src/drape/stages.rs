@@ -61,10 +61,6 @@ pub(crate) enum StartsFrom {
     Rest,
 }
 
-/// Damping from a drape that rested, 1/s². Nine changes between four knits took a long dress 41 steps
-/// until its forces balanced, with the 300 of a preview 51.
-const DAMPING_FROM_REST: f64 = 10.0;
-
 /// Steps at full resolution. [`Refine::Steps`]`(0)` takes none, but measures the coupled model's energy and residual.
 pub(crate) fn refine_from(
     scene: &Scene,
@@ -78,8 +74,9 @@ pub(crate) fn refine_from(
         Refine::Steps(n) => Some(n),
         Refine::Converged => None,
     };
-    let damping = if from == StartsFrom::Rest { DAMPING_FROM_REST } else { RefineOptions::default().damping };
-    let options = RefineOptions { max_steps, damping, self_contact: settings.self_contact, ..RefineOptions::default() };
+    let from_rest = from == StartsFrom::Rest;
+    let options =
+        RefineOptions { max_steps, from_rest, self_contact: settings.self_contact, ..RefineOptions::default() };
     let contacts = contacts_at(cloth, scene, settings.refine, ground, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
         if scene.fallen(step.positions).is_some() { ControlFlow::Break(()) } else { observer(step) }

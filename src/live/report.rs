@@ -59,7 +59,7 @@ pub(super) fn choices() -> Value {
 
 /// A job in the fields of an edit.
 fn job(job: &Job) -> Value {
-    let Settings { table, min_part, model, refine, fabric, self_contact } = &job.settings;
+    let Settings { table, min_part, model, refine, fabric, self_contact, solver: _ } = &job.settings;
     let table = match table {
         TableRule::Rows(rows) => json!(rows),
         TableRule::Quantile { levels, .. } => json!({ "quantile": levels }),

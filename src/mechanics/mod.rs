@@ -13,3 +13,4 @@ pub mod reactions;
 pub mod refine;
 pub mod rest;
 mod sine_waves;
+pub mod solver_options;

@@ -21,7 +21,7 @@
 use glam::DVec3;
 
 use super::energy::field::SIDE;
-use super::energy::{Cloth, Contacts, Touch, touching_places};
+use super::energy::{Cloth, Contacts, Touch};
 use super::linear_algebra::norm;
 use crate::body::distance::Body;
 
@@ -251,7 +251,7 @@ fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> 
         Reaction::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, friction, true)
     };
     let mut all: Vec<Reaction> = contacts.touches().iter().filter(touches).map(of_vertex).collect();
-    for place in touching_places(&cloth.triangles, &cloth.thickness, body, x, PLACE_MARGIN_M) {
+    for place in cloth.face_contacts().touching_places(body, x, PLACE_MARGIN_M) {
         let shares = || place.corners.into_iter().zip(place.shares);
         let mean = |of: &[f64]| shares().map(|(v, w)| of[v as usize] * w).sum::<f64>();
         let (stiffness, friction) = (contacts.stiffness() * mean(&cloth.areas), mean(&cloth.friction));

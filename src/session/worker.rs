@@ -14,8 +14,8 @@ use super::state::{SessionState, ms_since};
 use super::task::{Refinement, Target, Task};
 use crate::base::error_text::with_causes;
 use crate::drape::{
-    ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, StageResults, StageTimes, StageTwo,
-    StartsFrom, approach, drape, folds_of, let_go, reactions, refine_from, settled, stage_two,
+    ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, Settings, StageResults, StageTimes,
+    StageTwo, StartsFrom, approach, drape, folds_of, let_go, reactions, refine_from, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;
@@ -131,7 +131,7 @@ impl Worker {
         let cached = self.cloth.as_ref().filter(|c| c.generation == generation && c.fabric == settings.fabric);
         let levels = cached.map(|c| Arc::clone(&c.levels));
         if needs_cloth && levels.is_none() {
-            return self.build_cloth(segmented, &settings.fabric);
+            return self.build_cloth(segmented, settings);
         }
         if let Some(rest) = target.snapshot.rest.as_ref().filter(|rest| rest.reused) {
             self.rest = Some(WarmStart { generation, positions: Arc::clone(&rest.held_positions) });
@@ -176,14 +176,14 @@ impl Worker {
     }
 
     /// Builds the cloth in this fabric. In another fabric of the same garment only the fabric's constants change.
-    fn build_cloth(&mut self, segmented: &Segmented, fabric: &Fabric) -> Result<(), EditError> {
+    fn build_cloth(&mut self, segmented: &Segmented, settings: &Settings) -> Result<(), EditError> {
         let began = Instant::now();
         let (scene, generation) = (&segmented.loaded_scene.input.scene, segmented.loaded_scene.generation);
         let levels = match self.cloth.take().filter(|cached| cached.generation == generation) {
-            Some(cached) => cached.levels.recut(scene, fabric),
-            None => Levels::new(scene, fabric),
+            Some(cached) => cached.levels.recut(scene, settings),
+            None => Levels::new(scene, settings),
         };
-        let (levels, fabric) = (levels.map_err(DrapeError::from)?, fabric.clone());
+        let (levels, fabric) = (levels.map_err(DrapeError::from)?, settings.fabric.clone());
         self.cloth = Some(CachedCloth { generation, fabric, levels: Arc::new(levels), took: began.elapsed() });
         Ok(())
     }

@@ -205,7 +205,7 @@ impl References<'_> {
             body: self.scene.body.mesh(),
             held: &self.scene.held,
             start,
-            options: &format!("{solver:?}"),
+            options: &format!("{solver:?}, {:?}", self.cloth.solver),
         });
         let mut compute = || {
             let began = Instant::now();
@@ -237,10 +237,10 @@ impl References<'_> {
                 found.reference
             }
         };
-        if reference.residual_over_weight >= solver.tolerance {
+        if reference.residual_over_weight >= self.cloth.solver.newton.tolerance {
             self.warnings.push(format!(
                 "the solver of a reference stopped at a residual of {:.1e} of the weight, expected less than {:.0e}: errors against it are inexact",
-                reference.residual_over_weight, solver.tolerance
+                reference.residual_over_weight, self.cloth.solver.newton.tolerance
             ));
         }
         Ok(reference)

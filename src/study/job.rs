@@ -15,7 +15,8 @@ use crate::drape::{Drape, DrapeError, Model, Prepared, Refine, Settings, drape, 
 use crate::garment::fabric::Fabric;
 use crate::mechanics::coupled::CoupledOptions;
 use crate::mechanics::paper::{BodyForce, LineForce, PaperOptions};
-use crate::mechanics::refine::{Observer, STEP_LIMIT};
+use crate::mechanics::refine::Observer;
+use crate::mechanics::solver_options::NewtonOptions;
 use crate::parts::range_table::TABLE_3;
 use crate::scene::{FileRole, Scene, SceneSpec};
 use crate::study::accuracy::{self, reference::ReferenceCache, representable::representable};
@@ -75,6 +76,7 @@ fn checked<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Error> {
         return Err(D::Error::custom(format!("settings.model: {key}: found {found:?}, expected {low:?} to {high:?}")));
     }
     settings.fabric.check("settings.fabric").map_err(D::Error::custom)?;
+    settings.solver.check().map_err(|error| D::Error::custom(format!("settings.solver.{error}")))?;
     let extents = settings.model.extents_cm();
     if extents.is_sorted_by(|a, b| a > b) && extents.iter().all(|cm| cm.is_finite() && *cm > 0.0) {
         return Ok(settings);
@@ -89,7 +91,7 @@ fn numbers(model: &Model) -> Vec<(&'static str, f64, RangeInclusive<f64>)> {
         Model::Coupled(options) => {
             let CoupledOptions { motion: _, extents_m: _, max_iterations, least_change_m } = options;
             vec![
-                ("max_iterations", *max_iterations as f64, 1.0..=STEP_LIMIT as f64),
+                ("max_iterations", *max_iterations as f64, 1.0..=NewtonOptions::default().max_steps as f64),
                 ("least_change_m", *least_change_m, 0.0..=1.0),
             ]
         }
@@ -151,7 +153,7 @@ impl Job {
     pub fn file_names(&self) -> Vec<(FileRole, &str)> {
         let Self { scene, settings, seed: _, accuracy: _, spread_starts: _ } = self;
         // Tables, models and fabrics of a job are their values, never names.
-        let Settings { table: _, min_part: _, model: _, refine: _, fabric: _, self_contact: _ } = settings;
+        let Settings { table: _, min_part: _, model: _, refine: _, fabric: _, self_contact: _, solver: _ } = settings;
         scene.file_names()
     }
 

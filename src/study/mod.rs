@@ -1,5 +1,7 @@
 //! Studies of drapes: metrics and accuracy, certificates, drape tests, sweeps, Table 4, and the range-table search.
 
+#[cfg(feature = "cli")]
+pub(crate) mod ablation;
 pub mod accuracy;
 pub mod certificate;
 pub(crate) mod drape_test;

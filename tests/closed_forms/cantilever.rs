@@ -29,10 +29,12 @@ fn a_cantilever_has_peirces_bending_length() {
         let held: Vec<u32> =
             (0..mesh.vertex_count() as u32).filter(|&v| mesh.positions[v as usize].x < 2.5 * cell).collect();
         let fabric = fabric(density, 2000.0, 0.0, bending, 0.0);
-        let cloth =
+        let mut cloth =
             Cloth::new(&mesh, &Topology::new(&mesh), &RestShape::from_edges(&mesh).unwrap(), &fabric, &held).unwrap();
-        let options = RefineOptions { tolerance: 1e-5, ..RefineOptions::default() };
-        let end = refine_with(&cloth, Contacts::none(), mesh.positions, &options, &mut |_| ControlFlow::Continue(()));
+        cloth.solver.newton.tolerance = 1e-5;
+        let end = refine_with(&cloth, Contacts::none(), mesh.positions, &RefineOptions::default(), &mut |_| {
+            ControlFlow::Continue(())
+        });
         let end = end.unwrap();
         assert_eq!(end.stop, Stop::Converged, "residual {:e}", end.residual_over_weight);
         let tip = end.positions.iter().filter(|p| p.z < 0.0).fold(DVec3::ZERO, |t, p| if p.z < t.z { *p } else { t });
@@ -80,10 +82,12 @@ fn a_cantilever_with_friction_between_yarns_sags_as_its_closed_form() {
         let held: Vec<u32> =
             (0..mesh.vertex_count() as u32).filter(|&v| mesh.positions[v as usize].x < 2.5 * cell).collect();
         let fabric = Fabric { bending_friction_n: [moment; 2], ..fabric(density, 2000.0, 0.0, bending, 0.0) };
-        let cloth =
+        let mut cloth =
             Cloth::new(&mesh, &Topology::new(&mesh), &RestShape::from_edges(&mesh).unwrap(), &fabric, &held).unwrap();
-        let options = RefineOptions { tolerance: 1e-6, soft_strain: 0.0, ..RefineOptions::default() };
-        let end = refine_with(&cloth, Contacts::none(), mesh.positions, &options, &mut |_| ControlFlow::Continue(()));
+        (cloth.solver.newton.tolerance, cloth.solver.softening.strain) = (1e-6, 0.0);
+        let end = refine_with(&cloth, Contacts::none(), mesh.positions, &RefineOptions::default(), &mut |_| {
+            ControlFlow::Continue(())
+        });
         let end = end.unwrap();
         let (sag, expected) = (-end.positions.last().unwrap().z, with_friction(weight, length, bending, moment));
         assert!((sag / expected - 1.0).abs() < 0.02, "HB {share}: {sag} m for {expected} m, {} steps", end.steps);

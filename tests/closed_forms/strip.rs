@@ -16,11 +16,12 @@ fn elongation_ratio(across: usize, stretch: f64) -> f64 {
     let mesh = rectangle(DVec3::X * 0.1, DVec3::NEG_Z * length, across, 6 * across);
     let held: Vec<u32> = (0..=across as u32).collect();
     let fabric = fabric(density, stretch, 0.3, 1e-5, 0.0);
-    let cloth =
+    let mut cloth =
         Cloth::new(&mesh, &Topology::new(&mesh), &RestShape::from_edges(&mesh).unwrap(), &fabric, &held).unwrap();
-    let options = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
-    let end =
-        refine_with(&cloth, Contacts::none(), mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(()));
+    cloth.solver.newton.tolerance = 1e-6;
+    let end = refine_with(&cloth, Contacts::none(), mesh.positions.clone(), &RefineOptions::default(), &mut |_| {
+        ControlFlow::Continue(())
+    });
     let end = end.unwrap();
     assert_eq!(end.stop, Stop::Converged, "residual {:e}", end.residual_over_weight);
     let same = |w: &&[Record]| w[0].softened == w[1].softened;
@@ -41,10 +42,11 @@ fn a_strip_of_two_fabrics_stretches_as_the_sum_of_their_closed_forms() {
     let held: Vec<u32> = (0..=across as u32).collect();
     for [(d1, k1), (d2, k2)] in [[(0.2, 60.0), (0.4, 600.0)], [(0.45, 3000.0), (0.15, 40.0)]] {
         let fabrics = [fabric(d1, k1, 0.0, 1e-5, 0.0), fabric(d2, k2, 0.0, 1e-5, 0.0)];
-        let cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabrics[..], &held).unwrap();
-        let options = RefineOptions { tolerance: 1e-6, ..RefineOptions::default() };
-        let end =
-            refine_with(&cloth, Contacts::none(), mesh.positions.clone(), &options, &mut |_| ControlFlow::Continue(()));
+        let mut cloth = Cloth::new(&mesh, &Topology::new(&mesh), &rest, &fabrics[..], &held).unwrap();
+        cloth.solver.newton.tolerance = 1e-6;
+        let end = refine_with(&cloth, Contacts::none(), mesh.positions.clone(), &RefineOptions::default(), &mut |_| {
+            ControlFlow::Continue(())
+        });
         let end = end.unwrap();
         assert_eq!(end.stop, Stop::Converged, "residual {:e}", end.residual_over_weight);
         let hem = &end.positions[end.positions.len() - across - 1..];

@@ -43,6 +43,16 @@ fn a_mistyped_name_is_answered_by_the_one_that_is_like_it() {
 }
 
 #[test]
+fn options_of_the_solver_are_set_by_name_and_unknown_ones_refused() {
+    let bench = Bench::new();
+    let one = bench.drape(&["--no-save", "--format", "json", "--solver", "newton.max-steps=1"]);
+    assert_eq!(json(&one)["refine_steps"], 1, "{}", stderr(&one));
+    bench.refuses(&["--solver", "newton.dampin=3"], &["newton.dampin", "newton.damping,"]);
+    bench.refuses(&["--solver", "newton.damping=-1"], &["newton.damping", "0 to 1e9"]);
+    bench.refuses(&["--method", "zhu2016", "--no-save", "--solver", "newton.damping=1"], &["--solver", "two-stage"]);
+}
+
+#[test]
 fn the_recording_of_an_earlier_run_is_replaced_with_a_word() {
     let bench = Bench::new();
     let preview = ["--refine", "0"];

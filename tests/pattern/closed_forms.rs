@@ -6,6 +6,7 @@ use partwise::garment::fabric::Fabric;
 use partwise::garment::pattern::{SewingPattern, SewnGarment, sew};
 use partwise::mechanics::energy::{Cloth, Contacts};
 use partwise::mechanics::refine::{RefineOptions, refine_with};
+use partwise::mechanics::solver_options::NewtonOptions;
 use partwise::mesh::Topology;
 use serde_json::{Value, json};
 
@@ -19,7 +20,7 @@ fn relaxed(sewn: &SewnGarment, tolerance: f64) -> (Vec<DVec3>, f64) {
     // Bending as of paper, isotropic, because a cone of anisotropic cloth is not round.
     fabric.bending_nm = [100.0 * fabric.bending_nm[1]; 3];
     let topology = Topology::new(&sewn.mesh);
-    let cloth = Cloth::new(&sewn.mesh, &topology, &sewn.rest, &fabric, &[]).unwrap();
+    let mut cloth = Cloth::new(&sewn.mesh, &topology, &sewn.rest, &fabric, &[]).unwrap();
     // A plane piece is an unstable equilibrium, so the start is perturbed deterministically.
     let moved = |(i, x): (usize, &DVec3)| {
         let wave = |k: f64| 1e-3 * (k * (i as f64 + 1.0)).sin();
@@ -27,14 +28,9 @@ fn relaxed(sewn: &SewnGarment, tolerance: f64) -> (Vec<DVec3>, f64) {
     };
     let start = sewn.mesh.positions.iter().enumerate().map(moved).collect();
     // The criteria of rest are shares of the weight, of which this cloth has next to none.
-    let options = RefineOptions {
-        tolerance,
-        damping: 1e4,
-        max_steps: Some(500),
-        soft_strain: 0.0,
-        lasting: false,
-        ..RefineOptions::default()
-    };
+    cloth.solver.newton = NewtonOptions { tolerance, damping: 1e4, ..NewtonOptions::default() };
+    cloth.solver.softening.strain = 0.0;
+    let options = RefineOptions { max_steps: Some(500), lasting: false, ..RefineOptions::default() };
     let rested =
         refine_with(&cloth, Contacts::none(), start, &options, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
     assert_eq!(rested.stop, partwise::mechanics::refine::Stop::Converged, "{:e}", rested.residual_over_weight);

@@ -34,6 +34,7 @@ use crate::GRAVITY;
 use crate::base::simd::{Four, Lanes, Work, run};
 use crate::body::distance::Body;
 use crate::garment::fabric::{Fabric, at_vertices};
+use crate::mechanics::solver_options::SolverOptions;
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that compresses half the thickness of the cloth, Pa. 2 kPa is the pressure of a tight elastic garment (compression
@@ -134,6 +135,8 @@ pub struct Cloth {
     pub triangles: Arc<Vec<Triangle>>,
     /// The bending elements.
     pub(crate) bending: Arc<Bending>,
+    /// Options of the solver that brings it to rest.
+    pub solver: SolverOptions,
     /// Membrane stiffness of each fabric.
     stiffness: Vec<Stiffness>,
     /// The triangles by fours, and their compression ratios.
@@ -221,6 +224,7 @@ impl Cloth {
             fabrics: Arc::new(fabrics.to_vec()),
             triangles: Arc::new(triangles),
             bending: Arc::new(bending),
+            solver: SolverOptions::default(),
             stiffness: fabrics.iter().map(Stiffness::new).collect(),
             clear: Arc::clone(&placed),
             placed,
@@ -265,6 +269,12 @@ impl Cloth {
         Some(Self { stiffness, ..self.clone() })
     }
 
+    /// The same cloth with these options of the solver.
+    #[must_use]
+    pub fn with_solver(self, solver: SolverOptions) -> Self {
+        Self { solver, ..self }
+    }
+
     /// The same cloth with `x` (m) in place of the placement as the positions that an intersecting start returns to.
     #[must_use]
     pub(crate) fn clear_at(self, x: Vec<DVec3>) -> Self {
@@ -288,12 +298,24 @@ impl Cloth {
         &self.stiffness[triangle.fabric as usize]
     }
 
+    /// Contact places within its triangles, none yet.
+    pub(crate) fn face_contacts(&self) -> FaceContacts {
+        FaceContacts::new(Arc::clone(&self.triangles), Arc::clone(&self.thickness), self.solver.face_contact)
+    }
+
     /// Contacts of this cloth with a body, before the first update.
     pub(crate) fn new_contacts<'b>(&self, body: &'b Body) -> Contacts<'b> {
         let friction = Friction::new(Arc::clone(&self.friction));
-        let face_contacts = FaceContacts::new(Arc::clone(&self.triangles), Arc::clone(&self.thickness));
         let stiffness = self.contact_stiffness();
-        Contacts::new(body, [&self.areas, &self.offsets], &self.held, stiffness, friction, face_contacts)
+        Contacts::new(
+            body,
+            [&self.areas, &self.offsets],
+            &self.held,
+            stiffness,
+            friction,
+            self.face_contacts(),
+            self.solver.body_contact,
+        )
     }
 
     /// Contacts of this cloth with a body at `x`, friction anchored at the points of contact.
@@ -331,7 +353,7 @@ impl Cloth {
     pub fn proximity(&self) -> Proximity {
         let surface = self.surface.get_or_init(|| Arc::new(Surface::new(&self.triangles, self.vertex_count())));
         let of_vertices = [&self.thickness, &self.friction].map(Arc::clone);
-        Proximity::new(Arc::clone(surface), [&self.placed, &self.clear].map(Arc::clone), of_vertices)
+        Proximity::new(Arc::clone(surface), [&self.placed, &self.clear].map(Arc::clone), of_vertices, &self.solver)
     }
 
     /// E at `x`, J; `contacts` must have been updated at `x`.

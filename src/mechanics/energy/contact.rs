@@ -35,6 +35,7 @@ use super::friction::{Friction, Touch};
 use super::membrane::outer;
 use super::proximity::Proximity;
 use crate::body::distance::{Body, pull_off_protrusions};
+use crate::mechanics::solver_options::BodyContactOptions;
 use crate::mesh::TriMesh;
 use crate::mesh::self_intersection::crossing_pairs;
 
@@ -43,12 +44,6 @@ const PLANE_RADIUS_M: f64 = 2e-3;
 
 /// Least number of vertices a thread filters: the filter is one comparison a vertex.
 const MIN_VERTICES_PER_TASK: usize = 8192;
-
-/// Factor on κ where a contact is pressed in. Heuristic.
-const STIFFENING: f64 = 4.0;
-
-/// Times that the cloth is moved off protrusions of the body, at most. Heuristic.
-const MAX_PROTRUSION_FIXES: usize = 3;
 
 /// The body, and the distance that contact takes from it.
 #[derive(Debug, Clone, Default)]
@@ -105,6 +100,7 @@ pub struct Contacts<'b> {
     /// Contact of the cloth with itself, if it is to be considered.
     pub proximity: Option<Proximity>,
     face_contacts: FaceContacts,
+    options: BodyContactOptions,
 }
 
 impl<'b> Contacts<'b> {
@@ -124,6 +120,7 @@ impl<'b> Contacts<'b> {
         stiffness: f64,
         friction: Friction,
         face_contacts: FaceContacts,
+        options: BodyContactOptions,
     ) -> Self {
         let n = areas.len();
         Self {
@@ -139,6 +136,7 @@ impl<'b> Contacts<'b> {
             stiffness,
             friction,
             face_contacts,
+            options,
             ..Self::none()
         }
     }
@@ -302,7 +300,7 @@ impl<'b> Contacts<'b> {
             self.store_query(v, x[v], rounded);
         }
         if found.iter().any(|penetration| penetration.rounded <= 0.0) {
-            self.stiffen(STIFFENING);
+            self.stiffen(self.options.stiffening);
         }
         !found.is_empty()
     }
@@ -328,7 +326,7 @@ impl<'b> Contacts<'b> {
         let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return FaceUpdate::Unchanged };
         let garment = self.garment(std::mem::take(x));
         let pairs = crossing_pairs(&garment, body.mesh());
-        if !pairs.is_empty() && self.face_contacts.protrusions < MAX_PROTRUSION_FIXES {
+        if !pairs.is_empty() && self.face_contacts.protrusions < self.options.max_protrusion_fixes {
             self.face_contacts.protrusions += 1;
             let moved = pull_off_protrusions(body, &garment, &self.held);
             let proximity = self.proximity.as_mut();

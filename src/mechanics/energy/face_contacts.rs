@@ -19,33 +19,12 @@ use glam::DVec3;
 use super::membrane::Triangle;
 use super::proximity::gap::{Gap, Key, Kind};
 use crate::body::distance::{Body, OUTWARD, SurfacePoint};
+use crate::mechanics::solver_options::FaceContactOptions;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{NONE, TriMesh, lattice};
 
-/// Amount by which the offset of a place is raised at a time, m. Heuristic.
-const OFFSET_STEP_M: f64 = 3e-4;
-/// Largest total amount by which the offset of a place is raised, m. Heuristic.
-const MAX_OFFSET_RAISE_M: f64 = 4e-3;
-
 /// Pressure that compresses half the offset, Pa: the value used for contact at vertices.
 const HALF_OFFSET_PRESSURE: f64 = 2000.0;
-
-/// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
-const MIN_OFFSET_M: f64 = 6e-4;
-
-/// Deepest penetration that is pushed out, m. Contact at vertices may start too late by the sag of a triangle, not by more.
-const MAX_DEPTH_M: f64 = 0.015;
-
-/// Most places that are added to a triangle at a time. Heuristic.
-const MAX_NEW_PLACES: usize = 6;
-/// Least distance between places that are added at a time, in longest sides of the triangle. Heuristic.
-const MIN_SPACING: f64 = 0.2;
-
-/// Share of its offset below which the distance of a place makes it a contact. Heuristic.
-const NEAR_SHARE: f64 = 0.5;
-
-/// Updates without fewer intersections after which the intersecting triangles are released. Heuristic.
-const MAX_IDLE_UPDATES: usize = 3;
 
 /// A contact place within a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,10 +45,10 @@ impl Place {
     }
 
     /// The gap to the body with this number; `None` where the way out of the body does not lead out of the cloth.
-    fn gap(&self, number: u32, body: &Body, x: &[DVec3]) -> Option<Gap> {
+    fn gap(&self, number: u32, body: &Body, x: &[DVec3], max_depth_m: f64) -> Option<Gap> {
         let ([a, b, c], [s, t, u]) = (self.corners, self.shares);
         let nearest = body.nearest(self.at(x));
-        if !self.leads_out(&nearest, x) {
+        if !self.leads_out(&nearest, x, max_depth_m) {
             return None;
         }
         let key = Key { kind: Kind::Body, vertices: [a, b, c, NONE, NONE], place: number };
@@ -79,17 +58,17 @@ impl Place {
     }
 
     /// Whether the way to the nearest point of the body leads to the outer side of the cloth, which is wound outward.
-    fn leads_out(&self, nearest: &SurfacePoint, x: &[DVec3]) -> bool {
+    fn leads_out(&self, nearest: &SurfacePoint, x: &[DVec3], max_depth_m: f64) -> bool {
         let [a, b, c] = self.corners.map(|v| x[v as usize]);
         let out = (b - a).cross(c - a).normalize_or_zero();
-        nearest.signed_distance >= 0.0 || nearest.signed_distance > -MAX_DEPTH_M && nearest.normal.dot(out) > OUTWARD
+        nearest.signed_distance >= 0.0 || nearest.signed_distance > -max_depth_m && nearest.normal.dot(out) > OUTWARD
     }
 }
 
 /// Distance that places of a triangle keep from the body, m: the thickness of the cloth (m) there.
-fn place_offset(thickness: &[f64], triangle: &Triangle) -> f64 {
+fn place_offset(thickness: &[f64], triangle: &Triangle, options: &FaceContactOptions) -> f64 {
     let mean = triangle.vertices.iter().map(|&v| thickness[v as usize]).sum::<f64>() / 3.0;
-    mean.max(MIN_OFFSET_M)
+    mean.max(options.min_offset_m)
 }
 
 /// A point inside a triangle that touches the body.
@@ -99,44 +78,6 @@ pub(crate) struct TouchingPlace {
     pub(crate) shares: [f64; 3],
     /// Outward normal of the body.
     pub(crate) normal: DVec3,
-}
-
-/// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. Where the body rises between the points,
-/// the solver raises their offset until it no longer crosses the triangle: the points of a triangle that itself is within `margin` of its
-/// offset therefore touch from up to [`MAX_OFFSET_RAISE_M`] farther. The distance to the body is Lipschitz with constant one, so the
-/// distances of the corners exclude most points without a query.
-pub(crate) fn touching_places(
-    triangles: &[Triangle],
-    thickness: &[f64],
-    body: &Body,
-    x: &[DVec3],
-    margin: f64,
-) -> Vec<TouchingPlace> {
-    let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
-    let reach = |t: &Triangle| place_offset(thickness, t) + margin;
-    let mut candidates: Vec<(usize, [f64; 3], DVec3)> = Vec::new();
-    for (number, t) in triangles.iter().enumerate() {
-        let farthest = reach(t) + MAX_OFFSET_RAISE_M;
-        let corners = t.vertices.map(|v| x[v as usize]);
-        let clear = |at: DVec3| {
-            t.vertices.iter().zip(corners).any(|(&v, corner)| distances[v as usize] - corner.distance(at) > farthest)
-        };
-        let all = lattice::lattice(t.longest_side_m()).map(|shares| (number, shares, lattice::place(corners, shares)));
-        candidates.extend(all.filter(|(_, _, at)| !clear(*at)));
-    }
-    let found = body.nearest_all(&candidates.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
-    let all: Vec<_> = candidates.iter().map(|(t, shares, _)| (*t, *shares)).zip(found).collect();
-    let near = near_triangles(triangles, body, x, &all, reach);
-    let touches = |((t, _), nearest): &((usize, _), SurfacePoint)| {
-        let raise = if near[*t] { MAX_OFFSET_RAISE_M } else { 0.0 };
-        nearest.signed_distance < reach(&triangles[*t]) + raise
-    };
-    let place = |((t, shares), nearest): ((usize, _), SurfacePoint)| TouchingPlace {
-        corners: triangles[t].vertices,
-        shares,
-        normal: nearest.normal,
-    };
-    all.into_iter().filter(touches).map(place).collect()
 }
 
 /// Which triangles cross the body, or would if they were moved to it by their `reach` (m) from the deepest of these places.
@@ -170,10 +111,11 @@ fn near_triangles(
 
 /// The contact places of a cloth, and the state of the updates so far.
 #[derive(Debug, Clone, Default)]
-pub(super) struct FaceContacts {
+pub(crate) struct FaceContacts {
     pub(super) triangles: Arc<Vec<Triangle>>,
     /// Thickness of the cloth at each vertex, m.
     thickness: Arc<Vec<f64>>,
+    options: FaceContactOptions,
     pub(super) places: Vec<Place>,
     fewest: Option<usize>,
     idle: usize,
@@ -184,15 +126,52 @@ pub(super) struct FaceContacts {
 }
 
 impl FaceContacts {
-    pub(super) fn new(triangles: Arc<Vec<Triangle>>, thickness: Arc<Vec<f64>>) -> Self {
-        Self { triangles, thickness, ..Self::default() }
+    pub(super) fn new(triangles: Arc<Vec<Triangle>>, thickness: Arc<Vec<f64>>, options: FaceContactOptions) -> Self {
+        Self { triangles, thickness, options, ..Self::default() }
+    }
+
+    /// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. Where the body rises between the points,
+    /// the solver raises their offset until it no longer crosses the triangle: the points of a triangle that itself is within `margin` of its
+    /// offset therefore touch from up to `max_offset_raise_m` farther. The distance to the body is Lipschitz with constant one, so the
+    /// distances of the corners exclude most points without a query.
+    pub(crate) fn touching_places(&self, body: &Body, x: &[DVec3], margin: f64) -> Vec<TouchingPlace> {
+        let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
+        let (triangles, options) = (&*self.triangles, &self.options);
+        let reach = |t: &Triangle| place_offset(&self.thickness, t, options) + margin;
+        let mut candidates: Vec<(usize, [f64; 3], DVec3)> = Vec::new();
+        for (number, t) in triangles.iter().enumerate() {
+            let farthest = reach(t) + options.max_offset_raise_m;
+            let corners = t.vertices.map(|v| x[v as usize]);
+            let clear = |at: DVec3| {
+                t.vertices
+                    .iter()
+                    .zip(corners)
+                    .any(|(&v, corner)| distances[v as usize] - corner.distance(at) > farthest)
+            };
+            let all =
+                lattice::lattice(t.longest_side_m()).map(|shares| (number, shares, lattice::place(corners, shares)));
+            candidates.extend(all.filter(|(_, _, at)| !clear(*at)));
+        }
+        let found = body.nearest_all(&candidates.iter().map(|(_, _, at)| *at).collect::<Vec<_>>());
+        let all: Vec<_> = candidates.iter().map(|(t, shares, _)| (*t, *shares)).zip(found).collect();
+        let near = near_triangles(triangles, body, x, &all, reach);
+        let touches = |((t, _), nearest): &((usize, _), SurfacePoint)| {
+            let raise = if near[*t] { options.max_offset_raise_m } else { 0.0 };
+            nearest.signed_distance < reach(&triangles[*t]) + raise
+        };
+        let place = |((t, shares), nearest): ((usize, _), SurfacePoint)| TouchingPlace {
+            corners: triangles[t].vertices,
+            shares,
+            normal: nearest.normal,
+        };
+        all.into_iter().filter(touches).map(place).collect()
     }
 
     /// The gaps to `body` at `x` (m).
     pub(super) fn gaps(&self, body: Option<&Body>, x: &[DVec3]) -> Vec<Gap> {
         let Some(body) = body else { return Vec::new() };
         let active = (0..).zip(&self.places).filter(|(_, place)| place.stiffness > 0.0);
-        active.filter_map(|(number, place)| place.gap(number, body, x)).collect()
+        active.filter_map(|(number, place)| place.gap(number, body, x, self.options.max_depth_m)).collect()
     }
 
     /// Updates the places about these `pairs` of triangles of cloth and body that intersect. Returns how many places were added, raised or
@@ -208,7 +187,7 @@ impl FaceContacts {
         let mut intersects = vec![false; triangles.len()];
         pairs.iter().for_each(|[t, _]| intersects[*t as usize] = true);
         let intersecting = || triangles.iter().zip(&intersects).filter(|(_, intersects)| **intersects).map(|(t, _)| t);
-        if self.idle >= MAX_IDLE_UPDATES {
+        if self.idle >= self.options.max_idle_updates {
             self.closed = true;
             let tight: Vec<[u32; 3]> = intersecting().map(|t| t.vertices).collect();
             let released = self.places.iter_mut().filter(|place| tight.contains(&place.corners));
@@ -228,25 +207,26 @@ impl FaceContacts {
     /// Adds the points of a triangle that are deepest in the body; returns how many.
     pub(super) fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], intersects: bool) -> usize {
         let (corners, longest) = (triangle.vertices, triangle.longest_side_m());
-        let offset = place_offset(&self.thickness, triangle);
+        let options = self.options;
+        let offset = place_offset(&self.thickness, triangle, &options);
         let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
         let all: Vec<Place> =
             lattice::lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
         let found = body.nearest_all(&at);
-        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x));
+        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x, options.max_depth_m));
         let mut deepest: Vec<(f64, usize)> = out.map(|(nearest, i)| (nearest.signed_distance, i)).collect();
         deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
         let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added: Vec<DVec3> = Vec::new();
         for (distance, i) in deepest {
             let first = intersects && added.is_empty() && distance < offset;
-            let wanted = first || distance < NEAR_SHARE * offset;
-            if !wanted || added.len() == MAX_NEW_PLACES {
+            let wanted = first || distance < options.near_share * offset;
+            if !wanted || added.len() == options.max_new_places {
                 break;
             }
             let is_new = present.iter().all(|p| p.shares != all[i].shares);
-            if is_new && added.iter().all(|p| p.distance(at[i]) > MIN_SPACING * longest) {
+            if is_new && added.iter().all(|p| p.distance(at[i]) > options.min_spacing * longest) {
                 added.push(at[i]);
                 self.places.push(all[i]);
             }
@@ -256,9 +236,9 @@ impl FaceContacts {
 
     /// Raises the offset of the places of a triangle; returns how many.
     fn raise(&mut self, triangle: &Triangle) -> usize {
-        let max = place_offset(&self.thickness, triangle) + MAX_OFFSET_RAISE_M;
+        let max = place_offset(&self.thickness, triangle, &self.options) + self.options.max_offset_raise_m;
         let raised = self.places.iter_mut().filter(|p| p.corners == triangle.vertices && p.offset < max);
-        raised.map(|place| place.offset += OFFSET_STEP_M).count()
+        raised.map(|place| place.offset += self.options.offset_step_m).count()
     }
 }
 
@@ -346,7 +326,8 @@ mod tests {
         let (mut contacts, _) = slipped(&cloth, &body, x.clone());
         // The cloth does not move, so no update reduces the intersections.
         let updates = (0..200).take_while(|_| contacts.update_face_contacts(&mut x) != FaceUpdate::Unchanged).count();
-        assert!((MAX_IDLE_UPDATES - 1..200).contains(&updates), "{updates}");
+        let least = FaceContactOptions::default().max_idle_updates - 1;
+        assert!((least..200).contains(&updates), "{updates}");
         contacts.refresh(&x);
         assert_eq!(contacts.proximity.as_ref().unwrap().pressing(&x), 0);
     }

@@ -32,7 +32,6 @@ pub(crate) use cloth::ContactBlock;
 pub use cloth::{Cloth, EnergyError, Scratch};
 pub use contact::Contacts;
 pub(crate) use contact::FaceUpdate;
-pub(crate) use face_contacts::touching_places;
 pub use friction::{Friction, Touch};
 pub(crate) use membrane::HessianKind;
 pub use proximity::Proximity;

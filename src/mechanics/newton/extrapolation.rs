@@ -17,12 +17,6 @@ use glam::DVec3;
 
 use crate::mechanics::linear_algebra::{dot, norm};
 
-/// Cosine with the previous step above which a step continues it. Heuristic.
-const CONTINUES_COSINE: f64 = 0.8;
-
-/// Cosine below minus this value with which a step opposes the previous one. Heuristic.
-const OPPOSES_COSINE: f64 = 0.3;
-
 /// The last step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Extrapolation {
@@ -35,12 +29,13 @@ pub(super) struct Extrapolation {
 }
 
 impl Extrapolation {
-    /// The factor on `step` that is tried first, between 1 and `max`.
-    pub(super) fn factor(&self, step: &[DVec3], max: f64) -> f64 {
+    /// The factor on `step` that is tried first, between 1 and `max`. A step continues the previous one if the cosine between them is larger
+    /// than `continues_cosine`.
+    pub(super) fn factor(&self, step: &[DVec3], max: f64, continues_cosine: f64) -> f64 {
         let (now, before) = (norm(step), norm(&self.step));
         let along = dot(step, &self.step);
         // NaN where there is no previous step.
-        if along.is_nan() || along <= CONTINUES_COSINE * now * before {
+        if along.is_nan() || along <= continues_cosine * now * before {
             return 1.0;
         }
         let rho = along / (before * before);
@@ -54,9 +49,9 @@ impl Extrapolation {
         self.taken = taken;
     }
 
-    /// Stores the displacement of a step; returns whether it opposes the previous one (negative inner product).
-    pub(super) fn opposes(&mut self, moved: Vec<DVec3>) -> bool {
-        let opposes = dot(&moved, &self.moved) < -OPPOSES_COSINE * norm(&moved) * norm(&self.moved);
+    /// Stores the displacement of a step; returns whether it opposes the previous one, with a cosine below −`opposes_cosine`.
+    pub(super) fn opposes(&mut self, moved: Vec<DVec3>, opposes_cosine: f64) -> bool {
+        let opposes = dot(&moved, &self.moved) < -opposes_cosine * norm(&moved) * norm(&self.moved);
         self.moved = moved;
         opposes
     }
@@ -77,7 +72,7 @@ mod tests {
         let (mut x, mut extrapolation) = (0.0, Extrapolation::default());
         for left in [0.375, 0.0] {
             let step = [DVec3::X * ((1.0 - x) / 1.6)];
-            let factor = extrapolation.factor(&step, 2.0);
+            let factor = extrapolation.factor(&step, 2.0, 0.8);
             x += step[0].x * factor;
             extrapolation.store_step(&step, factor);
             assert!((1.0 - x - left).abs() < 1e-12, "{x}");
@@ -87,13 +82,13 @@ mod tests {
     #[test]
     fn steps_that_turn_or_shrink_are_not_extrapolated() {
         let mut extrapolation = Extrapolation::default();
-        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0), 1.0);
+        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0, 0.8), 1.0);
         extrapolation.store_step(&[DVec3::X], 1.0);
-        assert_eq!(extrapolation.factor(&[DVec3::Y], 2.0), 1.0);
-        assert_eq!(extrapolation.factor(&[DVec3::X * 1.1], 2.0), 2.0);
-        assert!((extrapolation.factor(&[DVec3::X * 0.25], 2.0) - 4.0 / 3.0).abs() < 1e-12);
+        assert_eq!(extrapolation.factor(&[DVec3::Y], 2.0, 0.8), 1.0);
+        assert_eq!(extrapolation.factor(&[DVec3::X * 1.1], 2.0, 0.8), 2.0);
+        assert!((extrapolation.factor(&[DVec3::X * 0.25], 2.0, 0.8) - 4.0 / 3.0).abs() < 1e-12);
         extrapolation.reset();
-        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0), 1.0);
-        assert!(!extrapolation.opposes(vec![DVec3::X]) && extrapolation.opposes(vec![DVec3::NEG_X]));
+        assert_eq!(extrapolation.factor(&[DVec3::X], 2.0, 0.8), 1.0);
+        assert!(!extrapolation.opposes(vec![DVec3::X], 0.3) && extrapolation.opposes(vec![DVec3::NEG_X], 0.3));
     }
 }

@@ -9,9 +9,6 @@ use super::factor::SolveError;
 use super::solver::Solver;
 use crate::mechanics::energy::{Cloth, Contacts, HessianKind, HessianLayout};
 
-/// Most steps with the projected Hessian after one whose true Hessian was indefinite.
-const MAX_PROJECTED_STEPS: usize = 4;
-
 /// The inputs of a Newton step.
 pub(crate) struct State<'a> {
     pub(crate) cloth: &'a Cloth,
@@ -77,11 +74,12 @@ impl FullSpace {
         own: &mut Vec<DMat3>,
     ) -> Result<(), SolveError> {
         let State { cloth, x, .. } = *here;
+        let max_projected = cloth.solver.newton.max_projected_steps.max(1);
         self.couple(here);
         let mut solved = false;
         if self.projected_left == 0 {
             solved = self.solve(here, HessianKind::True).is_ok();
-            self.projected_steps = if solved { 0 } else { (2 * self.projected_steps).clamp(1, MAX_PROJECTED_STEPS) };
+            self.projected_steps = if solved { 0 } else { (2 * self.projected_steps).clamp(1, max_projected) };
             self.projected_left = self.projected_steps;
         }
         self.is_true = solved;
@@ -103,8 +101,8 @@ impl FullSpace {
     }
 
     /// After a rejected step: switches to the projected Hessian; returns whether the step had the true one.
-    pub(crate) fn fall_back(&mut self) -> bool {
-        self.projected_left = MAX_PROJECTED_STEPS;
+    pub(crate) fn fall_back(&mut self, cloth: &Cloth) -> bool {
+        self.projected_left = cloth.solver.newton.max_projected_steps.max(1);
         std::mem::take(&mut self.is_true)
     }
 }

@@ -33,5 +33,5 @@ pub use factor::SolveError;
 pub(crate) use full_space::FullSpace;
 pub(crate) use saddle_escape::{RestCheck, check_rest};
 pub use solver::Solver;
+pub(crate) use state::NewtonState;
 pub use state::Record;
-pub(crate) use state::{NewtonState, StepLimits};

@@ -24,12 +24,6 @@ use super::vectors::{self, MEMORY, Pair};
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};
 
-/// Longest move of a vertex in one iteration, m: a fraction of a triangle.
-const MAX_MOVE_M: f64 = 3e-3;
-
-/// γ of the first iteration: neighbours pull as much as a vertex itself.
-const FIRST_SCALE: f64 = 0.3;
-
 /// The share of the predicted decrease that an iteration must bring.
 const ARMIJO: f64 = 1e-4;
 
@@ -84,11 +78,12 @@ impl Relaxation {
             self.inverse.set(v as usize, before);
             self.known[v as usize] = false;
         }
-        let mut scale = FIRST_SCALE;
+        let options = cloth.solver.relaxation;
+        let mut scale = options.first_scale;
         for _ in 0..iterations {
             self.touch(contacts);
             let [slope, longest] = vectors::turn(&self.pairs, &self.inverse, scale, &self.down, &mut self.direction);
-            let mut t = (MAX_MOVE_M / longest).min(1.0);
+            let mut t = (options.longest_move_m / longest).min(1.0);
             loop {
                 self.direction.added_to(x, t, &mut self.trial);
                 contacts.update(&self.trial);

@@ -16,10 +16,6 @@ use crate::mechanics::energy::StepCheck;
 use crate::mechanics::reactions::Forces;
 use crate::mechanics::rest::{Criterion, Linearised};
 
-/// Shortest and longest move of a vertex along an unstable direction, m: a wrinkle buckles by tenths of a millimetre, a skirt swings by
-/// centimetres.
-const ESCAPE_RANGE_M: [f64; 2] = [2e-5, 0.03];
-
 /// Result of a check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum RestCheck {
@@ -32,12 +28,8 @@ pub(crate) enum RestCheck {
 }
 
 /// Checks the equilibrium of `state`. Unstable modes are searched if all else passes, or in any case if `always_search`. The cloth leaves an
-/// unstable equilibrium, with this many iterations of relaxation.
-pub(crate) fn check_rest(
-    state: &mut NewtonState<'_, '_>,
-    always_search: bool,
-    relaxing: usize,
-) -> Result<RestCheck, SolveError> {
+/// unstable equilibrium and is relaxed.
+pub(crate) fn check_rest(state: &mut NewtonState<'_, '_>, always_search: bool) -> Result<RestCheck, SolveError> {
     let first_failed = |criteria: &[Criterion]| criteria.iter().find(|criterion| !criterion.passes).copied();
     let forces = Forces::on(state.cloth, state.contacts.body(), &state.x);
     let unbalanced = first_failed(&Criterion::of_forces(&forces, state.cloth));
@@ -51,14 +43,14 @@ pub(crate) fn check_rest(
     }
     let curvature = linearised.curvature();
     let stable = Criterion::of_curvature(&curvature);
-    if !stable.passes && escape(state, &curvature.modes, relaxing) {
+    if !stable.passes && escape(state, &curvature.modes) {
         return Ok(RestCheck::Escaped);
     }
     Ok(failed.or(first_failed(&[stable])).map_or(RestCheck::Rests, RestCheck::Fails))
 }
 
 /// Moves along each of these directions; returns whether the energy decreased along one.
-fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>], relaxing: usize) -> bool {
+fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>]) -> bool {
     let mut escaped = false;
     for direction in directions {
         let [one, other] = [1.0, -1.0].map(|side| lowest_along(state, direction, side));
@@ -75,7 +67,7 @@ fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>], relaxing: 
     if escaped {
         state.contacts.refresh(&state.x);
         state.extrapolation.reset();
-        state.relax(relaxing, || ());
+        state.relax(|| ());
     }
     escaped
 }
@@ -83,8 +75,9 @@ fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>], relaxing: 
 /// The lowest energy (J) at 1, 2, 4, ... times the shortest move to one side, as long as it falls, and its step length.
 fn lowest_along(state: &mut NewtonState<'_, '_>, direction: &[DVec3], side: f64) -> (f64, f64) {
     let NewtonState { cloth, contacts, x, trial, trial_gradient, scratch, energy, .. } = state;
+    let range = cloth.solver.rest_check;
     let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
-    let [mut far, limit] = ESCAPE_RANGE_M;
+    let (mut far, limit) = (range.shortest_escape_m, range.longest_escape_m);
     let mut best = (*energy, 0.0);
     while far < limit {
         let t = side * far / longest;

@@ -8,30 +8,13 @@ use super::full_space::{FullSpace, State};
 use super::relax::Relaxation;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch, StepCheck};
 use crate::mechanics::linear_algebra::{dot, norm};
+use crate::mechanics::solver_options::SolverOptions;
 
 /// Armijo's constant: the share of the predicted decrease that a step must bring.
 const ARMIJO: f64 = 1e-4;
 
 /// Step length below which the line search ends: rounding.
 const MIN_STEP_LENGTH: f64 = 1e-6;
-
-/// Most trials of a line search that are relaxed. Heuristic.
-const MAX_RELAXED_TRIALS: usize = 2;
-
-/// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that starts
-/// far from its rest shape is moved as far by its relaxation however short the step.
-const MAX_REJECTED_RELAXATIONS: usize = 8;
-
-/// Limits of a step and of its relaxations.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct StepLimits {
-    /// Longest move of a vertex in one step, m.
-    pub(crate) longest_move_m: f64,
-    /// Iterations of a relaxation after a step.
-    pub(crate) relaxing: usize,
-    /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation.
-    pub(crate) relaxing_trial: usize,
-}
 
 /// Result of an iteration.
 #[derive(Debug, Clone, Copy)]
@@ -128,11 +111,12 @@ impl<'c, 'b> NewtonState<'c, 'b> {
     }
 
     /// Relaxes the start itself, `beside` something else, by a Hessian's own blocks.
-    pub(crate) fn relax<T: Send>(&mut self, iterations: usize, beside: impl FnOnce() -> T + Send) -> T {
+    pub(crate) fn relax<T: Send>(&mut self, beside: impl FnOnce() -> T + Send) -> T {
         self.cloth.diagonal_blocks(&self.x, &self.contacts, self.damping, &mut self.blocks);
         self.relaxation.prepare(self.cloth, &self.contacts, &self.blocks);
         let Self { cloth, contacts, x, relaxation, trial, .. } = self;
         trial.clone_from(x);
+        let iterations = cloth.solver.relaxation.iterations;
         let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
         match contacts.proximity.as_mut().map(|p| p.check_step(trial, x)) {
             None | Some(StepCheck::Clear) => {}
@@ -148,7 +132,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
     }
 
     /// One iteration. The damping is the caller's to change afterwards.
-    pub(crate) fn advance(&mut self, tangent: &mut FullSpace, limits: StepLimits) -> Result<Advance, SolveError> {
+    pub(crate) fn advance(&mut self, tangent: &mut FullSpace) -> Result<Advance, SolveError> {
         let Self { cloth, x, contacts, gradient, direction, blocks, damping, .. } = self;
         tangent.step(&State { cloth, x, contacts, gradient, damping: *damping }, direction, blocks)?;
         let Self {
@@ -168,11 +152,13 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             ..
         } = self;
         let cloth = *cloth;
+        let SolverOptions { newton, relaxation: relaxing, cycles, .. } = &cloth.solver;
         relaxation.prepare(cloth, contacts, &self.blocks);
         let slope = dot(gradient, direction);
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
-        let first = (limits.longest_move_m / longest).min(1.0);
-        let mut t = (first * extrapolation.factor(direction, *max_extrapolation)).min(limits.longest_move_m / longest);
+        let first = (newton.longest_move_m / longest).min(1.0);
+        let mut t = (first * extrapolation.factor(direction, *max_extrapolation, newton.continues_cosine))
+            .min(newton.longest_move_m / longest);
         let (mut relaxed, mut crossed) = (0, 0);
         let accepted = loop {
             trial.clear();
@@ -182,14 +168,14 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound;
             if !falls {
                 relaxed += usize::from(t <= first);
-                falls = relaxed <= MAX_RELAXED_TRIALS
-                    && crossed < MAX_REJECTED_RELAXATIONS
-                    && limits.relaxing_trial > 0
-                    && relaxation.run(cloth, contacts, trial, limits.relaxing_trial) <= bound;
+                falls = relaxed <= relaxing.max_trials
+                    && crossed < relaxing.max_rejected
+                    && relaxing.trial_iterations > 0
+                    && relaxation.run(cloth, contacts, trial, relaxing.trial_iterations) <= bound;
             }
             if falls {
-                if crossed < MAX_REJECTED_RELAXATIONS {
-                    relaxation.run(cloth, contacts, trial, limits.relaxing);
+                if crossed < relaxing.max_rejected {
+                    relaxation.run(cloth, contacts, trial, relaxing.iterations);
                 }
                 if *step_share < 1.0 {
                     trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *step_share));
@@ -216,7 +202,8 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         if accepted {
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
-            opposes = extrapolation.opposes(x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect());
+            let moved = x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect();
+            opposes = extrapolation.opposes(moved, cycles.opposes_cosine);
         } else {
             contacts.update(x);
         }
@@ -227,26 +214,26 @@ impl<'c, 'b> NewtonState<'c, 'b> {
 
     /// [`untangle`](Self::untangle); once more from the clear positions where much more is left than intersects there
     /// ([`Proximity::restart`](crate::mechanics::energy::Proximity)).
-    pub(crate) fn untangle_or_restart(&mut self, rounds: usize, iterations: usize) {
-        self.untangle(rounds, iterations);
+    pub(crate) fn untangle_or_restart(&mut self) {
+        self.untangle();
         let Self { contacts, x, .. } = self;
         if let Some(there) = contacts.proximity.as_mut().and_then(|proximity| proximity.restart(x)) {
             *x = there;
             contacts.update(x);
             contacts.refresh(x);
             self.evaluate();
-            self.untangle(rounds, iterations);
+            self.untangle();
         }
     }
 
-    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in `rounds` relaxations at most. No
-    /// factorisation is needed.
-    pub(crate) fn untangle(&mut self, rounds: usize, iterations: usize) {
-        for _ in 0..rounds {
+    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in a limited number of relaxations. No factorisation
+    /// is needed.
+    pub(crate) fn untangle(&mut self) {
+        for _ in 0..self.cloth.solver.untangling.max_rounds {
             if self.contacts.proximity.as_mut().is_none_or(|proximity| proximity.crossings(&self.x) == 0) {
                 return;
             }
-            self.relax(iterations, || ());
+            self.relax(|| ());
         }
     }
 

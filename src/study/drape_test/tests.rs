@@ -11,7 +11,7 @@ fn coarse(rows: usize) -> DrapeTest {
 fn falls_inside(band: &Target) {
     let drape = coarse(8).run(&Fabric::by_name(&band.fabric).unwrap()).unwrap();
     let (name, percent, nodes) = (&band.fabric, 100.0 * drape.coefficient, drape.nodes.count);
-    let tolerance = crate::mechanics::refine::RefineOptions::default().tolerance;
+    let tolerance = crate::mechanics::solver_options::NewtonOptions::default().tolerance;
     let residual = drape.residual_over_weight;
     assert!(residual < tolerance, "{name}: residual {residual:e} after {}", drape.steps);
     assert!(percent > band.low_percent && percent < band.high_percent, "{name}: {percent} %");

@@ -154,7 +154,7 @@ fn extents(source: Source<'_>, value: &At) -> Result<Vec<f64>, PlanError> {
 /// The reference of a point, and further keys of its scene that do not name files.
 fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
     let expected = "{ name = value, ... } with accuracy = \"none\", \"canonical\" or \"own\", or a key of the scene such as \
-                    rest = \"texture\", hold, unit, up, weld";
+                    rest = \"texture\", hold, unit, up, weld, or an option of the solver such as \"newton.damping\"";
     let wrong = |what: &str| source.wrong(value, "options", format!("{expected}{what}"));
     let given = value.get_ref().as_table().ok_or_else(|| wrong(""))?.clone();
     let set = move |point: &mut Point| -> Result<(), String> {
@@ -166,6 +166,11 @@ fn options(source: Source<'_>, value: &At) -> Result<Vec<Edit>, PlanError> {
                 "body" | "garment" => return Err("bodies and garments have axes of their own".to_owned()),
                 "rest" | "fabrics" if names_a_file(&text) => return Err("options name no file".to_owned()),
                 "fabrics_file" => return Err("options name no file; put one beside the garment's".to_owned()),
+                name if name.contains('.') => {
+                    let value = number(v).ok_or_else(|| format!("{name}: found {v}, expected a number"))?;
+                    point.job.settings.solver =
+                        point.job.settings.solver.with(name, value).map_err(|e| e.to_string())?;
+                }
                 _ => drop(scene.insert(key.clone(), v.clone())),
             }
             point.options.insert(key.clone(), text);

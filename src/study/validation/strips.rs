@@ -59,9 +59,9 @@ fn rectangle(cell: f64, along: usize, across: usize, at: impl Fn(f64, f64) -> DV
 /// Rests a strip of `mesh` whose first `held` vertices are held; `rest` are its flat triangles.
 fn rested(mesh: TriMesh, rest: &RestShape, fabric: &Fabric, held: usize) -> Result<Vec<DVec3>, ValidationError> {
     let held: Vec<u32> = (0..held as u32).collect();
-    let cloth = Cloth::new(&mesh, &Topology::new(&mesh), rest, fabric, &held)?;
-    let options =
-        RefineOptions { tolerance: TOLERANCE, self_contact: false, soft_strain: 0.0, ..RefineOptions::default() };
+    let mut cloth = Cloth::new(&mesh, &Topology::new(&mesh), rest, fabric, &held)?;
+    (cloth.solver.newton.tolerance, cloth.solver.softening.strain) = (TOLERANCE, 0.0);
+    let options = RefineOptions { self_contact: false, ..RefineOptions::default() };
     let end = refine_with(&cloth, Contacts::none(), mesh.positions, &options, &mut |_| ControlFlow::Continue(()))?;
     Ok(end.positions)
 }

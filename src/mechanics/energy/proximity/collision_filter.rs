@@ -15,26 +15,9 @@ use rayon::prelude::*;
 
 use super::surface::Surface;
 use super::verlet_list::VerletList;
+use crate::mechanics::solver_options::CollisionFilterOptions;
 use crate::mesh::each_once;
 use crate::mesh::self_intersection::cross;
-
-/// Longest move of a step that is cut, in mean edges; a longer step is rejected, because cutting it would tear the cloth. Heuristic.
-const MAX_CUT_MOVE: f64 = 1.0;
-
-/// Spacing of the checks along a step, in mean edges: intersecting parts stay so for about the length of their roundness. Heuristic.
-const CHECK_SPACING: f64 = 2.0;
-
-/// Most stages of a step that are checked, its end included.
-const MAX_STAGES: f64 = 4.0;
-
-/// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. Heuristic.
-const MAX_HALVINGS: usize = 4;
-
-/// Most times that a step is cut. Heuristic.
-const MAX_CUTS: usize = 16;
-
-/// Rings of neighbours about intersecting triangles in which new intersections are allowed. Heuristic.
-const TANGLED_RINGS: usize = 2;
 
 /// Result of the check of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +35,7 @@ pub(crate) enum StepCheck {
 pub(super) struct CollisionFilter {
     surface: Arc<Surface>,
     list: VerletList,
+    options: CollisionFilterOptions,
     /// Pairs of triangles that intersect where the last step ended; `None` before the first.
     crossing: Option<Vec<[u32; 2]>>,
     /// Whether each vertex is near one of these pairs; empty without pairs.
@@ -59,10 +43,9 @@ pub(super) struct CollisionFilter {
 }
 
 impl CollisionFilter {
-    /// A filter with a Verlet list of this `reach`, m.
-    pub(super) fn new(surface: Arc<Surface>, reach: f64) -> Self {
-        let list = VerletList::new(Arc::clone(&surface), reach);
-        Self { surface, list, crossing: None, tangled: Vec::new() }
+    /// A filter that reads the near triangles from this list.
+    pub(super) fn new(surface: Arc<Surface>, list: VerletList, options: CollisionFilterOptions) -> Self {
+        Self { surface, list, options, crossing: None, tangled: Vec::new() }
     }
 
     /// The list of near triangles at `x`, m.
@@ -90,7 +73,7 @@ impl CollisionFilter {
         self.tangled.clear();
         if !crossing.is_empty() {
             self.tangled.resize(self.surface.vertex_areas.len(), false);
-            for v in self.vertices_about(crossing.iter().flatten(), TANGLED_RINGS) {
+            for v in self.vertices_about(crossing.iter().flatten(), self.options.tangled_rings) {
                 self.tangled[v as usize] = true;
             }
         }
@@ -129,7 +112,7 @@ impl CollisionFilter {
     pub(super) fn check(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
         self.current(from);
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.surface.edge_m;
-        let stages = (longest / CHECK_SPACING).ceil().clamp(1.0, MAX_STAGES);
+        let stages = (longest / self.options.check_spacing).ceil().clamp(1.0, self.options.max_stages.max(1.0));
         let mut stage = 1.0;
         while stage < stages {
             let there: Vec<DVec3> = from.iter().zip(&*to).map(|(a, b)| a.lerp(*b, stage / stages)).collect();
@@ -141,17 +124,17 @@ impl CollisionFilter {
         }
         let mut crossing = self.crossing_at(to);
         let mut new = self.new_crossings(&crossing);
-        if !new.is_empty() && longest > MAX_CUT_MOVE {
+        if !new.is_empty() && longest > self.options.max_cut_move {
             return StepCheck::Crosses;
         }
         let mut share = vec![1.0_f64; from.len()];
-        for cut in 0..MAX_CUTS {
+        for cut in 0..self.options.max_cuts {
             if new.is_empty() {
                 break;
             }
-            for v in self.vertices_about(new.iter(), cut.saturating_sub(MAX_HALVINGS)) {
+            for v in self.vertices_about(new.iter(), cut.saturating_sub(self.options.max_halvings)) {
                 let share = &mut share[v as usize];
-                *share = if cut < MAX_HALVINGS { 0.5 * *share } else { 0.0 };
+                *share = if cut < self.options.max_halvings { 0.5 * *share } else { 0.0 };
             }
             let kept: Vec<DVec3> = from.iter().zip(&*to).zip(&share).map(|((a, b), s)| a.lerp(*b, *s)).collect();
             crossing = self.crossing_at(&kept);

@@ -6,9 +6,6 @@ use crate::mechanics::energy::friction::{ELASTIC_SLIP, huber, tangential_stiffne
 use crate::mechanics::energy::membrane::outer;
 use crate::mesh::NONE;
 
-/// Share of its initial stiffness below which a vanishing gap is removed. Heuristic.
-const VANISHED_SHARE: f64 = 1e-3;
-
 /// Identifies a gap across refreshes: the features it connects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Key {
@@ -139,14 +136,15 @@ impl Gap {
     }
 }
 
-/// Adds to `gaps` those of `before` that are no longer found, until their stiffness has vanished.
-pub(super) fn keep_vanishing(before: &[Gap], gaps: &mut Vec<Gap>) {
+/// Adds to `gaps` those of `before` that are no longer found, until their stiffness is below this share of the initial
+/// one.
+pub(super) fn keep_vanishing(before: &[Gap], gaps: &mut Vec<Gap>, vanished_share: f64) {
     let mut now = gaps.iter().map(|gap| gap.key).peekable();
     let mut vanishing = Vec::new();
     for gap in before {
         while now.next_if(|key| *key < gap.key).is_some() {}
         let gone = now.peek() != Some(&gap.key) && gap.key.kind != Kind::Crossing;
-        if gone && gap.stiffness > VANISHED_SHARE * gap.first {
+        if gone && gap.stiffness > vanished_share * gap.first {
             vanishing.push(Gap { vanishing: true, ..*gap });
         }
     }

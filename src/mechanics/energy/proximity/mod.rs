@@ -53,36 +53,21 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::friction::ELASTIC_SLIP;
+use crate::mechanics::solver_options::{SolverOptions, UntanglingOptions};
 use crate::mesh::NONE;
 use collision_filter::CollisionFilter;
 pub(crate) use collision_filter::StepCheck;
 use gap::{Gap, Kind};
 use search::Spacing;
 use surface::Surface;
-
-/// Distance up to which gaps are searched, in offsets: large enough that a step closes no gap which the search missed. Heuristic.
-const SEARCH_REACH: f64 = 2.5;
-
-/// A gap with less than this share of its offset left grows stiffer. Heuristic.
-const NARROW_SHARE: f64 = 0.25;
-
-/// Factor by which a narrow gap grows stiffer at a refresh. Heuristic.
-const STIFFENING: f64 = 2.0;
-
-/// Largest ratio of the stiffness of a gap to its initial one. Heuristic.
-const MAX_STIFFENING: f64 = 64.0;
-
-/// Refreshes without fewer intersections after which no further untangling is attempted. Heuristic.
-const MAX_UNTANGLING_REFRESHES: usize = 40;
+use untangle::Pull;
+use verlet_list::VerletList;
 
 /// Factor by which an intersecting start retreats at a time.
 const RETREAT_FACTOR: f64 = 0.7;
 
 /// Share of the way below which the start retreats to the clear positions.
 const MIN_RETREAT_SHARE: f64 = 0.02;
-
-/// Ratio of intersecting pairs after untangling to those at the clear positions above which the drape restarts from these. Evidence: see above.
-const RESTART_RATIO: usize = 2;
 
 /// The gaps of a cloth with itself.
 #[derive(Debug, Clone)]
@@ -94,6 +79,7 @@ pub struct Proximity {
     friction: Arc<Vec<f64>>,
     gaps: Vec<Gap>,
     filter: CollisionFilter,
+    untangling: UntanglingOptions,
     /// Share of its stiffness that a gap gains or loses at a refresh.
     under_relaxation: f64,
     /// Fewest intersections so far, and the number of refreshes since.
@@ -107,9 +93,13 @@ impl Proximity {
         surface: Arc<Surface>,
         [placed, clear]: [Arc<Vec<DVec3>>; 2],
         [thickness, friction]: [Arc<Vec<f64>>; 2],
+        options: &SolverOptions,
     ) -> Self {
-        let spacing = Spacing::new(thickness, surface.edge_m);
-        let filter = CollisionFilter::new(Arc::clone(&surface), SEARCH_REACH * spacing.max_offset());
+        let SolverOptions { self_contact, untangling, collision_filter, .. } = *options;
+        let spacing = Spacing::new(thickness, surface.edge_m, self_contact);
+        let reach = self_contact.search_reach * spacing.max_offset();
+        let list = VerletList::new(Arc::clone(&surface), reach, self_contact.list_margin_of_edge * surface.edge_m);
+        let filter = CollisionFilter::new(Arc::clone(&surface), list, collision_filter);
         Self {
             surface,
             placed,
@@ -118,6 +108,7 @@ impl Proximity {
             friction,
             gaps: Vec::new(),
             filter,
+            untangling,
             under_relaxation: 1.0,
             fewest: usize::MAX,
             since_fewest: 0,
@@ -127,14 +118,16 @@ impl Proximity {
     /// Searches the gaps at `x` (m), beside these gaps to the body; gaps that existed before keep their history.
     pub(crate) fn refresh_with(&mut self, x: &[DVec3], to_body: Vec<Gap>) {
         let Self { surface, placed, spacing, friction, filter, .. } = self;
-        let max_offset = spacing.max_offset();
-        let mut gaps = search::gaps(surface, filter.list(x), x, placed, spacing, SEARCH_REACH * max_offset);
+        let (max_offset, options) = (spacing.max_offset(), spacing.options);
+        let mut gaps = search::gaps(surface, filter.list(x), x, placed, spacing, options.search_reach * max_offset);
         let crossing = filter.current(x);
         self.since_fewest = if crossing.len() < self.fewest { 0 } else { self.since_fewest + 1 };
         self.fewest = self.fewest.min(crossing.len());
         if !crossing.is_empty() {
-            let untangling = (self.since_fewest < MAX_UNTANGLING_REFRESHES)
-                .then(|| untangle::gaps(surface, x, crossing, Spacing::stiffness(max_offset)));
+            let untangling = (self.since_fewest < self.untangling.max_refreshes).then(|| {
+                let pull = Pull { stiffness: Spacing::stiffness(max_offset), options: self.untangling };
+                untangle::gaps(surface, x, crossing, pull)
+            });
             // Near an intersection the side of a gap is unknown.
             gaps.retain(|gap| !gap.members().any(|(v, _)| filter.is_tangled(v)));
             gaps.extend(untangling.into_iter().flatten());
@@ -143,7 +136,7 @@ impl Proximity {
         gaps.sort_unstable_by_key(|gap| gap.key);
         let share = self.under_relaxation;
         if share < 1.0 {
-            gap::keep_vanishing(&self.gaps, &mut gaps);
+            gap::keep_vanishing(&self.gaps, &mut gaps, options.vanished_share);
         }
         let mut before = self.gaps.iter().peekable();
         for gap in &mut gaps {
@@ -160,8 +153,8 @@ impl Proximity {
             let depth = gap.depth(x);
             gap.limit = gap.mean(friction) * gap.stiffness * depth.max(0.0);
             // The friction limit keeps the present pressure; the stiffness grows for the next steps.
-            if depth > (1.0 - NARROW_SHARE) * gap.goal && share == 1.0 {
-                gap.stiffness *= STIFFENING.min(MAX_STIFFENING * gap.first / gap.stiffness);
+            if depth > (1.0 - options.narrow_share) * gap.goal && share == 1.0 {
+                gap.stiffness *= options.stiffening.min(options.max_stiffening * gap.first / gap.stiffness);
             }
             gap.slip = if gap.limit > 0.0 { gap.slip.clamp_length_max(ELASTIC_SLIP) } else { DVec3::ZERO };
         }
@@ -257,14 +250,14 @@ impl Proximity {
         self.filter.begin(Vec::new());
     }
 
-    /// The clear positions, if the intersections at `x` exceed theirs by more than [`RESTART_RATIO`]. The next step then starts there.
+    /// The clear positions, if the intersections at `x` exceed theirs by more than the restart ratio. The next step then starts there.
     pub(crate) fn restart(&mut self, x: &[DVec3]) -> Option<Vec<DVec3>> {
         let left = self.crossings(x);
         if left == 0 {
             return None;
         }
         let there = self.filter.crossing_at(&self.clear);
-        if RESTART_RATIO * there.len() >= left {
+        if self.untangling.restart_ratio * there.len() as f64 >= left as f64 {
             return None;
         }
         self.filter.begin(there);

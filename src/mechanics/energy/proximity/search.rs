@@ -20,35 +20,18 @@ use rayon::prelude::*;
 use super::gap::{Gap, Key, Kind};
 use super::surface::Surface;
 use super::verlet_list::VerletList;
+use crate::mechanics::solver_options::SelfContactOptions;
 use crate::mesh::NONE;
 
 /// Pressure that compresses half the offset, Pa. The layers of a garment press on each other by their weight, some 2 Pa each; where more
 /// is needed a gap grows stiffer.
 const HALF_OFFSET_PRESSURE: f64 = 200.0;
 
-/// Least offset in mean edges, so that contact is distinguished from intersection. Heuristic.
-const MIN_OFFSET_OF_EDGE: f64 = 0.1;
-
-/// Largest value of that least offset on a coarse mesh, m. Heuristic.
-const MAX_MIN_OFFSET_M: f64 = 4e-3;
-
-/// Largest offset in mean edges: places two triangles apart on a flat cloth must not form a gap.
-const MAX_OFFSET_OF_EDGE: f64 = 0.25;
-
 /// Distance below which two places have no normal, m; they form no gap until the next refresh.
 const COINCIDENT_M: f64 = 1e-9;
 
-/// Distance as placed, in search reaches, from which topological neighbours count as any other places. Heuristic.
-const NEIGHBOURS_APART: f64 = 2.0;
-
-/// Share of their distance as placed below which topological neighbours press. Heuristic.
-const NEIGHBOUR_SHARE: f64 = 0.5;
-
 /// Offset below which a gap is ignored, m.
 const MIN_GOAL_M: f64 = 1e-5;
-
-/// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
-const EDGE_AREA_SHARE: f64 = 0.25;
 
 /// Offsets of a cloth from itself.
 #[derive(Debug, Clone)]
@@ -57,13 +40,14 @@ pub(super) struct Spacing {
     thickness: Arc<Vec<f64>>,
     /// Least and largest offset on this mesh, m.
     bounds: [f64; 2],
+    pub(super) options: SelfContactOptions,
 }
 
 impl Spacing {
     /// Offsets of a cloth of this thickness (m) at each vertex with this mean edge (m).
-    pub(super) fn new(thickness: Arc<Vec<f64>>, edge_m: f64) -> Self {
-        let min = (MIN_OFFSET_OF_EDGE * edge_m).min(MAX_MIN_OFFSET_M);
-        Self { thickness, bounds: [min, (MAX_OFFSET_OF_EDGE * edge_m).max(min)] }
+    pub(super) fn new(thickness: Arc<Vec<f64>>, edge_m: f64, options: SelfContactOptions) -> Self {
+        let min = (options.min_offset_of_edge * edge_m).min(options.max_min_offset_m);
+        Self { thickness, bounds: [min, (options.max_offset_of_edge * edge_m).max(min)], options }
     }
 
     /// h of two places with this mean thickness (m), m.
@@ -194,7 +178,8 @@ impl Search<'_> {
             return;
         }
         let key = Key { kind: Kind::Edges, vertices: [a, b, c, d, NONE], place: NONE };
-        let area = EDGE_AREA_SHARE * self.surface.edge_areas[e as usize].min(self.surface.edge_areas[f as usize]);
+        let area = self.spacing.options.edge_area_share
+            * self.surface.edge_areas[e as usize].min(self.surface.edge_areas[f as usize]);
         if let Some(gap) = self.gap(key, [p_share, q_share, -r_share, -s_share, 0.0], area) {
             found.push(Found { gap, triangles: 1 });
         }
@@ -209,8 +194,9 @@ impl Search<'_> {
         // Places that were placed nearer are not pushed farther apart than that.
         let placed = gap.across(self.placed).length();
         gap.goal = gap.goal.min(placed.max(thickness));
-        if placed < NEIGHBOURS_APART * self.reach && self.are_neighbours(&gap) {
-            gap.goal = gap.goal.min(NEIGHBOUR_SHARE * placed);
+        let SelfContactOptions { neighbours_apart, neighbour_share, .. } = self.spacing.options;
+        if placed < neighbours_apart * self.reach && self.are_neighbours(&gap) {
+            gap.goal = gap.goal.min(neighbour_share * placed);
         }
         gap.from = gap.across(self.x);
         let distance = gap.from.length();

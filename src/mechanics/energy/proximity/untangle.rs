@@ -18,23 +18,26 @@ use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind};
 use super::surface::Surface;
+use crate::mechanics::solver_options::UntanglingOptions;
 use crate::mesh::NONE;
 
-/// Distance that an intersecting edge is pulled between two refreshes, in mean edges. Heuristic.
-const STRIDE_OF_EDGE: f64 = 0.5;
-
-/// |G|² at which the edge is pulled by 1/√2 of that. |G| is two between two flat triangles and nearly zero on a smooth contour. Heuristic.
-const HALF_AT: f64 = 0.5;
+/// How intersecting edges are pulled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pull {
+    /// κ, N/m³.
+    pub(super) stiffness: f64,
+    pub(super) options: UntanglingOptions,
+}
 
 /// Gaps that pull apart the intersecting `pairs` of triangles at `x`.
-pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64) -> Vec<Gap> {
+pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], pull: Pull) -> Vec<Gap> {
     let mut found = BTreeMap::new();
     for &[t, u] in pairs {
         for (one, other) in [(t, u), (u, t)] {
             let [a, b, c] = surface.triangles[one as usize];
             for side in [[a, b], [b, c], [c, a]] {
                 let edge = surface.topology.edge_between(side[0], side[1]);
-                if let Some(gap) = edge.and_then(|edge| crossing(surface, x, edge, other as usize, stiffness)) {
+                if let Some(gap) = edge.and_then(|edge| crossing(surface, x, edge, other as usize, pull)) {
                     found.insert(gap.key, gap);
                 }
             }
@@ -43,7 +46,7 @@ pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], stiffness
     found.into_values().collect()
 }
 
-fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, stiffness: f64) -> Option<Gap> {
+fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, pull: Pull) -> Option<Gap> {
     let ([p, q], corners) = (surface.topology.edges[edge], surface.triangles[triangle]);
     if corners.contains(&p) || corners.contains(&q) {
         return None;
@@ -72,10 +75,11 @@ fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, stiffn
         g += r - n * (2.0 * e.dot(r) / e.dot(n));
     }
     let length = g.length();
-    let stride = STRIDE_OF_EDGE * surface.edge_m * length / (length * length + HALF_AT).sqrt();
+    let UntanglingOptions { stride_of_edge, half_at, .. } = pull.options;
+    let stride = stride_of_edge * surface.edge_m * length / (length * length + half_at).sqrt();
     let key = Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]], place: NONE };
     let weights = [1.0 - share, share, -shares[0], -shares[1], -shares[2]];
-    let mut gap = Gap::new(key, weights, 0.0, stiffness * surface.edge_areas[edge]);
+    let mut gap = Gap::new(key, weights, 0.0, pull.stiffness * surface.edge_areas[edge]);
     gap.normal = g / length;
     gap.goal = gap.normal.dot(gap.across(x)) + stride;
     (length > 1e-6 && gap.goal.is_finite()).then_some(gap)

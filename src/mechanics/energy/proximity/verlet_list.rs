@@ -16,9 +16,6 @@ use rayon::prelude::*;
 
 use super::surface::Surface;
 
-/// Margin in mean edges. A larger one is rebuilt less often and gives a longer list. Heuristic.
-const MARGIN_OF_EDGE: f64 = 0.5;
-
 /// The list, with its margin.
 #[derive(Debug, Clone)]
 pub(super) struct VerletList {
@@ -34,9 +31,8 @@ pub(super) struct VerletList {
 }
 
 impl VerletList {
-    /// An empty list for pairs whose boxes are nearer than `reach`, m.
-    pub(super) fn new(surface: Arc<Surface>, reach: f64) -> Self {
-        let margin = MARGIN_OF_EDGE * surface.edge_m;
+    /// An empty list for pairs whose boxes are nearer than `reach`, m, searched again after moves of half the `margin`, m.
+    pub(super) fn new(surface: Arc<Surface>, reach: f64, margin: f64) -> Self {
         Self { surface, reach, margin, built_at: Vec::new(), pairs: Vec::new(), boxes: Vec::new() }
     }
 
@@ -121,7 +117,7 @@ mod tests {
         let mesh = sheet(14, 14, |i, j| DVec3::new(i, j, 0.0) * 0.01);
         let surface = Arc::new(Surface::new(&Cloth::sample(&mesh, "jersey", &[]).triangles, mesh.vertex_count()));
         let flat = mesh.positions;
-        let mut list = VerletList::new(Arc::clone(&surface), 3e-3);
+        let mut list = VerletList::new(Arc::clone(&surface), 3e-3, 0.5 * surface.edge_m);
         let mut unmoved = Vec::new();
         let moves = [
             (0.0, 0.0),

@@ -33,7 +33,7 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
         [[points]]
         table = { quantile = 7 }
         extent_cm = [12, 6]
-        options = { rest = "texture", weld = true }
+        options = { rest = "texture", weld = true, "newton.damping" = 30 }
         "#,
     );
     let found: Vec<_> =
@@ -53,8 +53,9 @@ fn the_grid_comes_in_the_order_written_the_last_axis_fastest() {
     let last = &plan.points[16];
     assert_eq!(
         (last.options_text().as_str(), last.job.scene.rest.as_str(), last.job.scene.weld),
-        ("accuracy=none rest=texture weld=true", "texture", true)
+        ("accuracy=none newton.damping=30 rest=texture weld=true", "texture", true)
     );
+    assert_eq!(last.job.settings.solver.newton.damping, 30.0);
     assert_eq!(
         (last.job.settings.refine, last.extent_text().as_str(), &last.job.settings.table),
         (Refine::Converged, "12>6", &TableRule::Quantile { name: "quantile 7".into(), levels: 7 })
@@ -251,6 +252,8 @@ fn bad_files_are_refused_with_place_cause_and_remedy() {
         (format!("{point}body = {{ bust = \"wide\" }}"), "s.toml:3: body: found", "centimetres"),
         (format!("{point}options = {{ a = [1] }}"), "s.toml:3: options: found", "name = value"),
         (format!("{point}options = {{ speed = 3 }}"), "s.toml:3: options: found", "speed"),
+        (format!("{point}options = {{ \"newton.dampin\" = 3 }}"), "s.toml:3: options: found", "newton.damping,"),
+        (format!("{point}options = {{ \"newton.damping\" = \"much\" }}"), "s.toml:3: options: found", "a number"),
         (format!("{point}options = {{ unit = \"furlong\" }}"), "s.toml:3: options: found", "furlong"),
         (format!("{point}options = {{ accuracy = \"high\" }}"), "s.toml:3: options: found", "canonical"),
         (format!("{point}options = {{ rest = \"a.obj\" }}"), "s.toml:3: options: found", "name no file"),

@@ -1,0 +1,42 @@
+//! Contact places within triangles, from equilibrium to equilibrium.
+//!
+//! At an equilibrium, triangles that the body passes through receive contact places (`Contacts::update_face_contacts`); the cloth then
+//! descends to the next equilibrium. Places are also added on the way there, and removed for good where the cloth does not rest with them.
+
+use crate::mechanics::energy::FaceUpdate;
+use crate::mechanics::newton::NewtonState;
+
+/// The phase: since which step the places have changed.
+#[derive(Debug, Default)]
+pub(super) struct FaceContactPhase {
+    since: Option<usize>,
+}
+
+impl FaceContactPhase {
+    /// Updates the places at an equilibrium after this many steps.
+    pub(super) fn at_equilibrium(&mut self, descent: &mut NewtonState<'_, '_>, iteration: usize) -> FaceUpdate {
+        let NewtonState { contacts, x, .. } = descent;
+        let update = contacts.update_face_contacts(x);
+        self.since = (update != FaceUpdate::Unchanged).then_some(iteration);
+        update
+    }
+
+    /// Removes the places if the cloth does not rest with them, or adds some near rest; `near_rest` where that may be.
+    pub(super) fn before_step(&mut self, descent: &mut NewtonState<'_, '_>, iteration: usize, may_add: bool) {
+        let options = descent.cloth.solver.face_contact;
+        if self.since.is_some_and(|since| iteration > since + options.max_steps) {
+            self.since = None;
+            descent.contacts.remove_face_contacts();
+            refreshed(descent);
+        }
+        let near_rest = may_add && descent.residual < options.max_residual;
+        if near_rest && descent.contacts.extend_face_contacts(&descent.x) > 0 {
+            refreshed(descent);
+        }
+    }
+}
+
+fn refreshed(descent: &mut NewtonState<'_, '_>) {
+    descent.contacts.refresh(&descent.x);
+    descent.evaluate();
+}

@@ -1,0 +1,86 @@
+//! Refinement: from any start to the drape, by Newton's method at full resolution.
+//!
+//! The loop is a state machine ([`settle`]):
+//!
+//! ```text
+//!               untangling
+//!                   │
+//!      far from rest, stiff cloth?
+//!           yes │        │ no
+//!           softened → descent ⇄ equilibrium → converged, or unsettled
+//! ```
+//!
+//! | state | what it does | file |
+//! |---|---|---|
+//! | untangling | relaxes a start that intersects itself | `newton::state`, `energy::proximity` |
+//! | softened | steps with capped stiffness, until the residual is small | `softening` |
+//! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping` |
+//! | equilibrium | forces balance: resolves penetrations, updates contact places, checks the rest | `face_contact_phase`, `rest_phase` |
+//!
+//! A step is one of [`newton`](super::newton). A run stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight,
+//! is under the tolerance, no vertex is inside the body, and the equilibrium is stable: the residual is also small at a saddle of the energy
+//! and where cloth slides slowly (`newton::saddle_escape`).
+//!
+//! Every tolerance, limit and switch is an option of the cloth's solver ([`SolverOptions`](super::solver_options::SolverOptions)).
+
+mod cycle_damping;
+mod damping;
+mod face_contact_phase;
+mod rest_phase;
+mod settle;
+mod softening;
+mod types;
+
+use glam::DVec3;
+
+use super::energy::{Cloth, Contacts};
+use super::newton::NewtonState;
+pub use super::newton::{Record, SolveError, Solver};
+use crate::body::distance::Body;
+pub(crate) use types::Observer;
+pub use types::{RefineOptions, Refined, Step, Stop};
+
+/// Settles `cloth` on `body` from the vertex positions `start` (m), one for each vertex, held ones included.
+///
+/// `observer` sees the start and the cloth after every step; where it breaks off, what there is by then is returned with
+/// [`Stop::Interrupted`]. Runs in rayon's pool; the bits do not depend on its size.
+///
+/// # Errors
+/// [`SolveError`] where the start holds positions that are not finite.
+pub fn refine(
+    cloth: &Cloth,
+    body: &Body,
+    start: Vec<DVec3>,
+    options: &RefineOptions,
+    observer: Observer<'_>,
+) -> Result<Refined, SolveError> {
+    let contacts = cloth.contacts(body, &start);
+    refine_with(cloth, contacts, start, options, observer)
+}
+
+/// [`refine`] with contacts made by the caller: [`Contacts::none`] for a cloth that hangs free, or those of an earlier state,
+/// whose anchors of friction and stiffness then go on.
+///
+/// # Errors
+/// As [`refine`].
+pub fn refine_with(
+    cloth: &Cloth,
+    contacts: Contacts<'_>,
+    start: Vec<DVec3>,
+    options: &RefineOptions,
+    observer: Observer<'_>,
+) -> Result<Refined, SolveError> {
+    // Inside the pool: a join from outside it suspends the caller, and each of hundreds of gradients is a join.
+    rayon::scope(|_| settle::settle(cloth, contacts, start, options, observer))
+}
+
+/// `x` relaxed until nothing crosses, in a few rounds; `None` where something still does.
+pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>) -> Option<Vec<DVec3>> {
+    contacts.proximity = Some(cloth.proximity());
+    contacts.update(&x);
+    contacts.refresh(&x);
+    let mut descent = NewtonState::new(cloth, contacts, x, cloth.solver.newton.damping);
+    descent.untangle();
+    let left = descent.contacts.proximity.as_mut().map_or(0, |proximity| proximity.crossings(&descent.x));
+    (left == 0).then_some(descent.x)
+}

@@ -1,0 +1,246 @@
+//! The loop of a refinement: see [the module](super).
+
+use glam::DVec3;
+
+use super::cycle_damping::CycleDamping;
+use super::damping;
+use super::face_contact_phase::FaceContactPhase;
+use super::rest_phase::{RestPhase, Verdict};
+use super::softening::softened;
+use super::types::{Observer, RefineOptions, Refined, Step, Stop};
+use crate::mechanics::energy::{Cloth, Contacts, FaceUpdate};
+use crate::mechanics::newton::{FullSpace, NewtonState, Record, SolveError, Solver};
+
+/// Where a solve stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Steps with capped stiffness follow.
+    Softened,
+    /// Steps with the true stiffness follow.
+    Descent,
+    /// The residual is under the tolerance.
+    Equilibrium,
+    /// The solve has ended.
+    Ended(Stop),
+}
+
+/// A solve in progress.
+struct Settling<'c, 'b, 'o> {
+    /// The cloth with its true stiffness.
+    cloth: &'c Cloth,
+    options: &'o RefineOptions,
+    observer: Observer<'o>,
+    descent: NewtonState<'c, 'b>,
+    tangent: FullSpace,
+    history: Vec<Record>,
+    iteration: usize,
+    limit: usize,
+    /// Damping to begin an energy with, 1/s².
+    damping: f64,
+    /// Residual over weight of an equilibrium, and the smaller one that still follows.
+    tolerance: f64,
+    continued_to: Option<f64>,
+    /// Whether the steps are those of the softened cloth.
+    soft: bool,
+    /// Whether the start of an energy is still to be relaxed.
+    fresh: bool,
+    rest: RestPhase,
+    faces: FaceContactPhase,
+    cycles: CycleDamping,
+}
+
+/// Settles `cloth` from `start`: [`refine_with`](super::refine_with) within rayon's pool.
+pub(super) fn settle(
+    cloth: &Cloth,
+    mut contacts: Contacts<'_>,
+    mut start: Vec<DVec3>,
+    options: &RefineOptions,
+    observer: Observer<'_>,
+) -> Result<Refined, SolveError> {
+    let newton = &cloth.solver.newton;
+    let limit = options.max_steps.map_or(newton.max_steps, |most| most.min(newton.max_steps));
+    if options.self_contact && limit > 0 {
+        let mut proximity = cloth.proximity();
+        proximity.retreat(&mut start);
+        contacts.proximity = Some(proximity);
+        contacts.update(&start);
+        contacts.refresh(&start);
+    }
+    let damping = if options.from_rest { newton.damping_from_rest } else { newton.damping };
+    let mut descent = NewtonState::new(cloth, contacts, start, damping);
+    let softened = softened(cloth, &descent.x, descent.residual);
+    if let Some(softened) = &softened {
+        descent.cloth = softened;
+        descent.evaluate();
+    }
+    if limit > 0 {
+        descent.untangle_or_restart();
+    }
+    let settling = Settling {
+        cloth,
+        options,
+        observer,
+        history: vec![descent.record(0, None, softened.is_some())],
+        descent,
+        tangent: FullSpace::default(),
+        iteration: 0,
+        limit,
+        damping,
+        tolerance: newton.tolerance,
+        continued_to: options.continued_to,
+        soft: softened.is_some(),
+        fresh: true,
+        rest: RestPhase::default(),
+        faces: FaceContactPhase::default(),
+        cycles: CycleDamping::default(),
+    };
+    settling.run()
+}
+
+impl Settling<'_, '_, '_> {
+    fn run(mut self) -> Result<Refined, SolveError> {
+        let mut state = self.seen();
+        let stop = loop {
+            state = match state {
+                State::Softened | State::Descent => self.step()?,
+                State::Equilibrium => self.check_equilibrium()?,
+                State::Ended(stop) => break stop,
+            };
+        };
+        if self.soft {
+            self.descent.cloth = self.cloth;
+            self.descent.evaluate();
+        }
+        let Self { descent, history, iteration, .. } = self;
+        Ok(Refined {
+            energy: descent.energy,
+            residual_over_weight: descent.residual,
+            steps: iteration,
+            history,
+            stop,
+            contact_stiffness: descent.contacts.stiffness(),
+            positions: descent.x,
+        })
+    }
+
+    /// Shows the cloth to the observer; the state that it is in.
+    fn seen(&mut self) -> State {
+        if self.observe(false) {
+            State::Ended(Stop::Interrupted)
+        } else if self.soft {
+            State::Softened
+        } else if self.descent.residual < self.tolerance {
+            State::Equilibrium
+        } else {
+            State::Descent
+        }
+    }
+
+    /// Shows the cloth to the observer; returns whether it ends the run.
+    fn observe(&mut self, at_rest: bool) -> bool {
+        let NewtonState { energy, residual, contacts, x, .. } = &self.descent;
+        let step = Step {
+            iteration: self.iteration,
+            energy: *energy,
+            residual_over_weight: *residual,
+            contacts: contacts.touches().len(),
+            positions: x,
+            at_rest,
+        };
+        (self.observer)(&step).is_break()
+    }
+
+    /// Forces balance: keeps the body out of the cloth, and ends where the equilibrium lasts.
+    fn check_equilibrium(&mut self) -> Result<State, SolveError> {
+        if !self.descent.contacts.resolve_penetrations(&self.descent.x) {
+            let update = if self.options.self_contact {
+                self.faces.at_equilibrium(&mut self.descent, self.iteration)
+            } else {
+                FaceUpdate::Unchanged
+            };
+            if update != FaceUpdate::Unchanged {
+                self.cycles.reset(&mut self.descent);
+            }
+            let lasting = self.options.lasting && self.cloth.solver.rest_check.max_checks > 0;
+            match update {
+                FaceUpdate::Places => {}
+                FaceUpdate::Moved => self.descent.damping = self.damping,
+                FaceUpdate::Unchanged if !lasting || self.iteration >= self.limit => {
+                    return Ok(State::Ended(Stop::Converged));
+                }
+                FaceUpdate::Unchanged => {
+                    if let Some(stop) = self.check_rest()? {
+                        return Ok(State::Ended(stop));
+                    }
+                }
+            }
+        }
+        self.descent.contacts.update(&self.descent.x);
+        self.descent.contacts.refresh(&self.descent.x);
+        self.descent.evaluate();
+        Ok(State::Descent)
+    }
+
+    /// Checks whether the equilibrium lasts; `None` where the solve goes on.
+    fn check_rest(&mut self) -> Result<Option<Stop>, SolveError> {
+        if self.rest.is_first() && self.observe(true) {
+            return Ok(Some(Stop::Interrupted));
+        }
+        let ended = match self.rest.check(&mut self.descent)? {
+            Verdict::Rests => Some(Stop::Converged),
+            Verdict::Unsettled(criterion) => Some(Stop::Unsettled(criterion)),
+            Verdict::GoesOn { escaped } => {
+                if escaped {
+                    self.cycles.reset(&mut self.descent);
+                }
+                None
+            }
+        };
+        self.descent.damping = self.cloth.solver.newton.min_damping;
+        // An end may be continued to a smaller residual, once.
+        match (ended, self.continued_to.take_if(|_| ended.is_some())) {
+            (Some(_), Some(smaller)) => self.tolerance = smaller,
+            (ended, _) => return Ok(ended),
+        }
+        Ok(None)
+    }
+
+    /// One step, with what comes before and after it.
+    fn step(&mut self) -> Result<State, SolveError> {
+        let newton = &self.cloth.solver.newton;
+        if self.iteration >= self.limit {
+            return Ok(State::Ended(Stop::StepsDone));
+        }
+        self.faces.before_step(&mut self.descent, self.iteration, !self.soft);
+        if std::mem::take(&mut self.fresh) {
+            let (analysed, cloth) = (self.tangent.solver.take(), self.cloth);
+            let solver = self.descent.relax(|| analysed.unwrap_or_else(|| Solver::new(cloth.pattern())));
+            self.tangent.solver = Some(solver);
+        }
+        let near_rest = !self.soft && self.descent.residual < newton.near_rest;
+        self.descent.max_extrapolation = if near_rest { newton.max_extrapolation.max(1.0) } else { 1.0 };
+        let advance = self.descent.advance(&mut self.tangent)?;
+        self.iteration += usize::from(advance.accepted);
+        // The true Hessian may give no direction of descent, and the softened cloth need not converge.
+        let astray = !advance.accepted && !self.tangent.fall_back(self.cloth);
+        if astray && !self.soft {
+            let failed = self.rest.failed().filter(|_| self.descent.residual < self.tolerance);
+            return Ok(State::Ended(failed.map_or(Stop::Stalled, Stop::Unsettled)));
+        }
+        if self.soft && (astray || self.descent.residual < self.cloth.solver.softening.tolerance) {
+            self.soft = false;
+            self.fresh = true;
+            self.descent.cloth = self.cloth;
+            self.descent.damping = self.damping;
+            self.descent.evaluate();
+        } else {
+            let NewtonState { damping: before, residual, .. } = self.descent;
+            self.descent.damping = damping::after_step(newton, before, advance.share, residual);
+        }
+        self.cycles.after_step(&mut self.descent, advance.opposes);
+        if advance.accepted {
+            self.history.push(self.descent.record(self.iteration, Some(advance), self.soft));
+        }
+        Ok(self.seen())
+    }
+}

@@ -1,0 +1,395 @@
+//! Options of the solver: every tolerance, limit and switch of Newton's method at full resolution, with its default.
+//!
+//! One group for each mechanism, in the order in which a solve meets them. `partwise bench ablation` changes one option at a time
+//! (`docs/guide/solver.md`); *heuristic* marks a value without other evidence. Options are set by
+//! `--solver GROUP.KEY=VALUE`, in a job (`[settings.solver.GROUP]`) and in a sweep; they are for experiments, and what was measured was
+//! measured with the defaults.
+//!
+//! Constants that describe the model (stiffness of contact, thickness, friction) or the machine (sizes of chunks) are not here.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Largest number that an option takes.
+const MAX_VALUE: f64 = 1e9;
+
+macro_rules! options {
+    ($($(#[$group_doc:meta])* $group:ident { $($(#[$doc:meta])* $key:ident: $type:ty = $default:expr,)* })*) => {
+        $(
+            $(#[$group_doc])*
+            #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+            #[serde(default, deny_unknown_fields)]
+            pub struct $group { $($(#[$doc])* pub $key: $type,)* }
+
+            impl Default for $group {
+                fn default() -> Self {
+                    Self { $($key: $default,)* }
+                }
+            }
+        )*
+    };
+}
+
+options! {
+    /// Nested iteration: a large garment rests on coarser cloth first.
+    NestedIterationOptions {
+        /// Vertices that a coarser garment must have to be brought to rest first. On one machine within hours, without and with: a knit
+        /// skirt of 64,000 vertices 77 and 20 s, a dress of 16,000 19.6 and 6.8 s (cotton 23 and 16); a pullover of 5,000, whose coarser one has
+        /// 1,275, would take 1.2 for 0.9 (cotton 3.3 for 2.4). A dress of 10,861 in cotton loses, 15 for 9, and one of 9,867 gains, 8 for 10.
+        min_vertices: usize = 1500,
+        /// Most steps on a coarser garment. A stiff one takes over a hundred to its rest, of which the first bring it into the right
+        /// folds. With 80, five stiff garments of 16,000 take 239 steps at full resolution for 213.
+        max_steps: usize = 20,
+    }
+
+    /// Starts that intersect themselves: see `energy::proximity`.
+    UntanglingOptions {
+        /// Most relaxations of an intersecting start; 0 leaves it as it is. Heuristic.
+        max_rounds: usize = 60,
+        /// Refreshes without fewer intersections after which no further untangling is attempted. Heuristic.
+        max_refreshes: usize = 40,
+        /// Ratio of intersecting pairs after untangling to those at the clear positions above which the drape restarts from these. Restarting
+        /// whenever the clear positions have fewer is worse: coarse trousers of two layers, with 44 pairs as placed and 54 after their preview,
+        /// take 238 steps from the placement and an eighth of that time from the preview.
+        restart_ratio: f64 = 2.0,
+        /// Distance that an intersecting edge is pulled between two refreshes, in mean edges. Heuristic.
+        stride_of_edge: f64 = 0.5,
+        /// |G|² at which the edge is pulled by 1/√2 of that: |G| is two between two flat triangles and nearly zero on a smooth contour.
+        /// Heuristic.
+        half_at: f64 = 0.5,
+    }
+
+    /// Softened continuation: stiff cloth far from rest is settled with a capped stiffness first.
+    SofteningOptions {
+        /// Strain under its own hanging weight at which the stiffness is capped; 0 for the true stiffness throughout.
+        strain: f64 = 0.005,
+        /// Residual, over ‖m g‖₂ (that of cloth in free fall), above which cloth is softened. A drape that was at rest before is well below.
+        min_residual: f64 = 0.5,
+        /// Residual over weight at which the softened cloth gets its true stiffness. Heuristic.
+        tolerance: f64 = 1e-2,
+    }
+
+    /// Newton's method: damping and line search.
+    NewtonOptions {
+        /// Residual over weight that counts as converged.
+        tolerance: f64 = 1e-3,
+        /// No run takes more steps.
+        max_steps: usize = 2000,
+        /// Longest move of a vertex in one step, m.
+        longest_move_m: f64 = 0.1,
+        /// Damping ε to begin with, 1/s².
+        damping: f64 = 300.0,
+        /// Damping to begin with from a drape that rested, 1/s². Nine changes between four knits took a long dress 41 steps until its forces
+        /// balanced, with 300 51.
+        damping_from_rest: f64 = 10.0,
+        /// Least damping, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it.
+        min_damping: f64 = 1.0,
+        /// Most damping, 1/s²; at 1e4 a step under gravity is a millimetre. With 1e3 flared skirts of 4,000, 2,000 and 1,000 vertices in jersey
+        /// take 31, 25 and 28 steps for 43, 28 and 30, but a ribbon knotted into a trefoil never rests.
+        max_damping: f64 = 1e4,
+        /// Factor on the damping after a whole step.
+        damping_decrease: f64 = 0.5,
+        /// The same near rest: only the softest directions are left, which damping slows most. Heuristic.
+        damping_decrease_near_rest: f64 = 0.1,
+        /// Factor on the damping after a short step.
+        damping_increase: f64 = 2.0,
+        /// Share of its length below which a step is short.
+        short_step: f64 = 0.3,
+        /// Residual over weight below which the cloth is near rest. Heuristic.
+        near_rest: f64 = 1e-2,
+        /// Largest extrapolation of a step near rest: see `newton::extrapolation`. With 2 the five garments at ten sizes, knit and woven, take
+        /// 354 steps together, with 1 363.
+        max_extrapolation: f64 = 2.0,
+        /// Cosine with the previous step above which a step continues it. Heuristic.
+        continues_cosine: f64 = 0.8,
+        /// Most steps with the projected Hessian after one whose true Hessian was indefinite.
+        max_projected_steps: usize = 4,
+    }
+
+    /// Relaxation of steps by L-BFGS: see `newton::relax`.
+    RelaxationOptions {
+        /// Iterations at the start and after a step; 0 for none.
+        iterations: usize = 20,
+        /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. With 25 the five
+        /// garments and two plain skirts of 4,000 and 16,000 vertices, all knit, take 42 steps together, with 60 31, with 80 34 (damping from 100).
+        trial_iterations: usize = 60,
+        /// Most trials of a line search that are relaxed. Heuristic.
+        max_trials: usize = 2,
+        /// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that
+        /// starts far from its rest shape is moved as far by its relaxation however short the step.
+        max_rejected: usize = 8,
+        /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
+        longest_move_m: f64 = 3e-3,
+        /// Scale γ of the first iteration: neighbours pull as much as a vertex itself.
+        first_scale: f64 = 0.3,
+    }
+
+    /// The check of a rest: see `newton::saddle_escape`.
+    RestCheckOptions {
+        /// Most checks; 0 for none. Without them the five garments at ten sizes in two fabrics take 327 steps for 354, and four of them end at saddle
+        /// points or still move; with four checks one still does, and from other previews with eight.
+        max_checks: usize = 16,
+        /// Shortest move of a vertex along an unstable direction, m: a wrinkle buckles by tenths of a millimetre.
+        shortest_escape_m: f64 = 2e-5,
+        /// Longest move of a vertex along an unstable direction, m: a skirt swings by centimetres.
+        longest_escape_m: f64 = 0.03,
+    }
+
+    /// Damping of cycles: see [`refine`](super::refine).
+    CycleOptions {
+        /// Cosine below minus this value with which a step opposes the previous one. Heuristic.
+        opposes_cosine: f64 = 0.3,
+        /// Consecutive opposing steps that count as a cycle near rest. Heuristic.
+        max_opposing: usize = 3,
+        /// The same farther from rest. Heuristic.
+        max_opposing_far: usize = 8,
+        /// Ratio to the least residual so far below which a residual is progress, which ends a cycle. Heuristic.
+        progress_ratio: f64 = 0.9,
+        /// Residual over weight above which steps do not count as a cycle; 0 turns the damping of cycles off. Heuristic.
+        max_residual: f64 = 0.1,
+        /// Steps that count as a cycle if they end near where they began. Heuristic.
+        window: usize = 8,
+        /// The distance from there, over the way travelled. Heuristic.
+        return_share: f64 = 0.3,
+        /// Least share of a step that is taken. Heuristic.
+        min_step_share: f64 = 0.125,
+        /// Least under-relaxation of gaps. Heuristic.
+        min_under_relaxation: f64 = 1.0 / 64.0,
+    }
+
+    /// Contact of vertices with the body: see `energy::contact`.
+    BodyContactOptions {
+        /// Factor on the stiffness κ where a vertex is pressed into the body. Heuristic.
+        stiffening: f64 = 4.0,
+        /// Most times that the cloth is moved off protrusions of the body. Heuristic.
+        max_protrusion_fixes: usize = 3,
+    }
+
+    /// Contact places within triangles: see `energy::face_contacts`.
+    FaceContactOptions {
+        /// Residual over weight below which places are added before the cloth rests with the present ones. Heuristic.
+        max_residual: f64 = 3e-2,
+        /// Steps after which the places are removed if the cloth does not rest with them. The most observed are 24, in a pair of trousers.
+        max_steps: usize = 80,
+        /// Amount by which the offset of a place is raised at a time, m. Heuristic.
+        offset_step_m: f64 = 3e-4,
+        /// Largest total amount by which the offset of a place is raised, m. Heuristic.
+        max_offset_raise_m: f64 = 4e-3,
+        /// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
+        min_offset_m: f64 = 6e-4,
+        /// Deepest penetration that is pushed out, m. Contact at vertices may start too late by the sag of a triangle, not by more.
+        max_depth_m: f64 = 0.015,
+        /// Most places that are added to a triangle at a time. Heuristic.
+        max_new_places: usize = 6,
+        /// Least distance between places that are added at a time, in longest sides of the triangle. Heuristic.
+        min_spacing: f64 = 0.2,
+        /// Share of its offset below which the distance of a place makes it a contact. Heuristic.
+        near_share: f64 = 0.5,
+        /// Updates without fewer intersections after which the intersecting triangles are released. Heuristic.
+        max_idle_updates: usize = 3,
+    }
+
+    /// Contact of the cloth with itself: see `energy::proximity`.
+    SelfContactOptions {
+        /// Distance up to which gaps are searched, in offsets: large enough that a step closes no gap which the search missed. Heuristic.
+        search_reach: f64 = 2.5,
+        /// Least offset in mean edges, so that contact is distinguished from intersection. Heuristic.
+        min_offset_of_edge: f64 = 0.1,
+        /// Largest value of that least offset on a coarse mesh, m. Heuristic.
+        max_min_offset_m: f64 = 4e-3,
+        /// Largest offset in mean edges: places two triangles apart on a flat cloth must not form a gap.
+        max_offset_of_edge: f64 = 0.25,
+        /// Distance as placed, in search reaches, from which topological neighbours count as any other places. Heuristic.
+        neighbours_apart: f64 = 2.0,
+        /// Share of their distance as placed below which topological neighbours press. Heuristic.
+        neighbour_share: f64 = 0.5,
+        /// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
+        edge_area_share: f64 = 0.25,
+        /// A gap with less than this share of its offset left grows stiffer. Heuristic.
+        narrow_share: f64 = 0.25,
+        /// Factor by which a narrow gap grows stiffer at a refresh. Heuristic.
+        stiffening: f64 = 2.0,
+        /// Largest ratio of the stiffness of a gap to its initial one. Heuristic.
+        max_stiffening: f64 = 64.0,
+        /// Share of its initial stiffness below which a vanishing gap is removed. Heuristic.
+        vanished_share: f64 = 1e-3,
+        /// Margin of the list of near triangles in mean edges. A larger one is rebuilt less often and gives a longer list. Heuristic.
+        list_margin_of_edge: f64 = 0.5,
+    }
+
+    /// The collision filter: which steps are taken, cut or rejected.
+    CollisionFilterOptions {
+        /// Spacing of the checks along a step, in mean edges: intersecting parts stay so for about the length of their roundness. Heuristic.
+        check_spacing: f64 = 2.0,
+        /// Most stages of a step that are checked, its end included.
+        max_stages: f64 = 4.0,
+        /// Longest move of a step that is cut, in mean edges; a longer step is rejected, because cutting it tears the cloth: with longer ones a
+        /// ribbon knotted into a trefoil never rests, though a skirt of 4,000 vertices in jersey takes 29 steps for 43.
+        max_cut_move: f64 = 1.0,
+        /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. Heuristic.
+        max_halvings: usize = 4,
+        /// Most times that a step is cut. Heuristic.
+        max_cuts: usize = 16,
+        /// Rings of neighbours about intersecting triangles in which new intersections are allowed. Heuristic.
+        tangled_rings: usize = 2,
+    }
+}
+
+/// All options of the solver.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolverOptions {
+    /// Nested iteration on coarser cloth.
+    pub nested_iteration: NestedIterationOptions,
+    /// Starts that intersect themselves.
+    pub untangling: UntanglingOptions,
+    /// Softened continuation.
+    pub softening: SofteningOptions,
+    /// Newton's method.
+    pub newton: NewtonOptions,
+    /// Relaxation of steps.
+    pub relaxation: RelaxationOptions,
+    /// The check of a rest.
+    pub rest_check: RestCheckOptions,
+    /// Damping of cycles.
+    pub cycles: CycleOptions,
+    /// Contact of vertices with the body.
+    pub body_contact: BodyContactOptions,
+    /// Contact places within triangles.
+    pub face_contact: FaceContactOptions,
+    /// Contact of the cloth with itself.
+    pub self_contact: SelfContactOptions,
+    /// The collision filter.
+    pub collision_filter: CollisionFilterOptions,
+}
+
+/// Why an option cannot be set.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SolverOptionError {
+    /// The text is no assignment.
+    #[error("found `{0}`, expected GROUP.KEY=VALUE such as newton.damping=100")]
+    NoAssignment(String),
+    /// No option has this name.
+    #[error("found the option `{found}`, expected one of {expected}")]
+    Unknown {
+        /// The name.
+        found: String,
+        /// Names that are valid in its place.
+        expected: String,
+    },
+    /// The value is not a number in the range of the option.
+    #[error("{name}: found {found}, expected {expected}")]
+    Value {
+        /// The option.
+        name: String,
+        /// The value.
+        found: String,
+        /// What the option takes.
+        expected: String,
+    },
+}
+
+impl SolverOptions {
+    /// Every option by its name (`group.key`) and its value, sorted by name.
+    #[must_use]
+    pub fn list(&self) -> Vec<(String, f64)> {
+        let Ok(Value::Object(groups)) = serde_json::to_value(self) else { return Vec::new() };
+        let of_group = |(group, keys): (String, Value)| {
+            let Value::Object(keys) = keys else { return Vec::new() };
+            let named = |(key, value): (String, Value)| (format!("{group}.{key}"), value.as_f64().unwrap_or(f64::NAN));
+            keys.into_iter().map(named).collect()
+        };
+        groups.into_iter().flat_map(of_group).collect()
+    }
+
+    /// The same with the option `name` (`group.key`) set to `value`.
+    ///
+    /// # Errors
+    /// [`SolverOptionError`] names what is valid.
+    pub fn with(&self, name: &str, value: f64) -> Result<Self, SolverOptionError> {
+        let unknown = |expected: Vec<String>| SolverOptionError::Unknown {
+            found: name.to_owned(),
+            expected: expected.join(", "),
+        };
+        let wrong = |expected: &str| SolverOptionError::Value {
+            name: name.to_owned(),
+            found: format!("{value:?}"),
+            expected: expected.to_owned(),
+        };
+        let mut all = serde_json::to_value(self).unwrap_or_default();
+        let (group, key) = name.split_once('.').unwrap_or((name, ""));
+        let Some(keys) = all.get_mut(group).and_then(Value::as_object_mut) else {
+            let groups = all.as_object().map(|all| all.keys().cloned().collect());
+            return Err(unknown(groups.unwrap_or_default()));
+        };
+        let Some(slot) = keys.get_mut(key) else {
+            return Err(unknown(keys.keys().map(|key| format!("{group}.{key}")).collect()));
+        };
+        if !(0.0..=MAX_VALUE).contains(&value) {
+            return Err(wrong("a number from 0 to 1e9"));
+        }
+        *slot = match slot.is_u64() {
+            true if value.fract() == 0.0 => Value::from(value as u64),
+            true => return Err(wrong("a whole number")),
+            false => Value::from(value),
+        };
+        serde_json::from_value(all).map_err(|error| wrong(&error.to_string()))
+    }
+
+    /// The same after an assignment `group.key=value`.
+    ///
+    /// # Errors
+    /// [`SolverOptionError`] names what is valid.
+    pub fn assign(&self, assignment: &str) -> Result<Self, SolverOptionError> {
+        let Some((name, text)) = assignment.split_once('=') else {
+            return Err(SolverOptionError::NoAssignment(assignment.to_owned()));
+        };
+        let (name, text) = (name.trim().replace('-', "_"), text.trim());
+        let wrong = || SolverOptionError::Value {
+            name: name.clone(),
+            found: format!("`{text}`"),
+            expected: "a number from 0 to 1e9".to_owned(),
+        };
+        self.with(&name, text.parse().map_err(|_| wrong())?)
+    }
+
+    /// The first option with a value outside its range.
+    ///
+    /// # Errors
+    /// [`SolverOptionError::Value`].
+    pub fn check(&self) -> Result<(), SolverOptionError> {
+        self.list().into_iter().try_for_each(|(name, value)| Self::default().with(&name, value).map(drop))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_option_is_listed_once_and_set_by_its_name() {
+        let default = SolverOptions::default();
+        let all = default.list();
+        assert!(all.iter().all(|(_, value)| value.is_finite()) && all.len() > 20, "{all:?}");
+        for (name, value) in &all {
+            let set = default.assign(&format!("{}={}", name.replace('_', "-"), 2.0 * value + 1.0)).unwrap();
+            let different: Vec<_> = set.list().into_iter().zip(&all).filter(|(now, before)| now != *before).collect();
+            assert_eq!(different.len(), 1, "{name}");
+            assert_eq!(different[0].0, (name.clone(), 2.0 * value + 1.0));
+        }
+    }
+
+    #[test]
+    fn unknown_options_and_values_out_of_range_are_refused_with_what_is_valid() {
+        let default = SolverOptions::default();
+        let message = |text: &str| default.assign(text).unwrap_err().to_string();
+        assert!(message("newton.dampin=3").contains("newton.damping,"));
+        assert!(message("newtons.damping=3").contains("relaxation"));
+        assert!(message("newton=3").contains("newton.damping"));
+        assert!(message("newton.damping").contains("GROUP.KEY=VALUE"));
+        for wrong in ["-1", "nan", "inf", "1e300", "much"] {
+            assert!(message(&format!("newton.damping={wrong}")).contains("0 to 1e9"), "{wrong}");
+        }
+        assert!(message("newton.max_steps=1.5").contains("whole number"));
+    }
+}
