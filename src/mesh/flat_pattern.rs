@@ -37,8 +37,11 @@ pub struct FlatPattern {
 }
 
 impl FlatPattern {
-    /// The pattern in the texture coordinates of a mesh; `None` if a triangle has none or they are no pattern.
+    /// The pattern in the texture coordinates of a mesh; `None` if any triangle has none or they are no pattern.
     pub(crate) fn find(mesh: &TriMesh, texture: &[Option<[DVec2; 3]>]) -> Option<Self> {
+        if texture.is_empty() {
+            return None;
+        }
         let mut found: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(mesh.triangles.len());
         let mut whole = 0.0;
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);

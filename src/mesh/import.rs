@@ -149,7 +149,7 @@ pub struct Imported {
     pub report: MeshReport,
     /// The file, for the export.
     pub source: MeshSource,
-    /// Texture coordinates of the corners of each triangle; `None` if a corner has none.
+    /// Texture coordinates of the corners of each triangle, `None` if a corner has none; empty where the file has none.
     pub texture: Vec<Option<[DVec2; 3]>>,
     /// Index into [`MeshSource::faces`] of the face that each triangle was cut from.
     face: Vec<u32>,
@@ -259,8 +259,10 @@ impl Imported {
                 }
                 self.mesh.triangles.push([a, b, c]);
                 self.face.push(number as u32);
-                let [a, b, c] = corners.map(|i| self.source.textures.get(outline[i].texture as usize).copied());
-                self.texture.push(a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]));
+                if !self.source.textures.is_empty() {
+                    let [a, b, c] = corners.map(|i| self.source.textures.get(outline[i].texture as usize).copied());
+                    self.texture.push(a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]));
+                }
             }
         }
         [quads, larger, degenerate]
@@ -414,7 +416,7 @@ impl Imported {
     /// Reverses one triangle and its texture coordinates.
     fn turn(&mut self, t: usize) {
         self.mesh.triangles[t].swap(1, 2);
-        if let Some(corners) = &mut self.texture[t] {
+        if let Some(Some(corners)) = self.texture.get_mut(t) {
             corners.swap(1, 2);
         }
     }

@@ -28,7 +28,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Reads the connectivity off the triangles; O(n log n).
+    /// Reads the connectivity off the triangles.
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
         Self::of(&mesh.triangles, mesh.vertex_count())
@@ -36,27 +36,32 @@ impl Topology {
 
     /// The connectivity of triangles over a number of vertices.
     pub(crate) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
-        let mut halves: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * triangles.len());
-        for (t, &[a, b, c]) in triangles.iter().enumerate() {
-            for (i, j) in [(a, b), (b, c), (c, a)] {
-                halves.push((i.min(j), i.max(j), t as u32));
-            }
-        }
-        halves.sort_unstable();
+        // The larger end and the triangle of each side, by its smaller end.
+        let side = |i: u32, j: u32, t: u32| (i.min(j), (i.max(j), t));
+        let sides = || {
+            let triangles = triangles.iter().zip(0..);
+            triangles.flat_map(move |(&[a, b, c], t)| [side(a, b, t), side(b, c, t), side(c, a, t)])
+        };
+        let mut halves = Csr::gathered(vertices, sides);
         let mut topology = Self::default();
-        for &(a, b, t) in &halves {
-            if topology.edges.last() == Some(&[a, b]) {
-                let last = topology.edges.len() - 1;
-                if topology.edge_valence[last] == 1 {
-                    topology.edge_triangles[last][1] = t;
+        for a in 0..vertices as u32 {
+            let halves = halves.of_mut(a as usize);
+            halves.sort_unstable();
+            for &(b, t) in &*halves {
+                if topology.edges.last() == Some(&[a, b]) {
+                    let last = topology.edges.len() - 1;
+                    if topology.edge_valence[last] == 1 {
+                        topology.edge_triangles[last][1] = t;
+                    }
+                    topology.edge_valence[last] += 1;
+                } else {
+                    topology.edges.push([a, b]);
+                    topology.edge_triangles.push([t, NONE]);
+                    topology.edge_valence.push(1);
                 }
-                topology.edge_valence[last] += 1;
-            } else {
-                topology.edges.push([a, b]);
-                topology.edge_triangles.push([t, NONE]);
-                topology.edge_valence.push(1);
             }
         }
+        drop(halves);
         // Edges come sorted by (a, b): first the smaller neighbours of each vertex, then the larger, each ascending.
         let edges = &topology.edges;
         let smaller = || edges.iter().map(|&[a, b]| (b, a));

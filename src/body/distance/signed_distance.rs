@@ -31,13 +31,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::{DVec3, IVec3};
 use parry3d_f64::query::PointQueryWithLocation;
-use parry3d_f64::shape::{TriMesh as ParryMesh, TriMeshFlags, TrianglePointLocation};
+use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 use rayon::prelude::*;
 
 use super::tree::{Nearest, Tree};
+use crate::base::math;
 use crate::mesh::morton::along_a_curve;
 use crate::mesh::winding::signed_volumes;
-use crate::mesh::{Topology, TriMesh};
+use crate::mesh::{Csr, Topology, TriMesh};
 
 /// Below this distance to the surface, m, the direction to the closest point is rounding noise and the pseudo-normal is
 /// used. 1e-9 m is a million times the spacing of doubles at body size, and a millionth of a cloth's thickness.
@@ -51,7 +52,7 @@ const CHUNK: usize = 128;
 const MIN_VOLUME_RATIO: f64 = 1e-6;
 
 /// Largest difference, m, between the tree's distance to a triangle and parry's. Beyond it the triangle is a sliver whose
-/// distance the tree could not resolve, and parry searches the whole surface.
+/// distance the tree could not resolve, and the tree is searched again by parry's distances.
 const TREE_TOLERANCE: f64 = 1e-9;
 
 /// R, m: several steps of a drape. A vertex farther behind a cloth did not get there by being pushed.
@@ -98,7 +99,8 @@ pub struct SurfacePoint {
 #[derive(Clone)]
 pub struct Body {
     mesh: Arc<TriMesh>,
-    shape: Arc<ParryMesh>,
+    /// The triangles at each vertex, ascending.
+    fans: Arc<Csr<u32>>,
     tree: Arc<Tree>,
     cover: Option<Cover>,
     /// Signed distances at lattice points that were computed before, m. A value depends on its point alone, so the cache
@@ -115,7 +117,7 @@ struct Cover {
 
 impl std::fmt::Debug for Body {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Body").field("triangles", &self.shape.num_triangles()).finish_non_exhaustive()
+        f.debug_struct("Body").field("triangles", &self.mesh.triangles.len()).finish_non_exhaustive()
     }
 }
 
@@ -145,12 +147,11 @@ impl Body {
         if mesh.triangles.is_empty() {
             return Err(DistanceError::Empty);
         }
-        // ORIENTED makes the pseudo-normals; nothing is merged or deleted, so triangle indices stay ours.
-        let shape = || ParryMesh::with_flags(mesh.positions.clone(), mesh.triangles.clone(), TriMeshFlags::ORIENTED);
-        let (shape, tree) = rayon::join(shape, || Tree::new(mesh));
-        let shape = shape.map_err(|e| DistanceError::Refused(e.to_string()))?;
-        let (mesh, shape, tree) = (Arc::new(mesh.clone()), Arc::new(shape), Arc::new(tree));
-        Ok(Self { mesh, shape, tree, cover: None, lattice: Arc::default() })
+        let corners = || mesh.triangles.iter().zip(0..).flat_map(|(triangle, t)| triangle.map(|v| (v, t)));
+        let fans = || Csr::gathered(mesh.vertex_count(), corners);
+        let (fans, tree) = rayon::join(fans, || Tree::new(mesh));
+        let (mesh, fans, tree) = (Arc::new(mesh.clone()), Arc::new(fans), Arc::new(tree));
+        Ok(Self { mesh, fans, tree, cover: None, lattice: Arc::default() })
     }
 
     /// The same body under `cloth`, whose normals point outward. A cover that was there before is replaced.
@@ -234,11 +235,12 @@ impl Body {
     /// The nearest point of the surface without its cover, and its place on the triangle.
     fn on_skin(&self, x: DVec3, candidate: Nearest) -> (SurfacePoint, TrianglePointLocation) {
         let mut triangle = candidate.triangle;
-        let (mut projection, mut location) =
-            self.shape.triangle(triangle).project_local_point_and_get_location(x, false);
+        let project = |triangle| self.triangle(triangle).project_local_point_and_get_location(x, false);
+        let (mut projection, mut location) = project(triangle);
         let distance = x.distance(projection.point);
         if (distance - candidate.square.sqrt()).abs() > TREE_TOLERANCE * distance.max(1.0) {
-            (projection, (triangle, location)) = self.shape.project_local_point_and_get_location(x, false);
+            triangle = self.tree.nearest_by(x, |triangle| x.distance_squared(project(triangle).0.point));
+            (projection, location) = project(triangle);
         }
         let offset = x - projection.point;
         let distance = offset.length();
@@ -248,19 +250,41 @@ impl Body {
         (SurfacePoint { point: projection.point, signed_distance: sign * distance, normal, triangle }, location)
     }
 
+    fn triangle(&self, triangle: u32) -> Triangle {
+        let [a, b, c] = self.mesh.corners(triangle as usize);
+        Triangle::new(a, b, c)
+    }
+
+    /// The normal whose side of a point of `triangle` is outside: that of the triangle, the sum of those at an edge, or the sum of those at
+    /// a vertex, each times its angle there.
     fn pseudo_normal(&self, triangle: u32, location: TrianglePointLocation) -> DVec3 {
-        let face = || self.shape.triangle(triangle).scaled_normal();
-        let normal = match (location, self.shape.pseudo_normals()) {
-            (TrianglePointLocation::OnVertex(i), Some(normals)) => {
-                let v = self.shape.indices()[triangle as usize][i as usize];
-                normals.vertices_pseudo_normal[v as usize]
+        let corners = self.mesh.triangles[triangle as usize];
+        let corner = |i: u32| corners[i as usize % 3];
+        let unit = |t: u32| self.mesh.double_area_vector(t as usize).normalize_or_zero();
+        let normal = match location {
+            TrianglePointLocation::OnVertex(i) => {
+                let v = corner(i);
+                self.fans.of(v as usize).iter().map(|&t| unit(t) * self.angle(t, v)).sum()
             }
-            (TrianglePointLocation::OnEdge(i, _), Some(normals)) => {
-                normals.edges_pseudo_normal[triangle as usize][i as usize]
+            TrianglePointLocation::OnEdge(i, _) => {
+                let (a, b) = (corner(i), corner(i + 1));
+                let shared = |t: &&u32| self.mesh.triangles[**t as usize].contains(&b);
+                self.fans.of(a as usize).iter().filter(shared).map(|&t| unit(t)).sum()
             }
-            _ => face(),
+            _ => DVec3::ZERO,
         };
-        normal.try_normalize().unwrap_or_else(|| face().normalize_or_zero())
+        normal.try_normalize().unwrap_or_else(|| unit(triangle))
+    }
+
+    /// The angle of a triangle at its vertex `v`, rad.
+    fn angle(&self, triangle: u32, v: u32) -> f64 {
+        let here = self.mesh.positions[v as usize];
+        let others = self.mesh.triangles[triangle as usize].into_iter().filter(|&w| w != v);
+        let mut sides = others.map(|w| self.mesh.positions[w as usize] - here);
+        match (sides.next(), sides.next()) {
+            (Some(u), Some(w)) => math::atan2(u.cross(w).length(), u.dot(w)),
+            _ => 0.0,
+        }
     }
 }
 

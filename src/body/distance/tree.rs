@@ -82,7 +82,8 @@ impl Tree {
         let centroids: Vec<DVec3> =
             (0..mesh.triangles.len() as u32).map(|t| corners(t).iter().sum::<DVec3>()).collect();
         let mut order: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let mut tree = Self { nodes: Vec::new(), leaves: Vec::new(), leaf_of: vec![0; order.len()] };
+        let leaves = Vec::with_capacity(order.len().div_ceil(WIDTH));
+        let mut tree = Self { nodes: Vec::new(), leaves, leaf_of: vec![0; order.len()] };
         if order.len() <= WIDTH {
             // The root is a node.
             let child = tree.leaf(&order, &corners);
@@ -151,6 +152,39 @@ impl Tree {
     /// near each other.
     pub(super) fn nearest(&self, points: &[DVec3]) -> Vec<Nearest> {
         run(Search { tree: self, points })
+    }
+
+    /// The triangle of the least `square`, the squared distance from `p` to a triangle, m²: for slivers, whose distance
+    /// [`nearest`](Self::nearest) does not resolve.
+    pub(super) fn nearest_by(&self, p: DVec3, square: impl Fn(u32) -> f64) -> u32 {
+        let mut best = Nearest { square: f64::INFINITY, triangle: 0 };
+        let mut open = vec![(0.0, 0)];
+        while let Some((least, number)) = open.pop() {
+            if least * ROUNDED > best.square {
+                continue;
+            }
+            if number & LEAF != 0 {
+                for triangle in self.leaves[(number & !LEAF) as usize].triangles {
+                    let this = Nearest { square: square(triangle), triangle };
+                    if this.comes_before(best) {
+                        best = this;
+                    }
+                }
+                continue;
+            }
+            let node = &self.nodes[number as usize];
+            let first = open.len();
+            for (i, &child) in node.children.iter().enumerate() {
+                let [low, high] = [node.low, node.high].map(|corner| DVec3::from_array(corner.map(|axis| axis.0[i])));
+                let to_box = (low - p).max(p - high).max(DVec3::ZERO).length_squared();
+                if to_box < f64::INFINITY {
+                    open.push((to_box, child));
+                }
+            }
+            // The nearest child is popped first.
+            open[first..].sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        best.triangle
     }
 }
 
