@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::garment::fabric::{BUILT_IN, Fabric};
 use crate::record::{DrapeTestRecording, NamedOutline, Sink};
-use crate::study::drape_test::{DrapeTest, Drapes, STANDARDS, Standard, table_csv, to_svg};
+use crate::study::drape_test::{DrapeTest, Drapes, Figure, STANDARDS, Standard, table_csv, to_svg};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
@@ -112,8 +112,10 @@ impl CusickArgs {
             })
             .collect();
         if let Some(path) = &self.svg {
-            let outlines: Vec<_> = drapes.iter().map(|(name, drape)| (name.clone(), &drape.outline)).collect();
-            write(path, to_svg(&outlines, test.disc_m, test.specimen_m), "--svg")?;
+            let DrapeTest { specimen_m, disc_m, .. } = test;
+            let title = format!("specimen {:.1} cm, disc {:.1} cm, true size", 200.0 * specimen_m, 200.0 * disc_m);
+            let outlines = drapes.iter().map(|(name, drape)| (name.clone(), &drape.outline)).collect();
+            write(path, to_svg(&[Figure { title, disc_m, specimen_m, measured_m: None, outlines }]), "--svg")?;
         }
         if let Some(sink) = recording {
             let mut recording = DrapeTestRecording::open(sink, "drape tests", test.specimen_m)?;

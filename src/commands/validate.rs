@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::record::{DrapeTestRecording, NamedOutline, Sink};
-use crate::study::drape_test::to_svg;
-use crate::study::validation::{Outcome, Validation, cases};
+use crate::study::drape_test::{Drape, Figure, to_svg};
+use crate::study::validation::{Outcome, ValidatedDrapes, Validation, cases};
 use clap::Args;
 use serde_json::json;
 
@@ -23,7 +23,7 @@ pub(crate) struct ValidateArgs {
     /// Drapes of each fabric, each from another start; a laboratory takes six
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=100))]
     starts: u32,
-    /// Draw the outlines of all drapes from above
+    /// Draw the outlines of all drapes from above, a figure for each fabric, over the circle of the measured coefficient
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
     /// Record the drapes, the outlines of the starts over one another and over the circle of the measured coefficient
@@ -64,7 +64,7 @@ impl ValidateArgs {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.svg {
-            write(path, drawing(&validation), "--svg")?;
+            write(path, to_svg(&validation.drapes.iter().map(figure).collect::<Vec<_>>()), "--svg")?;
         }
         if let Some(sink) = sink {
             record(sink, &validation)?;
@@ -129,12 +129,24 @@ fn row(outcome: &Outcome) -> [String; 9] {
     ]
 }
 
-/// The outlines of the first start of each fabric.
-fn drawing(validation: &Validation) -> String {
-    let firsts = || validation.drapes.iter().filter_map(|of| Some((of, of.drapes.all.first()?)));
-    let outlines: Vec<_> = firsts().map(|(of, drape)| (of.case.clone(), &drape.outline)).collect();
-    let (disc, specimen) = validation.drapes.first().map_or((0.0, 0.0), |of| (of.test.disc_m, of.test.specimen_m));
-    to_svg(&outlines, disc, specimen)
+/// Simulated and measured coefficient of a fabric, as a line of text.
+fn coefficients(of: &ValidatedDrapes) -> String {
+    let percent = |drape: &Drape| 100.0 * drape.coefficient;
+    let mut text = format!("simulated {:.1} %", of.drapes.mean(percent));
+    text += &of.drapes.deviation(percent).map_or_else(String::new, |points| format!(" ± {points:.1}"));
+    text += &of.measured.map_or_else(String::new, |share| format!(", measured {:.1} %", 100.0 * share));
+    text
+}
+
+/// The figure of a fabric, with the outlines of all starts.
+fn figure(of: &ValidatedDrapes) -> Figure<'_> {
+    Figure {
+        title: format!("{}: {}", of.case, coefficients(of)),
+        disc_m: of.test.disc_m,
+        specimen_m: of.test.specimen_m,
+        measured_m: of.measured_radius(),
+        outlines: (0..).zip(&of.drapes.all).map(|(k, drape)| (format!("start {k}"), &drape.outline)).collect(),
+    }
 }
 
 /// Records each fabric as a step: its first drape, and the outlines of all starts.
@@ -143,14 +155,13 @@ fn record(sink: Sink, validation: &Validation) -> anyhow::Result<()> {
     let mut recording = DrapeTestRecording::open(sink, "validation", reach)?;
     for of in &validation.drapes {
         let Some(first) = of.drapes.all.first() else { continue };
-        let mut outlines = vec![NamedOutline::circle("disc", of.test.disc_m)];
-        let mut text = format!("**{}**: simulated {:.1} %", of.case, 100.0 * of.drapes.mean(|drape| drape.coefficient));
-        if let Some(measured) = of.measured {
-            // The circle whose shadow has the measured coefficient.
-            let [disc, specimen] = [of.test.disc_m, of.test.specimen_m].map(|r| r * r);
-            outlines.push(NamedOutline::circle("measured coefficient", (disc + measured * (specimen - disc)).sqrt()));
-            text += &format!(", measured {:.1} %", 100.0 * measured);
-        }
+        let mut outlines = vec![
+            NamedOutline::circle("disc", of.test.disc_m),
+            NamedOutline::circle("flat specimen", of.test.specimen_m),
+        ];
+        let text = format!("**{}**: {}", of.case, coefficients(of));
+        let measured = of.measured_radius().map(|radius| NamedOutline::circle("measured coefficient", radius));
+        outlines.extend(measured);
         let starts = (0..).zip(&of.drapes.all);
         outlines.extend(starts.map(|(start, drape)| NamedOutline {
             name: format!("start {start}"),

@@ -24,7 +24,7 @@ mod standards;
 mod table;
 
 pub(crate) use drape::Drape;
-pub(crate) use outline::to_svg;
+pub(crate) use outline::{Figure, to_svg};
 pub(crate) use standards::{DrapeTest, DrapeTestError, STANDARDS, Standard};
 pub(crate) use table::{Drapes, table_csv};
 

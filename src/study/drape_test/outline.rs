@@ -126,28 +126,65 @@ fn pass(a: DVec2, b: DVec2, radius_m: &mut [f64]) {
     }
 }
 
-/// Drawing of outlines over one another in true size, with the disc and the flat specimen; a colour and a line of the legend for each.
-pub(crate) fn to_svg(outlines: &[(String, &Outline)], disc_m: f64, specimen_m: f64) -> String {
+/// One figure of a drawing: outlines over one another, with the circles of their test.
+pub(crate) struct Figure<'a> {
+    /// The line below it.
+    pub title: String,
+    /// Radius of the disc, m.
+    pub disc_m: f64,
+    /// Radius of the flat specimen, m.
+    pub specimen_m: f64,
+    /// Radius of the circle whose shadow has the measured coefficient, m.
+    pub measured_m: Option<f64>,
+    /// The outlines with their names; a single one needs none.
+    pub outlines: Vec<(String, &'a Outline)>,
+}
+
+/// Most figures side by side.
+const COLUMNS: usize = 4;
+
+/// Drawing of figures in true size, in rows of [`COLUMNS`]: the disc a solid grey circle, the flat specimen a dashed one, the measured coefficient
+/// a dashed black one, each outline in its own colour with a line of the legend.
+pub(crate) fn to_svg(figures: &[Figure<'_>]) -> String {
     const COLOURS: [&str; 6] = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf"];
-    const LINE_MM: f64 = 6.0;
-    let reach = 1e3 * outlines.iter().flat_map(|(_, o)| &o.radius_m).copied().fold(specimen_m, f64::max) + 5.0;
-    let (side, height) = (2.0 * reach, 2.0 * reach + LINE_MM * (outlines.len() as f64 + 0.5));
+    const LINE_MM: f64 = 9.0;
+    const MARGIN_MM: f64 = 5.0;
+    let farthest = |figure: &Figure<'_>| {
+        let radii = figure.outlines.iter().flat_map(|(_, outline)| &outline.radius_m);
+        radii.copied().fold(figure.specimen_m.max(figure.measured_m.unwrap_or_default()), f64::max)
+    };
+    let reach = 1e3 * figures.iter().map(farthest).fold(0.0, f64::max) + MARGIN_MM;
+    let lines = 1 + figures.iter().map(|figure| figure.outlines.len()).max().unwrap_or_default();
+    let (side, height) = (2.0 * reach, 2.0 * reach + LINE_MM * lines as f64 + MARGIN_MM);
+    let columns = figures.len().clamp(1, COLUMNS);
+    let (width, full) = (side * columns as f64, height * figures.len().div_ceil(columns) as f64);
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{side:.1}mm\" height=\"{height:.1}mm\" \
-         viewBox=\"{:.1} {:.1} {side:.1} {height:.1}\" fill=\"none\" stroke-width=\"0.5\" font-family=\"sans-serif\" font-size=\"4\">\n\
-         <rect x=\"{:.1}\" y=\"{:.1}\" width=\"{side:.1}\" height=\"{height:.1}\" fill=\"white\"/>\n",
-        -reach, -reach, -reach, -reach
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.1}mm\" height=\"{full:.1}mm\" viewBox=\"0 0 {width:.1} {full:.1}\" \
+         fill=\"none\" stroke-width=\"0.6\" font-family=\"sans-serif\" font-size=\"7\">\n\
+         <rect width=\"{width:.1}\" height=\"{full:.1}\" fill=\"white\"/>\n"
     );
-    for (radius, dash) in [(disc_m, "none"), (specimen_m, "2 2")] {
-        out += &format!("<circle r=\"{:.2}\" stroke=\"#888\" stroke-dasharray=\"{dash}\"/>\n", 1e3 * radius);
-    }
-    for (i, (name, outline)) in outlines.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        let points: Vec<String> = outline.points().map(|p| format!("{:.2},{:.2}", 1e3 * p.x, -1e3 * p.y)).collect();
-        let name = name.replace('&', "&amp;").replace('<', "&lt;");
-        let (x, y) = (2.0 - reach, reach + LINE_MM * (i as f64 + 0.75));
-        out += &format!("<polygon points=\"{}\" stroke=\"{colour}\"/>\n", points.join(" "));
-        out += &format!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{colour}\" stroke=\"none\">{name}</text>\n");
+    for (i, figure) in figures.iter().enumerate() {
+        let (x, y) = (reach + side * (i % columns) as f64, reach + height * (i / columns) as f64);
+        out += &format!("<g transform=\"translate({x:.1} {y:.1})\">\n");
+        let circles = [(Some(figure.disc_m), "#888", "none"), (Some(figure.specimen_m), "#888", "2 2")];
+        for (radius, colour, dash) in circles.into_iter().chain([(figure.measured_m, "black", "5 2")]) {
+            let Some(radius) = radius else { continue };
+            out += &format!("<circle r=\"{:.2}\" stroke=\"{colour}\" stroke-dasharray=\"{dash}\"/>\n", 1e3 * radius);
+        }
+        let mut line = reach;
+        let mut text = |out: &mut String, colour: &str, text: &str| {
+            line += LINE_MM;
+            let text = text.replace('&', "&amp;").replace('<', "&lt;");
+            *out += &format!("<text x=\"{:.1}\" y=\"{line:.1}\" fill=\"{colour}\">{text}</text>\n", MARGIN_MM - reach);
+        };
+        text(&mut out, "black", &figure.title);
+        for (i, (name, outline)) in figure.outlines.iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let points: Vec<String> = outline.points().map(|p| format!("{:.2},{:.2}", 1e3 * p.x, -1e3 * p.y)).collect();
+            out += &format!("<polygon points=\"{}\" stroke=\"{colour}\"/>\n", points.join(" "));
+            text(&mut out, colour, name);
+        }
+        out += "</g>\n";
     }
     out + "</svg>\n"
 }
@@ -194,10 +231,19 @@ mod tests {
     }
 
     #[test]
-    fn the_drawing_names_every_outline() {
+    fn each_figure_has_its_own_circles_and_names() {
         let one = wave(5.0, 0.01);
-        let svg = to_svg(&[("a<b".to_owned(), &one), ("c".to_owned(), &one)], 0.09, 0.15);
-        assert_eq!(svg.matches("<polygon").count(), 2);
-        assert!(svg.contains("a&lt;b") && svg.ends_with("</svg>\n"));
+        let figure = |disc_m, measured_m| Figure {
+            title: "1 < 2".to_owned(),
+            disc_m,
+            specimen_m: 0.15,
+            measured_m,
+            outlines: vec![("a<b".to_owned(), &one), ("c".to_owned(), &one)],
+        };
+        let svg = to_svg(&[figure(0.09, None), figure(0.0635, Some(0.1))]);
+        let count = |text: &str| svg.matches(text).count();
+        assert_eq!([count("<polygon"), count("<circle"), count("<text")], [4, 5, 6]);
+        assert_eq!([count("r=\"90.00\""), count("r=\"63.50\""), count("r=\"100.00\"")], [1, 1, 1]);
+        assert!(svg.contains(">a&lt;b<") && svg.contains(">1 &lt; 2<") && svg.ends_with("</svg>\n"));
     }
 }

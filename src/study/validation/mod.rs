@@ -111,6 +111,14 @@ pub(crate) struct ValidatedDrapes {
     pub drapes: Drapes,
 }
 
+impl ValidatedDrapes {
+    /// Radius of the circle whose shadow has the measured coefficient, m.
+    pub(crate) fn measured_radius(&self) -> Option<f64> {
+        let [disc, specimen] = [self.test.disc_m, self.test.specimen_m].map(|r| r * r);
+        self.measured.map(|share| (disc + share * (specimen - disc)).sqrt())
+    }
+}
+
 /// Outcomes, and the drapes behind them.
 #[derive(Default)]
 pub(crate) struct Validation {
