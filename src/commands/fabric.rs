@@ -45,6 +45,7 @@ impl FabricArgs {
             None => console::document(converted.toml.as_bytes()),
         }
         console::notes(&converted.assumed);
+        console::warnings(&converted.doubts);
         console::warnings(&converted.fabric.warnings());
         Ok(())
     }

@@ -69,7 +69,15 @@ const fn quantity(
 const SHARE: &[(f64, &str)] = &[(0.01, "a share")];
 const LENGTH: &[(f64, &str)] = &[(0.1, "cm"), (1000.0, "µm"), (0.001, "m")];
 
-/// The ranges are those of apparel cloth, widened three times at each end.
+/// Factor by which the ranges of apparel cloth are widened at each end. A value outside is refused; one that only the widening admits is
+/// doubted if another unit explains it.
+const WIDENED: f64 = 3.0;
+
+/// Largest 2HB/(2B), 1/cm, that is not doubted: three times that of the cotton broad, the largest found. The cloth would keep a curvature of
+/// this size.
+const MAX_RESIDUAL_CURVATURE: f64 = 1.6;
+
+/// See [`WIDENED`].
 const KES: [Quantity; 9] = [
     quantity("B", "gf·cm²/cm", [0.001, 3.0], [true, true], &[(98.0665, "µN·m"), (9.806_65, "mN·cm²/cm")]),
     quantity("2HB", "gf·cm/cm", [0.0, 3.0], [false, true], &[(9.806_65, "mN·m/m")]),
@@ -140,6 +148,8 @@ pub(crate) struct FromSheet {
     pub(crate) toml: String,
     /// Constants that the sheet does not have.
     pub(crate) assumed: Vec<String>,
+    /// Values that cloth can have, and that another unit would make usual.
+    pub(crate) doubts: Vec<String>,
 }
 
 /// Warp and weft of each quantity, in the units of the sheet.
@@ -154,7 +164,7 @@ pub(crate) fn from_csv(system: LabSystem, text: &str, file: &str, name: &str) ->
         LabSystem::Kes => &KES[..],
         LabSystem::Fast => &FAST[..],
     };
-    let values = read(quantities, text, file)?;
+    let (values, mut doubts) = read(quantities, text, file)?;
     if let Some(missing) = quantities.iter().find(|q| q.required && !values.contains_key(q.name)) {
         return Err(LabSheetError::Missing { file: file.to_owned(), missing: missing.name });
     }
@@ -178,6 +188,7 @@ pub(crate) fn from_csv(system: LabSystem, text: &str, file: &str, name: &str) ->
             return Err(LabSheetError::Contradiction { file: file.to_owned(), what });
         }
     }
+    doubts.extend(doubtful_friction(of("2HB"), of("B"), file));
     if system == LabSystem::Fast || pair("2HB").is_none() {
         assumed.push("no friction between yarns in bending (2HB), so the cloth bends elastically".to_owned());
     }
@@ -203,7 +214,7 @@ pub(crate) fn from_csv(system: LabSystem, text: &str, file: &str, name: &str) ->
         file: file.to_owned(),
         what: format!("the fabric cannot be written as TOML: {error}"),
     })?;
-    Ok(FromSheet { fabric, toml, assumed })
+    Ok(FromSheet { fabric, toml, assumed, doubts })
 }
 
 impl LabSystem {
@@ -253,8 +264,8 @@ fn fast(k: usize, of: impl Fn(&str) -> [f64; 2]) -> Along {
 }
 
 /// Reads the lines of a sheet.
-fn read(quantities: &[Quantity], text: &str, file: &str) -> Result<Values, LabSheetError> {
-    let mut values = Values::new();
+fn read(quantities: &[Quantity], text: &str, file: &str) -> Result<(Values, Vec<String>), LabSheetError> {
+    let (mut values, mut doubts) = (Values::new(), Vec::new());
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -289,20 +300,33 @@ fn read(quantities: &[Quantity], text: &str, file: &str) -> Result<Values, LabSh
             _ => return Err(found(format!("found {} values of {name}", numbers.len()))),
         };
         for (direction, value) in ["warp", "weft"].into_iter().zip(pair) {
-            check(quantity, direction, value, file, line)?;
+            doubts.extend(check(quantity, direction, value, file, line)?);
         }
         if values.insert(quantity.name, pair).is_some() {
             return Err(LabSheetError::Twice { file: file.to_owned(), line, name: quantity.name });
         }
     }
-    Ok(values)
+    Ok((values, doubts))
 }
 
-/// Refuses a value that no cloth has; names the mistake of units that would explain it.
-fn check(quantity: &Quantity, direction: &'static str, value: f64, file: &str, line: u64) -> Result<(), LabSheetError> {
+/// Refuses a value that no cloth has, and doubts one that apparel cloth has in another unit alone; names that unit.
+fn check(
+    quantity: &Quantity,
+    direction: &'static str,
+    value: f64,
+    file: &str,
+    line: u64,
+) -> Result<Option<String>, LabSheetError> {
     let [low, high] = quantity.range;
     if (low..=high).contains(&value) {
-        return Ok(());
+        let usual = low * WIDENED..=high / WIDENED;
+        let others = quantity.others.iter().filter(|(size, _)| usual.contains(&(value / size)));
+        let others: Vec<String> = others.map(|(size, unit)| format!("{unit} (a factor of {size:.4})")).collect();
+        let is_doubtful = !usual.contains(&value) && !others.is_empty();
+        return Ok(is_doubtful.then(|| {
+            let (name, unit, others) = (quantity.name, quantity.unit, others.join(" or "));
+            format!("{file}, line {line}: {name} {direction} is {value} {unit}, unusual for apparel cloth; is it in {others}?")
+        }));
     }
     let explains = |(size, unit): &(f64, &'static str)| {
         let converted = value / size;
@@ -325,6 +349,19 @@ fn check(quantity: &Quantity, direction: &'static str, value: f64, file: &str, l
     })
 }
 
+/// A doubt about friction and bending stiffness (warp and weft) that do not belong to one cloth.
+fn doubtful_friction(hysteresis: [f64; 2], stiffness: [f64; 2], file: &str) -> Option<String> {
+    let residual = (0..2).map(|k| hysteresis[k] / (2.0 * stiffness[k])).filter(|curvature| curvature.is_finite());
+    let residual = residual.fold(0.0, f64::max);
+    (residual > MAX_RESIDUAL_CURVATURE).then(|| {
+        format!(
+            "{file}: 2HB is {:.1} times B, so the cloth would keep a curvature of {residual:.1}/cm, expected at most {MAX_RESIDUAL_CURVATURE}/cm; is 2HB in \
+             mN·m/m, a factor of 9.8066, or B in another unit?",
+            2.0 * residual
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -343,7 +380,7 @@ mod tests {
 
     #[test]
     fn a_kes_sheet_is_converted_unit_by_unit() {
-        let FromSheet { fabric, toml, assumed } = kes(SHEET).unwrap();
+        let FromSheet { fabric, toml, assumed, .. } = kes(SHEET).unwrap();
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-3, "{a} for {b}");
         near(fabric.bending_nm[2], 1.1572e-5);
         near(fabric.bending_nm[1], 0.5 * (fabric.bending_nm[0] + fabric.bending_nm[2]));
@@ -386,6 +423,28 @@ mod tests {
         ] {
             let text = error(&SHEET.replace(line, wrong));
             assert!(text.contains(unit) && text.contains(value), "{text}");
+        }
+    }
+
+    #[test]
+    fn values_that_another_unit_would_make_usual_are_doubted_and_taken() {
+        assert_eq!(kes(SHEET).unwrap().doubts, [""; 0]);
+        assert_eq!(from_csv(LabSystem::Fast, SIMPLE, "s.csv", "x").unwrap().doubts, [""; 0]);
+        for (line, wrong, expected) in [
+            (
+                "B,0.118,0.09",
+                "B,1.157,0.09",
+                "B warp is 1.157 gf·cm²/cm, unusual for apparel cloth; is it in µN·m (a factor of 98.0665) or mN·cm²/cm (a factor of 9.8066)?",
+            ),
+            (
+                "G,0.8,0.7",
+                "G,0.8,6.9",
+                "line 5: G weft is 6.9 gf/(cm·deg), unusual for apparel cloth; is it in mN/(cm·deg) (a factor of 9.8066)?",
+            ),
+            ("2HB,0.124,0.1", "2HB,0.7,0.98", "2HB is 10.9 times B, so the cloth would keep a curvature of 5.4/cm"),
+        ] {
+            let sheet = kes(&SHEET.replace(line, wrong)).unwrap();
+            assert!(sheet.doubts.len() == 1 && sheet.doubts[0].contains(expected), "{:?}", sheet.doubts);
         }
     }
 
