@@ -238,7 +238,8 @@ impl Metrics {
         ];
         faults.extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, of)| format!("{count} {of}")));
         if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
-            faults.push(format!("strain of {:.0} %, more than fabrics bear", 1e2 * strain));
+            let opening = self.tightest_opening.map(TightestOpening::text).unwrap_or_default();
+            faults.push(format!("strain of {:.0} %, more than fabrics bear{opening}", 1e2 * strain));
         }
         if faults.is_empty() { RESTS.to_owned() } else { faults.join("; ") }
     }
