@@ -1,4 +1,4 @@
-//! Utilities that know no domain: error text, names of enum variants, checksums, files, quantiles, elementary functions, SIMD.
+//! Utilities that know no domain: error text, names of enum variants, checksums, files, quantiles, elementary functions, random numbers, SIMD.
 
 pub mod atomic_file;
 pub mod checksum;
@@ -6,5 +6,6 @@ pub mod error_text;
 pub mod files;
 pub(crate) mod math;
 pub mod quantiles;
+pub(crate) mod random;
 pub mod serde_name;
 pub(crate) mod simd;

@@ -60,11 +60,6 @@ const KEPT: &[(&str, &str)] = kept![
     "tuned/pullover-1-levels.toml"
     "tuned/pullover-2-levels-and-extents.toml"
     "tuned/pullover-2-levels.toml"
-    "tuned/translations/flared-skirt-levels.toml"
-    "tuned/translations/long-sleeved-dress-levels.toml"
-    "tuned/translations/low-cut-dress-levels.toml"
-    "tuned/translations/pullover-1-levels.toml"
-    "tuned/translations/pullover-2-levels.toml"
 ];
 
 /// Arguments of `assets`.

@@ -72,7 +72,6 @@ fn is_users(cause: &(dyn Error + 'static)) -> bool {
         || cause.is::<crate::study::sweep::MergeError>()
         || cause.is::<crate::study::sweep::PlanError>()
         || cause.is::<crate::study::sweep::StoreError>()
-        || cause.is::<crate::study::table_search::SearchError>()
 }
 
 /// Signals within this time count as one: `timeout` and similar programs signal the process and then its group.

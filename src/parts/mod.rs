@@ -8,5 +8,4 @@ mod seeding;
 mod stage_one;
 
 pub use seeding::Grain;
-pub(crate) use seeding::{Ruler, spread_seeds};
 pub use stage_one::{Part, Parts, Seam, UNASSIGNED, segment};

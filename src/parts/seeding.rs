@@ -63,13 +63,13 @@ fn squares(mesh: &TriMesh, topology: &Topology, rest: &RestShape, edge: usize) -
 
 /// Measures edge lengths along the cloth.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ruler<'a> {
+pub(super) struct Ruler<'a> {
     /// The garment.
-    pub(crate) mesh: &'a TriMesh,
+    pub(super) mesh: &'a TriMesh,
     /// Its connectivity.
-    pub(crate) topology: &'a Topology,
+    pub(super) topology: &'a Topology,
     /// The grain, with the factors for lengths along weft and warp; `None` for unscaled lengths.
-    pub(crate) grain: Option<(&'a Grain, [f64; 2])>,
+    pub(super) grain: Option<(&'a Grain, [f64; 2])>,
 }
 
 impl Ruler<'_> {
@@ -90,33 +90,14 @@ impl Ruler<'_> {
 }
 
 /// The nearest seed of each of these connected vertices, and the number of seeds needed so that none is farther than half of
-/// `extent_m`. `local` gives the index of a vertex in the list, `None` for others.
+/// `extent_m`. Each seed is placed on the vertex farthest from those before. `local` gives the index of a vertex in the list, `None`
+/// for others.
 pub(super) fn nearest_seeds(
     vertices: &[u32],
     local: impl Fn(u32) -> Option<usize>,
     ruler: Ruler<'_>,
     extent_m: f64,
 ) -> (Vec<u32>, usize) {
-    let mut found = (Vec::new(), 0);
-    spread_seeds(vertices, local, ruler, |radius_m, seeds, seed_of_vertex| {
-        let enough = radius_m <= 0.5 * extent_m || radius_m == 0.0 || extent_m.is_nan();
-        if enough {
-            found = (seed_of_vertex.to_vec(), seeds);
-        }
-        enough
-    });
-    found
-}
-
-/// Places seeds, each on the vertex farthest from those before, until `enough` returns true. Its arguments after each seed: the largest
-/// distance of a vertex from its seed, m; the number of seeds; the nearest seed of every vertex. The seeds do not depend on where
-/// the loop ends, so one run serves every extent.
-pub(crate) fn spread_seeds(
-    vertices: &[u32],
-    local: impl Fn(u32) -> Option<usize>,
-    ruler: Ruler<'_>,
-    mut enough: impl FnMut(f64, usize, &[u32]) -> bool,
-) {
     // The edges inside the piece, by index in its list: neighbour and length, m.
     let mut graph = Csr::default();
     for &v in vertices {
@@ -127,16 +108,15 @@ pub(crate) fn spread_seeds(
         seed_of_vertex: vec![0; vertices.len()],
         parent: vec![usize::MAX; vertices.len()],
     };
-    let (mut next, mut radius_m) = (0, f64::INFINITY);
-    for seed in 0..vertices.len() {
-        nearest.add(seed, next, &graph);
+    let enough = |radius_m: f64| radius_m <= 0.5 * extent_m || radius_m == 0.0 || extent_m.is_nan();
+    let (mut next, mut radius_m, mut seeds) = (0, f64::INFINITY, 0);
+    // Every vertex is a seed at the latest where the radius is 0.
+    while seeds < vertices.len() && (seeds == 0 || !enough(radius_m)) {
+        nearest.add(seeds, next, &graph);
         (next, radius_m) = nearest.farthest();
-        if enough(radius_m, seed + 1, &nearest.seed_of_vertex) {
-            return;
-        }
+        seeds += 1;
     }
-    // Every vertex is a seed, and no caller requires less than a distance of 0.
-    debug_assert!(vertices.is_empty() || radius_m == 0.0);
+    (nearest.seed_of_vertex, seeds)
 }
 
 /// The nearest seed of every vertex.

@@ -23,8 +23,6 @@ pub struct Layout {
     pub several_tables: bool,
     /// The number of those steps, if known: plots then leave room for their legends.
     pub table_count: Option<u32>,
-    /// The steps show the best drape that PARTs can represent, without mechanics: no views of forces and of stage times.
-    pub without_mechanics: bool,
     /// Steps of the timeline `iteration`: adds the tab of the solver, and the recording opens on that timeline.
     pub iterations: bool,
     /// The error of the drape.
@@ -91,7 +89,7 @@ impl Layout {
 
     /// The grid of the stages: one row for a gown, two for a pullover.
     pub(super) fn stage_grid(&self, eye: &Eye) -> Grid {
-        let count = 3 + usize::from(!self.without_mechanics) + usize::from(self.error);
+        let count = 4 + usize::from(self.error);
         let width = ASPECT * count as f64 / (count as f64 + f64::from(REPORT_OVER_STAGE));
         Grid::fitting(eye, count, [width, STAGE_HEIGHT])
     }

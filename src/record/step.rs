@@ -114,14 +114,11 @@ fn log_force(recording: &OpenRecording, step: &StepView<'_>, tooltips: Vec<Strin
     let in_n = recording.range("force", || Range::to_quantile(force_n.iter().copied(), FORCE_QUANTILE));
     let map = ColourMap::FORCE;
     recording.log(paths::FORCE, &recording.cells.colours(&map.colours(&force_n, in_n)))?;
-    // Without mechanics the bar of the error has the row of the forces.
-    if !recording.layout().without_mechanics {
-        let (factor, unit) = if in_n.high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
-        let range = Range { low: factor * in_n.low, high: factor * in_n.high };
-        let open_end = force_n.iter().any(|&f| f > in_n.high);
-        let legend = Legend { title: "|F|", unit, map, range, open_end };
-        legend.log(recording, &format!("{}/force", paths::STAGES_LEGEND), [0, 3])?;
-    }
+    let (factor, unit) = if in_n.high < 0.1 { (1e3, "mN") } else { (1.0, "N") };
+    let range = Range { low: factor * in_n.low, high: factor * in_n.high };
+    let open_end = force_n.iter().any(|&f| f > in_n.high);
+    let legend = Legend { title: "|F|", unit, map, range, open_end };
+    legend.log(recording, &format!("{}/force", paths::STAGES_LEGEND), [0, 3])?;
     let placed = &recording.garment.positions;
     let arrows = part_marks::arrows(&recording.eye, placed, step.part_of_vertex, step.part_force_n, in_n.high);
     recording.log(paths::FORCE_ARROWS, &arrows.with_labels(tooltips).with_show_labels(false))
@@ -133,12 +130,11 @@ fn log_drape(recording: &mut OpenRecording, step: &StepView<'_>) -> Result<(), R
     recording.at_table(step.index, 5);
     recording.log(paths::DRAPE, &meshes::shape(&draped))?;
     recording.at(step.index, 6);
-    let error_row = if recording.layout().without_mechanics { 3 } else { 4 };
     let mut fit = 0;
     for overlay in step.overlays {
         if overlay.name == "error" {
             let legend = format!("{}/error", paths::STAGES_LEGEND);
-            log_overlay(recording, paths::ERROR, &draped, overlay, &legend, [0, error_row])?;
+            log_overlay(recording, paths::ERROR, &draped, overlay, &legend, [0, 4])?;
         } else {
             log_fit(recording, &draped, overlay, fit)?;
             fit += 1;

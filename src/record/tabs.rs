@@ -68,16 +68,12 @@ impl Tabs<'_> {
 
     fn stages(&self) -> Node {
         let (layout, eye) = (self.layout, &self.eye(Tab::Stages));
-        let mut views = vec![View::with_body("Distance", "/distance", eye), View::with_body("PARTs", "/parts", eye)];
-        if !layout.without_mechanics {
-            views.push(View::with_body("Force per PART", "/force", eye));
-        }
-        // The best representable garment may pass through the body, so it is not called a drape.
-        views.push(View::with_body(
-            if layout.without_mechanics { "Best fit of PARTs" } else { "Drape" },
-            "/drape",
-            eye,
-        ));
+        let mut views = vec![
+            View::with_body("Distance", "/distance", eye),
+            View::with_body("PARTs", "/parts", eye),
+            View::with_body("Force per PART", "/force", eye),
+            View::with_body("Drape", "/drape", eye),
+        ];
         if layout.error {
             views.push(View::with_body("Error", paths::ERROR, eye));
         }
@@ -97,7 +93,7 @@ impl Tabs<'_> {
             below.push((0.8, self.plot("All PARTs", "/numbers/part_count", false)));
         }
         // The table's name, levels, distance, force and error.
-        let bars = 3 + usize::from(!layout.without_mechanics) + usize::from(layout.error);
+        let bars = 4 + usize::from(layout.error);
         below.push((1.0, View::plane("Colours", &[paths::STAGES_LEGEND], visible([1, bars])).into()));
         let height = STAGE_HEIGHT as f32;
         let left = Node::Column("Stages", vec![(height, views), (1.0 - height, Node::Row("Levels", below))]);

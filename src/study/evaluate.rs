@@ -11,6 +11,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use crate::base::math;
+use crate::base::random::Random;
 use crate::drape::{Drape, Scene, Settings};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::{Cloth, EnergyError};
@@ -161,16 +162,8 @@ fn require_one_garment(scene: &Scene) -> Result<(), EvaluateError> {
 /// would not change the equilibrium, since the first relaxation removes it.
 #[must_use]
 pub fn perturbed(positions: &[DVec3], held: &[u32], seed: u64) -> Vec<DVec3> {
-    let mut state = seed;
-    let mut random = || {
-        // SplitMix64 (Steele, Lea, Flood 2014): equal bits on every platform.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-    };
-    let mut vector = || DVec3::new(random(), random(), random());
+    let mut random = Random::new(seed);
+    let mut vector = || DVec3::new(random.signed(), random.signed(), random.signed());
     let waves: [(DVec3, DVec3, DVec3); WAVES] =
         std::array::from_fn(|_| (WAVE_NUMBER * vector(), std::f64::consts::PI * vector(), vector()));
     let field =

@@ -248,7 +248,7 @@ fn a_full_disk_under_a_sweep_a_comparison_and_a_search_ends_them_with_words() {
         (0, "sweep sweep.toml --out full --no-save".to_owned()),
         (16, "sweep sweep.toml --out part --accuracy none".to_owned()),
         (8, format!("compare table-3 table-3 {scene} --accuracy none --repeats 1 --save full.rrd")),
-        (0, "tune --garment flared-skirt@400 --levels-only --max-parts 2 --out tuned".to_owned()),
+        (0, "tune --garment flared-skirt@400 --levels-only --tables 16 --out tuned".to_owned()),
         (1, "assets --vertices 400 --out assets".to_owned()),
     ] {
         let script = format!("ulimit -f {blocks}; exec {program} {arguments}");

@@ -113,7 +113,7 @@ pub(super) const KINDS: [Kind; 13] = [
     },
     Kind {
         name: "tune",
-        line: "tune --body body.obj --garment garment.obj --levels-only --max-parts 4 --out tuned --format json",
+        line: "tune --body body.obj --garment garment.obj --levels-only --tables 16 --max-parts 4 --out tuned --format json",
         files: &["body.obj", "garment.obj"],
         share: 5,
     },

@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 use super::moments::Moments;
 use super::summary::{MM_PER_M, rms_mm};
 use crate::mechanics::coupled::{Motion, Motions, Weights};
-use crate::mechanics::newton::SolveError;
 use crate::mesh::Topology;
 use crate::parts::{Parts, UNASSIGNED};
 
@@ -56,24 +55,8 @@ pub(crate) fn representable(
     }
 }
 
-/// The displacement nearest to `u` (m, from `start`) that the PARTs' blended motions can represent.
-///
-/// # Errors
-/// [`SolveError`] if positions are not finite.
-pub(crate) fn blended(
-    topology: &Topology,
-    parts: &Parts,
-    held: &[bool],
-    start: &[DVec3],
-    u: &[DVec3],
-    motion: Motion,
-) -> Result<Vec<DVec3>, SolveError> {
-    let weights = Weights::new(topology, start, parts).without(held);
-    Motions::new(parts, weights, start, motion).nearest(start, u)
-}
-
 /// The RMS remainder of the displacement `u` from `start` with one unblended motion per PART, m; 0 for a garment without vertices.
-pub(crate) fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
+fn unblended_rms_m(parts: &Parts, start: &[DVec3], u: &[DVec3], motion: Motion) -> f64 {
     let squared = |vertices: &[u32]| {
         let mut sums = Moments::default();
         Moments::of_each(vertices, start, u).iter().for_each(|m| sums += m);

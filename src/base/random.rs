@@ -1,0 +1,31 @@
+//! Pseudorandom numbers with equal bits on every platform.
+//!
+//! Source: SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", OOPSLA 2014).
+
+/// A generator; equal seeds give equal sequences.
+#[derive(Debug, Clone)]
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [−1, 1).
+    pub(crate) fn signed(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    }
+
+    /// An index below `count`; 0 if `count` is 0.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        (self.next() >> 11) as usize % count.max(1)
+    }
+}
