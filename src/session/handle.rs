@@ -123,6 +123,13 @@ impl Session {
         self.0.newest.load(Ordering::SeqCst) != state || self.is_closed()
     }
 
+    /// Waits for a state newer than `state`, for `timeout` at most; returns whether there is one.
+    pub(super) fn superseded_within(&self, state: u64, timeout: Duration) -> bool {
+        let newest = |_: &mut SessionState| !self.is_superseded(state);
+        drop(self.0.changed.wait_timeout_while(self.lock(), timeout, newest));
+        self.is_superseded(state)
+    }
+
     pub(super) fn lock(&self) -> MutexGuard<'_, SessionState> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -163,4 +170,21 @@ impl Session {
 fn check(job: &Job) -> Result<(), EditError> {
     job.scene.check_names()?;
     Ok(job.settings.fabric.check("settings.fabric")?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wait_for_a_newer_state_ends_with_one_and_with_the_session() {
+        let session = Session::new(Job::default(), true);
+        assert!(!session.superseded_within(1, Duration::ZERO));
+        let long = Duration::from_secs(600);
+        assert!(session.superseded_within(0, long));
+        let other = session.clone();
+        let waits = std::thread::spawn(move || other.superseded_within(1, long));
+        session.close();
+        assert!(waits.join().unwrap());
+    }
 }

@@ -29,6 +29,10 @@ use crate::study::metrics::Metrics;
 const PANICKED: &str = "computing this edit failed by a fault of the program, and the last good state stands; please report the edit with the \
      message that the program printed";
 
+/// Time without an edit before the figures of a state are computed. They take tenths of a second and cannot be broken off, so that
+/// without a pause only one in ten edits of a drag would get its two stages. Heuristic: longer than between two positions of a slow mouse.
+const PAUSE_BEFORE_FIGURES: Duration = Duration::from_millis(100);
+
 /// Computes the states of a session, and keeps the data that the next state can start from.
 pub struct Worker {
     meshes: MeshCache,
@@ -151,7 +155,9 @@ impl Worker {
             let start = approach(task.scene(), settings, levels, &stage.positions, &mut |_: &Step<'_>| task.check());
             return self.refine(task, levels, start, false);
         }
-        self.finish(task, levels.as_deref());
+        if !session.superseded_within(target.snapshot.state, PAUSE_BEFORE_FIGURES) {
+            self.finish(task, levels.as_deref());
+        }
         Ok(())
     }
 

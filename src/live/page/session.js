@@ -18,6 +18,8 @@ export class Session extends EventTarget {
   state = null;
   #waiting = null;
   #busy = false;
+  // Called with each new state.
+  #look = () => {};
 
   // Dispatches each state for as long as the page is open.
   async follow() {
@@ -63,7 +65,21 @@ export class Session extends EventTarget {
     const may_steer = state.may_steer ?? this.state?.may_steer;
     const run = state.run ?? this.state?.run;
     this.state = { ...state, trail, histogram, may_steer, run };
+    this.#look();
     this.dispatchEvent(new Event("state"));
+  }
+
+  // Until both stages of the newest state are here, or a quarter of a second.
+  #stages() {
+    return new Promise((done) => {
+      const late = setTimeout(done, 250);
+      this.#look = () => {
+        if (this.state.preview?.state !== this.state.state) return;
+        clearTimeout(late);
+        done();
+      };
+      this.#look();
+    });
   }
 
   #longer(end) {
@@ -85,6 +101,8 @@ export class Session extends EventTarget {
       this.#waiting = null;
       const path = gesture === undefined ? "api/state" : `api/state?gesture=${gesture}`;
       await this.send(path, "PATCH", JSON.stringify(change), "application/json", field);
+      // The next edit of a drag would break off stage two of this one, and the drape would stand still until the pointer does.
+      if (gesture !== undefined) await this.#stages();
     }
     this.#busy = false;
   }
