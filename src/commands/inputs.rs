@@ -19,7 +19,7 @@ use super::runtime::{self, refuse};
 #[command(next_help_heading = "Body and garment")]
 pub(crate) struct InputArgs {
     /// Body: `form` (the built-in dress form), a TOML file of its measurements, or a mesh file (OBJ, PLY, STL, glTF, .npz); for `run` also
-    /// a folder of OBJ files, the poses of one body
+    /// a folder of mesh files, the poses of one body
     #[arg(long, value_name = "form|FILE", default_value_t = SceneSpec::default().body)]
     body: String,
     /// Garment: pullover-1, pullover-2, flared-skirt, low-cut-dress or long-sleeved-dress, each optionally with @VERTICES; a TOML
