@@ -132,5 +132,5 @@ fn text(drapes: usize, rows: &[AblationRow]) -> String {
         ]
     };
     let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
-    format!("{drapes} drapes\n{}", console::table(console::RULED, &header.map(str::to_owned), 1.., &lines))
+    format!("{drapes} drapes\n{}", console::table(console::RULED, header.map(str::to_owned), 1.., &lines))
 }

@@ -6,12 +6,14 @@
 //! Times are processor times of the thread that drapes, so other load on the machine distorts them less than wall times.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 use serde::Serialize;
 
+use crate::base::files::bounded_text;
 use crate::drape::Settings;
 use crate::garment::MeshCache;
 use crate::garment::fabric::{Fabric, FabricError};
@@ -272,7 +274,7 @@ fn row(variant: &Variant, outcomes: &[Outcome], defaults: &[Outcome]) -> Ablatio
 /// Processor time of this thread, s; wall time where the system does not tell.
 fn processor_seconds() -> f64 {
     static BEGAN: OnceLock<Instant> = OnceLock::new();
-    let on_processor = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let on_processor = bounded_text(Path::new("/proc/thread-self/schedstat")).ok();
     let nanoseconds = on_processor.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(|| BEGAN.get_or_init(Instant::now).elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
