@@ -1,6 +1,6 @@
 //! Refinement: from any start to the drape, by Newton's method at full resolution.
 //!
-//! The loop is a state machine ([`settle`]):
+//! The loop is a state machine (`settle`):
 //!
 //! ```text
 //!               untangling
@@ -17,7 +17,7 @@
 //! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping` |
 //! | equilibrium | forces balance: resolves penetrations, updates contact places, checks the rest | `face_contact_phase`, `rest_phase` |
 //!
-//! A step is one of [`newton`](super::newton). A run stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight,
+//! A step is one of `mechanics::newton`. A run stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight,
 //! is under the tolerance, no vertex is inside the body, and the equilibrium is stable: the residual is also small at a saddle of the energy
 //! and where cloth slides slowly (`newton::saddle_escape`).
 //!

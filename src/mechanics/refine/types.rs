@@ -47,7 +47,7 @@ pub struct Step<'a> {
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The residual is under the tolerance, and the cloth rests by every criterion of [`rest`](super::rest).
+    /// The residual is under the tolerance, and the cloth rests by every criterion of [`rest`](crate::mechanics::rest).
     Converged,
     /// The residual is under the tolerance, but this criterion of rest keeps failing.
     Unsettled(&'static str),
