@@ -122,7 +122,7 @@ pub(crate) enum AblationError {
     Fabric(#[from] FabricError),
 }
 
-/// What came of one drape.
+/// The result of one drape.
 #[derive(Debug, Clone, Copy, Default)]
 struct Outcome {
     rests: bool,
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn a_variant_that_changes_nothing_has_the_steps_of_the_defaults_and_one_without_checks_has_fewer() {
         let meshes = MeshCache::in_user_cache();
-        let scene = SceneSpec::new(SceneSpec::default().body, "pullover-1@300");
+        let scene = SceneSpec::new(SceneSpec::default().body, "pullover-1@400");
         let cases = [Case::load(&scene, "jersey", 0, &meshes).unwrap()];
         let mut rows = Vec::new();
         let variants: Vec<Variant> = ["newton.max_steps=1900", "rest_check.max_checks=0"]
