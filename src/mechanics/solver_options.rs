@@ -13,6 +13,9 @@ use serde_json::Value;
 /// Largest number that an option takes.
 const MAX_VALUE: f64 = 1e9;
 
+/// Largest count that an option takes, so that no loop of the solver runs for hours.
+const MAX_COUNT: f64 = 1e5;
+
 macro_rules! options {
     ($($(#[$group_doc:meta])* $group:ident { $($(#[$doc:meta])* $key:ident: $type:ty = $default:expr,)* })*) => {
         $(
@@ -329,8 +332,8 @@ impl SolverOptions {
             return Err(wrong("a number from 0 to 1e9"));
         }
         *slot = match slot.is_u64() {
-            true if value.fract() == 0.0 => Value::from(value as u64),
-            true => return Err(wrong("a whole number")),
+            true if value.fract() == 0.0 && value <= MAX_COUNT => Value::from(value as u64),
+            true => return Err(wrong("a whole number from 0 to 100,000")),
             false => Value::from(value),
         };
         serde_json::from_value(all).map_err(|error| wrong(&error.to_string()))

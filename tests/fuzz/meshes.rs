@@ -47,7 +47,7 @@ fn whole(imported: &Imported) -> Result<(), String> {
     check(mesh.triangles.iter().flatten().all(|&v| (v as usize) < n), "a triangle has a vertex that is not there")?;
     let groups = if mesh.groups.is_empty() { 0 } else { mesh.triangles.len() };
     check(
-        mesh.triangle_group.len() == groups && imported.texture.len() == mesh.triangles.len(),
+        mesh.triangle_group.len() == groups && [0, mesh.triangles.len()].contains(&imported.texture.len()),
         "lists of unlike lengths",
     )?;
     check(report.vertices == n && report.triangles == mesh.triangles.len(), "the report counts otherwise")?;
