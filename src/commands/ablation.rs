@@ -1,7 +1,8 @@
-//! `partwise bench ablation`: every option of the solver off, halved and doubled.
+//! `partwise bench ablation`: every option of the solver off, or halved and doubled.
 
 use std::path::PathBuf;
 
+use crate::mechanics::solver_options::SolverOptions;
 use crate::scene::SceneSpec;
 use crate::study::ablation::{AblationRow, cases, run, variants};
 use clap::Args;
@@ -87,7 +88,7 @@ impl AblationArgs {
     }
 
     fn list_options(&self) -> anyhow::Result<()> {
-        let all = crate::mechanics::solver_options::SolverOptions::default().list();
+        let all = SolverOptions::default().list();
         let lines: Vec<Vec<String>> = all.iter().map(|(name, value)| vec![name.clone(), value.to_string()]).collect();
         match self.format {
             RowFormat::Json => {

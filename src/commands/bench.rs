@@ -42,7 +42,7 @@ pub(crate) enum BenchCommand {
     /// gives the reason.
     #[command(name = "table-4", after_help = include_str!("../../assets/help/bench-table-4.txt"))]
     TableFour(TableFourArgs),
-    /// What each option of the solver is good for: every one off, or halved and doubled, one at a time
+    /// Effect of each option of the solver: every one off, or halved and doubled, one at a time
     ///
     /// Drapes a set of garments to rest with each variant, and counts steps, time, drapes that rest, and intersections. A
     /// variant of the 52 drapes takes over a minute on two cores; name the options with --only.

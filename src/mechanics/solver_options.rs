@@ -287,7 +287,7 @@ pub enum SolverOptionError {
         name: String,
         /// The value.
         found: String,
-        /// What the option takes.
+        /// The values that are valid.
         expected: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What an export contains, and the writing of its bytes: shared by all formats.
+//! The content of an export, and the writing of its bytes: shared by all formats.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Ablation: what each option of the solver is good for.
+//! Ablation: the effect of each option of the solver.
 //!
 //! Every option of [`SolverOptions`] is turned off where that means something, otherwise halved and doubled, one at a time; each variant drapes
 //! one set of garments to rest. A mechanism whose absence changes neither steps nor time nor what ends at rest has no reason to exist.

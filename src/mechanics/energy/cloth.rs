@@ -23,6 +23,7 @@ use rayon::prelude::*;
 
 use super::bending::Bending;
 use super::contact::Contacts;
+use super::error::EnergyError;
 use super::face_contacts::FaceContacts;
 use super::friction::Friction;
 use super::membrane::{HessianKind, Stiffness, Triangle};
@@ -50,49 +51,6 @@ const MAX_SAG_M: f64 = 3e-3;
 
 /// Least number of vertices a thread passes over where memory bandwidth limits the loop.
 const VERTICES_PER_TASK: usize = 16_384;
-
-/// Why a garment has no energy. The user can correct each of these.
-#[derive(Debug, thiserror::Error)]
-pub enum EnergyError {
-    /// The rest shape belongs to another mesh.
-    #[error("the rest shape has {rest} triangles and the garment {mesh}: give the rest shape of this very mesh")]
-    RestCount {
-        /// Triangles of the rest shape.
-        rest: usize,
-        /// Triangles of the mesh.
-        mesh: usize,
-    },
-    /// A triangle without rest area has no strain.
-    #[error("triangle number {} has no area in the rest shape: repair the mesh or the pattern first", .triangle + 1)]
-    Degenerate {
-        /// Its index, from 0.
-        triangle: usize,
-    },
-    /// Triangles are cut from a fabric that is missing.
-    #[error("the garment is cut from {cut_from} fabrics and {given} given: give each, in the order of their numbers")]
-    Fabrics {
-        /// Fabrics that the rest shape names.
-        cut_from: usize,
-        /// Fabrics in the list.
-        given: usize,
-    },
-    /// A held vertex that does not exist.
-    #[error("held vertex number {} does not exist: the garment has {count}", u64::from(*.vertex) + 1)]
-    Held {
-        /// The index, from 0.
-        vertex: u32,
-        /// Number of vertices.
-        count: usize,
-    },
-    /// No vertex is free to move.
-    #[error(
-        "no vertex is free: all {count} are held, expected at least one that is not; hold an edge alone (--hold top)"
-    )]
-    NothingFree {
-        /// Number of vertices.
-        count: usize,
-    },
-}
 
 /// Buffers of an evaluation, reused by the next.
 #[derive(Debug, Clone, Default)]

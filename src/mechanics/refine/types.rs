@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::mechanics::newton::Record;
 
-/// What one run asks for; how it gets there is in the options of the cloth's solver.
+/// Options of one run. The options of the solver belong to the cloth ([`Cloth::solver`](crate::mechanics::energy::Cloth::solver)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RefineOptions {
     /// At most this many steps; `None` for as many as it takes, up to the solver's limit.
