@@ -226,9 +226,10 @@ options! {
         check_spacing: f64 = 2.0,
         /// Most stages of a step that are checked, its end included.
         max_stages: f64 = 4.0,
-        /// Longest move of a step that is cut, in mean edges; a longer step is rejected, because cutting it tears the cloth: with longer ones a
-        /// ribbon knotted into a trefoil never rests, though a skirt of 4,000 vertices in jersey takes 29 steps for 43.
+        /// Longest move of a step that is taken with parts held back whatever its energy, in mean edges; a longer one must lower the energy.
         max_cut_move: f64 = 1.0,
+        /// Most by which the moves of neighbours differ about a part that is held back, in mean edges. Heuristic.
+        max_spread: f64 = 0.5,
         /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. Heuristic.
         max_halvings: usize = 4,
         /// Most times that a step is cut. Heuristic.

@@ -73,6 +73,7 @@ const OFF: &[(&str, f64)] = &[
     ("self_contact.max_stiffening", 1.0),
     ("collision_filter.max_stages", 1.0),
     ("collision_filter.max_cut_move", 0.0),
+    ("collision_filter.max_spread", 1e9),
     ("collision_filter.max_halvings", 0.0),
     ("collision_filter.tangled_rings", 0.0),
 ];

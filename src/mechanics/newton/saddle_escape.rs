@@ -57,7 +57,9 @@ fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>]) -> bool {
         let (_, t) = if other.0 < one.0 { other } else { one };
         let mut to: Vec<DVec3> = state.x.iter().zip(direction).map(|(x, z)| *x + *z * t).collect();
         let proximity = state.contacts.proximity.as_mut();
-        if t != 0.0 && proximity.is_none_or(|p| p.check_step(&state.x, &mut to) != StepCheck::Crosses) {
+        if t != 0.0
+            && proximity.is_none_or(|p| matches!(p.check_step(&state.x, &mut to), StepCheck::Clear | StepCheck::Cut))
+        {
             state.x = to;
             escaped = true;
         }

@@ -121,9 +121,14 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         match contacts.proximity.as_mut().map(|p| p.check_step(trial, x)) {
             None | Some(StepCheck::Clear) => {}
             Some(StepCheck::Cut) => contacts.update(x),
-            Some(StepCheck::Crosses) => {
-                x.clone_from(trial);
+            Some(check) => {
                 contacts.update(x);
+                let held_back = check == StepCheck::HeldBack;
+                if !held_back || cloth.evaluate(x, contacts, &mut self.trial_gradient, &mut self.scratch) > self.energy
+                {
+                    x.clone_from(trial);
+                    contacts.update(x);
+                }
             }
         }
         self.contacts.refresh(&self.x);
@@ -186,6 +191,15 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                     Some(StepCheck::Cut) => {
                         contacts.update(trial);
                         break true;
+                    }
+                    Some(StepCheck::HeldBack) => {
+                        contacts.update(trial);
+                        if crossed >= relaxing.max_rejected
+                            || cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound
+                        {
+                            break true;
+                        }
+                        crossed += 1;
                     }
                     Some(StepCheck::Crosses) => crossed += 1,
                 }

@@ -1,13 +1,24 @@
-//! Collision filter: rejects or cuts steps that would make the cloth intersect itself.
+//! Collision filter: shortens steps, where they would make the cloth intersect itself, for those parts alone.
 //!
-//! At the end of a step from x to x', and at up to three points on the way of a long one, all intersecting pairs of triangles are found
-//! exactly (`mesh::self_intersection`). If a pair did not intersect at x, a long step is rejected, and the caller tries half of it. A short
-//! step is cut: the corners of intersecting triangles go back towards x, half the way each time, and after a few times all
-//! the way, together with their neighbours. Since x has no intersection, this terminates.
+//! A step from x to x' is followed in stages. At the end of each, all intersecting pairs of triangles are found exactly
+//! (`mesh::self_intersection`). Corners of pairs that did not intersect at x go back towards the stage before, half the way each time, and
+//! after a few times all the way, together with their neighbours; there they stay while the rest of the cloth goes on. Since x has no
+//! intersection, this terminates. Around such a part the moves of neighbours differ by at most a share of an edge, so the cloth is not torn:
 //!
-//! Limits: a part that passes through completely between two checks, a few centimetres apart, is not detected. Near pairs that
-//! intersect at x already, new intersections are allowed: these parts are being untangled ([`untangle`](super::untangle)).
+//! s(w) L ≤ s(v) L + β e  for neighbours v, w.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | s | share of its displacement that a vertex makes | – |
+//! | L | longest displacement of the step | m |
+//! | e | mean edge | m |
+//! | β | `max_spread` of the options | – |
+//!
+//! Limits: a part that passes through completely between two stages, a few centimetres apart, is not detected. Near pairs that
+//! intersect at x already, new intersections are allowed: these parts are being untangled ([`untangle`](super::untangle)). A long step after
+//! which more pairs intersect than before is rejected, and the caller tries half of it.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -24,9 +35,11 @@ use crate::mesh::self_intersection::cross;
 pub(crate) enum StepCheck {
     /// No new intersection.
     Clear,
-    /// Vertices went back so that there is no new intersection.
+    /// Vertices of a short step went back so that there is no new intersection.
     Cut,
-    /// A new intersection, in a step too long to be cut.
+    /// Parts of a long step were held back so that there is no new intersection; its energy may have risen.
+    HeldBack,
+    /// More intersections than before, after a long step of cloth that is being untangled.
     Crosses,
 }
 
@@ -108,48 +121,120 @@ impl CollisionFilter {
         found
     }
 
-    /// Checks the step from `from`, where the last one ended, to `to`, and cuts a short one with new intersections.
+    /// Checks the step from `from`, where the last one ended, to `to`, and holds back the parts that would intersect.
     pub(super) fn check(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
         self.current(from);
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.surface.edge_m;
         let stages = (longest / self.options.check_spacing).ceil().clamp(1.0, self.options.max_stages.max(1.0));
+        let is_long = longest > self.options.max_cut_move;
+        // Largest difference of the shares of neighbours.
+        let gain = self.options.max_spread / longest;
+        let mut limits = vec![1.0_f64; from.len()];
+        let at = |limits: &[f64], share: f64| -> Vec<DVec3> {
+            from.iter().zip(&*to).zip(limits).map(|((a, b), limit)| a.lerp(*b, limit.min(share))).collect()
+        };
+        let mut crossing = Vec::new();
         let mut stage = 1.0;
-        while stage < stages {
-            let there: Vec<DVec3> = from.iter().zip(&*to).map(|(a, b)| a.lerp(*b, stage / stages)).collect();
-            let crossing = self.crossing_at(&there);
-            if !self.new_crossings(&crossing).is_empty() {
-                return StepCheck::Crosses;
+        while stage <= stages {
+            let [before, share] = [(stage - 1.0) / stages, stage / stages];
+            for cut in 0.. {
+                crossing = self.crossing_at(&at(&limits, share));
+                let new = self.new_crossings(&crossing);
+                if new.is_empty() || cut == self.options.max_cuts {
+                    break;
+                }
+                let back = if cut < self.options.max_halvings { 0.5 } else { 0.0 };
+                let near = self.vertices_about(new.iter(), cut.saturating_sub(self.options.max_halvings));
+                for &v in &near {
+                    let limit = &mut limits[v as usize];
+                    *limit = limit.min(before + back * (limit.min(share) - before).max(0.0));
+                }
+                self.spread(near, gain, &mut limits);
             }
             stage += 1.0;
         }
-        let mut crossing = self.crossing_at(to);
-        let mut new = self.new_crossings(&crossing);
-        if !new.is_empty() && longest > self.options.max_cut_move {
+        if is_long && crossing.len() > self.crossing.as_ref().map_or(0, Vec::len) {
             return StepCheck::Crosses;
         }
-        let mut share = vec![1.0_f64; from.len()];
-        for cut in 0..self.options.max_cuts {
-            if new.is_empty() {
-                break;
-            }
-            for v in self.vertices_about(new.iter(), cut.saturating_sub(self.options.max_halvings)) {
-                let share = &mut share[v as usize];
-                *share = if cut < self.options.max_halvings { 0.5 * *share } else { 0.0 };
-            }
-            let kept: Vec<DVec3> = from.iter().zip(&*to).zip(&share).map(|((a, b), s)| a.lerp(*b, *s)).collect();
-            crossing = self.crossing_at(&kept);
-            new = self.new_crossings(&crossing);
-        }
-        for ((to, from), share) in to.iter_mut().zip(from).zip(&share).filter(|(_, s)| **s < 1.0) {
-            *to = from.lerp(*to, *share);
+        let kept = at(&limits, 1.0);
+        let cut = limits.iter().any(|limit| *limit < 1.0);
+        if cut {
+            to.copy_from_slice(&kept);
         }
         self.begin(crossing);
-        if share.iter().any(|s| *s < 1.0) { StepCheck::Cut } else { StepCheck::Clear }
+        match (cut, is_long) {
+            (false, _) => StepCheck::Clear,
+            (true, false) => StepCheck::Cut,
+            (true, true) => StepCheck::HeldBack,
+        }
+    }
+
+    /// Lowers the limits about these vertices until no limit exceeds that of a neighbour by more than `gain`.
+    fn spread(&self, from: Vec<u32>, gain: f64, limits: &mut [f64]) {
+        let mut queue = VecDeque::from(from);
+        while let Some(v) = queue.pop_front() {
+            let limit = limits[v as usize] + gain;
+            for &w in self.surface.topology.neighbours(v) {
+                if limits[w as usize] > limit {
+                    limits[w as usize] = limit;
+                    queue.push_back(w);
+                }
+            }
+        }
     }
 
     /// Triangles of the pairs that are not being untangled.
     fn new_crossings(&self, crossing: &[[u32; 2]]) -> Vec<u32> {
         let tangled = |t: u32| self.surface.triangles[t as usize].iter().all(|&v| self.is_tangled(v));
         crossing.iter().filter(|pair| !pair.iter().all(|&t| tangled(t))).flatten().copied().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanics::energy::Cloth;
+    use crate::mesh::samples::sheet;
+
+    #[test]
+    fn a_long_step_holds_back_only_the_part_that_would_intersect() {
+        // A sheet of 15 by 41 vertices folded over: two layers 6 mm apart, edges of 1 cm.
+        let mesh = sheet(14, 40, |i, j| DVec3::new(i.min(14.0 - i), j, 0.6 * ((i - 6.0) / 2.0).clamp(0.0, 1.0)) * 0.01);
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
+        let surface = Arc::new(Surface::new(&cloth.triangles, mesh.vertex_count()));
+        let options = CollisionFilterOptions::default();
+        let edge_m = surface.edge_m;
+        let list = VerletList::new(Arc::clone(&surface), 1e-3, 0.5 * edge_m);
+        let mut filter = CollisionFilter::new(Arc::clone(&surface), list, options);
+        let from = &mesh.positions;
+        // All of it moves by 5 cm along the fold; the upper layer also goes through the lower one at one end.
+        let moved = |p: &DVec3| {
+            let down = 0.03 * (1.0 - p.y / 0.06).max(0.0);
+            *p + DVec3::new(0.0, 0.05, if p.z > 0.005 { -down } else { 0.0 })
+        };
+        let wanted: Vec<DVec3> = from.iter().map(moved).collect();
+        assert!(!filter.crossing_at(&wanted).is_empty());
+        let mut to = wanted.clone();
+        assert_eq!(filter.check(from, &mut to), StepCheck::HeldBack);
+        assert!(filter.crossing_at(&to).is_empty());
+        let kept = from.iter().zip(&to).zip(&wanted).filter(|((p, _), _)| p.y > 0.3);
+        assert!(kept.clone().count() > 100 && kept.into_iter().all(|((_, to), wanted)| to == wanted));
+        let moves: Vec<f64> = from.iter().zip(&to).map(|(a, b)| a.distance(*b)).collect();
+        assert!(moves.iter().any(|m| *m < 0.03), "nothing was held back");
+        for v in 0..from.len() as u32 {
+            for &w in surface.topology.neighbours(v) {
+                let apart = (moves[v as usize] - moves[w as usize]).abs();
+                // Their own displacements differ, too.
+                let wanted = (wanted[v as usize] - from[v as usize]).distance(wanted[w as usize] - from[w as usize]);
+                assert!(apart <= options.max_spread * edge_m + wanted + 1e-12, "vertices {v} and {w}: {apart}");
+            }
+        }
+        // A short step is cut, whatever its energy.
+        let mut short: Vec<DVec3> = from.iter().zip(&wanted).map(|(a, b)| a.lerp(*b, 0.25)).collect();
+        short.iter_mut().zip(from).for_each(|(to, from)| to.y = from.y);
+        let mut filter = filter.clone();
+        filter.begin(Vec::new());
+        assert_eq!(filter.check(from, &mut short), StepCheck::Cut);
+        assert!(filter.crossing_at(&short).is_empty());
     }
 }
