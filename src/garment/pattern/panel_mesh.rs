@@ -110,8 +110,12 @@ pub(super) type Meshed = (Vec<DVec2>, Vec<[u32; 3]>);
 /// Why a point cannot be taken into a triangulation.
 fn unusable(error: InsertionError) -> String {
     match error {
-        InsertionError::TooSmall => "a coordinate is nearer to 0 than can be computed with; write 0 for it".to_owned(),
-        InsertionError::TooLarge | InsertionError::NAN => "a coordinate is no finite length".to_owned(),
+        InsertionError::TooSmall => {
+            "found a coordinate nearer to 0 than can be computed with; write 0 for it".to_owned()
+        }
+        InsertionError::TooLarge | InsertionError::NAN => {
+            "found a coordinate that is no finite length, expected one".to_owned()
+        }
     }
 }
 
@@ -126,7 +130,9 @@ pub(super) fn mesh(outline: &[DVec2], class: &[u32], edge_m: f64) -> Result<Mesh
     let mut plane = Plane::try_bulk_load_cdt(places, sides, |_| crossed = true).map_err(unusable)?;
     if crossed || plane.num_vertices() != all {
         return Err(
-            "its outline meets itself once it is divided into straight edges; is it very thin somewhere?".to_owned()
+            "found an outline that meets itself once it is divided into straight edges, expected one without thin places; \
+             widen it there, or ask for shorter edges (--edge-length)"
+                .to_owned()
         );
     }
     let even = 3.0_f64.sqrt() / 4.0 * edge_m * edge_m;

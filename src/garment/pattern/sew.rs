@@ -82,7 +82,7 @@ pub fn sew(pattern: &SewingPattern, edge_m: f64) -> Result<SewnGarment, PatternE
         .map(|(panel, outline)| {
             let failed = |reason: String| {
                 let panel = &panel.name;
-                PatternError::Invalid(format!("panel {panel}: it cannot be meshed: {reason}"))
+                PatternError::Invalid(format!("panel {panel}: no mesh: {reason}"))
             };
             if panel.signed_area() > 0.0 {
                 return panel_mesh::mesh(&outline.points, &outline.class, edge_m).map_err(failed);
