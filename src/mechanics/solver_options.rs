@@ -82,16 +82,15 @@ options! {
         longest_move_m: f64 = 0.1,
         /// Damping ε to begin with, 1/s². Steps and processor time of 24 drapes (four garments of 800, 1,500 and 3,000 vertices, knit and cotton):
         /// 699, 35 s with 10; 577, 31 s with 30; 678, 37 s with 60; 674, 33 s with 100; 751, 43 s with 300. Of eight drapes of patterns: 512, 112 s
-        /// with 30; 486, 88 s with 100. But with 100 the
-        /// drape coefficient of an isotropic fabric differs by more than 5 points between directions of a coarse mesh, and a rest of two sheets
-        /// has more than 3 % of the upper one's weight too much or too little between them.
+        /// with 30; 486, 88 s with 100. But with 100 the drape coefficient of an isotropic fabric differs by more than 5 points between
+        /// directions of a coarse mesh, and the force between two sheets at rest differs by more than 3 % from the weight of the upper one.
         damping: f64 = 300.0,
         /// Damping to begin with from a drape that rested, 1/s². Nine changes between four knits took a long dress 41 steps until its forces
         /// balanced, with 300 51.
         damping_from_rest: f64 = 10.0,
         /// Least damping, 1/s². A garment swings at some 20/s² (g over its length), so 1 hardly slows it.
         min_damping: f64 = 1.0,
-        /// Most damping, 1/s²; at 1e4 a step under gravity is a millimetre. With 1e3 24 drapes take the same steps.
+        /// Most damping, 1/s²; at 1e4 a step under gravity is a millimetre. With 1e3, 24 drapes take the same steps.
         max_damping: f64 = 1e4,
         /// Factor on the damping after a whole step.
         damping_decrease: f64 = 0.5,
@@ -229,7 +228,7 @@ options! {
         check_spacing: f64 = 2.0,
         /// Most stages of a step that are checked, its end included.
         max_stages: f64 = 4.0,
-        /// Longest move of a step that is taken with parts held back whatever its energy, in mean edges; a longer one must lower the energy.
+        /// Longest move of a step that is taken with parts held back even if its energy rises, in mean edges; a longer one must lower it.
         max_cut_move: f64 = 1.0,
         /// Most by which the moves of neighbours differ about a part that is held back, in mean edges. Heuristic.
         max_spread: f64 = 0.5,

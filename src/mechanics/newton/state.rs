@@ -123,9 +123,9 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             Some(StepCheck::Cut) => contacts.update(x),
             Some(check) => {
                 contacts.update(x);
-                let held_back = check == StepCheck::HeldBack;
-                if !held_back || cloth.evaluate(x, contacts, &mut self.trial_gradient, &mut self.scratch) > self.energy
-                {
+                let falls = check == StepCheck::HeldBack
+                    && cloth.evaluate(x, contacts, &mut self.trial_gradient, &mut self.scratch) <= self.energy;
+                if !falls {
                     x.clone_from(trial);
                     contacts.update(x);
                 }
@@ -194,9 +194,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                     }
                     Some(StepCheck::HeldBack) => {
                         contacts.update(trial);
-                        if crossed >= relaxing.max_rejected
-                            || cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound
-                        {
+                        if cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound {
                             break true;
                         }
                         crossed += 1;

@@ -229,10 +229,9 @@ mod tests {
                 assert!(apart <= options.max_spread * edge_m + wanted + 1e-12, "vertices {v} and {w}: {apart}");
             }
         }
-        // A short step is cut, whatever its energy.
+        // A short step is cut.
         let mut short: Vec<DVec3> = from.iter().zip(&wanted).map(|(a, b)| a.lerp(*b, 0.25)).collect();
         short.iter_mut().zip(from).for_each(|(to, from)| to.y = from.y);
-        let mut filter = filter.clone();
         filter.begin(Vec::new());
         assert_eq!(filter.check(from, &mut short), StepCheck::Cut);
         assert!(filter.crossing_at(&short).is_empty());
