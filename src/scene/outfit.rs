@@ -23,6 +23,7 @@ use crate::base::serde_name;
 use crate::body::distance::push_out::{PushOutReport, push_out};
 use crate::body::distance::{Body, SurfacePoint, pull_off_protrusions};
 use crate::garment::fabric::Fabric;
+use crate::garment::sewing::crotch_z;
 use crate::mesh::{RestShape, Topology, TriMesh, each_once};
 
 /// Distance from the body, m, of vertices that were pushed out: the thickness of a thick knit.
@@ -30,6 +31,9 @@ const PUSHED_CLEARANCE: f64 = 1e-3;
 
 /// Most connected parts that one message names.
 const MAX_NAMED: usize = 5;
+
+/// Least descent, m, of a vertex of a garment that has slid off the trunk: a skirt settles by less.
+const MIN_SLIDE_M: f64 = 0.1;
 
 /// Edges whose mean heights differ by less than this, m, are equally high.
 const SAME_HEIGHT: f64 = 0.005;
@@ -343,27 +347,53 @@ impl Scene {
         self.garment.with_positions(positions.to_vec()).triangle_areas().iter().sum::<f64>() / at_rest
     }
 
-    /// A warning about connected parts that have fallen off the body at `positions` (m): nothing of them is held, and every
-    /// vertex is below the body. They touch nothing any more and would fall for ever.
+    /// A warning about connected parts that have come off the body at `positions` (m).
     pub(crate) fn fallen(&self, positions: &[DVec3]) -> Option<String> {
         let fallen = self.fallen_parts(positions);
         (!fallen.is_empty()).then(|| {
             let have = if fallen.len() > 1 { "have" } else { "has" };
-            let (parts, remedy) = (self.named(&fallen), self.how_to_hold(&fallen));
-            format!("{parts} {have} fallen off the body; {remedy}, or place it better")
+            let (parts, off, remedy) = (self.named(&fallen), self.off(positions), self.how_to_hold(&fallen));
+            format!("{parts} {have} {off}; {remedy}, or place it better")
         })
     }
 
-    /// Numbers, from 1, of the connected parts that have [`fallen`](Self::fallen).
-    pub(crate) fn fallen_parts(&self, positions: &[DVec3]) -> Vec<usize> {
+    /// Where a fallen garment with its vertices at `positions` (m) has come off.
+    pub(crate) fn off(&self, positions: &[DVec3]) -> &'static str {
         let low = self.body.mesh().bounds().map_or(f64::NEG_INFINITY, |(low, _)| low.z);
-        // The common case first: this runs at every step.
-        if positions.iter().all(|x| x.z >= low) {
+        let past_the_feet = !self.parts_below(low, positions).is_empty();
+        if past_the_feet { "fallen off the body" } else { "slid off the trunk, down to the legs" }
+    }
+
+    /// Numbers, from 1, of the connected parts that have come off the body at `positions` (m): nothing of them is held, and every vertex is
+    /// below the body, where they touch nothing and would fall for ever, or below the crotch, though they were placed above it. There they
+    /// would slide on, and rest at best on the feet.
+    pub(crate) fn fallen_parts(&self, positions: &[DVec3]) -> Vec<usize> {
+        let Some((low, high)) = self.body.mesh().bounds() else { return Vec::new() };
+        let mut fallen = self.parts_below(low.z, positions);
+        let middle = 0.5 * (low.z + high.z);
+        // The common case first, as this runs at every step: no vertex has sunk from the upper half into the lower one.
+        let sank = |(x, placed): (&DVec3, &DVec3)| x.z < middle && placed.z > f64::max(middle, x.z + MIN_SLIDE_M);
+        if positions.iter().zip(&self.garment.positions).any(sank) {
+            let placed = self.parts_below(middle, &self.garment.positions);
+            let mut slid = self.parts_below(middle, positions);
+            slid.retain(|part| !placed.contains(part) && !fallen.contains(part));
+            if let Some(crotch) = (!slid.is_empty()).then(|| crotch_z(self.body.mesh())).flatten() {
+                let below = self.parts_below(crotch.min(middle), positions);
+                fallen.extend(slid.into_iter().filter(|part| below.contains(part)));
+                fallen.sort_unstable();
+            }
+        }
+        fallen
+    }
+
+    /// Numbers, from 1, of the connected parts without held vertices that lie below height `z` with all vertices at `positions` (m).
+    fn parts_below(&self, z: f64, positions: &[DVec3]) -> Vec<usize> {
+        if positions.iter().all(|x| x.z >= z) {
             return Vec::new();
         }
         let (part_of, _) = self.topology.components();
         let above: BTreeSet<u32> =
-            part_of.iter().zip(positions).filter(|(_, x)| x.z >= low).map(|(part, _)| *part).collect();
+            part_of.iter().zip(positions).filter(|(_, x)| x.z >= z).map(|(part, _)| *part).collect();
         self.loose_parts().into_iter().filter(|&part| !above.contains(&(part as u32 - 1))).collect()
     }
 

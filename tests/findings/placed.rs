@@ -3,10 +3,10 @@
 use glam::DVec3;
 use partwise::Job;
 use partwise::SceneSpec;
-use partwise::drape::{Refine, Scene, Settings};
+use partwise::drape::{Refine, Scene, Settings, drape, unobserved};
 use partwise::mesh::TriMesh;
 use partwise::mesh::export::write_mesh;
-use partwise::study::metrics::RESTS;
+use partwise::study::metrics::{Metrics, RESTS};
 
 use super::{cone, draped, draped_by, sphere, turned};
 
@@ -68,5 +68,31 @@ fn the_verdict_names_every_criterion_that_fails() {
     // Off the body.
     let ring = turned(&[(0.6, 0.9), (0.6, 0.85), (0.6, 0.8)], 24, None);
     let (fallen, ..) = draped(&Scene::of_meshes(&cone(), ring).unwrap());
-    assert!(fallen.verdict.starts_with("fell off the body"), "{}", fallen.verdict);
+    assert!(fallen.verdict.starts_with("fallen off the body"), "{}", fallen.verdict);
+}
+
+#[test]
+fn a_skirt_too_wide_for_the_hips_ends_once_it_lies_below_the_crotch() {
+    let form = SceneSpec::default().load().unwrap().scene.body.mesh().clone();
+    let skirt = |radius: f64, top: f64| {
+        let ring = |k: i32| (radius + 0.01 * f64::from(k), top - 0.03 * f64::from(k));
+        turned(&(0..12).map(ring).collect::<Vec<_>>(), 40, None)
+    };
+    // It hung from the feet after over a hundred steps.
+    let mut scene = Scene::of_meshes(&form, skirt(0.22, 1.0)).unwrap();
+    let result = drape(&scene, &Settings::default(), &mut unobserved).unwrap();
+    let (slid, x) = (Metrics::of(&scene, &result), &result.positions);
+    assert_eq!(slid.verdict, "slid off the trunk, down to the legs");
+    assert!(slid.refine_steps.is_some_and(|steps| steps < 30), "{:?} steps", slid.refine_steps);
+    assert!(x.iter().all(|x| x.z < 0.8) && x.iter().any(|x| x.z > 0.4), "its solve ended too late");
+    let message = "slid off the trunk, down to the legs; hold its edge (--hold top)";
+    assert!(result.warnings.iter().any(|w| w.contains(message)), "{:?}", result.warnings);
+    // Held, it rests.
+    scene.held = scene.edge("top").unwrap();
+    assert_eq!(draped(&scene).0.verdict, RESTS);
+    // Around a leg as placed: it never was on the trunk.
+    let mut leg = skirt(0.16, 0.7);
+    leg.positions.iter_mut().for_each(|x| x.x += 0.1);
+    let low = Scene::of_meshes(&form, leg).unwrap();
+    assert!(!draped(&low).0.verdict.contains("trunk"));
 }

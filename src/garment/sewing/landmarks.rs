@@ -35,6 +35,8 @@ const MIN_CURVES: usize = 6;
 /// Height of a leg's curve above the ankle, and heights of the trunk's curves, as shares of the body's.
 const ANKLE: f64 = 0.1;
 const TRUNK: [f64; 2] = [0.52, 0.7];
+/// Heights between which the crotch is searched, as shares of the body's.
+const CROTCH: [f64; 2] = [0.25, 0.7];
 /// Least excess of the trunk's extents in one direction over those in the other, both curves together, that excludes a front, and
 /// least excess of a foot before its ankle over that behind it, as shares of the height. Heuristics: a trunk is 8 to 14 cm wider
 /// than deep at each height, and a foot 8 to 12 cm longer before the ankle.
@@ -96,7 +98,7 @@ impl Landmarks {
         let girths = |from: f64, to: f64| between(from, to).filter_map(|l| Some((l.trunk.as_ref()?.tape_length(), l)));
         let narrowest = |from: f64, to: f64| girths(from, to).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l);
         let widest_z = |from: f64, to: f64| girths(from, to).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, l)| l.z);
-        let crotch = between(0.25, 0.7).find(|l| l.trunk.is_some()).map(|l| (l.z - low.z) / height);
+        let crotch = between(CROTCH[0], CROTCH[1]).find(|l| l.trunk.is_some()).map(|l| (l.z - low.z) / height);
         let width = |l: &Level| l.trunk.as_ref().map_or(0.0, |c| extent(c, across));
         let neck = narrowest(0.78, 0.95);
         let shoulder_z = neck.and_then(|neck| {
@@ -135,6 +137,22 @@ impl Landmarks {
         let kept = |t: &&[u32; 3]| !t.iter().any(|&v| arm[v as usize]);
         Some(TriMesh::new(body.positions.clone(), body.triangles.iter().filter(kept).copied().collect()))
     }
+}
+
+/// Height at which two legs join, m: the lowest curve around the middle of a body that stands on two. `None` for a body without legs, with
+/// legs that touch, or too tall to be searched.
+pub(crate) fn crotch_z(body: &TriMesh) -> Option<f64> {
+    let (low, high) = body.bounds()?;
+    let height = high.z - low.z;
+    if height > MAX_HEIGHT {
+        return None;
+    }
+    let (middle, [from, to]) = (middle(body, low.z, height), CROTCH.map(|share| low.z + share * height));
+    let across = math::unit(facing(body, low.z, height));
+    let level_at = |z: f64| level(body, z, middle, across);
+    let on_two_legs = |level: Level| level.trunk.is_none() && level.beside.iter().all(Option::is_some);
+    let mut heights = (1..).map(|i| from + STEP * f64::from(i)).take_while(|z| *z <= to);
+    if on_two_legs(level_at(from)) { heights.find(|&z| level_at(z).trunk.is_some()) } else { None }
 }
 
 /// Centre of the largest curve a little above half the height, in x and y.

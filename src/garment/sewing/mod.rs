@@ -11,5 +11,6 @@ mod put_on;
 
 pub(crate) use arap::laid_flat;
 pub use landmarks::Landmarks;
+pub(crate) use landmarks::crotch_z;
 pub use put_on::PutOn;
 pub(crate) use put_on::{draw_shut, put_on};

@@ -211,8 +211,9 @@ impl Metrics {
     /// [`RESTS`], or the criteria that the drape fails, separated by semicolons.
     fn faults(&self, scene: &Scene, drape: &Drape) -> String {
         let mut faults = Vec::new();
-        if !scene.fallen_parts(&drape.positions).is_empty() {
-            faults.push("fell off the body".to_owned());
+        let has_fallen = !scene.fallen_parts(&drape.positions).is_empty();
+        if has_fallen {
+            faults.push(scene.off(&drape.positions).to_owned());
         } else if !self.slid.is_empty() {
             faults.push(format!("slid down by {:.0} cm", 0.1 * self.top_sank_mm));
         }
@@ -226,6 +227,8 @@ impl Metrics {
                     );
                 }
                 Stop::Unsettled(criterion) => faults.push(format!("does not rest by the criterion `{criterion}`")),
+                // The fall ended the steps.
+                Stop::Interrupted if has_fallen => {}
                 Stop::StepsDone | Stop::Interrupted | Stop::Stalled => {
                     faults.push(format!("does not rest: residual {:.1e} of the weight", state.residual_over_weight));
                 }
