@@ -16,19 +16,23 @@ mod poses;
 fn a_garment_follows_the_form_through_five_poses_and_rests_in_each() {
     let form = dress_form(&BodySpec::default()).unwrap();
     let settings = Settings::default();
-    for garment in ["pullover-2@1200", "low-cut-dress@1500"] {
+    for garment in ["pullover-2@1200", "low-cut-dress@1500", "long-sleeved-dress@3000"] {
         let mut scene = SceneSpec::new("form", garment).load().unwrap().scene;
         let mut drape = scene.drape(&settings).unwrap();
         for (arms_deg, step_deg) in &poses::FIVE[1..] {
             let body = Body::new(&poses::posed(&form, *arms_deg, *step_deg)).unwrap();
-            scene = scene.in_pose(body, &drape.positions);
+            let last = (scene, drape);
+            scene = last.0.in_pose(body, &last.1.positions);
             let inside =
                 scene.body.nearest_all(&scene.garment.positions).iter().filter(|q| q.signed_distance < 0.0).count();
             assert_eq!(inside, 0, "{garment}, arms {arms_deg}, step {step_deg}: carried into the body");
-            drape = next_pose(&scene, &settings, &drape, &mut unobserved).unwrap();
+            drape = next_pose((&last.0, &last.1), &scene, &settings, &mut unobserved).unwrap();
             let metrics = Metrics::of(&scene, &drape);
             assert_eq!(metrics.verdict, RESTS, "{garment}, arms {arms_deg}, step {step_deg}");
-            assert_eq!(drape.state.as_ref().unwrap().stop, Stop::Converged);
+            let state = drape.state.as_ref().unwrap();
+            assert_eq!(state.stop, Stop::Converged);
+            // Without poses in between, cloth that intersects itself under lowered arms takes several times as many.
+            assert!(state.steps < 100, "{garment}, arms {arms_deg}: {} steps", state.steps);
             // The body carries the garment, up to contacts inside faces, which press on vertices that touch nothing themselves.
             let force: f64 = drape.outcomes.iter().map(|outcome| outcome.force_n.z).sum();
             let area: f64 = scene.rest.areas().iter().map(|area| area.abs()).sum();
@@ -47,6 +51,6 @@ fn the_same_pose_leaves_a_garment_where_it_rests() {
     let moved =
         |a: &[partwise::DVec3], b: &[partwise::DVec3]| a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     assert!(moved(&again.garment.positions, &drape.positions) < 1e-3, "carried by nothing");
-    let settled = next_pose(&again, &settings, &drape, &mut unobserved).unwrap();
+    let settled = next_pose((&scene, &drape), &again, &settings, &mut unobserved).unwrap();
     assert!(moved(&settled.positions, &drape.positions) < 5e-3);
 }

@@ -41,7 +41,7 @@ pub(crate) struct ModelArgs {
     /// Disable contact of cloth with cloth: for comparisons, and for garments that cannot touch themselves
     #[arg(long)]
     no_self_contact: bool,
-    /// Set an option of the solver at full resolution, for experiments, e.g. newton.damping=100; `bench ablation --list` prints all
+    /// Set an option of the solver at full resolution, for experiments, e.g. newton.damping=3; `bench ablation --list` prints all
     #[arg(long = "solver", value_name = "GROUP.KEY=VALUE", value_parser = solver_option)]
     solver: Vec<String>,
 }

@@ -3,7 +3,11 @@
 //! The garment was at rest before, so it starts from where it was carried ([`Scene::in_pose`]) with Newton's method at full resolution:
 //! neither stage runs again. Its PARTs are those of the first pose; the force on each is the sum of the body's reactions on its vertices.
 //!
-//! Limits: the cloth forgets friction from before the motion, and passes through no pose between the two.
+//! Cloth that intersects itself where it was carried (under arms that are lowered at once) is slow to untangle. Such a garment first rests on
+//! the body half-way between the two poses, each of whose vertices is the mean of both, and is carried on from there; so again, up to
+//! [`MAX_HALVINGS`] times.
+//!
+//! Limits: the cloth forgets friction from before the motion; between the poses every vertex of the body moves straight on.
 
 use std::time::Instant;
 
@@ -18,23 +22,63 @@ use super::settings::Settings;
 use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::refine::Observer;
+use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::UNASSIGNED;
 use crate::scene::Scene;
 
-/// The drape of a scene in another pose, whose garment lies where it was carried; `before` is its drape in the last one.
+/// How often a motion is halved at most.
+const MAX_HALVINGS: usize = 2;
+
+/// The drape of `scene`, to which the garment was carried ([`Scene::in_pose`]) from `last`, a scene and its drape. The steps are those of
+/// all poses on the way.
 ///
 /// # Errors
 /// [`DrapeError`] where a constant of the fabric cannot be used.
 pub fn next_pose(
+    last: (&Scene, &Drape),
     scene: &Scene,
+    settings: &Settings,
+    observer: Observer<'_>,
+) -> Result<Drape, DrapeError> {
+    rayon::scope(|_| follow(last, scene, settings, observer, MAX_HALVINGS))
+}
+
+/// [`next_pose`] with at most this many halvings.
+fn follow(
+    last: (&Scene, &Drape),
+    scene: &Scene,
+    settings: &Settings,
+    observer: Observer<'_>,
+    halvings: usize,
+) -> Result<Drape, DrapeError> {
+    let began = Instant::now();
+    let (from, before) = last;
+    let tangled = || self_intersecting_pairs(&scene.garment).len() > before.self_intersecting_pairs;
+    let half_way =
+        if halvings > 0 && settings.self_contact && tangled() { from.body.half_way(&scene.body) } else { None };
+    let Some(body) = half_way else {
+        return settle(scene, scene.garment.positions.clone(), settings, before, observer);
+    };
+    let half = from.in_pose(body, &before.positions);
+    let rest = follow(last, &half, settings, observer, halvings - 1)?;
+    let start = half.in_pose(scene.body.clone(), &rest.positions).garment.positions;
+    let mut drape = settle(scene, start, settings, before, observer)?;
+    if let (Some(state), Some(earlier)) = (&mut drape.state, &rest.state) {
+        state.steps += earlier.steps;
+    }
+    drape.times.refine += rest.times.total;
+    drape.times.total = began.elapsed();
+    Ok(drape)
+}
+
+/// Settles the garment from `start` (m), with `before` for its PARTs.
+fn settle(
+    scene: &Scene,
+    start: Vec<DVec3>,
     settings: &Settings,
     before: &Drape,
     observer: Observer<'_>,
 ) -> Result<Drape, DrapeError> {
-    rayon::scope(|_| settle(scene, settings, before, observer))
-}
-
-fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     let began = Instant::now();
     let ground = Distances::of(scene)?;
     let distance = began.elapsed();
@@ -43,8 +87,7 @@ fn settle(scene: &Scene, settings: &Settings, before: &Drape, observer: Observer
     let held: &[u32] = if released { &[] } else { &scene.held };
     let cloth = cloth_of(scene, settings, held)?;
     let carried = scene.garment.positions.clone();
-    let start = (carried.clone(), StartsFrom::Rest);
-    let refined = refine_from(scene, settings, &cloth, Some(&ground), start, observer)?;
+    let refined = refine_from(scene, settings, &cloth, Some(&ground), (start, StartsFrom::Rest), observer)?;
     let (positions, state) = settled(scene, settings, &cloth, Some(&ground), refined);
     let forces = reactions(&cloth, &positions, &state.fit.pressure_kpa);
     let mut outcomes: Vec<PartOutcome> = Vec::with_capacity(before.parts.len());

@@ -154,6 +154,15 @@ impl Body {
         Ok(Self { mesh, fans, tree, cover: None, lattice: Arc::default() })
     }
 
+    /// The body half-way to another pose, `other`: each vertex at the mean of both. `None` where they are not one mesh.
+    pub(crate) fn half_way(&self, other: &Self) -> Option<Self> {
+        if self.mesh.triangles != other.mesh.triangles {
+            return None;
+        }
+        let pairs = self.mesh.positions.iter().zip(&other.mesh.positions);
+        Self::new_open(&self.mesh.with_positions(pairs.map(|(a, b)| a.midpoint(*b)).collect())).ok()
+    }
+
     /// The same body under `cloth`, whose normals point outward. A cover that was there before is replaced.
     ///
     /// # Errors
@@ -312,6 +321,17 @@ mod tests {
         let on_face = body.nearest(DVec3::new(1.0, 0.4, 0.3));
         assert!(on_face.signed_distance.abs() < 1e-12);
         assert!((on_face.normal - DVec3::X).length() < 1e-12);
+    }
+
+    #[test]
+    fn half_way_to_a_larger_cube_is_one_between_and_another_mesh_has_none() {
+        let cube = Body::new(&cube()).unwrap();
+        let larger = Body::new(&cuboid(DVec3::ZERO, DVec3::splat(3.0))).unwrap();
+        let half = cube.half_way(&larger).unwrap();
+        assert_eq!(half.mesh().positions, cuboid(DVec3::ZERO, DVec3::splat(2.0)).positions);
+        let mut open = cube.mesh().clone();
+        open.triangles.pop();
+        assert!(cube.half_way(&Body::new_open(&open).unwrap()).is_none());
     }
 
     #[test]

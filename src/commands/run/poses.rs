@@ -91,8 +91,8 @@ impl RunArgs {
             loaded.body_name = stem(&file.to_string_lossy());
             let preview = began.elapsed();
             let title = format!("{name} on {}", loaded.body_name);
-            let drape =
-                with_progress(&title, |progress| next_pose(&loaded.scene, &job.settings, &before.drape, progress))?;
+            let last = (&before.loaded.scene, &before.drape);
+            let drape = with_progress(&title, |progress| next_pose(last, &loaded.scene, &job.settings, progress))?;
             let rest = drape.times.total;
             let preview_rms_mm = rms_mm(&drape.preview, &drape.positions);
             let origin = Origin { load: Duration::ZERO, iterations: Default::default() };

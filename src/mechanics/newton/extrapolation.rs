@@ -1,4 +1,4 @@
-//! How a step goes on from the one before: like it, and then farther, or back against it.
+//! Extrapolation of a step that goes on like the one before.
 //!
 //! Down a long valley the model is stiffer than the energy, and step after step goes the same way by the same length. With k the
 //! stiffness along it and k_m the model's, the next step is ρ = 1 − t k/k_m of the last, which taken t of its length, so the bottom is
@@ -24,8 +24,6 @@ pub(super) struct Extrapolation {
     step: Vec<DVec3>,
     /// t.
     taken: f64,
-    /// Displacement of the last step, m.
-    moved: Vec<DVec3>,
 }
 
 impl Extrapolation {
@@ -47,13 +45,6 @@ impl Extrapolation {
         self.step.clear();
         self.step.extend_from_slice(step);
         self.taken = taken;
-    }
-
-    /// Stores the displacement of a step; returns whether it opposes the previous one, with a cosine below −`opposes_cosine`.
-    pub(super) fn opposes(&mut self, moved: Vec<DVec3>, opposes_cosine: f64) -> bool {
-        let opposes = dot(&moved, &self.moved) < -opposes_cosine * norm(&moved) * norm(&self.moved);
-        self.moved = moved;
-        opposes
     }
 
     /// Forgets the previous step.
@@ -89,6 +80,5 @@ mod tests {
         assert!((extrapolation.factor(&[DVec3::X * 0.25], 2.0, 0.8) - 4.0 / 3.0).abs() < 1e-12);
         extrapolation.reset();
         assert_eq!(extrapolation.factor(&[DVec3::X], 2.0, 0.8), 1.0);
-        assert!(!extrapolation.opposes(vec![DVec3::X], 0.3) && extrapolation.opposes(vec![DVec3::NEG_X], 0.3));
     }
 }

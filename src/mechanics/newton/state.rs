@@ -27,8 +27,6 @@ pub(crate) struct Advance {
     pub(crate) step_length: f64,
     /// Largest move of a vertex, m.
     pub(crate) largest_move_m: f64,
-    /// Whether the step opposes the previous one (negative inner product), a sign of cycling.
-    pub(crate) opposes: bool,
 }
 
 /// One step of the history.
@@ -157,7 +155,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             ..
         } = self;
         let cloth = *cloth;
-        let SolverOptions { newton, relaxation: relaxing, cycles, .. } = &cloth.solver;
+        let SolverOptions { newton, relaxation: relaxing, .. } = &cloth.solver;
         relaxation.prepare(cloth, contacts, &self.blocks);
         let slope = dot(gradient, direction);
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
@@ -210,18 +208,15 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         };
         extrapolation.store_step(direction, if accepted { t } else { 0.0 });
         let mut largest_move_m = 0.0;
-        let mut opposes = false;
         if accepted {
             std::mem::swap(x, trial);
             largest_move_m = x.iter().zip(&*trial).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
-            let moved = x.iter().zip(&*trial).map(|(x, before)| *x - *before).collect();
-            opposes = extrapolation.opposes(moved, cycles.opposes_cosine);
         } else {
             contacts.update(x);
         }
         self.contacts.refresh(&self.x);
         self.evaluate();
-        Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m, opposes })
+        Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m })
     }
 
     /// [`untangle`](Self::untangle); once more from the clear positions where much more is left than intersects there

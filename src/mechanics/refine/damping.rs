@@ -1,20 +1,58 @@
 //! Levenberg's damping ε from step to step.
 //!
 //! ε falls while whole steps succeed, faster near rest, where only the softest directions are left, and grows where the line search cuts a
-//! step short (Levenberg 1944, Marquardt 1963).
+//! step short (Levenberg 1944, Marquardt 1963). Its unit is g/L, the square of the frequency at which a garment of length L swings:
+//! cloth with this damping moves by about L in a step under its own weight.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | ε | damping | 1/s² |
+//! | g | gravitational acceleration, [`GRAVITY`] | m/s² |
+//! | L | longest side of the box about the start | m |
 
+use glam::DVec3;
+
+use super::softening::extent;
+use crate::GRAVITY;
+use crate::mechanics::energy::Cloth;
 use crate::mechanics::solver_options::NewtonOptions;
 
-/// The damping after a step of which this share was taken, with this residual over weight after it; 1/s².
-pub(super) fn after_step(options: &NewtonOptions, damping: f64, share: f64, residual: f64) -> f64 {
-    if share >= 1.0 {
-        let near_rest = residual < options.near_rest;
-        let less = if near_rest { options.damping_decrease_near_rest } else { options.damping_decrease };
-        (damping * less).max(options.min_damping)
-    } else if share < options.short_step {
-        (damping * options.damping_increase).min(options.max_damping)
-    } else {
-        damping
+/// The damping of one solve.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Damping {
+    options: NewtonOptions,
+    /// g/L, 1/s².
+    unit: f64,
+}
+
+impl Damping {
+    /// For a solve of `cloth` from `start`, m.
+    pub(super) fn new(cloth: &Cloth, start: &[DVec3]) -> Self {
+        Self { options: cloth.solver.newton, unit: GRAVITY / extent(start) }
+    }
+
+    /// The damping to begin with, from a drape that rested or from any other start; 1/s².
+    pub(super) fn initial(&self, from_rest: bool) -> f64 {
+        self.unit * if from_rest { self.options.damping_from_rest } else { self.options.damping }
+    }
+
+    /// The least damping, 1/s².
+    pub(super) fn least(&self) -> f64 {
+        self.unit * self.options.min_damping
+    }
+
+    /// The damping after a step of which this share was taken, with this residual over weight after it; 1/s².
+    pub(super) fn after_step(&self, damping: f64, share: f64, residual: f64) -> f64 {
+        let options = &self.options;
+        if share >= 1.0 {
+            let near_rest = residual < options.near_rest;
+            let less = if near_rest { options.damping_decrease_near_rest } else { options.damping_decrease };
+            (damping * less).max(self.least())
+        } else if share < options.short_step {
+            (damping * options.damping_increase).min(self.unit * options.max_damping)
+        } else {
+            damping
+        }
     }
 }
 
@@ -24,11 +62,14 @@ mod tests {
 
     #[test]
     fn damping_falls_with_whole_steps_grows_with_short_ones_and_keeps_its_bounds() {
-        let options = NewtonOptions::default();
-        let after = |damping, share, residual| after_step(&options, damping, share, residual);
-        assert!(after(100.0, 1.0, 1.0) < 100.0 && after(100.0, 1.0, 1e-4) < after(100.0, 1.0, 1.0));
-        assert!(after(100.0, 0.1, 1.0) > 100.0 && after(100.0, 0.6, 1.0) == 100.0);
-        assert_eq!(after(options.min_damping, 1.0, 1e-4), options.min_damping);
-        assert_eq!(after(options.max_damping, 0.1, 1.0), options.max_damping);
+        let damping = Damping { options: NewtonOptions::default(), unit: 10.0 };
+        let first = damping.initial(false);
+        let after = |value, share, residual| damping.after_step(value, share, residual);
+        assert!(after(first, 1.0, 1.0) < first && after(first, 1.0, 1e-4) < after(first, 1.0, 1.0));
+        assert!(after(first, 0.1, 1.0) > first && after(first, 0.6, 1.0) == first);
+        assert_eq!(after(damping.least(), 1.0, 1e-4), damping.least());
+        let most = 10.0 * NewtonOptions::default().max_damping;
+        assert_eq!(after(most, 0.1, 1.0), most);
+        assert!(damping.initial(true) < first);
     }
 }

@@ -33,6 +33,7 @@ mod types;
 
 use glam::DVec3;
 
+use self::damping::Damping;
 use super::energy::{Cloth, Contacts};
 use super::newton::NewtonState;
 pub use super::newton::{Record, SolveError, Solver};
@@ -79,7 +80,8 @@ pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>
     contacts.proximity = Some(cloth.proximity());
     contacts.update(&x);
     contacts.refresh(&x);
-    let mut descent = NewtonState::new(cloth, contacts, x, cloth.solver.newton.damping);
+    let damping = Damping::new(cloth, &x).initial(false);
+    let mut descent = NewtonState::new(cloth, contacts, x, damping);
     descent.untangle();
     let left = descent.contacts.proximity.as_mut().map_or(0, |proximity| proximity.crossings(&descent.x));
     (left == 0).then_some(descent.x)

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::cycle_damping::CycleDamping;
-use super::damping;
+use super::damping::Damping;
 use super::face_contact_phase::FaceContactPhase;
 use super::rest_phase::{RestPhase, Verdict};
 use super::softening::softened;
@@ -35,8 +35,7 @@ struct Settling<'c, 'b, 'o> {
     history: Vec<Record>,
     iteration: usize,
     limit: usize,
-    /// Damping to begin an energy with, 1/s².
-    damping: f64,
+    damping: Damping,
     /// Residual over weight of an equilibrium, and the smaller one that still follows.
     tolerance: f64,
     continued_to: Option<f64>,
@@ -66,8 +65,8 @@ pub(super) fn settle(
         contacts.update(&start);
         contacts.refresh(&start);
     }
-    let damping = if options.from_rest { newton.damping_from_rest } else { newton.damping };
-    let mut descent = NewtonState::new(cloth, contacts, start, damping);
+    let damping = Damping::new(cloth, &start);
+    let mut descent = NewtonState::new(cloth, contacts, start, damping.initial(options.from_rest));
     let softened = softened(cloth, &descent.x, descent.residual);
     if let Some(softened) = &softened {
         descent.cloth = softened;
@@ -123,6 +122,11 @@ impl Settling<'_, '_, '_> {
         })
     }
 
+    /// The damping to begin an energy with, 1/s².
+    fn initial_damping(&self) -> f64 {
+        self.damping.initial(self.options.from_rest)
+    }
+
     /// Shows the cloth to the observer; the state that it is in.
     fn seen(&mut self) -> State {
         if self.observe(false) {
@@ -164,7 +168,7 @@ impl Settling<'_, '_, '_> {
             let lasting = self.options.lasting && self.cloth.solver.rest_check.max_checks > 0;
             match update {
                 FaceUpdate::Places => {}
-                FaceUpdate::Moved => self.descent.damping = self.damping,
+                FaceUpdate::Moved => self.descent.damping = self.initial_damping(),
                 FaceUpdate::Unchanged if !lasting || self.iteration >= self.limit => {
                     return Ok(State::Ended(Stop::Converged));
                 }
@@ -196,7 +200,7 @@ impl Settling<'_, '_, '_> {
                 None
             }
         };
-        self.descent.damping = self.cloth.solver.newton.min_damping;
+        self.descent.damping = self.damping.least();
         // An end may be continued to a smaller residual, once.
         match (ended, self.continued_to.take_if(|_| ended.is_some())) {
             (Some(_), Some(smaller)) => self.tolerance = smaller,
@@ -231,13 +235,13 @@ impl Settling<'_, '_, '_> {
             self.soft = false;
             self.fresh = true;
             self.descent.cloth = self.cloth;
-            self.descent.damping = self.damping;
+            self.descent.damping = self.initial_damping();
             self.descent.evaluate();
         } else {
             let NewtonState { damping: before, residual, .. } = self.descent;
-            self.descent.damping = damping::after_step(newton, before, advance.share, residual);
+            self.descent.damping = self.damping.after_step(before, advance.share, residual);
         }
-        self.cycles.after_step(&mut self.descent, advance.opposes);
+        self.cycles.after_step(&mut self.descent);
         if advance.accepted {
             self.history.push(self.descent.record(self.iteration, Some(advance), self.soft));
         }

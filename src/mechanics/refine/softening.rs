@@ -21,7 +21,7 @@ pub(super) fn softened(cloth: &Cloth, x: &[DVec3], residual: f64) -> Option<Clot
 }
 
 /// The longest side of the box about `x`, m: about the hanging length, in whichever direction the cloth lies.
-fn extent(x: &[DVec3]) -> f64 {
+pub(super) fn extent(x: &[DVec3]) -> f64 {
     let (low, high) = box_about(x.iter().copied());
     (high - low).max_element().max(0.0)
 }

@@ -122,14 +122,19 @@ impl Gap {
         Some(block)
     }
 
-    /// Takes over the slip and the raised stiffness of the same gap before the refresh. The stiffness approaches its end value by this
-    /// share.
+    /// Takes over the slip and the raised stiffness of the same gap before the refresh. The stiffness and the plane approach their new values
+    /// by this share: where the nearest points of two states lie on two faces of the body or of the cloth, either state leads to the other, and
+    /// a plane between both holds the gap at rest.
     pub(super) fn inherit(&mut self, before: &Self, x: &[DVec3], share: f64) {
         let end = if self.vanishing { 0.0 } else { self.stiffness.max(before.stiffness) };
         self.stiffness = if share < 1.0 { before.stiffness + share * (end - before.stiffness) } else { end };
         // A place that passed through the other has the opposite normal now, and must return.
         if before.normal.dot(self.normal) < 0.0 {
             self.normal = -self.normal;
+        }
+        if share < 1.0 {
+            self.normal = before.normal.lerp(self.normal, share).normalize_or(self.normal);
+            self.body = before.body.lerp(self.body, share);
         }
         let u = before.tangential_slip(before.across(x));
         self.slip = u - self.normal * self.normal.dot(u);
