@@ -32,7 +32,7 @@
 //! # Modules
 //! Data flows one way: [`mesh`] → [`body`] → [`garment`] → [`scene`] → [`parts`] → [`mechanics`] →
 //! [`drape`](mod@drape) → [`study`] → `record`. [`parts::range_table`] and [`garment::fabric`] hold the two inputs to
-//! tune, [`methods`] the paper's reference methods, [`study`] metrics, accuracy, sweeps and the table search,
+//! tune, [`mechanics::methods`] the paper's reference methods, [`study`] metrics, accuracy, sweeps and the table search,
 //! [`session`] a scene that is edited while it is draped. Only `record` imports Rerun.
 
 #![cfg_attr(
@@ -43,8 +43,6 @@
 
 pub mod base;
 pub mod body;
-#[doc(hidden)]
-pub mod colour;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod commands;
@@ -54,10 +52,9 @@ pub mod garment;
 pub mod live;
 pub mod mechanics;
 pub mod mesh;
-pub mod methods;
 pub mod parts;
-#[cfg(feature = "cli")]
-mod picture;
+#[doc(hidden)]
+pub mod picture;
 #[cfg(feature = "python")]
 mod python;
 #[cfg(feature = "viewer")]

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::SceneSpec;
-use crate::colour::map::Range;
 use crate::garment::fabric::{DEFAULT_FABRIC, Fabric};
 use crate::garment::{GarmentRequest, MeshCache};
+use crate::picture::colour::map::Range;
 use crate::record::{Colours, Compared, Layout, Overlay, Picture, RecordOptions, Recorder, ScatterPoint, Sink};
 use crate::scene::Scene;
 use crate::study::accuracy::vertex_errors;

@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use crate::Job;
 use crate::base::files::has_ending;
-use crate::colour::of_drape;
 use crate::drape::{self, Drape, Refine, Release};
+use crate::mechanics::methods::METHODS;
 use crate::mechanics::refine::{Observer, Step};
-use crate::methods::METHODS;
 use crate::picture::Quantity;
+use crate::picture::colour::of_drape;
 use crate::record::Recorder;
 use crate::scene::Loaded;
 use crate::study::certificate::certify;

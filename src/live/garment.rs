@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use super::pieces::{Pieces, shown_pins};
 use crate::base::files::read_own;
 use crate::base::math;
-use crate::colour::map::ColourMap;
 use crate::parts::UNASSIGNED;
+use crate::picture::colour::map::ColourMap;
 use crate::record::{Overlay, Refused, eyes, outlines, query, rest_colours};
 use crate::session::{LoadedScene, Segmented, Snapshot};
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use super::pieces::shown_pins;
 use crate::base::error_text;
-use crate::colour::level_colours;
 use crate::drape::{Model, Settings};
 use crate::garment::builtin;
 use crate::garment::fabric;
 use crate::parts::range_table::TableRule;
+use crate::picture::colour::level_colours;
 use crate::session::{AtRest, Finished, LoadedScene, Pin, Preview, Refusal, Segmented, Snapshot, preset_names};
 use crate::study::job::Job;
 use crate::study::metrics::LevelCount;

@@ -7,6 +7,7 @@ pub mod fit;
 pub mod folded_surface;
 pub mod folds;
 pub(crate) mod linear_algebra;
+pub mod methods;
 pub(crate) mod newton;
 pub mod paper;
 pub mod reactions;

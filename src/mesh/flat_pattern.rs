@@ -184,7 +184,7 @@ mod tests {
         // In no unit, panels over one another are not distinguishable from an atlas.
         let odd = |corners: &Option<[DVec2; 3]>| corners.map(|corners| corners.map(|p| 1.37 * p));
         assert_eq!(FlatPattern::find(&mesh, &over.iter().map(odd).collect::<Vec<_>>()), None);
-        // Each triangle a tile of its own, in centimetres.
+        // Each triangle as a separate tile, in centimetres.
         let tile = |corners: &Option<[DVec2; 3]>| corners.map(|c| c.map(|p| p - c[0].min(c[1]).min(c[2])));
         assert_eq!(FlatPattern::find(&mesh, &texture.iter().map(tile).collect::<Vec<_>>()), None);
     }

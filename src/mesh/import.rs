@@ -26,7 +26,7 @@ use super::{TriMesh, box_about, longest_side, polygon, renumbered, retain, windi
 const MAX_SIZE_RATIO: f64 = 4.0;
 
 /// Most triangles about one vertex of a garment. Bending couples all neighbours of a vertex with each other, so that a step
-/// costs the cube of their number: a fan of 500 triangles comes to rest in 3 s, one of 1,000 in 16 s, one of 4,000 in 87 s.
+/// costs the cube of their number: a fan of 500 triangles takes 3 s to rest, one of 1,000 16 s, one of 4,000 87 s.
 /// Poles of garments have up to 128.
 pub const MAX_GARMENT_FAN: usize = 500;
 

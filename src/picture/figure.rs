@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::raster::{Camera, Surface};
 use super::shading::{SAMPLES, draw};
 use super::text::Pixels;
-use crate::colour::legend::ColourBar;
+use crate::picture::colour::legend::ColourBar;
 
 /// Distance of the eye over half the height of the view: a field of view of 14°, as a portrait lens has.
 const DISTANCE: f64 = 8.0;

@@ -18,8 +18,8 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::colour::map::Rgb;
 use crate::mesh::TriMesh;
+use crate::picture::colour::map::Rgb;
 
 /// Rows of samples that one thread fills at a time.
 const BAND: usize = 64;

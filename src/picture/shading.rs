@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::raster::{Camera, Sample, Surface, rasterise};
 use crate::base::math;
-use crate::colour::map::Rgb;
+use crate::picture::colour::map::Rgb;
 
 /// Samples along each side of a pixel: 9 a pixel leave no visible steps on silhouettes.
 pub(super) const SAMPLES: usize = 3;

@@ -4,7 +4,7 @@ use std::io;
 
 use super::figure::Figure;
 use super::text::{Pixels, Size};
-use crate::colour::legend::ColourBar;
+use crate::picture::colour::legend::ColourBar;
 
 /// Largest number of figures, and the height of each of them, pixels.
 const HEIGHTS: [(usize, usize); 3] = [(6, 720), (16, 480), (usize::MAX, 320)];

@@ -7,11 +7,11 @@ use glam::DVec3;
 use super::figure::Figure;
 use super::raster::{Paint, Surface};
 use super::viewpoint::Viewpoint;
-use crate::colour::legend::{ColourBar, Legend, level_bar};
-use crate::colour::map::{ColourMap, Range, Rgb};
-use crate::colour::palette::{CLOTH, by_component, by_parts};
-use crate::colour::{FORCE_QUANTILE, Overlay, QUANTILE};
 use crate::mesh::TriMesh;
+use crate::picture::colour::legend::{ColourBar, Legend, level_bar};
+use crate::picture::colour::map::{ColourMap, Range, Rgb};
+use crate::picture::colour::palette::{CLOTH, by_component, by_parts};
+use crate::picture::colour::{FORCE_QUANTILE, Overlay, QUANTILE};
 use crate::study::metrics::LevelCount;
 
 /// The body: light beside a white ground, and unlike any shade of a PART.

@@ -4,7 +4,7 @@ use std::io;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster};
 
-use crate::colour::map::Rgb;
+use crate::picture::colour::map::Rgb;
 
 /// Colour of texts.
 const INK: Rgb = [40, 44, 52];

@@ -6,8 +6,8 @@ use rerun::{AnyValues, BarChart, Clear, ComponentIdentifier, Scalars, SeriesLine
 use super::error::RecordError;
 use super::open_recording::OpenRecording;
 use super::{meshes, paths};
-use crate::colour::map::Range;
-use crate::colour::palette;
+use crate::picture::colour::map::Range;
+use crate::picture::colour::palette;
 use crate::study::metrics::LevelCount;
 
 /// Number of bars of the histogram, about.

@@ -7,11 +7,11 @@ use super::legend::{Legend, view_caption};
 use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::paths;
-use crate::colour::Overlay;
-use crate::colour::cells::CellMesh;
-use crate::colour::map::{ColourMap, Range};
-use crate::colour::palette::{colour_parts, with_outside};
 use crate::parts::UNASSIGNED;
+use crate::picture::colour::Overlay;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::{ColourMap, Range};
+use crate::picture::colour::palette::{colour_parts, with_outside};
 use crate::study::metrics::LevelCount;
 
 /// One of two to six results side by side. All views have the same eye.

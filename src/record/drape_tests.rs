@@ -10,8 +10,8 @@ use super::meshes;
 use super::open_recording::{OpenRecording, RecordOptions, RecordSummary};
 use super::paths;
 use super::sinks::Sink;
-use crate::colour::palette;
 use crate::mesh::TriMesh;
+use crate::picture::colour::palette;
 
 /// Thickness of outlines on screen, points.
 const THICKNESS: f32 = 1.2;

@@ -8,8 +8,8 @@ use rerun::{Color, LineStrips2D, Points2D};
 use super::error::RecordError;
 use super::meshes::rerun_colours;
 use super::open_recording::OpenRecording;
-pub(super) use crate::colour::legend::Legend;
-use crate::colour::legend::{BANDS, ColourBar, level_bar};
+pub(super) use crate::picture::colour::legend::Legend;
+use crate::picture::colour::legend::{BANDS, ColourBar, level_bar};
 use crate::study::metrics::LevelCount;
 
 /// Colour of texts in a view: white, which is legible on the viewer's translucent boxes, dark in its dark theme and light grey in the

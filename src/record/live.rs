@@ -23,12 +23,12 @@ use super::eye::Eye;
 use super::meshes;
 use super::open_recording::application;
 use super::{part_marks, paths};
-use crate::colour::FORCE_QUANTILE;
-use crate::colour::cells::CellMesh;
-use crate::colour::map::{Range, Rgb};
-use crate::colour::palette::{self, colour_parts, with_outside};
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
+use crate::picture::colour::FORCE_QUANTILE;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::{Range, Rgb};
+use crate::picture::colour::palette::{self, colour_parts, with_outside};
 use crate::study::metrics::LevelCount;
 
 const PARTS: &str = "/parts";
@@ -222,7 +222,7 @@ pub(crate) fn rest_colours((name, id): (&str, &str), colours: &[Rgb]) -> Result<
     drain(&storage)
 }
 
-/// The outlines of a set of vertices on the garment as placed, after both stages, and at rest: a section of its own, drawn in addition to the
+/// The outlines of a set of vertices on the garment as placed, after both stages, and at rest: a separate section, drawn in addition to the
 /// newest of the session `name` and `id`. Shapes that do not exist yet, and an empty set, clear the outline.
 pub(crate) fn outlines(
     (name, id): (&str, &str),

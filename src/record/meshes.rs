@@ -3,9 +3,9 @@
 use glam::DVec3;
 use rerun::{Color, Mesh3D, Rgba32};
 
-use crate::colour::cells::CellMesh;
-use crate::colour::map::Rgb;
 use crate::mesh::TriMesh;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::Rgb;
 
 /// A point or direction in single precision.
 pub(super) fn single(p: DVec3) -> [f32; 3] {

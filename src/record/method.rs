@@ -10,9 +10,9 @@ use super::open_recording::OpenRecording;
 use super::overlay::log_fit;
 use super::panel::Panel;
 use super::paths;
-use crate::colour::Overlay;
-use crate::colour::palette;
-use crate::methods::Exhibit;
+use crate::mechanics::methods::Exhibit;
+use crate::picture::colour::Overlay;
+use crate::picture::colour::palette;
 
 /// Thickness of lines on screen, points.
 const THICKNESS: f32 = 1.3;

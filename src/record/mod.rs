@@ -31,7 +31,7 @@ pub mod web;
 mod wrinkles;
 mod writer;
 
-pub use crate::colour::Overlay;
+pub use crate::picture::colour::Overlay;
 pub(crate) use compare::{Colours, Compared};
 pub(crate) use drape_tests::{DrapeTestRecording, NamedOutline};
 pub use error::RecordError;

@@ -15,9 +15,9 @@ use super::meshes;
 use super::paths;
 use super::sinks::{OpenSinks, Sink, Target};
 use super::web::WebViewer;
-use crate::colour::cells::CellMesh;
-use crate::colour::map::{Range, Rgb};
 use crate::mesh::TriMesh;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::{Range, Rgb};
 
 /// Longest application id, bytes.
 const MAX_ID: usize = 100;

@@ -8,11 +8,11 @@ use super::legend::{Cell, Legend};
 use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::paths;
-use crate::colour::Overlay;
-use crate::colour::cells::CellMesh;
-use crate::colour::map::{ColourMap, Range};
-use crate::colour::palette::CLOTH;
 use crate::mesh::TriMesh;
+use crate::picture::colour::Overlay;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::{ColourMap, Range};
+use crate::picture::colour::palette::CLOTH;
 
 /// Share of a view's height or width that flat panels fill.
 const PANELS_FILL: f64 = 0.95;

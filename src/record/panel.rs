@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::error::RERUN_VERSION;
-use crate::colour::legend::number;
+use crate::picture::colour::legend::number;
 use crate::study::metrics::LevelCount;
 
 /// The contents of the text panel. Empty sections are left out.

@@ -6,8 +6,8 @@ use rerun::{Arrows3D, Color, Points3D, Radius};
 use super::eye::Eye;
 use super::meshes::single;
 use super::panel::range_cm;
-use crate::colour::legend::number;
-use crate::colour::palette::level_of_part;
+use crate::picture::colour::legend::number;
+use crate::picture::colour::palette::level_of_part;
 use crate::study::metrics::LevelCount;
 
 /// More dots than this would hide the PARTs.

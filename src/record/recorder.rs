@@ -16,9 +16,9 @@ use super::step::{self, OutfitView, StepView};
 use super::web::WebViewer;
 use super::wrinkles::{self, FoldView, WrinkleView};
 use super::{blueprint, meshes, paths, tabs};
-use crate::colour::map::Range;
-use crate::colour::palette;
 use crate::mesh::TriMesh;
+use crate::picture::colour::map::Range;
+use crate::picture::colour::palette;
 
 /// A recording in progress. Its methods fail if Rerun rejects the data, and if a slice does not fit the garment. Dropping it without
 /// [`finish`](Self::finish) leaves no file.

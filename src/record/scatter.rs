@@ -15,8 +15,8 @@ use super::error::RecordError;
 use super::legend::texts;
 use super::open_recording::OpenRecording;
 use super::{meshes, paths};
-use crate::colour::legend::number;
-use crate::colour::palette;
+use crate::picture::colour::legend::number;
+use crate::picture::colour::palette;
 
 /// Path and axis titles of a scatter plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

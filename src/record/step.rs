@@ -12,11 +12,11 @@ use super::open_recording::OpenRecording;
 use super::overlay::{log_fit, log_overlay};
 use super::panel::Panel;
 use super::{part_marks, paths};
-use crate::colour::cells::CellMesh;
-use crate::colour::map::{ColourMap, Range, Rgb};
-use crate::colour::palette::{self, colour_parts, with_outside};
-use crate::colour::{FORCE_QUANTILE, Overlay, QUANTILE};
 use crate::parts::UNASSIGNED;
+use crate::picture::colour::cells::CellMesh;
+use crate::picture::colour::map::{ColourMap, Range, Rgb};
+use crate::picture::colour::palette::{self, colour_parts, with_outside};
+use crate::picture::colour::{FORCE_QUANTILE, Overlay, QUANTILE};
 use crate::scene::Layer;
 
 /// The result of one range table. Slices have one value per vertex of the garment unless stated otherwise.

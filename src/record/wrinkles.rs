@@ -13,10 +13,10 @@ use super::meshes::{self, single};
 use super::open_recording::OpenRecording;
 use super::overlay::log_overlay;
 use super::paths;
-use crate::colour::map::{ColourMap, Range};
-use crate::colour::palette;
-use crate::colour::{Overlay, QUANTILE};
 use crate::mesh::TriMesh;
+use crate::picture::colour::map::{ColourMap, Range};
+use crate::picture::colour::palette;
+use crate::picture::colour::{Overlay, QUANTILE};
 
 /// Height of the lines above the cloth, m: lines in the cloth would be half hidden.
 const ABOVE_M: f64 = 0.002;

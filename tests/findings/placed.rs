@@ -23,7 +23,7 @@ fn a_garment_given_twice_is_refused_with_both_remedies() {
             assert!(refusal.contains(part), "no \"{part}\" in: {refusal}");
         }
     }
-    // Another garment over it is none of its vertices.
+    // The vertices of another garment over it do not count.
     SceneSpec { over: vec!["pullover-1@900".to_owned()], ..skirt }.load().unwrap();
 }
 

@@ -107,7 +107,7 @@ fn a_body_in_millimetres_and_a_garment_in_metres_meet_and_options_name_each_fram
     assert!(close(placed(&spec).unwrap()));
     let notes = spec.load().unwrap().notes().join("\n");
     assert!(notes.contains("in m, z up") && notes.contains("0 in mm, y up, as the body)"), "{notes}");
-    // Each frame has options of its own; those of both files apply where they have none.
+    // Each frame has its options; those of both files apply where they have none.
     let given = SceneSpec {
         body_unit: Some(Unit::Mm),
         body_up: Some(Axis::Y),

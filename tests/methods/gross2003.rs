@@ -4,11 +4,11 @@ use std::path::Path;
 
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
-use partwise::methods::gross2003::Gross2003;
-use partwise::methods::gross2003::cut::cut;
-use partwise::methods::gross2003::developable::Developable;
-use partwise::methods::gross2003::pieces::{BodyPart, Piece, distortion, lay_all, of_pattern, parts};
-use partwise::methods::{Ended, Exhibit, MethodError, MethodInput, RestRule};
+use partwise::mechanics::methods::gross2003::Gross2003;
+use partwise::mechanics::methods::gross2003::cut::cut;
+use partwise::mechanics::methods::gross2003::developable::Developable;
+use partwise::mechanics::methods::gross2003::pieces::{BodyPart, Piece, distortion, lay_all, of_pattern, parts};
+use partwise::mechanics::methods::{Ended, Exhibit, MethodError, MethodInput, RestRule};
 use partwise::{DVec3, Scene, SceneSpec};
 
 use super::scenes::{drape, hanging, rectangle};

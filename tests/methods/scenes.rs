@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
+use partwise::mechanics::methods::{MethodDrape, MethodError, MethodInput, ReferenceMethod, RestRule};
 use partwise::mesh::{RestShape, TriMesh};
-use partwise::methods::{MethodDrape, MethodError, MethodInput, ReferenceMethod, RestRule};
 use partwise::{DVec3, Scene};
 
 use crate::fixtures::{far_away, flipped};

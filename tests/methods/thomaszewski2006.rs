@@ -2,11 +2,11 @@
 
 use glam::{DMat3, Vec3A};
 use partwise::mechanics::energy::Cloth;
+use partwise::mechanics::methods::implicit_euler::Elastic;
+use partwise::mechanics::methods::linear::Operator;
+use partwise::mechanics::methods::thomaszewski2006::{Thomaszewski2006, elements_of_garment};
+use partwise::mechanics::methods::{Ended, MethodError, MethodInput};
 use partwise::mesh::TriMesh;
-use partwise::methods::implicit_euler::Elastic;
-use partwise::methods::linear::Operator;
-use partwise::methods::thomaszewski2006::{Thomaszewski2006, elements_of_garment};
-use partwise::methods::{Ended, MethodError, MethodInput};
 use partwise::{DVec3, GRAVITY};
 
 use crate::fixtures::{Diagonals, grid, isotropic};
@@ -82,7 +82,7 @@ fn stiffness_is_the_derivative_of_the_force_in_the_plane() {
     let x = &scene.garment.positions;
     let move_by: Vec<DVec3> =
         x.iter().map(|p| DVec3::new((9.0 * p.z).sin(), (20.0 * p.x).cos(), (11.0 * p.x).sin()) * 1e-4).collect();
-    let forces = |elements: &mut partwise::methods::thomaszewski2006::elements::Elements, sign: f64| {
+    let forces = |elements: &mut partwise::mechanics::methods::thomaszewski2006::elements::Elements, sign: f64| {
         let mut f = vec![DVec3::ZERO; x.len()];
         let y: Vec<DVec3> = x.iter().zip(&move_by).map(|(x, d)| *x + *d * sign).collect();
         elements.linearise(&y, &mut f);

@@ -2,10 +2,10 @@
 
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::energy::Cloth;
-use partwise::methods::implicit_euler::Obstacle;
-use partwise::methods::zhu2016::Zhu2016;
-use partwise::methods::zhu2016::hierarchy::Hierarchy;
-use partwise::methods::{Ended, Exhibit, MethodError, MethodInput, RestRule};
+use partwise::mechanics::methods::implicit_euler::Obstacle;
+use partwise::mechanics::methods::zhu2016::Zhu2016;
+use partwise::mechanics::methods::zhu2016::hierarchy::Hierarchy;
+use partwise::mechanics::methods::{Ended, Exhibit, MethodError, MethodInput, RestRule};
 use partwise::{DVec3, GRAVITY, Scene, SceneSpec};
 
 use crate::fixtures::isotropic;

@@ -6,7 +6,7 @@ use crate::DVec3;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
-use crate::methods::{self, MethodDrape, MethodInput, RestRule};
+use crate::mechanics::methods::{self, MethodDrape, MethodInput, RestRule};
 use crate::record::{Layout, MethodView, Overlay, Panel, RecordOptions, Recorder};
 use crate::scene::Loaded;
 use crate::study::certificate::{Certificate, certify};

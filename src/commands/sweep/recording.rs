@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::base::quantiles::nearest_rank;
-use crate::colour::map::Range;
+use crate::picture::colour::map::Range;
 use crate::record::{
     Colours, Compared, Layout, Overlay, Panel, Picture, RecordOptions, RecordSummary, Recorder, ScatterPoint, Sink,
     StepView, Tab,

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::drape_metrics::Metrics;
 use super::faults::{SlidPart, sinking};
 use crate::mechanics::fit::{Fit, fit};
+use crate::mechanics::methods::{Ended, MethodDrape, MethodInput};
 use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
-use crate::methods::{Ended, MethodDrape, MethodInput};
 use crate::study::accuracy::{State, rms_mm};
 
 /// Metrics of one drape by a reference method. Names shared with [`Metrics`] have the same meaning; energy and pressure are those of

@@ -9,8 +9,8 @@ use crate::drape::{Model, Refine, Settings, StageTimes, drape};
 use crate::garment::builtin::{BUILT_IN, TABLE_4_SIZES};
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::Cloth;
+use crate::mechanics::methods::{self, Ended, MethodInput, RestRule, gross2003, thomaszewski2006, zhu2016};
 use crate::mechanics::refine::Stop;
-use crate::methods::{self, Ended, MethodInput, RestRule, gross2003, thomaszewski2006, zhu2016};
 use crate::scene::Scene;
 
 /// A compared method.

@@ -1,6 +1,6 @@
 //! The paper's Table 4, repeated: every method on the same garments, with time and error side by side.
 //!
-//! A row is a garment at a size. The compared methods are the three [reference methods](crate::methods), the paper's own
+//! A row is a garment at a size. The compared methods are the three [reference methods](crate::mechanics::methods), the paper's own
 //! equations, the coupled model's two stages alone, and these two stages followed by refinement to convergence. All
 //! drape the same scene in the same fabric on the same threads. Rounds are interleaved (each method once a round, after
 //! an uncounted warm-up round), so a disturbance of the machine affects all methods alike. Ratios are taken round by

@@ -10,7 +10,7 @@ const SMALL: Table4Options = Table4Options {
     rounds: 2,
     warm_up: 0,
     starts: 1,
-    rule: crate::methods::RestRule { speed_m_per_s: 0.01, over_s: 0.25, limit_s: 20.0 },
+    rule: crate::mechanics::methods::RestRule { speed_m_per_s: 0.01, over_s: 0.25, limit_s: 20.0 },
 };
 
 #[test]

@@ -163,7 +163,7 @@ fn the_lower_of_two_sheets_on_a_plate_carries_the_upper() {
     let cloth = Cloth::sample(&mesh, "jersey", &[]);
     let mut go_on = |_: &crate::mechanics::refine::Step<'_>| std::ops::ControlFlow::Continue(());
     let landed = refine(&cloth, &body, mesh.positions, &RefineOptions::default(), &mut go_on).unwrap();
-    // Gaps that became narrow on the way down are stiffer than those that are made anew below: settle once more without them.
+    // Gaps that became narrow on the way down are stiffer than new ones, which the check below uses: settle once more.
     let end = refine(&cloth, &body, landed.positions, &RefineOptions::default(), &mut go_on).unwrap();
     assert_eq!((landed.stop, end.stop), (Stop::Converged, Stop::Converged));
     let mut contacts = cloth.contacts(&body, &end.positions);

@@ -22,8 +22,8 @@ use glam::DVec3;
 use crate::GRAVITY;
 use crate::base::math;
 use crate::mechanics::energy::{Cloth, Contacts};
-use crate::methods::method::{find_velocities, rms_speed};
-use crate::methods::spring_list::Spring;
+use crate::mechanics::methods::method::{find_velocities, rms_speed};
+use crate::mechanics::methods::spring_list::Spring;
 
 /// Time step, damping and constraints.
 #[derive(Debug, Clone, Copy, PartialEq)]

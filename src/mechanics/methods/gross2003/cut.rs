@@ -14,8 +14,8 @@ use glam::{DVec2, DVec3};
 
 use super::pieces::{Piece, unfit};
 use crate::garment::sewing::laid_flat;
+use crate::mechanics::methods::method::{MethodError, MethodInput};
 use crate::mesh::{Csr, RestShape, Topology, TriMesh, each_once, pieces};
-use crate::methods::method::{MethodError, MethodInput};
 
 /// Smallest share of the garment's triangles in a piece; a smaller one joins its neighbour. A heuristic.
 const MIN_SHARE: f64 = 0.02;

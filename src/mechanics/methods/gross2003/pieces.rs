@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use super::developable::Developable;
 use crate::base::quantiles::{extremes, nearest_rank};
 use crate::garment::pattern::SewnGarment;
+use crate::mechanics::methods::method::{MethodError, MethodInput};
+use crate::mechanics::methods::segment::{Segments, principal_axis};
 use crate::mesh::{RestShape, TriMesh};
-use crate::methods::method::{MethodError, MethodInput};
-use crate::methods::segment::{Segments, principal_axis};
 
 /// The method's name.
 pub(crate) const NAME: &str = "gross2003";

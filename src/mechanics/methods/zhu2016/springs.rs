@@ -14,11 +14,11 @@
 use glam::{DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use crate::mechanics::methods::implicit_euler::Elastic;
+use crate::mechanics::methods::linear::{BlockRows, Operator};
+use crate::mechanics::methods::method::MethodInput;
+use crate::mechanics::methods::spring_list::{Spring, springs};
 use crate::mesh::Csr;
-use crate::methods::implicit_euler::Elastic;
-use crate::methods::linear::{BlockRows, Operator};
-use crate::methods::method::MethodInput;
-use crate::methods::spring_list::{Spring, springs};
 
 /// Most sweeps of Provot's limiting after a step; it ends earlier once no spring is too long. A heuristic.
 const MAX_SWEEPS: usize = 30;

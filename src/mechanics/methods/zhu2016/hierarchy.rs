@@ -18,9 +18,9 @@ use rayon::prelude::*;
 
 use super::units::{BodyUnit, REACH};
 use crate::mechanics::energy::Touch;
-use crate::methods::implicit_euler::Obstacle;
-use crate::methods::method::MethodInput;
-use crate::methods::segment::Segments;
+use crate::mechanics::methods::implicit_euler::Obstacle;
+use crate::mechanics::methods::method::MethodInput;
+use crate::mechanics::methods::segment::Segments;
 
 /// Vertices of one parallel task. A heuristic.
 const CHUNK: usize = 256;

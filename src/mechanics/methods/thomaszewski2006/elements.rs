@@ -33,9 +33,9 @@ use rayon::prelude::*;
 use crate::garment::fabric::Fabric;
 use crate::mechanics::energy::bending::bending_stiffness;
 use crate::mechanics::energy::membrane::Stiffness;
+use crate::mechanics::methods::implicit_euler::Elastic;
+use crate::mechanics::methods::linear::Operator;
 use crate::mesh::Csr;
-use crate::methods::implicit_euler::Elastic;
-use crate::methods::linear::Operator;
 
 /// Elements or vertices of one parallel task. A heuristic.
 const CHUNK: usize = 256;

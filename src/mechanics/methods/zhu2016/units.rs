@@ -10,8 +10,8 @@ use glam::{DMat3, DVec2, DVec3};
 use super::quadric::Quadric;
 use crate::base::math;
 use crate::base::quantiles::extremes;
+use crate::mechanics::methods::segment::principal_axis;
 use crate::mesh::{TriMesh, box_about};
-use crate::methods::segment::principal_axis;
 
 /// Height of a slice h, m. Lower slices fit the body more closely, and are more. A heuristic.
 const HEIGHT: f64 = 0.04;
