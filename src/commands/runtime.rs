@@ -244,7 +244,7 @@ impl Decay {
     /// Longest estimate, s; a slower decay says nothing.
     const LONGEST: f64 = 1800.0;
 
-    /// Adds a step, and returns the seconds until the residual falls below `target` if its logarithm goes on as over the last steps.
+    /// Adds a step, and returns the seconds until the residual falls below `target` if its logarithm keeps falling at the rate of the last steps.
     fn seconds_left(&mut self, seconds: f64, residual: f64, target: f64) -> Option<f64> {
         if residual.is_nan() || residual <= 0.0 {
             return None;

@@ -150,7 +150,7 @@ impl MeshSource {
         self.add_face(Face { first: first as u32, count, number: 0, group, object });
     }
 
-    /// Adds a face whose corners are [`corners`](Self::corners) or will be; it gets its number.
+    /// Adds a face and numbers it; its corners stand in [`corners`](Self::corners) or are added next.
     pub(super) fn add_face(&mut self, face: Face) {
         self.has_groups |= face.group != NONE;
         self.faces.push(Face { number: self.faces.len() as u32, ..face });

@@ -107,7 +107,7 @@ fn radii_and_meshes_that_are_no_drape_test_are_refused() {
 
 #[test]
 fn the_stored_results_equal_the_computed_ones() {
-    // One row is drawn again; all of them would take the better part of a minute.
+    // One row is computed again; all of them would take most of a minute.
     let kept = include_str!("../../../assets/cusick/results.csv");
     let drapes = Drapes::of(&Fabric::by_name("interlock").unwrap(), coarse(10), 1).unwrap();
     let drawn = table_csv(&coarse(10), &[("interlock".to_owned(), drapes)]).unwrap();
