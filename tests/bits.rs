@@ -68,7 +68,7 @@ fn nothing_that_a_drape_computes_depends_on_functions_of_the_platform() {
     let calls: Vec<String> = functions.split_whitespace().map(|function| format!(".{function}(")).collect();
     let others = ["DVec2::from_angle(", "::from_rotation_", "::from_axis_angle(", "faer::linalg", "matmul"];
     let mut found = Vec::new();
-    let rooms = ["mesh", "body", "garment", "scene", "parts", "mechanics", "drape", "methods", "session"];
+    let rooms = ["mesh", "body", "garment", "scene", "parts", "mechanics", "drape", "session"];
     for room in rooms {
         let mut folders = vec![std::path::PathBuf::from(format!("{}/src/{room}", env!("CARGO_MANIFEST_DIR")))];
         while let Some(folder) = folders.pop() {

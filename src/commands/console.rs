@@ -115,10 +115,13 @@ pub(crate) fn table<R: Into<Row>>(
     numbers: impl IntoIterator<Item = usize>,
     rows: impl IntoIterator<Item = R>,
 ) -> Table {
-    let texts = |row: Row| row.cell_iter().map(Cell::content).collect::<Vec<String>>();
+    let width = Table::new().width();
+    // On a terminal no line breaks between a number and its percent sign.
+    let kept = |text: String| if width.is_some() { text.replace(" %", "\u{a0}%") } else { text };
+    let texts = |row: Row| row.cell_iter().map(Cell::content).map(kept).collect::<Vec<String>>();
     let header = texts(Row::from(header.into_iter().map(Into::into).collect::<Vec<Cell>>()));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|row| texts(row.into())).collect();
-    let width = Table::new().width().unwrap_or(u16::MAX);
+    let width = width.unwrap_or(u16::MAX);
     fitted(style, &header, numbers, &rows, width)
 }
 
@@ -134,7 +137,7 @@ fn fitted(
     let mut longest_word = vec![0_u16; columns];
     for row in std::iter::once(header).chain(rows.iter().map(Vec::as_slice)) {
         for (longest, text) in longest_word.iter_mut().zip(row) {
-            *longest = text.split_whitespace().map(letters).fold(*longest, u16::max);
+            *longest = text.split([' ', '\n']).map(letters).fold(*longest, u16::max);
         }
     }
     // Each column takes its padding and a separator.

@@ -283,7 +283,8 @@ impl RunArgs {
         if interrupted() {
             job.accuracy = Against::None;
         }
-        let title = format!("{}: references", loaded.garment_name);
+        let what = if matches!(job.accuracy, Against::None) { "measurements" } else { "references" };
+        let title = format!("{}: {what}", loaded.garment_name);
         let draped = Instant::now();
         let measure = |progress: Observer<'_>| job.measure(&loaded.scene, &drape, cache.as_ref(), progress);
         let measured = match with_progress(&title, measure) {

@@ -143,9 +143,10 @@ options! {
         progress_ratio: f64 = 0.9,
         /// Residual over weight above which steps do not count as a cycle; 0 turns the damping of cycles off. Heuristic.
         max_residual: f64 = 0.1,
-        /// Steps without progress that count as a cycle. With 12, 24 drapes of built-in garments take the same steps, but a circle skirt in cotton
-        /// 238 for 135; with 8 the 24 take 781 for 636.
-        max_steps: usize = 24,
+        /// Steps without progress that may count as a cycle. Heuristic.
+        window: usize = 12,
+        /// They do if the energy changed by less than this share of what it went up and down. Heuristic.
+        return_share: f64 = 0.3,
         /// Least share of a step that is taken. Heuristic.
         min_step_share: f64 = 0.125,
         /// Least under-relaxation of gaps. Heuristic.
