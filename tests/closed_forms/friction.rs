@@ -75,8 +75,9 @@ fn a_cloth_over_a_table_edge_holds_or_slides_by_its_friction() {
     assert!(held.positions[0].x < 0.01, "slid to {}", held.positions[0].x);
     let low = held.positions.iter().map(|p| p.z).fold(0.0, f64::min);
     assert!(low < -0.06, "the end hangs only to {low}");
-    let slid = settle(&mesh, &body, 0.15, 200);
-    assert!(slid.positions[0].x > 0.03, "{:?} at {}", slid.stop, slid.positions[0].x);
+    let slid = settle(&mesh, &body, 0.15, 80);
+    let at = slid.positions[0];
+    assert!(at.x > 0.03 || at.z < -0.1, "{:?} at {at}, neither slid nor fallen off", slid.stop);
 }
 
 #[test]

@@ -84,7 +84,11 @@ fn a_skirt_too_wide_for_the_hips_ends_once_it_lies_below_the_crotch() {
     let (slid, x) = (Metrics::of(&scene, &result), &result.positions);
     assert_eq!(slid.verdict, "slid off the trunk, down to the legs");
     assert!(slid.refine_steps.is_some_and(|steps| steps < 30), "{:?} steps", slid.refine_steps);
-    assert!(x.iter().all(|x| x.z < 0.8) && x.iter().any(|x| x.z > 0.4), "its solve ended too late");
+    assert!(
+        x.iter().all(|x| x.z < 0.82) && x.iter().any(|x| x.z > 0.4),
+        "its solve ended too late: {:?}",
+        x.iter().map(|x| x.z).fold((9.0_f64, 0.0_f64), |(a, b), z| (a.min(z), b.max(z)))
+    );
     let message = "slid off the trunk, down to the legs; hold its edge (--hold top)";
     assert!(result.warnings.iter().any(|w| w.contains(message)), "{:?}", result.warnings);
     // Held, it rests.
