@@ -20,7 +20,9 @@ pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
     let mut causes: Vec<String> = Vec::new();
     let mut next = Some(error);
     while let Some(error) = next {
-        let cause = with_suggestion(error.to_string());
+        // What `toml` says of a number in place of a name.
+        let message = error.to_string().replace("wanted string or table", "expected a name in quotes");
+        let cause = with_suggestion(message);
         // Compared before shortening: a shortened message no longer contains the whole cause.
         if !causes.iter().any(|outer| outer.contains(&cause)) {
             causes.push(cause);
@@ -145,6 +147,17 @@ mod tests {
         assert!(text("colour").contains("unknown field `colour`, expected one of"), "{}", text("colour"));
         let sweep = std::io::Error::other("a.toml:3: unknown key `tabels`, expected one of bodies, tables, sizes");
         assert!(with_causes(&sweep, ": ").contains("`tabels`, did you mean `tables`? expected"));
+    }
+
+    #[test]
+    fn a_number_in_place_of_a_name_is_answered_by_what_is_expected() {
+        #[derive(Debug, serde::Deserialize)]
+        enum Side {
+            Front,
+        }
+        let number = toml::from_str::<std::collections::BTreeMap<String, Side>>("side = 1");
+        let text = with_causes(&number.map(|_| Side::Front).unwrap_err(), ": ");
+        assert!(text.contains("expected a name in quotes"), "{text}");
     }
 
     #[test]
