@@ -91,6 +91,8 @@ fn judge(case: &Case, folder: &Path) -> Result<&'static str, String> {
         Some(1) if message.contains("points failed: the column `error`") => "failed points",
         // A certificate that is not given, which names what it is that fails.
         Some(1) if message.contains("not certified") => "not certified",
+        // A drape that `--strict` does not accept.
+        Some(3) if message.contains("--strict: found") => "not at rest",
         other => return Err(format!("it ended with {other:?} ({status}): {message}")),
     };
     if outcome != "done" && !message.contains("error: ") {
