@@ -31,7 +31,7 @@ const CIRCLES: [(&str, f64); 3] = [("half", 0.5), ("three quarters", 0.75), ("fu
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let edge = 0.01 * arguments.next().map_or(Ok(1.5), |cm| cm.parse::<f64>())?;
+    let edge = 0.01 * arguments.next().map_or(Ok(2.0), |cm| cm.parse::<f64>())?;
     if !(0.005..=0.1).contains(&edge) {
         return Err(format!("found an edge of {} cm, expected 0.5 to 10", 100.0 * edge).into());
     }

@@ -20,7 +20,7 @@ pub fn with_causes(error: &(dyn Error + 'static), separator: &str) -> String {
     let mut causes: Vec<String> = Vec::new();
     let mut next = Some(error);
     while let Some(error) = next {
-        // What `toml` says of a number in place of a name.
+        // The message of `toml` about a number in place of a name.
         let message = error.to_string().replace("wanted string or table", "expected a name in quotes");
         let cause = with_suggestion(message);
         // Compared before shortening: a shortened message no longer contains the whole cause.

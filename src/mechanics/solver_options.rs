@@ -80,14 +80,14 @@ options! {
         max_steps: usize = 2000,
         /// Longest move of a vertex in one step, m.
         longest_move_m: f64 = 0.1,
-        /// Damping ε to begin with, in g/L ([`refine`](super::refine)).
+        /// Damping ε to begin with, in g/L ([`refine`](super::refine)). Evidence: decision 33.
         damping: f64 = 8.0,
         /// Damping to begin with from a drape that rested, in g/L. Nine changes between four knits took a long dress 41 steps until its forces
         /// balanced, with thirty times as much 51.
         damping_from_rest: f64 = 0.8,
-        /// Least damping, in g/L.
+        /// Least damping, in g/L. Heuristic.
         min_damping: f64 = 0.1,
-        /// Most damping, in g/L.
+        /// Most damping, in g/L. Heuristic.
         max_damping: f64 = 800.0,
         /// Factor on the damping after a whole step.
         damping_decrease: f64 = 0.5,
