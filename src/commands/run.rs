@@ -312,7 +312,7 @@ impl RunArgs {
             summary.certificate = Some(certify(&scene, &job.settings.fabric, &drape.positions)?);
             summary.add_time("certify", began.elapsed());
         }
-        let folded = folded_preview(&loaded, job, &drape)?;
+        let folded = folded_preview(&loaded, job, &drape);
         Ok(Solved { loaded, drape, measured, folded, iterations, summary })
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::Job;
-use crate::drape::{Drape, DrapeError, Refine, unobserved};
+use crate::drape::{Drape, Refine, unobserved};
 use crate::mechanics::folded_surface::FoldedSurface;
 use crate::record::{
     FoldView, Layout, OutfitView, Overlay, PatternView, RecordError, RecordOptions, RecordSummary, Recorder, StepView,
@@ -42,19 +42,17 @@ pub(super) struct Iteration {
 }
 
 /// The preview with its folds, where the job ends with the preview.
-pub(super) fn folded_preview(loaded: &Loaded, job: &Job, drape: &Drape) -> Result<Option<FoldedSurface>, DrapeError> {
-    if job.settings.refine != Refine::Steps(0) {
-        return Ok(None);
-    }
-    let folded = drape.folded_preview(&loaded.scene, &job.settings)?;
-    Ok(folded.filter(|folded| !folded.counts.is_empty()))
+pub(super) fn folded_preview(loaded: &Loaded, job: &Job, drape: &Drape) -> Option<FoldedSurface> {
+    let ends = job.settings.refine == Refine::Steps(0);
+    let folded = ends.then(|| drape.folded_preview(&loaded.scene)).flatten();
+    folded.filter(|folded| !folded.counts.is_empty())
 }
 
 impl Solved {
     /// A state of a session and its measurements.
     pub(super) fn of_session(job: &Job, finished: &Finished, measured: Measured) -> anyhow::Result<Self> {
         let (loaded, drape) = (finished.loaded_scene.input.clone(), finished.drape.clone());
-        let folded = folded_preview(&loaded, job, &drape)?;
+        let folded = folded_preview(&loaded, job, &drape);
         let mut summary = Summary::new(&loaded, &job.settings, &drape, &measured)?;
         summary.add_time("load", Duration::from_secs_f64(1e-3 * finished.loaded_scene.load_ms));
         Ok(Self { loaded, drape, measured, folded, iterations: BTreeMap::new(), summary })

@@ -81,7 +81,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         state = Some((positions, reached));
         times.refine += refining.elapsed();
     }
-    let folds = worn.all_folds();
+    let folds = worn.all_folds().map(|folds| (folds, None));
     let made = StageResults {
         ground,
         table,
@@ -132,7 +132,7 @@ impl LayerState<'_> {
             self.append_history(&state.history);
         }
         self.stages.push(stage);
-        self.folds.extend(folds);
+        self.folds.extend(folds.map(|(folds, _)| folds));
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::error::DrapeError;
 use super::result::PartOutcome;
 use super::settings::{Model, Settings};
-use crate::body::distance::SurfacePoint;
+use super::stages::Distances;
 use crate::mechanics::coupled::{self, Asked, CoupledOptions, Garment};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::paper::{self, Cut, PartForces};
@@ -34,7 +34,7 @@ pub(crate) fn stage_one(scene: &Scene, min_part: usize, table: &RangeTable, dist
 pub(crate) fn stage_two(
     scene: &Scene,
     settings: &Settings,
-    surface: &[SurfacePoint],
+    ground: &Distances,
     parts: Parts,
     cloth: Option<&Cloth>,
     asked: Asked<'_>,
@@ -51,11 +51,11 @@ pub(crate) fn stage_two(
                     &made
                 }
             };
-            couple(scene, cloth, surface, parts, options, asked)
+            couple(scene, cloth, ground, parts, options, asked)
         }
         Model::Paper(options) => {
             let cut = Cut { rest: &scene.rest, fabrics: &scene.fabrics(fabric) };
-            let result = paper::solve_cut(mesh, topology, body, surface, &parts, &cut, options)?;
+            let result = paper::solve_cut(mesh, topology, body, &ground.surface, &parts, &cut, options)?;
             let of_part =
                 |p: &PartForces| PartOutcome { force_n: p.resultant, displacement: p.displacement, contact: p.contact };
             Ok(StageTwo {
@@ -76,7 +76,7 @@ const FLAT: &str = "the garment is laid flat, and PARTs cannot tell how it will 
 fn couple(
     scene: &Scene,
     cloth: &Cloth,
-    surface: &[SurfacePoint],
+    ground: &Distances,
     parts: Parts,
     options: &CoupledOptions,
     asked: Asked<'_>,
@@ -90,7 +90,8 @@ fn couple(
         return Ok(StageTwo { parts, outcomes, positions: placed.clone(), warnings });
     }
     let garment = Garment { mesh, topology, cloth };
-    let mut distance_m: Vec<f64> = surface.iter().map(|s| s.signed_distance).collect();
+    let mut moved_surface;
+    let mut surface = &ground.surface;
     let mut stage = StageTwo { parts, outcomes: Vec::new(), positions: placed.clone(), warnings: Vec::new() };
     let table = stage.parts.clone();
     let uncut = [f64::INFINITY];
@@ -98,10 +99,11 @@ fn couple(
     for (number, &extent) in extents.iter().enumerate() {
         stage.parts = table.cut_to_extent(mesh, topology, extent);
         if number > 0 {
-            distance_m = body.nearest_all(&stage.positions).into_iter().map(|s| s.signed_distance).collect();
+            moved_surface = body.nearest_all(&stage.positions);
+            surface = &moved_surface;
         }
-        let start = (&stage.positions[..], &distance_m[..]);
-        let result = coupled::solve_with_distances(&garment, body, &stage.parts, start, options, asked)?;
+        let start = (&stage.positions[..], &surface[..]);
+        let result = coupled::solve_from(&garment, body, &stage.parts, start, &ground.bands, options, asked)?;
         stage.outcomes = result.parts.iter().map(outcome).collect();
         stage.positions = result.positions;
     }

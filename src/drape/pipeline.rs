@@ -14,6 +14,7 @@ use super::release::{Release, ReleasedDrape, let_go};
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
 use super::stages::{Distances, StageResults, StartsFrom, folds_of, refine_from, settled};
+use crate::mechanics::folded_surface::FoldableCloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::Observer;
 use crate::parts::Parts;
@@ -95,7 +96,7 @@ pub(super) fn needs_cloth(settings: &Settings) -> bool {
 /// Result of stage two and of the steps after it.
 pub(super) struct Moved {
     pub(super) stage: StageTwo,
-    pub(super) folds: Option<Folds>,
+    pub(super) folds: Option<(Folds, Option<FoldableCloth>)>,
     pub(super) state: Option<(Vec<DVec3>, ClothState)>,
     pub(super) let_go: Option<Release>,
 }
@@ -112,7 +113,7 @@ pub(super) fn moved(
 ) -> Result<Moved, DrapeError> {
     let on = || ControlFlow::Continue(());
     let stage = timed(&mut times.mechanics, || {
-        stage_two(scene, settings, &ground.surface, parts, cloth.map(|levels| &levels.cloth), &on)
+        stage_two(scene, settings, ground, parts, cloth.map(|levels| &levels.cloth), &on)
     })?;
     let folds = folds_of(settings, cloth, &stage);
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };

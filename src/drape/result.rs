@@ -4,13 +4,10 @@ use std::time::Duration;
 
 use glam::DVec3;
 
-use super::error::DrapeError;
 use super::release::Release;
-use super::settings::Settings;
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::energy::Cloth;
 use crate::mechanics::fit::Fit;
-use crate::mechanics::folded_surface::{FoldedSurface, folded_surface};
+use crate::mechanics::folded_surface::{FoldableCloth, FoldedSurface, folded_surface};
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Record, Stop};
 use crate::parts::Parts;
@@ -91,6 +88,8 @@ pub struct Drape {
     pub preview: Vec<DVec3>,
     /// Cloth that the preview has no room for, and folds of PARTs do not show; the coupled model's alone.
     pub folds: Option<Folds>,
+    /// What drawing them needs of the cloth; none for several layers.
+    pub(crate) foldable: Option<FoldableCloth>,
     /// The displaced garment, m.
     pub positions: Vec<DVec3>,
     /// The cloth at full resolution; the equations of the paper alone need none.
@@ -110,16 +109,12 @@ pub struct Drape {
 }
 
 impl Drape {
-    /// The preview with the folds that its PARTs do not show; `scene` and `settings` are those of the drape. `None` for several layers
-    /// and for the paper's model, which know no excess length.
-    ///
-    /// # Errors
-    /// [`DrapeError`] where a constant of the fabric cannot be used.
-    pub fn folded_preview(&self, scene: &Scene, settings: &Settings) -> Result<Option<FoldedSurface>, DrapeError> {
-        let (Some(folds), 0..=1) = (&self.folds, scene.layers.len()) else { return Ok(None) };
-        let Scene { garment, topology, rest, held, body, .. } = scene;
-        let cloth = Cloth::new(garment, topology, rest, &scene.fabrics(&settings.fabric), held)?;
-        let preview = garment.with_positions(self.preview.clone());
-        Ok(Some(folded_surface(&cloth, topology, body, &preview, folds)))
+    /// The preview with the folds that its PARTs do not show; `scene` is that of the drape. `None` for several layers and for the
+    /// paper's model, which know no excess length.
+    #[must_use]
+    pub fn folded_preview(&self, scene: &Scene) -> Option<FoldedSurface> {
+        let (folds, cloth) = (self.folds.as_ref()?, self.foldable.as_ref()?);
+        let preview = scene.garment.with_positions(self.preview.clone());
+        Some(folded_surface(cloth, &scene.topology, &scene.body, &preview, folds))
     }
 }

@@ -1,6 +1,7 @@
 //! Stages of a drape, for [`drape()`](super::drape) and for the session, which computes them one at a time.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -11,8 +12,10 @@ use super::release::Release;
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
+use crate::mechanics::coupled::Bands;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::{CRUSHED_SHARE, fit};
+use crate::mechanics::folded_surface::FoldableCloth;
 use crate::mechanics::folds::{Folds, folds};
 use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -20,13 +23,15 @@ use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
 use crate::scene::{Scene, SceneError};
 
-/// How far the garment as placed is from what it is over.
+/// How far the garment as placed is from what it is over, and along itself. No table changes it.
 #[derive(Debug, Clone)]
 pub(crate) struct Distances {
     /// Closest points on it.
     pub(crate) surface: Vec<SurfacePoint>,
     /// Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
     pub(crate) unsigned_m: Vec<f64>,
+    /// Along the cloth: bands of the PARTs of the last table.
+    pub(crate) bands: Arc<Bands>,
 }
 
 impl Distances {
@@ -40,14 +45,19 @@ impl Distances {
     }
 
     fn from_surface(surface: Vec<SurfacePoint>) -> Self {
-        Self { unsigned_m: surface.iter().map(|s| s.signed_distance.abs()).collect(), surface }
+        let unsigned_m = surface.iter().map(|s| s.signed_distance.abs()).collect();
+        Self { surface, unsigned_m, bands: Arc::default() }
     }
 }
 
-/// Cloth that the PARTs have no room for; the coupled model's alone.
-pub(crate) fn folds_of(settings: &Settings, levels: Option<&Levels>, stage: &StageTwo) -> Option<Folds> {
+/// Cloth that the PARTs have no room for, and what drawing it needs; the coupled model's alone.
+pub(crate) fn folds_of(
+    settings: &Settings,
+    levels: Option<&Levels>,
+    stage: &StageTwo,
+) -> Option<(Folds, Option<FoldableCloth>)> {
     match settings.model {
-        Model::Coupled(_) => levels.map(|levels| folds(&levels.cloth, &stage.positions)),
+        Model::Coupled(_) => levels.map(|Levels { cloth, .. }| (folds(cloth, &stage.positions), Some(cloth.into()))),
         Model::Paper(_) => None,
     }
 }
@@ -104,7 +114,7 @@ pub(crate) struct StageResults {
     pub(crate) table: RangeTable,
     pub(crate) level_part_count: usize,
     pub(crate) stage: StageTwo,
-    pub(crate) folds: Option<Folds>,
+    pub(crate) folds: Option<(Folds, Option<FoldableCloth>)>,
     pub(crate) state: Option<(Vec<DVec3>, ClothState)>,
     pub(crate) let_go: Option<Release>,
 }
@@ -130,6 +140,7 @@ impl StageResults {
         let inside = depths(scene, &ground, &positions).into_iter().filter(|&depth| depth > 0.0);
         let (penetrating_vertices, penetration) = inside.fold((0, 0.0_f64), |(n, deepest), d| (n + 1, deepest.max(d)));
         let self_intersecting_pairs = self_intersecting_pairs(&scene.garment.with_positions(positions.clone())).len();
+        let (folds, foldable) = folds.map_or((None, None), |(folds, foldable)| (Some(folds), foldable));
         Drape {
             surface: ground.surface,
             distance: ground.unsigned_m,
@@ -139,6 +150,7 @@ impl StageResults {
             outcomes: stage.outcomes,
             preview: stage.positions,
             folds,
+            foldable,
             state,
             let_go,
             self_intersecting_pairs,

@@ -30,16 +30,20 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec2, DVec3};
+use std::sync::{Arc, LazyLock};
 
-use super::coupled::push_out;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::coupled::Clearance;
 use super::energy::Cloth;
 use super::energy::membrane::Triangle;
 use super::folds::{Folds, compression};
 use super::sine_waves::SineWaves;
 use crate::GRAVITY;
 use crate::base::math;
-use crate::body::distance::Body;
+use crate::body::distance::{Body, SurfacePoint};
+use crate::garment::fabric::Fabric;
 use crate::mesh::{Topology, TriMesh};
 
 /// Excess length from which cloth folds: below it compression and rounding of the mesh look alike. Folds grow from here to twice of it.
@@ -66,6 +70,33 @@ const PASSES: usize = 3;
 /// Edges of the mesh that a fold needs at least.
 const EDGES_PER_FOLD: f64 = 6.0;
 
+/// Least number of vertices in a parallel task.
+const MIN_TASK: usize = 512;
+
+static WAVES: LazyLock<SineWaves> = LazyLock::new(SineWaves::new);
+
+/// What drawing needs of the cloth.
+#[derive(Debug, Clone)]
+pub(crate) struct FoldableCloth {
+    triangles: Arc<Vec<Triangle>>,
+    fabrics: Arc<Vec<Fabric>>,
+    areas: Vec<f64>,
+    offsets: Vec<f64>,
+    held: Vec<bool>,
+}
+
+impl From<&Cloth> for FoldableCloth {
+    fn from(cloth: &Cloth) -> Self {
+        Self {
+            triangles: Arc::clone(&cloth.triangles),
+            fabrics: Arc::clone(&cloth.fabrics),
+            areas: cloth.areas.clone(),
+            offsets: cloth.offsets.clone(),
+            held: cloth.held.clone(),
+        }
+    }
+}
+
 /// A preview with its folds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoldedSurface {
@@ -77,7 +108,7 @@ pub struct FoldedSurface {
 
 /// Draws the `folds` of `cloth` on its `preview`, over `body`.
 pub(crate) fn folded_surface(
-    cloth: &Cloth,
+    cloth: &FoldableCloth,
     topology: &Topology,
     body: &Body,
     preview: &TriMesh,
@@ -88,44 +119,49 @@ pub(crate) fn folded_surface(
     for _ in 0..SMOOTHING {
         excess = averaged(topology, &excess);
     }
-    let waves = SineWaves::new();
+    let waves = &*WAVES;
     let normals = preview.vertex_normals();
     let mut moves = vec![0.0; x.len()];
     let mut counts = Vec::new();
+    let nowhere = SurfacePoint { point: DVec3::ZERO, signed_distance: 0.0, normal: DVec3::ZERO, triangle: 0 };
+    let mut surface = vec![nowhere; x.len()];
     for region in regions(topology, &excess) {
         let Some(ring) = Ring::new(cloth, topology, x, &region, folds) else { continue };
         let at: Vec<DVec3> = region.iter().map(|&v| x[v as usize]).collect();
         let mut room = vec![f64::INFINITY; x.len()];
         for (&v, near) in region.iter().zip(body.nearest_all(&at)) {
             room[v as usize] = (near.signed_distance - cloth.offsets[v as usize]).max(0.0);
+            surface[v as usize] = near;
         }
         let mut reach = vec![0.0; x.len()];
-        ring.reach(&region, &excess, &waves, &mut reach);
-        let Some(count) = ring.count(cloth, x, &excess, &reach, &room, &waves) else { continue };
+        ring.reach(&region, &excess, waves, &mut reach);
+        let Some(count) = ring.count(cloth, x, &excess, &reach, &room, waves) else { continue };
         let n = count as f64;
         let phase = ring.phase(cloth, &region, &room, n);
+        let wave = |&v: &u32| math::cos(n * ring.angle[v as usize] - phase);
+        let wave: Vec<f64> = region.par_iter().with_min_len(MIN_TASK).map(wave).collect();
         for pass in 0..PASSES {
-            for &v in &region {
+            for (&v, wave) in region.iter().zip(&wave) {
                 let v = v as usize;
                 let amplitude = reach[v] / n;
-                moves[v] = amplitude * math::cos(n * ring.angle[v] - phase) + (amplitude - room[v]).max(0.0);
+                moves[v] = amplitude * wave + (amplitude - room[v]).max(0.0);
             }
             if pass + 1 == PASSES {
                 break;
             }
-            let drawn = ring.drawn_share(x, &drawn(x, &normals, &moves));
+            let drawn = ring.drawn_share(&drawn(x, &normals, &moves));
             for &v in &region {
                 let e = &mut excess[v as usize];
                 *e = 1.0 - (1.0 - *e) * drawn.at(x[v as usize].z);
             }
-            ring.reach(&region, &excess, &waves, &mut reach);
+            ring.reach(&region, &excess, waves, &mut reach);
         }
         counts.push(count);
     }
     let mut positions = drawn(x, &normals, &moves);
     let still: Vec<bool> = moves.iter().zip(&cloth.held).map(|(&d, &held)| held || d == 0.0).collect();
     positions.iter_mut().zip(x).zip(&still).filter(|(_, still)| **still).for_each(|((moved, x), _)| *moved = *x);
-    push_out(body, &still, &cloth.offsets, &mut positions);
+    Clearance::new(x, surface).push_out(body, &still, &cloth.offsets, &mut positions);
     FoldedSurface { positions, counts }
 }
 
@@ -141,7 +177,7 @@ fn averaged(topology: &Topology, values: &[f64]) -> Vec<f64> {
         let sum: f64 = near.iter().map(|&w| values[w as usize]).sum();
         if near.is_empty() { value } else { 0.5 * (value + sum / near.len() as f64) }
     };
-    values.iter().enumerate().map(of_vertex).collect()
+    values.par_iter().with_min_len(4 * MIN_TASK).enumerate().map(of_vertex).collect()
 }
 
 /// Connected vertices whose excess is over [`MIN_EXCESS`].
@@ -170,6 +206,10 @@ fn regions(topology: &Topology, excess: &[f64]) -> Vec<Vec<u32>> {
 /// A region that closes around a vertical axis.
 struct Ring<'a> {
     triangles: Vec<&'a Triangle>,
+    /// ∇θ in each, 1/m.
+    around: Vec<DVec3>,
+    /// Of the compressed triangles: index, direction of the compression in the rest shape, and height z, m.
+    compressed: Vec<(u32, DVec2, f64)>,
     /// θ of each vertex of the region.
     angle: Vec<f64>,
     /// |∇θ|, 1/m, at its vertices.
@@ -181,7 +221,7 @@ struct Ring<'a> {
 
 impl<'a> Ring<'a> {
     /// `None` where the region does not close, or its folds run otherwise.
-    fn new(cloth: &'a Cloth, topology: &Topology, x: &[DVec3], region: &[u32], folds: &Folds) -> Option<Self> {
+    fn new(cloth: &'a FoldableCloth, topology: &Topology, x: &[DVec3], region: &[u32], folds: &Folds) -> Option<Self> {
         let mut inside = vec![false; x.len()];
         region.iter().for_each(|&v| inside[v as usize] = true);
         let heights = region.iter().map(|&v| x[v as usize].z);
@@ -196,13 +236,15 @@ impl<'a> Ring<'a> {
             }
         }
         let middles = sums.map(|(sum, weight)| sum / weight.max(f64::MIN_POSITIVE));
-        let mut angle = vec![0.0; x.len()];
-        let mut occupied = [false; SECTORS];
-        for &v in region {
+        let theta = |&v: &u32| {
             let p = x[v as usize];
             let (below, share) = slices.at(p.z);
-            let from = p.truncate() - middles[below].lerp(middles[below + 1], share);
-            let theta = math::atan2(from.y, from.x);
+            math::angle(p.truncate() - middles[below].lerp(middles[below + 1], share))
+        };
+        let thetas: Vec<f64> = region.par_iter().with_min_len(MIN_TASK).map(theta).collect();
+        let mut angle = vec![0.0; x.len()];
+        let mut occupied = [false; SECTORS];
+        for (&v, theta) in region.iter().zip(thetas) {
             angle[v as usize] = theta;
             occupied[((theta + PI) / TAU * SECTORS as f64) as usize % SECTORS] = true;
         }
@@ -211,17 +253,27 @@ impl<'a> Ring<'a> {
         }
         let whole = |t: &&Triangle| !t.sliver && t.vertices.iter().all(|&v| inside[v as usize]);
         let triangles: Vec<&Triangle> = cloth.triangles.iter().filter(whole).collect();
-        let mut ring = Self { triangles, angle, gradient: vec![0.0; x.len()], slices, max_count: 0.0 };
+        let of_triangle = |t: &&Triangle| {
+            let [a, b, c] = t.vertices.map(|v| angle[v as usize]);
+            let around = gradient(x, t, turn(b - a), turn(c - a));
+            (around, compression(t.deformation(x)))
+        };
+        let found: Vec<_> = triangles.par_iter().with_min_len(MIN_TASK).map(of_triangle).collect();
+        let height = |t: &Triangle| t.vertices.iter().map(|&v| x[v as usize].z).sum::<f64>() / 3.0;
+        let folded = (0..).zip(triangles.iter().zip(&found)).filter(|(_, (_, (_, (excess, _))))| *excess >= MIN_EXCESS);
+        let compressed = folded.map(|(i, (t, (_, (_, v2))))| (i, *v2, height(t))).collect();
+        let around = found.into_iter().map(|(around, _)| around).collect();
+        let gradient = vec![0.0; x.len()];
+        let mut ring = Self { triangles, around, compressed, angle, gradient, slices, max_count: 0.0 };
         let mut areas = vec![0.0; x.len()];
         let (mut aligned, mut all) = (0.0, 0.0);
-        for t in &ring.triangles {
-            let gradient = ring.angle_gradient(x, t);
+        for (t, gradient) in ring.triangles.iter().zip(&ring.around) {
             let size = gradient.length();
             for v in t.vertices.map(|v| v as usize) {
                 ring.gradient[v] += t.area * size;
                 areas[v] += t.area;
                 let weight = t.area * folds.excess_percent[v];
-                aligned += weight * (folds.across[v].dot(gradient) / size.max(f64::MIN_POSITIVE)).abs();
+                aligned += weight * (folds.across[v].dot(*gradient) / size.max(f64::MIN_POSITIVE)).abs();
                 all += weight;
             }
         }
@@ -250,31 +302,21 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Length across the folds in `drawn` over that at rest, by the height of the preview x. Waves of few edges are shorter than sine waves.
-    fn drawn_share(&self, x: &[DVec3], drawn: &[DVec3]) -> BySlice {
+    /// Length across the folds in `drawn` over that at rest, by the height of the preview. Waves of few edges are shorter than sine waves.
+    fn drawn_share(&self, drawn: &[DVec3]) -> BySlice {
         let mut share = BySlice { slices: self.slices, sums: [(0.0, 0.0); SLICES] };
-        for t in &self.triangles {
-            let (excess, v2) = compression(t.deformation(x));
-            if excess < MIN_EXCESS {
-                continue;
-            }
+        for &(i, v2, z) in &self.compressed {
+            let t = self.triangles[i as usize];
             let [fu, fv] = t.deformation(drawn);
-            let z = t.vertices.iter().map(|&v| x[v as usize].z).sum::<f64>() / 3.0;
             share.add(z, (fu * v2.x + fv * v2.y).length(), t.area);
         }
         share
     }
 
-    /// ∇θ in a triangle at x, 1/m.
-    fn angle_gradient(&self, x: &[DVec3], t: &Triangle) -> DVec3 {
-        let [a, b, c] = t.vertices.map(|v| self.angle[v as usize]);
-        gradient(x, t, turn(b - a), turn(c - a))
-    }
-
     /// N; `None` where there is nothing to fold.
     fn count(
         &self,
-        cloth: &Cloth,
+        cloth: &FoldableCloth,
         x: &[DVec3],
         excess: &[f64],
         reach: &[f64],
@@ -282,11 +324,10 @@ impl<'a> Ring<'a> {
         waves: &SineWaves,
     ) -> Option<usize> {
         let (mut bending, mut lifting, mut amplitude, mut space) = (0.0, 0.0, 0.0, 0.0);
-        for t in &self.triangles {
+        for (t, &around) in self.triangles.iter().zip(&self.around) {
             let vertices = t.vertices.map(|v| v as usize);
             let mean = |values: &[f64]| vertices.iter().map(|&v| values[v]).sum::<f64>() / 3.0;
             let fabric = &cloth.fabrics[t.fabric as usize];
-            let around = self.angle_gradient(x, t);
             let size = around.length().max(f64::MIN_POSITIVE);
             let [a, b, c] = vertices.map(|v| reach[v]);
             let slope = gradient(x, t, b - a, c - a);
@@ -309,7 +350,7 @@ impl<'a> Ring<'a> {
     }
 
     /// φ: the phase at which crests that point inwards have the most room.
-    fn phase(&self, cloth: &Cloth, region: &[u32], room: &[f64], n: f64) -> f64 {
+    fn phase(&self, cloth: &FoldableCloth, region: &[u32], room: &[f64], n: f64) -> f64 {
         let (mut re, mut im) = (0.0, 0.0);
         for v in region.iter().map(|&v| v as usize) {
             let (sin, cos) = math::sin_cos(n * self.angle[v]);
@@ -404,7 +445,7 @@ mod tests {
         let topology = Topology::new(&tube);
         let cloth = Cloth::new(&tube, &topology, &RestShape::from_edges(&rest).unwrap(), &fabric, &[]).unwrap();
         let body = Body::new(&cuboid(DVec3::new(-post, -post, -0.1), DVec3::new(post, post, 0.7))).unwrap();
-        let drawn = folded_surface(&cloth, &topology, &body, &tube, &folds(&cloth, &tube.positions));
+        let drawn = folded_surface(&(&cloth).into(), &topology, &body, &tube, &folds(&cloth, &tube.positions));
         let inside = body.nearest_all(&drawn.positions).iter().filter(|near| near.signed_distance <= 0.0).count();
         assert_eq!(inside, 0);
         let hem = |v: usize| drawn.positions[v % AROUND as usize];
@@ -440,7 +481,7 @@ mod tests {
         let body = Body::new(&cuboid(DVec3::splat(-0.05), DVec3::splat(0.05))).unwrap();
         let cloth = Cloth::new(&mesh, &topology, &RestShape::from_edges(&mesh).unwrap(), &fabric, &[]).unwrap();
         let none = folds(&cloth, &mesh.positions);
-        let drawn = folded_surface(&cloth, &topology, &body, &mesh, &none);
+        let drawn = folded_surface(&(&cloth).into(), &topology, &body, &mesh, &none);
         assert!(drawn.counts.is_empty() && drawn.positions == mesh.positions);
         // Half of a tube does not close: squeezed to half its width, it has excess and no folds.
         let half = crate::mesh::samples::sheet(24, 12, |i, j| (math::unit(PI * i / 24.0) * 0.2).extend(j * 0.03));
@@ -450,7 +491,7 @@ mod tests {
         let cloth = Cloth::new(&half, &topology, &RestShape::from_edges(&half).unwrap(), &fabric, &[]).unwrap();
         let excess = folds(&cloth, &squeezed.positions);
         assert!(excess.excess_percent.iter().all(|&e| e > 40.0));
-        let drawn = folded_surface(&cloth, &topology, &body, &squeezed, &excess);
+        let drawn = folded_surface(&(&cloth).into(), &topology, &body, &squeezed, &excess);
         assert!(drawn.counts.is_empty() && drawn.positions == squeezed.positions);
     }
 }

@@ -53,6 +53,14 @@ impl<T> Csr<T> {
         self.starts.push(self.entries.len() as u32);
     }
 
+    /// The lists of several, one after the other.
+    pub(crate) fn joined(several: Vec<Self>) -> Self {
+        let mut all = Self::default();
+        all.entries.reserve(several.iter().map(|lists| lists.entries.len()).sum());
+        several.into_iter().for_each(|lists| all.append(lists));
+        all
+    }
+
     /// Adds the lists of the next owners.
     pub(crate) fn append(&mut self, mut other: Self) {
         let before = self.entries.len() as u32;

@@ -197,10 +197,10 @@ impl Worker {
     /// Both stages from the undraped garment, as `run` computes them.
     fn both_stages(&mut self, task: Task<'_>, levels: Option<&Levels>) -> Result<(), EditError> {
         let began = Instant::now();
-        let surface = &task.loaded_scene().distances.surface;
+        let ground = &task.loaded_scene().distances;
         let parts = (*task.segmented.table_parts).clone();
         let cloth = levels.map(|levels| &levels.cloth);
-        let stage = match stage_two(task.scene(), task.settings(), surface, parts, cloth, &|| task.check()) {
+        let stage = match stage_two(task.scene(), task.settings(), ground, parts, cloth, &|| task.check()) {
             Ok(stage) => stage,
             Err(DrapeError::Coupled(CoupledError::Interrupted)) => return Ok(()),
             Err(error) => return Err(error.into()),

@@ -286,6 +286,11 @@ impl<L: Lanes> Vectors<L> {
         Self { x: Pack::load(l, x), y: Pack::load(l, y), z: Pack::load(l, z) }
     }
 
+    #[inline(always)]
+    pub(crate) fn store(self) -> [Four; 3] {
+        [self.x.store(), self.y.store(), self.z.store()]
+    }
+
     /// From registers that hold one vector each; their fourth lane is ignored.
     #[inline(always)]
     pub(crate) fn from_rows(l: L, [a, b, c, d]: [L::Register; 4]) -> Self {

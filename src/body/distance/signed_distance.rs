@@ -188,10 +188,17 @@ impl Body {
     /// [`nearest`](Self::nearest) of every point, in parallel; the order, and every bit, is that of the input.
     #[must_use]
     pub fn nearest_all(&self, points: &[DVec3]) -> Vec<SurfacePoint> {
+        self.nearest_all_from(points, &[])
+    }
+
+    /// [`nearest_all`](Self::nearest_all), to the same bits, by searches that start at these triangles, one for each point: sooner where they
+    /// are those of points near by.
+    pub(crate) fn nearest_all_from(&self, points: &[DVec3], hints: &[u32]) -> Vec<SurfacePoint> {
         let order = along_a_curve(points);
         let chunk = |chunk: &[u32]| {
             let here: Vec<DVec3> = chunk.iter().map(|&i| points[i as usize]).collect();
-            let found = self.tree.nearest(&here);
+            let hints: Vec<u32> = chunk.iter().filter_map(|&i| hints.get(i as usize).copied()).collect();
+            let found = self.tree.nearest_from(&here, &hints);
             here.into_iter().zip(found).map(|(x, candidate)| self.outermost(x, candidate)).collect::<Vec<_>>()
         };
         let found: Vec<SurfacePoint> = order.par_chunks(CHUNK).flat_map_iter(chunk).collect();

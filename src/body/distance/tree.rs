@@ -151,7 +151,12 @@ impl Tree {
     /// The triangle nearest to each point. Each search starts at the result of the one before, so consecutive points should be
     /// near each other.
     pub(super) fn nearest(&self, points: &[DVec3]) -> Vec<Nearest> {
-        run(Search { tree: self, points })
+        self.nearest_from(points, &[])
+    }
+
+    /// The same, where each search starts at a triangle of `hints`; any number is a hint, and a bad one takes time alone.
+    pub(super) fn nearest_from(&self, points: &[DVec3], hints: &[u32]) -> Vec<Nearest> {
+        run(Search { tree: self, points, hints })
     }
 
     /// The triangle of the least `square`, the squared distance from `p` to a triangle, m²: for slivers, whose distance
@@ -232,6 +237,8 @@ const ROUNDED: f64 = 1.0 - 1e-12;
 pub(super) struct Search<'a> {
     pub(super) tree: &'a Tree,
     pub(super) points: &'a [DVec3],
+    /// A triangle to start from for each point, or none.
+    pub(super) hints: &'a [u32],
 }
 
 impl Work for Search<'_> {
@@ -242,9 +249,10 @@ impl Work for Search<'_> {
         let Tree { nodes, leaves, leaf_of } = self.tree;
         let mut found: Vec<Nearest> = Vec::with_capacity(self.points.len());
         let mut open: Vec<(f64, u32)> = Vec::new();
-        for &p in self.points {
+        for (i, &p) in self.points.iter().enumerate() {
             let p = Vectors { x: Pack::splat(l, p.x), y: Pack::splat(l, p.y), z: Pack::splat(l, p.z) };
-            let near = found.last().map_or(0, |before| before.triangle);
+            let hint = self.hints.get(i).copied().filter(|hint| (*hint as usize) < leaf_of.len());
+            let near = hint.unwrap_or_else(|| found.last().map_or(0, |before| before.triangle));
             let mut best = Nearest { square: f64::INFINITY, triangle: near };
             nearest_of(l, &leaves[leaf_of[near as usize] as usize], p, &mut best);
             open.push((0.0, 0));
@@ -394,6 +402,8 @@ mod tests {
             let backwards: Vec<DVec3> = points.iter().rev().copied().collect();
             prop_assert!(tree.nearest(&backwards).iter().eq(found.iter().rev()));
             prop_assert!(points.iter().zip(&found).all(|(p, near)| tree.nearest(&[*p])[0] == *near));
+            let hints: Vec<u32> = (0..points.len() as u32).map(|i| i * 7919 % (mesh.triangles.len() as u32 + 3)).collect();
+            prop_assert_eq!(tree.nearest_from(&points, &hints), found);
         }
     }
 

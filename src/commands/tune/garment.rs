@@ -102,7 +102,7 @@ impl Garment {
     pub(super) fn preview(&self, fabric: usize, parts: &Parts) -> Result<StageTwo, DrapeError> {
         let Tailored { settings, cloth, .. } = &self.tailored[fabric];
         let go_on = || ControlFlow::Continue(());
-        stage_two(&self.scene, settings, &self.distances.surface, parts.clone(), Some(cloth), &go_on)
+        stage_two(&self.scene, settings, &self.distances, parts.clone(), Some(cloth), &go_on)
     }
 
     /// RMS distance of stage two from the canonical drape, mm.

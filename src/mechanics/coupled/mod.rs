@@ -29,17 +29,15 @@ mod weights;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use glam::DVec3;
-use rayon::prelude::*;
-
 pub(crate) use folding::is_flat;
+use glam::DVec3;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
-pub use weights::Weights;
+pub use weights::{Bands, Weights};
 
 use super::energy::Cloth;
 use crate::GRAVITY;
-use crate::body::distance::Body;
+use crate::body::distance::{Body, SurfacePoint};
 use crate::mesh::{Topology, TriMesh};
 use crate::parts::Parts;
 use admm::Admm;
@@ -75,8 +73,8 @@ pub fn solve(
     start: &[DVec3],
     options: &CoupledOptions,
 ) -> Result<CoupledResult, CoupledError> {
-    let distance_m: Vec<f64> = body.nearest_all(start).into_iter().map(|near| near.signed_distance).collect();
-    solve_with_distances(garment, body, parts, (start, &distance_m), options, &|| ControlFlow::Continue(()))
+    let surface = body.nearest_all(start);
+    solve_from(garment, body, parts, (start, &surface), &Bands::default(), options, &|| ControlFlow::Continue(()))
 }
 
 /// PARTs up to which [`CoupledOptions::max_iterations`] holds. An iteration carries a change from one PART to the next, and a garment of n
@@ -89,39 +87,39 @@ const PARTS_OF_LIMIT: f64 = 150.0;
 /// canonical drape. The cloth sinks at each push-out, so their number is limited by [`CoupledOptions::max_iterations`].
 const CONFORM_INTERVAL: usize = 8;
 
-/// [`solve`] from positions with known signed distances to the body, m.
+/// [`solve`] from positions with known points of the body. `bands` keeps what other PARTs of the same garment have computed, and does not
+/// change the result.
 ///
 /// # Errors
 /// As there; [`CoupledError::Interrupted`] where `asked` breaks off.
-pub(crate) fn solve_with_distances(
+pub(crate) fn solve_from(
     garment: &Garment<'_>,
     body: &Body,
     parts: &Parts,
-    (start, distance_m): (&[DVec3], &[f64]),
+    (start, surface): (&[DVec3], &[SurfacePoint]),
+    bands: &Bands,
     options: &CoupledOptions,
     asked: Asked<'_>,
 ) -> Result<CoupledResult, CoupledError> {
     let Garment { mesh, topology, cloth } = *garment;
     check("the list of start positions", start.len(), mesh.vertex_count())?;
-    check("the list of distances", distance_m.len(), mesh.vertex_count())?;
+    check("the list of surface points", surface.len(), mesh.vertex_count())?;
     check("the list of vertex PARTs", parts.part_of_vertex.len(), mesh.vertex_count())?;
     if parts.is_empty() {
         return Err(CoupledError::NoParts);
     }
     let began = Instant::now();
-    let weights = Weights::new(topology, &mesh.positions, parts).without(&cloth.held);
-    let motions = Motions::new(parts, weights, start, options.motion);
-    let compression = folding::buckling_loads(mesh, parts, cloth);
-    let mut admm = Admm::new(cloth, body, &motions, start, folding::hanging_height_m(mesh), &compression, distance_m)?;
+    let weights = || bands.weights(topology, &mesh.positions, parts).without(&cloth.held);
+    let (motions, compression) = rayon::join(
+        || Motions::new(parts, weights(), start, options.motion),
+        || folding::buckling_loads(mesh, parts, cloth),
+    );
+    let mut admm = Admm::new(cloth, body, &motions, start, folding::hanging_height_m(mesh), &compression, surface)?;
     let setup = began.elapsed();
 
     let began = Instant::now();
     let mut positions = start.to_vec();
-    let mut moves = Vec::new();
-    // A vertex that moved by less than its distance from the body does not touch it.
-    let clear = |x: &[DVec3]| -> Vec<bool> {
-        (0..x.len()).map(|v| cloth.held[v] || distance_m[v] - x[v].distance(start[v]) > cloth.offsets[v]).collect()
-    };
+    let mut clearance = Clearance::new(start, surface.to_vec());
     let limit = options.max_iterations as f64 * (parts.len() as f64 / PARTS_OF_LIMIT).sqrt().max(1.0);
     let limit = limit as usize;
     for iteration in 1..=limit {
@@ -132,17 +130,16 @@ pub(crate) fn solve_with_distances(
         if !ends && iteration % CONFORM_INTERVAL != 0 {
             continue;
         }
-        motions.prolong(start, admm.unknowns(), &mut moves);
-        positions.iter_mut().zip(&moves).for_each(|(x, d)| *x += *d);
+        admm.displace(&mut positions);
         if ends {
             break;
         }
-        push_out(body, &clear(&positions), &cloth.offsets, &mut positions);
+        clearance.push_out(body, &cloth.held, &cloth.offsets, &mut positions);
         admm.rebase(&positions);
     }
     let forces = admm.forces();
-    let residual_over_weight = admm.residual_over_weight(start, &forces);
-    let pushed_out = push_out(body, &clear(&positions), &cloth.offsets, &mut positions);
+    let residual_over_weight = admm.residual_over_weight(&forces);
+    let pushed_out = clearance.push_out(body, &cloth.held, &cloth.offsets, &mut positions);
     let results = parts.map(|_, part| {
         let over = |of: &dyn Fn(usize) -> DVec3| -> DVec3 { part.vertices.iter().map(|&v| of(v as usize)).sum() };
         let reaction = over(&|v| forces.body[v]);
@@ -173,23 +170,46 @@ fn check(what: &'static str, found: usize, expected: usize) -> Result<(), Couple
 
 /// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
 pub fn push_out(body: &Body, held: &[bool], offsets_m: &[f64], positions: &mut [DVec3]) -> usize {
-    let moved: Vec<bool> = positions
-        .par_iter_mut()
-        .with_min_len(128)
-        .zip(held)
-        .zip(offsets_m)
-        .map(|((x, &held), &offset_m)| {
-            let mut moved = false;
-            for _ in 0..if held { 0 } else { MAX_PUSHES } {
-                let near = body.nearest(*x);
-                if near.signed_distance >= NEAR_SHARE * offset_m {
-                    break;
+    let mut clearance = Clearance::new(positions, body.nearest_all(positions));
+    clearance.push_out(body, held, offsets_m, positions)
+}
+
+/// The last known point of the body of each vertex. A vertex that has moved by less than its distance since does not touch the body.
+pub(super) struct Clearance {
+    /// Where it was known, m.
+    at: Vec<DVec3>,
+    surface: Vec<SurfacePoint>,
+}
+
+impl Clearance {
+    /// The vertices at these positions (m) with their points of the body.
+    pub(super) fn new(at: &[DVec3], surface: Vec<SurfacePoint>) -> Self {
+        Self { at: at.to_vec(), surface }
+    }
+
+    /// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
+    pub(super) fn push_out(&mut self, body: &Body, held: &[bool], offsets_m: &[f64], x: &mut [DVec3]) -> usize {
+        let clear = |v: usize| held[v] || self.surface[v].signed_distance - x[v].distance(self.at[v]) > offsets_m[v];
+        let mut left: Vec<u32> = (0..x.len()).filter(|&v| !clear(v)).map(|v| v as u32).collect();
+        let mut moved = 0;
+        for push in 0..MAX_PUSHES {
+            let points: Vec<DVec3> = left.iter().map(|&v| x[v as usize]).collect();
+            let hints: Vec<u32> = left.iter().map(|&v| self.surface[v as usize].triangle).collect();
+            let mut found = body.nearest_all_from(&points, &hints).into_iter();
+            left.retain(|&v| {
+                let v = v as usize;
+                let Some(near) = found.next() else { return false };
+                (self.at[v], self.surface[v]) = (x[v], near);
+                let inside = near.signed_distance < NEAR_SHARE * offsets_m[v];
+                if inside {
+                    x[v] += near.normal * (offsets_m[v] - near.signed_distance);
                 }
-                *x += near.normal * (offset_m - near.signed_distance);
-                moved = true;
+                inside
+            });
+            if push == 0 {
+                moved = left.len();
             }
-            moved
-        })
-        .collect();
-    moved.iter().filter(|&&m| m).count()
+        }
+        moved
+    }
 }

@@ -15,6 +15,7 @@
 //! Limits: within a PART nothing bends, and the blend strains the cloth at the seams.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::options::Motion;
 use super::part_matrix::PartMatrix;
@@ -32,6 +33,9 @@ const MAX_TRANSLATED: usize = 3;
 
 /// Least spread along an axis, relative to the largest: a flat PART is not turned by what it is thick.
 const MIN_SPREAD_RATIO: f64 = 0.05;
+
+/// Vertices in a parallel task.
+const CHUNK: usize = 1024;
 
 /// No PART is smaller than this, m.
 const MIN_SPREAD_M: f64 = 1e-4;
@@ -132,14 +136,17 @@ impl Motions {
 
     /// The unknowns that move each vertex, PART by PART, with their values at `x`.
     pub(super) fn functions_at(&self, x: &[DVec3]) -> Csr<(u32, f64)> {
-        let mut functions = Csr::default();
-        for (v, x) in x.iter().enumerate() {
-            functions.push(self.weights.of(v).iter().flat_map(|&(p, w)| {
-                let count = self.count[p as usize] as usize;
-                (self.first[p as usize]..).zip(self.values(p, w, *x)).take(count)
-            }));
-        }
-        functions
+        let of_chunk = |(number, chunk): (usize, &[DVec3])| {
+            let mut functions = Csr::default();
+            for (v, x) in (number * CHUNK..).zip(chunk) {
+                functions.push(self.weights.of(v).iter().flat_map(|&(p, w)| {
+                    let count = self.count[p as usize] as usize;
+                    (self.first[p as usize]..).zip(self.values(p, w, *x)).take(count)
+                }));
+            }
+            functions
+        };
+        Csr::joined(x.par_chunks(CHUNK).enumerate().map(of_chunk).collect())
     }
 
     /// From a force (or any covector) at each vertex to that of each unknown.

@@ -3,19 +3,28 @@
 //! An element belongs to every PART that moves one of its vertices. A PART of n elements takes a share r(n) of them, spread evenly by a
 //! low-discrepancy sequence; a sampled element stands for 1/r elements.
 
+use rayon::prelude::*;
+
 use super::weights::Weights;
+use crate::mechanics::energy::membrane::Triangle;
 use crate::mesh::Csr;
 
-/// PARTs of each element, ascending, from the vertices of each.
-pub(super) fn parts_of<'a>(weights: &Weights, all: impl Iterator<Item = &'a [u32]>) -> Csr<u32> {
-    let (mut parts, mut own) = (Csr::default(), Vec::new());
-    for vertices in all {
-        own.extend(vertices.iter().flat_map(|&v| weights.of(v as usize)).map(|w| w.0));
-        own.sort_unstable();
-        own.dedup();
-        parts.push(own.drain(..));
-    }
-    parts
+/// Triangles in a parallel task.
+const CHUNK: usize = 2048;
+
+/// PARTs of each triangle, ascending: those of its vertices.
+pub(super) fn parts_of(weights: &Weights, triangles: &[Triangle]) -> Csr<u32> {
+    let of_chunk = |chunk: &[Triangle]| {
+        let (mut parts, mut own) = (Csr::default(), Vec::new());
+        for t in chunk {
+            own.extend(t.vertices.iter().flat_map(|&v| weights.of(v as usize)).map(|w| w.0));
+            own.sort_unstable();
+            own.dedup();
+            parts.push(own.drain(..));
+        }
+        parts
+    };
+    Csr::joined(triangles.par_chunks(CHUNK).map(of_chunk).collect())
 }
 
 /// Samples the elements of `count` PARTs by a low-discrepancy sequence (multiples of the golden section). Returns the index of each sampled
@@ -29,9 +38,10 @@ pub(super) fn sample(count: usize, parts: &Csr<u32>, rate: impl Fn(f64) -> f64) 
             size[p as usize] += 1.0 / list.len() as f64;
         }
     }
+    let rates: Vec<f64> = size.into_iter().map(rate).collect();
     let mut sampled = Vec::new();
     for i in 0..parts.len() {
-        let rate = parts.of(i).iter().map(|&p| rate(size[p as usize])).fold(0.0, f64::max).min(1.0);
+        let rate = parts.of(i).iter().map(|&p| rates[p as usize]).fold(0.0, f64::max).min(1.0);
         if (i as f64 * GOLDEN).fract() < rate {
             sampled.push((i as u32, rate.recip()));
         }

@@ -15,6 +15,9 @@
 //! 1968), with a limit to its reach. Tried: three quarters to twice the half-width; half of it folds less well (10 mm instead of 4 on a
 //! skirt in 343 PARTs), twice takes more time for the same. Limits: a vertex in no PART goes with the nearest along the cloth.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,39 +31,69 @@ const MIN_WEIGHT: f64 = 0.03;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Weights(Csr<(u32, f64)>);
 
-impl Weights {
-    /// Weights of every vertex; one of a piece of garment without any PART has none.
-    #[must_use]
-    pub fn new(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Self {
+/// The vertices around a PART that it moves as well, with their kernel κ.
+type Band = Arc<Vec<(u32, f64)>>;
+
+/// Bands of the PARTs of the last table of a garment, by their vertices: two tables of a drag share most PARTs. A band depends on the
+/// garment and on these vertices alone, so the bits do not depend on what is kept.
+#[derive(Debug, Default)]
+pub struct Bands(Mutex<HashMap<Vec<u32>, Band>>);
+
+impl Bands {
+    /// Weights of every vertex of the garment that the bands belong to; one of a piece of garment without any PART has none.
+    pub(super) fn weights(&self, topology: &Topology, placed: &[DVec3], parts: &Parts) -> Weights {
         let owner = owners(topology, placed, parts);
         let mut members = vec![Vec::new(); parts.len()];
         for (v, &p) in owner.iter().enumerate().filter(|&(_, &p)| p != UNASSIGNED) {
             members[p as usize].push(v as u32);
         }
-        let bands: Vec<Vec<(u32, f64)>> = members
+        // Not locked while it computes: a waiting thread may begin another table of the garment.
+        let known: Vec<Option<Band>> = {
+            let kept = self.lock();
+            members.iter().map(|members| kept.get(members).cloned()).collect()
+        };
+        let bands: Vec<Band> = members
             .par_iter()
+            .zip(known)
             .enumerate()
             .map_init(
-                || Dijkstra::new(topology, placed),
-                |dijkstra, (p, members)| band(dijkstra, &owner, p as u32, members),
+                || None,
+                |dijkstra, (p, (members, known))| {
+                    known.unwrap_or_else(|| {
+                        let dijkstra = dijkstra.get_or_insert_with(|| Dijkstra::new(topology, placed));
+                        Arc::new(band(dijkstra, &owner, p as u32, members))
+                    })
+                },
             )
             .collect();
-        let mut rows: Vec<Vec<(u32, f64)>> =
-            owner.iter().map(|&p| if p == UNASSIGNED { Vec::new() } else { vec![(p, 1.0)] }).collect();
-        for (p, band) in bands.iter().enumerate() {
-            for &(v, kernel) in band {
-                rows[v as usize].push((p as u32, kernel));
-            }
-        }
-        let mut weights = Self::default();
-        for mut row in rows {
+        let own = || (0..).zip(&owner).filter(|(_, p)| **p != UNASSIGNED).map(|(v, &p)| (v, (p, 1.0)));
+        let around = || (0..).zip(&bands).flat_map(|(p, band)| band.iter().map(move |&(v, kernel)| (v, (p, kernel))));
+        let rows = Csr::gathered(owner.len(), || own().chain(around()));
+        *self.lock() = members.into_iter().zip(bands).collect();
+        let mut weights = Weights::default();
+        let mut row: Vec<(u32, f64)> = Vec::new();
+        for v in 0..owner.len() {
+            row.clear();
+            row.extend_from_slice(rows.of(v));
             let sum: f64 = row.iter().map(|e| e.1).sum();
             row.retain(|e| e.1 >= MIN_WEIGHT * sum);
             let sum: f64 = row.iter().map(|e| e.1).sum();
             row.sort_unstable_by_key(|e| e.0);
-            weights.0.push(row.into_iter().map(|(p, kernel)| (p, kernel / sum)));
+            weights.0.push(row.iter().map(|&(p, kernel)| (p, kernel / sum)));
         }
         weights
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<Vec<u32>, Band>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Weights {
+    /// Weights of every vertex; one of a piece of garment without any PART has none.
+    #[must_use]
+    pub fn new(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Self {
+        Bands::default().weights(topology, placed, parts)
     }
 
     /// PARTs and weights of a vertex, by PART number.
@@ -71,7 +104,10 @@ impl Weights {
 
     /// The same with no weight at the vertices that are held.
     #[must_use]
-    pub(crate) fn without(&self, held: &[bool]) -> Self {
+    pub(crate) fn without(self, held: &[bool]) -> Self {
+        if !held.contains(&true) {
+            return self;
+        }
         let mut weights = Self::default();
         for (v, &held) in held.iter().enumerate() {
             weights.0.push(if held { &[] } else { self.of(v) }.iter().copied());
