@@ -1,5 +1,6 @@
 //! `partwise bench ablation`: every option of the solver off, or halved and doubled.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use crate::mechanics::solver_options::SolverOptions;
@@ -17,7 +18,7 @@ pub(crate) struct AblationArgs {
     /// Options to change: beginnings of their names, such as `cycles` or `newton.damping` [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
-    /// 22 small drapes for 52
+    /// 21 small drapes for 52
     #[arg(long)]
     quick: bool,
     /// Drape this sewing pattern on the dress form as well
@@ -29,7 +30,7 @@ pub(crate) struct AblationArgs {
     /// List the options with their defaults, and drape nothing
     #[arg(long)]
     list: bool,
-    /// Also write the rows to this CSV file
+    /// Also write the rows to this CSV file, each as it is done
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Format of the result on stdout
@@ -65,22 +66,24 @@ impl AblationArgs {
         keep_results();
         let bar = console::progress(Some(variants.len() as u64), "ablation");
         let mut rows: Vec<AblationRow> = Vec::new();
+        let mut written = Ok(());
         run(&cases, &variants, rayon::current_num_threads(), |row| {
             bar.set_message(format!("{} drapes with each variant", cases.len()));
             bar.inc(1);
             rows.push(row);
-            control_flow()
+            // The whole file after each variant: a run takes an hour, and what is finished is kept whatever ends it.
+            if let Some(path) = &self.csv {
+                written = csv_lines(&rows).and_then(|csv| write(path, &csv, "--csv"));
+            }
+            if written.is_ok() { control_flow() } else { ControlFlow::Break(()) }
         });
         bar.finish_and_clear();
+        written?;
         if rows.len() < variants.len() {
             console::warning(&format!("{} of {} variants are missing", variants.len() - rows.len(), variants.len()));
         }
-        let csv = csv_lines(&rows)?;
-        if let Some(path) = &self.csv {
-            write(path, &csv, "--csv")?;
-        }
         match self.format {
-            RowFormat::Csv => console::result(&csv),
+            RowFormat::Csv => console::result(&csv_lines(&rows)?),
             RowFormat::Json => console::json(&json!({ "drapes": cases.len(), "rows": rows }))?,
             RowFormat::Text => console::result(&text(cases.len(), &rows)),
         }
@@ -117,7 +120,8 @@ fn csv_lines(rows: &[AblationRow]) -> anyhow::Result<String> {
 }
 
 fn text(drapes: usize, rows: &[AblationRow]) -> String {
-    let header = ["option", "value", "at rest", "lost", "gained", "steps", "median ratio", "s", "crossing", "inside"];
+    let header =
+        ["option", "value", "at rest", "lost", "gained", "steps", "median ratio", "s", "crossing", "skin", "inside"];
     let line = |row: &AblationRow| {
         vec![
             row.option.clone(),
@@ -129,6 +133,7 @@ fn text(drapes: usize, rows: &[AblationRow]) -> String {
             format!("{:.2}", row.step_ratio),
             format!("{:.1}", row.seconds),
             format!("{} in {}", row.crossing, row.drapes_crossing),
+            format!("{} in {}", row.through, row.drapes_through),
             row.inside.to_string(),
         ]
     };
