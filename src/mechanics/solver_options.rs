@@ -155,9 +155,9 @@ options! {
 
     /// Contact of vertices with the body: see `energy::contact`.
     BodyContactOptions {
-        /// Factor on the stiffness κ where a vertex is pressed into the body. Heuristic.
+        /// Factor on the stiffness κ where a vertex is pressed into the body. With 1 a jumpsuit stalls with a vertex inside.
         stiffening: f64 = 4.0,
-        /// Most times that the cloth is moved off protrusions of the body. Heuristic.
+        /// Most times that the cloth is moved off protrusions of the body. With 0 a jumpsuit takes 90 steps for 9.
         max_protrusion_fixes: usize = 3,
     }
 
@@ -181,8 +181,6 @@ options! {
         min_spacing: f64 = 0.2,
         /// Share of its offset below which the distance of a place makes it a contact. Heuristic.
         near_share: f64 = 0.5,
-        /// Updates without fewer intersections after which the intersecting triangles are released. Heuristic.
-        max_idle_updates: usize = 3,
     }
 
     /// Contact of the cloth with itself: see `energy::proximity`.
@@ -197,7 +195,7 @@ options! {
         max_offset_of_edge: f64 = 0.25,
         /// Distance as placed, in search reaches, from which topological neighbours count as any other places. Heuristic.
         neighbours_apart: f64 = 2.0,
-        /// Share of their distance as placed below which topological neighbours press. Heuristic.
+        /// Share of their distance as placed below which topological neighbours press. With 0 a shirt in cotton takes 106 steps for 63.
         neighbour_share: f64 = 0.5,
         /// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
         edge_area_share: f64 = 0.25,
@@ -220,7 +218,8 @@ options! {
         check_spacing: f64 = 1.0,
         /// Most stages of a step that are checked, its end included. Heuristic.
         max_stages: f64 = 16.0,
-        /// Longest move of a step that is taken with parts held back even if its energy rises, in mean edges; a longer one must lower it.
+        /// Longest move of a step that is taken with parts held back even if its energy rises, in mean edges; a longer one must lower it. With 0
+        /// garments rest as soon, but two sheets that start intersecting stall.
         max_cut_move: f64 = 1.0,
         /// Most by which the moves of neighbours differ about a part that is held back, in mean edges. Heuristic.
         max_spread: f64 = 0.5,
@@ -228,7 +227,8 @@ options! {
         max_halvings: usize = 4,
         /// Most times that a step is cut. Heuristic.
         max_cuts: usize = 16,
-        /// Rings of neighbours about intersecting triangles in which new intersections are allowed. Heuristic.
+        /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern does
+        /// not rest within 2,000 steps (14 with 2).
         tangled_rings: usize = 2,
     }
 }
