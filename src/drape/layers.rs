@@ -11,13 +11,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::{Levels, cloth_of};
 use super::parts::{StageTwo, stage_one};
 use super::pipeline::{Moved, moved, needs_cloth, timed};
 use super::result::{Drape, PartOutcome, StageTimes};
 use super::settings::Settings;
-use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
+use super::stages::{StageResults, StartsFrom, refine_from, settled};
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::{Observer, Record, Step};
 use crate::mesh::Topology;

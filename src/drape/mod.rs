@@ -3,6 +3,7 @@
 //! [`drape`] is the whole two-stage model; it reads as the paper's sections do. Its input ([`Scene`], [`Settings`])
 //! is plain data, and so is its result ([`Drape`]); other modules record, print and compare it.
 
+mod distances;
 mod error;
 mod layers;
 mod levels;
@@ -21,6 +22,7 @@ use pipeline::drape_prepared;
 
 use crate::mechanics::refine::{Observer, Step};
 pub use crate::scene::Scene;
+pub(crate) use distances::Distances;
 pub use error::DrapeError;
 pub(crate) use levels::Levels;
 pub(crate) use nested_iteration::approach;
@@ -32,7 +34,7 @@ pub use release::Release;
 pub(crate) use release::{ReleasedDrape, let_go};
 pub use result::{ClothState, Drape, PartOutcome, StageTimes};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
-pub(crate) use stages::{Distances, StageResults, StartsFrom, folds_of, refine_from, settled};
+pub(crate) use stages::{StageResults, StartsFrom, folds_of, refine_from, settled};
 
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is called after each and may end
 /// them.

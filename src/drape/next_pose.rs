@@ -13,13 +13,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::cloth_of;
 use super::parts::StageTwo;
 use super::release::Release;
 use super::result::{Drape, PartOutcome, StageTimes};
 use super::settings::Settings;
-use super::stages::{Distances, StageResults, StartsFrom, refine_from, settled};
+use super::stages::{StageResults, StartsFrom, refine_from, settled};
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::refine::Observer;
 use crate::mesh::self_intersection::self_intersecting_pairs;

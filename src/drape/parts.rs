@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use super::distances::Distances;
 use super::error::DrapeError;
 use super::result::PartOutcome;
 use super::settings::{Model, Settings};
-use super::stages::Distances;
 use crate::mechanics::coupled::{self, Asked, CoupledOptions, Garment};
 use crate::mechanics::energy::Cloth;
 use crate::mechanics::paper::{self, Cut, PartForces};

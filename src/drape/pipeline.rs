@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::Levels;
 use super::nested_iteration::approach;
@@ -13,7 +14,7 @@ use super::parts::{StageTwo, stage_one, stage_two};
 use super::release::{Release, ReleasedDrape, let_go};
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
-use super::stages::{Distances, StageResults, StartsFrom, folds_of, refine_from, settled};
+use super::stages::{StageResults, StartsFrom, folds_of, refine_from, settled};
 use crate::mechanics::folded_surface::FoldableCloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::Observer;

@@ -1,10 +1,10 @@
 //! Stages of a drape, for [`drape()`](super::drape) and for the session, which computes them one at a time.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::distances::Distances;
 use super::error::DrapeError;
 use super::levels::Levels;
 use super::parts::StageTwo;
@@ -12,7 +12,6 @@ use super::release::Release;
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
 use crate::body::distance::SurfacePoint;
-use crate::mechanics::coupled::Bands;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::fit::{CRUSHED_SHARE, fit};
 use crate::mechanics::folded_surface::FoldableCloth;
@@ -21,34 +20,7 @@ use crate::mechanics::refine::{self, Observer, RefineOptions, Refined, Stop};
 use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
-use crate::scene::{Scene, SceneError};
-
-/// How far the garment as placed is from what it is over, and along itself. No table changes it.
-#[derive(Debug, Clone)]
-pub(crate) struct Distances {
-    /// Closest points on it.
-    pub(crate) surface: Vec<SurfacePoint>,
-    /// Equation (1) takes the distance without its sign: a vertex inside is as far from the surface as one outside.
-    pub(crate) unsigned_m: Vec<f64>,
-    /// Along the cloth: bands of the PARTs of the last table.
-    pub(crate) bands: Arc<Bands>,
-}
-
-impl Distances {
-    pub(crate) fn of(scene: &Scene) -> Result<Self, SceneError> {
-        Ok(Self::from_surface(scene.surface()?))
-    }
-
-    /// To the body, and what it wears.
-    pub(super) fn to_body(scene: &Scene) -> Self {
-        Self::from_surface(scene.body.nearest_all(&scene.garment.positions))
-    }
-
-    fn from_surface(surface: Vec<SurfacePoint>) -> Self {
-        let unsigned_m = surface.iter().map(|s| s.signed_distance.abs()).collect();
-        Self { surface, unsigned_m, bands: Arc::default() }
-    }
-}
+use crate::scene::Scene;
 
 /// Cloth that the PARTs have no room for, and what drawing it needs; the coupled model's alone.
 pub(crate) fn folds_of(
