@@ -6,13 +6,13 @@
 //! E = Σ ½ A_i (B_u |x_uu|² + H |x_uv|² + B_v |x_vv|²), H = 4 B_45 − B_u − B_v,
 //!
 //! is a thin plate's energy whose stiffness towards weft, bias and warp is the measured B_u, B_45, B_v: exact for a
-//! cylinder in any direction. It is quadratic in x (as in Bergou, Wardetzky, Harmon, Zorin, Grinspun: "A quadratic
+//! cylinder in any direction on any mesh. It is quadratic in x (as in Bergou, Wardetzky, Harmon, Zorin, Grinspun: "A quadratic
 //! bending model for inextensible surfaces", SGP 2006), so its Hessian is constant: a scalar per pair of vertices. One
 //! hinge per edge would be cheaper, but is up to three times too stiff, depending on the direction of the edges.
 //!
 //! A triangle without an inner vertex (a corner, a belt one triangle wide) is in no ring; each of its edges has a hinge,
-//! ½ B/(A₀ + A₁) |Σ c_i x_i|² with the cotangent weights c_i of the same paper. Across its edge (n) and along it (t), a hinge of two
-//! equilateral triangles has ½ B (κ_nn − κ_tt/3)² per area, and a sheet of them, over all edges, ½ B κ² when it is bent to a cylinder.
+//! ½ 2B/(A₀ + A₁) |Σ c_i x_i|² with the cotangent weights c_i of the same paper. This is too stiff: B/(A₀ + A₁) over all edges gives a sheet of equilateral
+//! triangles the stiffness B, and a belt 0.9 B.
 //!
 //! Where fabrics meet, a ring or hinge has their mean by area. Along the seam this is exact. Across it, where the softer side would bend
 //! more, it is an upper bound; a real seam with its allowances is stiffer than the cloth beside it, too.
@@ -23,8 +23,7 @@
 //! | B_u, B_45, B_v | bending stiffness along weft, bias and warp | N·m |
 //! | x_uu, x_uv, x_vv | second derivatives of the position | 1/m |
 //!
-//! Limits: flat rest; one stiffness at all curvatures. Four neighbours do not determine x_uv, which is then left out: such vertices bend
-//! too softly on the bias (by H/4 of B_45). Friction between yarns is a separate term (`bending_friction`).
+//! Limits: flat rest; one stiffness at all curvatures. Friction between yarns is a separate term (`bending_friction`).
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -140,7 +139,7 @@ impl Bending {
         let start = self.vertices.len() as u32;
         self.vertices.extend(vertices);
         self.weights.extend(weights.map(|w| DVec3::X * w));
-        self.elements.push(Element { start, end: start + 4, stiffness: DVec3::X * (b_mean / area) });
+        self.elements.push(Element { start, end: start + 4, stiffness: DVec3::X * (2.0 * b_mean / area) });
     }
 
     /// Vertices, weights of x_uu, x_uv, x_vv, and stiffness A·(B_u, H, B_v) of every element.
