@@ -71,7 +71,7 @@ impl AblationArgs {
             bar.set_message(format!("{} drapes with each variant", cases.len()));
             bar.inc(1);
             rows.push(row);
-            // The whole file after each variant: a run takes an hour, and what is finished is kept whatever ends it.
+            // After each variant, so that a run which is ended keeps its rows.
             if let Some(path) = &self.csv {
                 written = csv_lines(&rows).and_then(|csv| write(path, &csv, "--csv"));
             }

@@ -88,7 +88,7 @@ pub struct Drape {
     pub preview: Vec<DVec3>,
     /// Cloth that the preview has no room for, and folds of PARTs do not show; the coupled model's alone.
     pub folds: Option<Folds>,
-    /// What drawing them needs of the cloth; none for several layers.
+    /// Data of the cloth for drawing them; none for several layers.
     pub(crate) foldable: Option<FoldableCloth>,
     /// The displaced garment, m.
     pub positions: Vec<DVec3>,

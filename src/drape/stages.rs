@@ -22,7 +22,7 @@ use crate::parts::Parts;
 use crate::parts::range_table::RangeTable;
 use crate::scene::Scene;
 
-/// Cloth that the PARTs have no room for, and what drawing it needs; the coupled model's alone.
+/// Cloth that the PARTs have no room for, and the data for drawing it; the coupled model's alone.
 pub(crate) fn folds_of(
     settings: &Settings,
     levels: Option<&Levels>,

@@ -75,7 +75,7 @@ const MIN_TASK: usize = 512;
 
 static WAVES: LazyLock<SineWaves> = LazyLock::new(SineWaves::new);
 
-/// What drawing needs of the cloth.
+/// Data of a cloth for drawing its folds.
 #[derive(Debug, Clone)]
 pub(crate) struct FoldableCloth {
     triangles: Arc<Vec<Triangle>>,

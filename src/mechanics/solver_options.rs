@@ -157,7 +157,7 @@ options! {
     BodyContactOptions {
         /// Factor on the stiffness κ where a vertex is pressed into the body. With 1 a jumpsuit stalls with a vertex inside.
         stiffening: f64 = 4.0,
-        /// Most times that the cloth is moved off protrusions of the body. With 0 a jumpsuit takes 90 steps for 9.
+        /// Most times that the cloth is moved off protrusions of the body. With 0 a jumpsuit takes 93 steps for 16, with skin through cloth.
         max_protrusion_fixes: usize = 3,
     }
 
@@ -229,8 +229,8 @@ options! {
         max_halvings: usize = 4,
         /// Most times that a step is cut. Heuristic.
         max_cuts: usize = 16,
-        /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern does
-        /// not rest within a minute (4 s with 2).
+        /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern
+        /// stops after 654 steps with 44 crossing pairs (14 steps with 2).
         tangled_rings: usize = 2,
     }
 }

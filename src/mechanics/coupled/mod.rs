@@ -18,6 +18,7 @@
 //! PARTs" to the energy of the cloth between them. Limits: no folds, however narrow the PARTs; forces are sums over sampled elements.
 
 mod admm;
+mod elements;
 mod folding;
 mod local_step;
 mod motions;
@@ -33,7 +34,8 @@ pub(crate) use folding::is_flat;
 use glam::DVec3;
 pub use motions::Motions;
 pub use options::{CoupledError, CoupledOptions, CoupledResult, Motion, PartResult};
-pub use weights::{Bands, Weights};
+pub(crate) use weights::Bands;
+pub use weights::Weights;
 
 use super::energy::Cloth;
 use crate::GRAVITY;
@@ -176,7 +178,7 @@ pub fn push_out(body: &Body, held: &[bool], offsets_m: &[f64], positions: &mut [
 
 /// The last known point of the body of each vertex. A vertex that has moved by less than its distance since does not touch the body.
 pub(super) struct Clearance {
-    /// Where it was known, m.
+    /// Position of each vertex at its last query, m.
     at: Vec<DVec3>,
     surface: Vec<SurfacePoint>,
 }

@@ -37,7 +37,7 @@ type Band = Arc<Vec<(u32, f64)>>;
 /// Bands of the PARTs of the last table of a garment, by their vertices: two tables of a drag share most PARTs. A band depends on the
 /// garment and on these vertices alone, so the bits do not depend on what is kept.
 #[derive(Debug, Default)]
-pub struct Bands(Mutex<HashMap<Vec<u32>, Band>>);
+pub(crate) struct Bands(Mutex<HashMap<Vec<u32>, Band>>);
 
 impl Bands {
     /// Weights of every vertex of the garment that the bands belong to; one of a piece of garment without any PART has none.
