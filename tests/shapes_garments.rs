@@ -249,6 +249,46 @@ fn lengths_and_eases_agree_with_the_spec() {
     }
 }
 
+/// The greatest share of x in the directions in which the cloth leaves the lowest centimetre of its armholes: 0 where it runs straight up.
+fn lip(mesh: &TriMesh) -> f64 {
+    let topology = Topology::new(mesh);
+    let normals: Vec<DVec3> = (0..mesh.triangles.len())
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            (b - a).cross(c - a).normalize()
+        })
+        .collect();
+    let group = mesh.groups.iter().position(|name| name == "armholes").unwrap() as u32;
+    let mut edges = Vec::new();
+    for (t, &[a, b, c]) in mesh.triangles.iter().enumerate().filter(|(t, _)| mesh.triangle_group[*t] == group) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let ends = [from.min(to), from.max(to)];
+            let edge = topology.edges.binary_search(&ends).unwrap();
+            if topology.edge_valence[edge] == 1 {
+                let [from, to] = [from, to].map(|v| mesh.positions[v as usize]);
+                edges.push((0.5 * (from + to), (to - from).normalize().cross(normals[t])));
+            }
+        }
+    }
+    let lowest = edges.iter().map(|(middle, _)| middle.z).fold(f64::INFINITY, f64::min);
+    let low = edges.iter().filter(|(middle, _)| middle.z < lowest + 0.01);
+    low.map(|(_, out)| out.x.abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn cloth_runs_straight_up_to_an_armhole_under_the_arm() {
+    for size in [34, 38, 44, 48] {
+        let form = DressForm::new(&BodySpec::eu_size(size).unwrap()).unwrap();
+        for bust_cm in [6.0, 12.0] {
+            let mut spec = GarmentSpec::by_name("low-cut-dress").unwrap();
+            spec.ease.bust_cm = bust_cm;
+            let dress = garment_on(&spec, &form, Some(5628)).unwrap();
+            let lip = lip(&dress.mesh);
+            assert!(lip < 0.45, "EU {size}, ease {bust_cm} cm: {lip:.2}");
+        }
+    }
+}
+
 #[test]
 fn length_edge_length_and_vertex_count_can_be_changed() {
     let text = include_str!("../assets/garments/flared-skirt.toml");

@@ -20,7 +20,7 @@ use crate::mesh::{RestShape, TriMesh};
 
 /// First bytes of an entry, and part of every name. The number rises with the format and with every change of the mesher's
 /// results, so that an older mesh is never used for a newer one.
-const TAG: &Tag = b"PWMESH02";
+const TAG: &Tag = b"PWMESH03";
 /// Most entries, the newest: a sweep over measurements makes a form for each.
 const MAX_ENTRIES: usize = 64;
 
@@ -133,7 +133,7 @@ mod tests {
         let mut flipped = other.clone();
         flipped[200] ^= 1;
         let foreign = checksum::encode(TAG, &(format!("{of} "), &stored)).unwrap();
-        for damaged in [&flipped[..], &other[..300], b"", b"PWMESH02 and more", &foreign[..]] {
+        for damaged in [&flipped[..], &other[..300], b"", b"PWMESH03 and more", &foreign[..]] {
             std::fs::write(&entry, damaged).unwrap();
             assert_eq!(skirt(&cache), made);
             assert_eq!(std::fs::read(&entry).unwrap(), whole, "it is kept anew");

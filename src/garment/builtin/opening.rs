@@ -15,6 +15,9 @@ const SHOULDER_HALF: f64 = 0.035;
 
 /// Distance of an armhole from the arm where it leaves the shoulder, m.
 const ARMHOLE_ROOM: f64 = 0.03;
+/// Depth of an armhole below the armpit, m. Nearer to the armpit the cloth follows the arm outward, and the lip that is left stands
+/// out when it hangs.
+const ARMHOLE_DEPTH: f64 = 0.05;
 
 /// One opening.
 #[derive(Debug, Clone)]
@@ -59,9 +62,8 @@ impl<'a> Opening<'a> {
             let width = spec.neckline.map_or(0.18, |n| n.width_cm / 100.0);
             let strap = spec.strap_cm.unwrap_or(4.0) / 100.0;
             let upper = DVec3::new(0.5 * width + strap, 0.0, cloth.top);
-            // Under the arm the opening starts a little below the armpit, outside the chest.
             let chest = anatomy.trunk.section(m.axilla_height)[2];
-            let along = DVec3::new(chest + 0.016, 0.0, m.axilla_height - 0.035) - upper;
+            let along = DVec3::new(chest, 0.0, m.axilla_height - ARMHOLE_DEPTH) - upper;
             let normal = DVec3::new(-along.z, 0.0, along.x).normalize();
             let root = anatomy.arm.section(0.06 * m.scale());
             let radius = root[2].max(root[3]) + ARMHOLE_ROOM;
