@@ -58,7 +58,10 @@ pub struct Reaction {
     pub shares: Vec<(u32, f64)>,
     /// Unit normal of the contact.
     pub normal: DVec3,
-    /// Contact stiffness, N/m.
+    /// Depth below the offset, m; zero of a place inside a triangle.
+    pub depth: f64,
+    /// Contact stiffness, N/m: κ A of the penalty, or R·n over the depth where that is more, as it is where a solver has stiffened the
+    /// penalty so that it bears R at this depth.
     pub stiffness: f64,
     /// The force R, N.
     pub force: DVec3,
@@ -75,7 +78,17 @@ pub struct Reaction {
 impl Reaction {
     /// A reaction of zero.
     fn at(shares: Vec<(u32, f64)>, normal: DVec3, stiffness: f64, friction: f64, of_body: bool) -> Self {
-        Self { shares, normal, stiffness, force: DVec3::ZERO, normal_n: 0.0, friction, sticks: false, of_body }
+        Self {
+            shares,
+            normal,
+            depth: 0.0,
+            stiffness,
+            force: DVec3::ZERO,
+            normal_n: 0.0,
+            friction,
+            sticks: false,
+            of_body,
+        }
     }
 }
 
@@ -203,6 +216,9 @@ fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cl
         reaction.normal_n = reaction.force.dot(reaction.normal);
         let tangential = reaction.force - reaction.normal * reaction.normal_n;
         reaction.sticks = tangential.length() < STICKING_SHARE * reaction.friction * reaction.normal_n;
+        if reaction.depth > 0.0 {
+            reaction.stiffness = reaction.stiffness.max(reaction.normal_n / reaction.depth);
+        }
     }
 }
 
@@ -231,6 +247,7 @@ fn contacts_at(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Vec<Reaction>
     // The force of the penalty is a good start.
     all.extend(gaps.map(|gap| Reaction {
         force: gap.normal * (gap.stiffness * gap.depth(x).max(0.0)),
+        depth: gap.depth(x).max(0.0),
         ..Reaction::at(gap.members().collect(), gap.normal, gap.stiffness, gap.mean(&cloth.friction), false)
     }));
     all
@@ -240,7 +257,8 @@ fn contacts_at(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Vec<Reaction>
 fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> {
     // The rounded distance exceeds the exact one by less than the side of the lattice. The solver raises the offsets of vertices that are
     // inside by the exact one alone, so the smaller of the two decides.
-    let mut contacts = cloth.new_contacts(body).with_margin(TOUCH_MARGIN_M + SIDE);
+    let margin = TOUCH_MARGIN_M + SIDE;
+    let mut contacts = cloth.new_contacts(body).with_margin(margin);
     contacts.update(x);
     let touches = |t: &&Touch| {
         let v = t.vertex as usize;
@@ -248,7 +266,9 @@ fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> 
     };
     let of_vertex = |t: &Touch| {
         let friction = cloth.friction[t.vertex as usize];
-        Reaction::at(vec![(t.vertex, 1.0)], t.normal.normalize_or_zero(), t.stiffness, friction, true)
+        let normal = t.normal.normalize_or_zero();
+        let depth = (t.depth - margin).max(0.0);
+        Reaction { depth, ..Reaction::at(vec![(t.vertex, 1.0)], normal, t.stiffness, friction, true) }
     };
     let mut all: Vec<Reaction> = contacts.touches().iter().filter(touches).map(of_vertex).collect();
     for place in cloth.face_contacts().touching_places(body, x, PLACE_MARGIN_M) {

@@ -13,8 +13,8 @@
 //! | distance to rest | RMS of that step, mm | thickness of a garment's cloth |
 //! | lowest curvature | ω² of the softest mode, 1/s²: negative at an unstable equilibrium | rounding |
 //!
-//! **Curvature.** H is the Hessian of `mechanics::curvature` plus the stiffness of the touching vertices: κ A n nᵀ along the normal and, where
-//! friction sticks, μ_f N/ε across it. B is the projected Hessian (without the negative part of each triangle, as in Newton's steps)
+//! **Curvature.** H is the Hessian of `mechanics::curvature` plus the stiffness k of the touching vertices: k n nᵀ along the normal
+//! ([`Reaction::stiffness`](super::reactions::Reaction)) and, where friction sticks, μ_f N/ε across it. B is the projected Hessian (without the negative part of each triangle, as in Newton's steps)
 //! plus a damping ε M, so it can be factorised.
 //!
 //! | symbol | meaning | unit |

@@ -78,6 +78,10 @@ options! {
         tolerance: f64 = 1e-3,
         /// No run takes more steps.
         max_steps: usize = 2000,
+        /// Steps without progress after which a solve has stalled. Contact places with which the cloth does not rest are removed after 80.
+        stall_steps: usize = 100,
+        /// Fall of the energy over the weight that is progress, m. Heuristic.
+        stall_fall_m: f64 = 1e-4,
         /// Longest move of a vertex in one step, m.
         longest_move_m: f64 = 0.1,
         /// Damping ε to begin with, in g/L ([`refine`](super::refine)). Evidence: decision 33.

@@ -5,6 +5,7 @@
 //! and vertices that start inside the body are pushed out. [`Scene::of_meshes`] does the same with meshes in memory.
 
 mod carry;
+mod details;
 mod error;
 mod layering;
 mod loaded;

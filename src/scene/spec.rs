@@ -377,7 +377,8 @@ impl SceneSpec {
         let form = if self.body_is_a_mesh() { None } else { self.form()?.measures().ok() };
         scene.girths_at_m = form.map(|m| [m.bust_height, m.waist_height, m.hip_height]);
         let reports = imported_body.iter().chain(&unplaced.imported).map(|i| i.report.clone()).collect();
-        let hold_notes = self.hold.as_ref().map(|names| scene.ambiguous_edges(names)).unwrap_or_default();
+        let mut hold_notes = self.hold.as_ref().map(|names| scene.ambiguous_edges(names)).unwrap_or_default();
+        hold_notes.extend((!scene.releases_held).then(|| scene.hold_details()).flatten());
         Ok(Loaded {
             scene,
             body_name: stem(&self.body),

@@ -46,6 +46,7 @@ const OFF: &[(&str, f64)] = &[
     ("untangling.max_rounds", 0.0),
     ("untangling.restart_ratio", 1e9),
     ("softening.strain", 0.0),
+    ("newton.stall_steps", 1e5),
     ("newton.damping_decrease_near_rest", 0.5),
     ("newton.max_extrapolation", 1.0),
     ("newton.max_projected_steps", 1.0),

@@ -21,18 +21,22 @@ impl FaceContactPhase {
         update
     }
 
-    /// Removes the places if the cloth does not rest with them, or adds some near rest; `near_rest` where that may be.
-    pub(super) fn before_step(&mut self, descent: &mut NewtonState<'_, '_>, iteration: usize, may_add: bool) {
+    /// Removes the places if the cloth does not rest with them, or adds some near rest where that is allowed; returns whether they changed.
+    pub(super) fn before_step(&mut self, descent: &mut NewtonState<'_, '_>, iteration: usize, may_add: bool) -> bool {
         let options = descent.cloth.solver.face_contact;
+        let mut changed = false;
         if self.since.is_some_and(|since| iteration > since + options.max_steps) {
             self.since = None;
             descent.contacts.remove_face_contacts();
             refreshed(descent);
+            changed = true;
         }
         let near_rest = may_add && descent.residual < options.max_residual;
         if near_rest && descent.contacts.extend_face_contacts(&descent.x) > 0 {
             refreshed(descent);
+            changed = true;
         }
+        changed
     }
 }
 

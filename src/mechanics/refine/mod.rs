@@ -14,7 +14,7 @@
 //! |---|---|---|
 //! | untangling | relaxes a start that intersects itself | `newton::state`, `energy::proximity` |
 //! | softened | steps with capped stiffness, until the residual is small | `softening` |
-//! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping` |
+//! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping`, no progress in `stall` |
 //! | equilibrium | forces balance: resolves penetrations, updates contact places, checks the rest | `face_contact_phase`, `rest_phase` |
 //!
 //! A step is one of `mechanics::newton`. A run stops where the residual ‖∇E‖₂ over the free vertices, divided by the garment's weight,
@@ -29,6 +29,7 @@ mod face_contact_phase;
 mod rest_phase;
 mod settle;
 mod softening;
+mod stall;
 mod types;
 
 use glam::DVec3;

@@ -7,6 +7,7 @@ use super::damping::Damping;
 use super::face_contact_phase::FaceContactPhase;
 use super::rest_phase::{RestPhase, Verdict};
 use super::softening::softened;
+use super::stall::StallDetection;
 use super::types::{Observer, RefineOptions, Refined, Step, Stop};
 use crate::mechanics::energy::{Cloth, Contacts, FaceUpdate};
 use crate::mechanics::newton::{FullSpace, NewtonState, Record, SolveError, Solver};
@@ -46,6 +47,7 @@ struct Settling<'c, 'b, 'o> {
     rest: RestPhase,
     faces: FaceContactPhase,
     cycles: CycleDamping,
+    stall: StallDetection,
 }
 
 /// Settles `cloth` from `start`: [`refine_with`](super::refine_with) within rayon's pool.
@@ -92,6 +94,7 @@ pub(super) fn settle(
         rest: RestPhase::default(),
         faces: FaceContactPhase::default(),
         cycles: CycleDamping::default(),
+        stall: StallDetection::default(),
     };
     settling.run()
 }
@@ -182,6 +185,7 @@ impl Settling<'_, '_, '_> {
         self.descent.contacts.update(&self.descent.x);
         self.descent.contacts.refresh(&self.descent.x);
         self.descent.evaluate();
+        self.stall = StallDetection::default();
         Ok(State::Descent)
     }
 
@@ -215,7 +219,9 @@ impl Settling<'_, '_, '_> {
         if self.iteration >= self.limit {
             return Ok(State::Ended(Stop::StepsDone));
         }
-        self.faces.before_step(&mut self.descent, self.iteration, !self.soft);
+        if self.faces.before_step(&mut self.descent, self.iteration, !self.soft) {
+            self.stall = StallDetection::default();
+        }
         if std::mem::take(&mut self.fresh) {
             let (analysed, cloth) = (self.tangent.solver.take(), self.cloth);
             let solver = self.descent.relax(|| analysed.unwrap_or_else(|| Solver::new(cloth.pattern())));
@@ -231,12 +237,15 @@ impl Settling<'_, '_, '_> {
             let failed = self.rest.failed().filter(|_| self.descent.residual < self.tolerance);
             return Ok(State::Ended(failed.map_or(Stop::Stalled, Stop::Unsettled)));
         }
-        if self.soft && (astray || self.descent.residual < self.cloth.solver.softening.tolerance) {
+        let stalled = self.stall.after_step(&self.descent);
+        let hardens = self.soft && (astray || stalled || self.descent.residual < self.cloth.solver.softening.tolerance);
+        if hardens {
             self.soft = false;
             self.fresh = true;
             self.descent.cloth = self.cloth;
             self.descent.damping = self.initial_damping();
             self.descent.evaluate();
+            self.stall = StallDetection::default();
         } else {
             let NewtonState { damping: before, residual, .. } = self.descent;
             self.descent.damping = self.damping.after_step(before, advance.share, residual);
@@ -245,6 +254,9 @@ impl Settling<'_, '_, '_> {
         if advance.accepted {
             self.history.push(self.descent.record(self.iteration, Some(advance), self.soft));
         }
-        Ok(self.seen())
+        Ok(match self.seen() {
+            State::Descent if stalled && !hardens => State::Ended(Stop::Stalled),
+            state => state,
+        })
     }
 }

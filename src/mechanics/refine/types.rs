@@ -55,7 +55,8 @@ pub enum Stop {
     StepsDone,
     /// The observer said so.
     Interrupted,
-    /// No step lowers the energy any more, though the residual is over the tolerance: rounding is reached before.
+    /// No step lowers the energy any more, though the residual is over the tolerance: rounding is reached before, or the solve cycles far from
+    /// rest.
     Stalled,
 }
 

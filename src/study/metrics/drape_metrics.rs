@@ -8,7 +8,7 @@ use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
 use crate::mechanics::fit::{CRUSHED_SHARE, TORN_PERCENT};
 use crate::mechanics::refine::Stop;
-use crate::mesh::self_intersection::crossing_pairs;
+use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
 use crate::scene::Scene;
 use crate::study::accuracy::{Accuracy, rms_mm};
 use crate::study::evaluate::Evaluation;
@@ -237,9 +237,16 @@ impl Metrics {
         let counts = [
             (self.penetrating_vertices, "vertices inside the body"),
             (self.body_crossing_pairs, "pairs of triangles with skin through cloth"),
-            (self.self_intersecting_pairs, "pairs of triangles with cloth through cloth"),
         ];
         faults.extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, of)| format!("{count} {of}")));
+        if self.self_intersecting_pairs > 0 {
+            let placed = self_intersecting_pairs(&scene.garment).len();
+            let as_placed = if placed > 0 { format!(" ({placed} as placed)") } else { String::new() };
+            faults.push(format!(
+                "{} pairs of triangles with cloth through cloth{as_placed}",
+                self.self_intersecting_pairs
+            ));
+        }
         if let Some(strain) = self.strain_max.filter(|strain| 1e2 * *strain > TORN_PERCENT) {
             let opening = self.tightest_opening.map(TightestOpening::text).unwrap_or_default();
             faults.push(format!("strain of {:.0} %, more than fabrics bear{opening}", 1e2 * strain));
