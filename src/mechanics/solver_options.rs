@@ -185,8 +185,6 @@ options! {
         min_spacing: f64 = 0.2,
         /// Share of its offset below which the distance of a place makes it a contact. Heuristic.
         near_share: f64 = 0.5,
-        /// Updates without fewer intersections after which the intersecting triangles are released. Heuristic.
-        max_idle_updates: usize = 3,
     }
 
     /// Contact of the cloth with itself: see `energy::proximity`.
