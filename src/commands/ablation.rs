@@ -104,7 +104,7 @@ impl AblationArgs {
             }
             RowFormat::Text => {
                 let header = ["option", "default"].map(str::to_owned);
-                console::result(&console::table(console::RULED, &header, 1.., &lines).to_string());
+                console::result(&console::table(console::RULED, &header, 1.., &lines));
             }
         }
         Ok(())

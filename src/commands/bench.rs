@@ -195,7 +195,7 @@ impl TableFourArgs {
             RowFormat::Json => {
                 console::json(&json!({ "conditions": log.conditions, "rows": rows, "missing_rows": missing }))?;
             }
-            RowFormat::Text => console::result(&text(log, &rows)),
+            RowFormat::Text => console::prose(&text(log, &rows)),
         }
         if self.recordings.is_some() && found > 0 {
             console::note(&format!(
@@ -215,7 +215,8 @@ impl TableFourArgs {
 fn text(log: &RowLog, rows: &[Table4Row]) -> String {
     let mut out = log.conditions.text();
     for cells in table4::tables(rows).into_iter().chain(table4::exponents(rows)) {
-        let table = console::table(console::RULED, &cells.header, 1.., &cells.rows);
+        // The vertices tell rows of one garment apart.
+        let table = console::table(console::RULED, &cells.header, 2.., &cells.rows);
         out += &format!("\n\n{}\n{table}", cells.title);
     }
     for (row, entry) in rows.iter().flat_map(|row| row.entries.iter().map(move |entry| (row, entry))) {

@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::base::error_text::{self, with_causes, without_control};
 use clap::ValueEnum;
 use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Row, Table, Width};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// The format of a result on stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -106,50 +106,82 @@ pub(crate) fn all_printed() -> bool {
 /// Styles of tables: a border alone, or lines between the columns as well.
 pub(crate) use comfy_table::presets::{UTF8_BORDERS_ONLY as OPEN, UTF8_FULL_CONDENSED as RULED};
 
-/// A table that fits the terminal: long cells are wrapped between words. If even the longest words do not fit side by side, the longest of
-/// all are broken, such as paths, after a mark such as a slash if they have one. In a file or a pipe the lines have their full length. The
-/// columns listed in `numbers`, ascending, are aligned right.
+/// A table that fits the terminal: long cells are wrapped between words, and words such as paths after a mark such as a slash. If its
+/// columns do not fit side by side even so, further ones stand in tables below, each with the first columns again. In a file or a pipe the
+/// lines have their full length. The columns listed in `numbers`, ascending, are aligned right.
 pub(crate) fn table<R: Into<Row>>(
     style: &str,
     header: impl IntoIterator<Item: Into<Cell>>,
     numbers: impl IntoIterator<Item = usize>,
     rows: impl IntoIterator<Item = R>,
-) -> Table {
+) -> String {
     let width = Table::new().width();
-    // On a terminal no line breaks between a number and its percent sign.
-    let kept = |text: String| if width.is_some() { text.replace(" %", "\u{a0}%") } else { text };
+    // On a terminal no line breaks between a number and its percent sign, or about a plus-minus sign.
+    let kept = |text: String| match width {
+        Some(_) => text.replace(" %", "\u{a0}%").replace(" ± ", "\u{a0}±\u{a0}"),
+        None => text,
+    };
     let texts = |row: Row| row.cell_iter().map(Cell::content).map(kept).collect::<Vec<String>>();
     let header = texts(Row::from(header.into_iter().map(Into::into).collect::<Vec<Cell>>()));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|row| texts(row.into())).collect();
     let width = width.unwrap_or(u16::MAX);
-    fitted(style, &header, numbers, &rows, width)
+    let columns = rows.iter().map(Vec::len).fold(header.len(), usize::max);
+    let numbers: Vec<usize> = numbers.into_iter().take_while(|column| *column < columns).collect();
+    fitted(style, &header, &numbers, &rows, width)
 }
 
 /// The table in a terminal of this width, in characters.
-fn fitted(
+fn fitted(style: &str, header: &[String], numbers: &[usize], rows: &[Vec<String>], width: u16) -> String {
+    let pieces = longest(header, rows, pieces_of);
+    let columns = pieces.len();
+    // The columns before the first number tell the rows apart; a number in the first column does so too.
+    let first_number = numbers.iter().copied().find(|column| *column > 0).unwrap_or(1);
+    let keys: Vec<usize> = (0..first_number.min(columns)).collect();
+    let taken = |columns: &[usize]| 1 + columns.iter().map(|c| u32::from(pieces[*c]) + 1).sum::<u32>();
+    let mut tables = vec![keys.clone()];
+    for column in keys.len()..columns {
+        let last = tables.last_mut().filter(|last| {
+            let wider = [last.as_slice(), &[column]].concat();
+            last.len() == keys.len() || taken(&wider) <= u32::from(width)
+        });
+        match last {
+            Some(last) => last.push(column),
+            None => tables.push([keys.as_slice(), &[column]].concat()),
+        }
+    }
+    let part = |columns: &Vec<usize>| {
+        let of = |row: &[String]| columns.iter().filter_map(|c| row.get(*c).cloned()).collect::<Vec<String>>();
+        let right = (0..columns.len()).filter(|i| numbers.contains(&columns[*i]));
+        let rows: Vec<Vec<String>> = rows.iter().map(|row| of(row)).collect();
+        narrow(style, &of(header), right, &rows, width).to_string()
+    };
+    tables.iter().map(part).collect::<Vec<String>>().join("\n")
+}
+
+/// A table of these columns in a terminal of this width; where they do not fit, the longest words are broken.
+fn narrow(
     style: &str,
     header: &[String],
     numbers: impl IntoIterator<Item = usize>,
     rows: &[Vec<String>],
     width: u16,
 ) -> Table {
-    let columns = rows.iter().map(Vec::len).fold(header.len(), usize::max);
-    let mut longest_word = vec![0_u16; columns];
-    for row in std::iter::once(header).chain(rows.iter().map(Vec::as_slice)) {
-        for (longest, text) in longest_word.iter_mut().zip(row) {
-            *longest = text.split([' ', '\n']).map(letters).fold(*longest, u16::max);
-        }
-    }
+    let mut longest_word = longest(header, rows, |word| vec![word]);
+    let longest_piece = longest(header, rows, pieces_of);
+    let columns = longest_word.len();
     // Each column takes its padding and a separator.
     let total = |words: &[u16], padding: (u16, u16)| {
         words.iter().map(|n| n.saturating_add(padding.0 + padding.1 + 1)).fold(1, u16::saturating_add)
     };
     let fits = |padding: &(u16, u16)| total(&longest_word, *padding) <= width;
     let padding = [(1, 1), (0, 1)].into_iter().find(fits).unwrap_or((0, 0));
-    while total(&longest_word, padding) > width
-        && let Some(longest) = longest_word.iter_mut().max().filter(|longest| **longest > 1)
-    {
-        *longest -= 1;
+    while total(&longest_word, padding) > width {
+        // Words that have marks are broken first.
+        let above = |least: &[u16]| {
+            (0..columns).filter(|c| longest_word[*c] > least[*c]).max_by_key(|c| (longest_word[*c], *c))
+        };
+        let Some(column) = above(&longest_piece).or_else(|| above(&vec![1; columns])) else { break };
+        longest_word[column] -= 1;
     }
     let broken = |row: &[String]| -> Vec<String> {
         row.iter().zip(&longest_word).map(|(text, most)| broken_after_marks(text, *most)).collect()
@@ -171,23 +203,43 @@ fn fitted(
     table
 }
 
+/// Letters of the longest part of each column's words.
+fn longest<'a>(header: &'a [String], rows: &'a [Vec<String>], parts: impl Fn(&'a str) -> Vec<&'a str>) -> Vec<u16> {
+    let mut longest = vec![0; rows.iter().map(Vec::len).fold(header.len(), usize::max)];
+    for row in std::iter::once(header).chain(rows.iter().map(Vec::as_slice)) {
+        for (longest, text) in longest.iter_mut().zip(row) {
+            *longest = text.split([' ', '\n']).flat_map(&parts).map(letters).fold(*longest, u16::max);
+        }
+    }
+    longest
+}
+
+/// The parts of a word that stay together: up to and with each slash, dash or the like. A number is one part.
+fn pieces_of(word: &str) -> Vec<&str> {
+    if word.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c)) {
+        return vec![word];
+    }
+    word.split_inclusive(|c| MARKS.contains(c)).collect()
+}
+
+/// Characters after which a long word may be broken.
+const MARKS: &str = "/\\-_.,:;=@";
+
 fn letters(word: &str) -> u16 {
     u16::try_from(word.chars().count()).unwrap_or(u16::MAX)
 }
 
 /// `text` with line ends in words of more than `most` letters, after the last slash, dash or the like that fits.
 fn broken_after_marks(text: &str, most: u16) -> String {
-    let most = usize::from(most);
     let split = |word: &str| {
-        let mut pieces = Vec::new();
-        let mut rest: Vec<char> = word.chars().collect();
-        while rest.len() > most {
-            let fits = &rest[..most];
-            let Some(mark) = fits.iter().rposition(|c| "/\\-_.,:;=@".contains(*c)) else { break };
-            pieces.push(rest.drain(..=mark).collect::<String>());
+        let mut lines: Vec<String> = vec![String::new()];
+        for piece in pieces_of(word) {
+            match lines.last_mut() {
+                Some(line) if line.is_empty() || letters(line) + letters(piece) <= most => line.push_str(piece),
+                _ => lines.push(piece.to_owned()),
+            }
         }
-        pieces.push(rest.into_iter().collect());
-        pieces.join("\n")
+        lines.join("\n")
     };
     // Lines and runs of spaces stay as they are.
     text.split('\n').map(|line| line.split(' ').map(split).collect::<Vec<_>>().join(" ")).collect::<Vec<_>>().join("\n")
@@ -236,10 +288,17 @@ const MARK: usize = 9;
 /// A progress bar, shown on terminals only; without `length` a spinner.
 pub(crate) fn progress(length: Option<u64>, title: &str) -> ProgressBar {
     let (bar, template) = match length {
-        Some(n) => (ProgressBar::new(n), "{msg} {wide_bar} {pos}/{len}  {eta} left"),
-        None => (ProgressBar::new_spinner(), "{spinner} {msg}  {elapsed}"),
+        Some(n) => (ProgressBar::new(n), "{msg} {wide_bar} {pos}/{len}{left}"),
+        // A longer line would wrap, and each redraw would leave its first part behind.
+        None => (ProgressBar::new_spinner(), "{spinner} {wide_msg} {elapsed}"),
     };
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    // Before the first point is done, nothing is known about the time left.
+    bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        if state.pos() > 0 {
+            let _ = write!(out, "  {:#} left", HumanDuration(state.eta()));
+        }
+    }));
     bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
     bar.set_message(without_control(title).into_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
@@ -253,7 +312,7 @@ mod tests {
     fn lines(width: u16, setting: &str) -> Vec<String> {
         let header = ["garment", "setting", "canonical error mm", "translation bound mm"];
         let row = ["flared-skirt@3920", setting, "45.8", "76.9"].map(str::to_owned);
-        fitted(OPEN, &header.map(str::to_owned), 2.., &[row.to_vec()], width).lines().collect()
+        fitted(OPEN, &header.map(str::to_owned), &[2, 3], &[row.to_vec()], width).lines().map(str::to_owned).collect()
     }
 
     #[test]
@@ -266,6 +325,20 @@ mod tests {
         assert_eq!(wrapped(text, None), text);
         let aligned = wrapped("refined             4 steps, residual 3.8e-4 of the weight", Some(44)).into_owned();
         assert!(aligned.starts_with("refined             4 steps, residual 3.8e-4\n"), "{aligned}");
+    }
+
+    #[test]
+    fn a_table_of_too_many_columns_goes_on_below_with_its_first_columns_again() {
+        let header = ["garment", "vertices", "thomaszewski2006", "converged", "canonical"].map(str::to_owned);
+        let row = ["pullover-1", "4710", "1126 ± 7.12", "3.8/17.0\u{a0}%;", "76.8;"].map(str::to_owned);
+        let text = fitted(RULED, &header, &[1, 2, 3, 4], &[row.to_vec()], 44);
+        assert!(text.lines().all(|line| line.chars().count() <= 44), "{text}");
+        // No word of the table is broken, and each table names its rows.
+        for word in header.iter().chain(&row).flat_map(|text| text.split(' ')) {
+            assert!(text.contains(word), "{word}: {text}");
+        }
+        assert_eq!(text.matches("pullover-1").count(), text.matches('┌').count(), "{text}");
+        assert!(text.matches('┌').count() > 1, "{text}");
     }
 
     #[test]

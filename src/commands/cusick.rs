@@ -166,7 +166,7 @@ pub(super) fn print(csv: &str, format: RowFormat) -> anyhow::Result<()> {
         RowFormat::Text => {
             let header: Vec<String> = header.iter().map(|name| name.replace('_', " ")).collect();
             let table = console::table(console::RULED, &header, [], rows.iter().map(csv::StringRecord::iter));
-            console::result(&table.to_string());
+            console::result(&table);
         }
     }
     Ok(())

@@ -15,7 +15,6 @@ use crate::study::accuracy::Accuracy;
 use crate::study::certificate::Certificate;
 use crate::study::job::Measured;
 use crate::study::metrics::{GirthEase, LevelCount, Metrics, RESTS};
-use comfy_table::Table;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -232,7 +231,7 @@ impl Summary {
         self.ease.iter().filter_map(|ease| Some((ease, ease.garment_cm?, ease.ease_cm?)))
     }
 
-    fn ease_table(&self) -> Table {
+    fn ease_table(&self) -> String {
         let header = ["at", "height cm", "body cm", "garment as cut cm", "ease cm", ""];
         let rows = self.covered().map(|(ease, garment_cm, ease_cm)| {
             let [height, body, mut garment] = [ease.height_cm, ease.body_cm, garment_cm].map(|cm| format!("{cm:.1}"));
@@ -247,7 +246,7 @@ impl Summary {
         console::table(console::RULED, header.into_iter().take(columns), 1..5, rows)
     }
 
-    fn levels_table(&self) -> Table {
+    fn levels_table(&self) -> String {
         let bound = |cm: f64| if cm.is_finite() { format!("{cm}") } else { "∞".to_owned() };
         let rows = self.levels.iter().filter(|l| l.vertices > 0).map(|l| {
             let [lower, upper] = [l.lower_cm, l.upper_cm].map(bound);

@@ -146,7 +146,7 @@ impl RunArgs {
                         metrics.verdict.clone(),
                     ]
                 });
-                console::prose(&console::table(console::OPEN, header, 1..6, rows).to_string());
+                console::prose(&console::table(console::OPEN, header, 1..6, rows));
                 for pose in poses.iter().filter(|pose| pose.summary.certificate.is_some()) {
                     console::prose(&format!("\n{}", pose.summary.body()));
                     print_certificate(pose.summary.certificate.as_ref());

@@ -85,20 +85,30 @@ pub(crate) fn recording_line(recording: &RecordSummary) -> String {
 pub(crate) fn rows_text(rows: &[Row]) -> String {
     let mm = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"));
     let refs: Vec<&Row> = rows.iter().collect();
-    let cells = rows.iter().zip(labels(&refs)).filter_map(|(row, label)| {
-        let (index, garment) = (row.index.to_string(), row.garment.clone());
-        if row.status == Status::Error {
-            return Some(vec![index, garment, format!("{label}: {}", row.error)]);
-        }
+    let errors = |row: &Row| {
         let m = row.metrics.as_ref()?;
-        let errors = [m.rms_mm, m.canonical_rms_mm, m.representable_affine_rms_mm, m.representable_rms_mm];
-        let (parts, time) = (m.part_count.to_string(), mm(total_ms(row)));
-        Some([index, garment, label, parts, time].into_iter().chain(errors.map(mm)).collect())
+        Some([m.rms_mm, m.canonical_rms_mm, m.representable_affine_rms_mm, m.representable_rms_mm])
+    };
+    let measured = rows.iter().filter_map(errors).flatten().any(|error| error.is_some());
+    let bodies = rows.windows(2).any(|pair| pair[0].body != pair[1].body);
+    let cells = rows.iter().zip(labels(&refs)).filter_map(|(row, label)| {
+        let body = bodies.then(|| row.body.clone());
+        let first = [row.index.to_string()].into_iter().chain(body).chain([row.garment.clone()]);
+        if row.status == Status::Error {
+            return Some(first.chain([format!("{label}: {}", row.error)]).collect::<Vec<String>>());
+        }
+        let (parts, time) = (row.metrics.as_ref()?.part_count.to_string(), mm(total_ms(row)));
+        let errors = errors(row).filter(|_| measured).into_iter().flatten().map(mm);
+        Some(first.chain([label, parts, time]).chain(errors).collect())
     });
-    let errors = ["own error mm", "canonical error mm", "best affine mm", "best translation mm"];
-    let header = ["", "garment", "setting", "PARTs", "ms"].into_iter().chain(errors);
-    let table = console::table(console::OPEN, header, [0].into_iter().chain(3..), cells);
-    let measured = rows.iter().filter_map(|row| row.metrics.as_ref()).any(|metrics| metrics.canonical_rms_mm.is_some());
+    let names = ["own error mm", "canonical error mm", "best affine mm", "best translation mm"];
+    let mut header = vec![""];
+    header.extend(bodies.then_some("body"));
+    header.extend(["garment", "setting"]);
+    let first = header.len();
+    header.extend(["PARTs", "ms"]);
+    header.extend(names.into_iter().filter(|_| measured));
+    let table = console::table(console::OPEN, header, [0].into_iter().chain(first..), cells);
     format!("{table}\n{}", if measured { ERRORS } else { "" })
 }
 

@@ -13,7 +13,6 @@ use crate::record::{
 use crate::study::accuracy::{rms, vertex_errors_mm};
 use crate::study::metrics::LevelCount;
 use crate::study::table_search::Judged;
-use comfy_table::Table;
 use serde::Serialize;
 
 use super::garment::Garment;
@@ -78,7 +77,7 @@ impl Verdict {
 }
 
 /// The comparisons with Table 3 as a table.
-pub(super) fn verdicts(all: &[Verdict]) -> Table {
+pub(super) fn verdicts(all: &[Verdict]) -> String {
     let kind = |v: &Verdict| match v.extent_factor {
         1.0 => v.kind.to_owned(),
         factor => format!("{} × {factor:.2}", v.kind),
