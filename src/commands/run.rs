@@ -317,15 +317,19 @@ impl RunArgs {
     }
 
     fn print(&self, solved: &Solved) -> anyhow::Result<()> {
+        let summary = &solved.summary;
         match self.format {
             Format::Text => {
-                console::prose(&solved.summary.text());
-                print_certificate(solved.summary.certificate.as_ref());
+                console::prose(&summary.text());
+                print_certificate(summary.certificate.as_ref());
             }
-            Format::Json => console::json(&solved.summary)?,
+            Format::Json => console::json(summary)?,
         }
         console::notes(&solved.loaded.notes());
-        console::warnings(&solved.summary.warnings);
+        console::warnings(&summary.warnings);
+        if matches!(self.format, Format::Text) {
+            console::prose(&summary.verdict());
+        }
         Ok(())
     }
 }

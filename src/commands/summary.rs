@@ -154,7 +154,7 @@ impl Summary {
         }
     }
 
-    /// Text for the terminal.
+    /// Text for the terminal, up to the verdict.
     pub(crate) fn text(&self) -> String {
         let Self { metrics, table, model, motion, fabric, .. } = self;
         let (levels, singletons) = (metrics.levels, metrics.singletons);
@@ -174,7 +174,12 @@ impl Summary {
         if self.covered().next().is_some() {
             let _ = writeln!(out, "{}", self.ease_table());
         }
-        out + &ending(self.times(), &self.outputs) + &self.metrics.verdict_line() + "\n"
+        out + &ending(self.times(), &self.outputs)
+    }
+
+    /// The verdict, the last line for the terminal.
+    pub(crate) fn verdict(&self) -> String {
+        self.metrics.verdict_line()
     }
 
     fn since_last(&self) -> impl Iterator<Item = (&'static str, String)> {

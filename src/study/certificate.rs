@@ -131,8 +131,12 @@ fn of_rest(rest: &RestState, cloth: &Cloth) -> [Finding; 6] {
         format!("{} of {} touching vertices slip or are pulled", forces.insufficient, forces.reactions.len()),
         format!("by up to {:.2} mm", 1e3 * longest),
         "RMS of the next Newton step".to_owned(),
+        // The energy is not smooth: a mode may be negative in the space that was searched and not along itself.
         match curvature.unstable_modes {
             0 => "a minimum".to_owned(),
+            _ if criteria[5].passes => {
+                format!("the energy rises along the softest mode, about vertex {}", curvature.at + 1)
+            }
             n => format!("{n} unstable modes, the softest about vertex {}", curvature.at + 1),
         },
     ];

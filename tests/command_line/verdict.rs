@@ -29,6 +29,31 @@ fn a_run_ends_with_its_verdict_and_strict_makes_it_an_exit_code() {
     bench.refuses(&["--strict", "--method", "zhu2016", "--no-save"], &["--strict", "zhu2016", "two-stage"]);
 }
 
+/// What a terminal shows of a drape: both streams in their order.
+fn shown(bench: &Bench, more: &[&str]) -> String {
+    let path = bench.path("shown.txt");
+    let file = std::fs::File::create(&path).unwrap();
+    let inputs = ["--body", "body.obj", "--garment", "garment.obj", "--unit", "m", "--up", "z", "--no-save"];
+    std::process::Command::new(env!("CARGO_BIN_EXE_partwise"))
+        .current_dir(bench.folder.path())
+        .args(inputs.iter().chain(more))
+        .stdout(file.try_clone().unwrap())
+        .stderr(file)
+        .status()
+        .unwrap();
+    std::fs::read_to_string(path).unwrap()
+}
+
+#[test]
+fn the_verdict_stands_below_all_notes_and_warnings() {
+    let bench = Bench::new();
+    for more in [&["--certify"][..], &["--refine", "0"]] {
+        let shown = shown(&bench, more);
+        let last = shown.trim_end().lines().last().unwrap();
+        assert!(shown.contains("garment.obj: 169 vertices") && last.starts_with("verdict: "), "{shown}");
+    }
+}
+
 #[test]
 fn a_mistyped_name_is_answered_by_the_one_that_is_like_it() {
     let bench = Bench::new();

@@ -1,5 +1,7 @@
 //! How garments are placed and held: garments given twice, and held edges by the thousand.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 use partwise::Job;
 use partwise::SceneSpec;
@@ -59,6 +61,12 @@ fn the_verdict_names_every_criterion_that_fails() {
     let preview = Job { settings: Settings { refine: Refine::Steps(0), ..Settings::default() }, ..Job::default() };
     let (metrics, ..) = draped_by(&scene, &preview);
     assert!(metrics.verdict.contains("does not rest: residual "), "{}", metrics.verdict);
+    assert!(metrics.verdict.contains("after the two stages alone"), "{}", metrics.verdict);
+    // An interrupted drape is not judged by a residual that may be small by then.
+    let job = Job::default();
+    let stopped = drape(&scene, &job.settings, &mut |_| ControlFlow::Break(())).unwrap();
+    let metrics = job.measure(&scene, &stopped, None, &mut unobserved).unwrap().metrics;
+    assert!(metrics.verdict.starts_with("interrupted at a residual "), "{}", metrics.verdict);
     // Far too narrow, though at rest.
     let mut narrow = Scene::of_meshes(&cone(), tube(0.3)).unwrap();
     narrow.held.clone_from(&scene.held);

@@ -229,8 +229,14 @@ impl Metrics {
                 Stop::Unsettled(criterion) => faults.push(format!("does not rest by the criterion `{criterion}`")),
                 // The fall ended the steps.
                 Stop::Interrupted if has_fallen => {}
-                Stop::StepsDone | Stop::Interrupted | Stop::Stalled => {
-                    faults.push(format!("does not rest: residual {:.1e} of the weight", state.residual_over_weight));
+                Stop::Interrupted => {
+                    faults
+                        .push(format!("interrupted at a residual of {:.1e} of the weight", state.residual_over_weight));
+                }
+                Stop::StepsDone | Stop::Stalled => {
+                    let residual = state.residual_over_weight;
+                    let preview = if state.steps == 0 { " after the two stages alone" } else { "" };
+                    faults.push(format!("does not rest: residual {residual:.1e} of the weight{preview}"));
                 }
             },
         }
