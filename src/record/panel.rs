@@ -76,7 +76,7 @@ pub(super) fn range_cm(lower_cm: f64, upper_cm: f64) -> String {
     if upper_cm.is_finite() {
         format!("{} – {}", cm(lower_cm), cm(upper_cm))
     } else {
-        format!("{} –", cm(lower_cm))
+        format!("{} – ∞", cm(lower_cm))
     }
 }
 
@@ -129,7 +129,7 @@ mod tests {
         let text = panel.markdown();
         for piece in [
             "| 1 | 0 – 0.06 | 4 | 2 |",
-            "| 3 | 0.06 – | 9 | 1 |",
+            "| 3 | 0.06 – ∞ | 9 | 1 |",
             "| distance | 12.3 |",
             "partwise run",
             "| model | coupled |",

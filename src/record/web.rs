@@ -80,8 +80,15 @@ pub(crate) fn check_file(path: &Path) -> Result<Option<String>, RecordError> {
 pub fn serve_file(path: &Path, web_port: Option<u16>, grpc_port: Option<u16>) -> Result<WebViewer, RecordError> {
     let (messages, warning) = read(path)?;
     let viewer = WebViewer::start(web_port, grpc_port, WHOLE_HISTORY)?;
-    viewer.recording.send_all(messages);
+    viewer.recording.send_all(layout_first(messages));
     Ok(WebViewer { warning, ..viewer })
+}
+
+/// The messages with those of the layout before the data. A file ends with its layout, and a viewer that has loaded only a part of the data
+/// would arrange every entity by itself until then.
+fn layout_first(mut messages: Vec<LogMsg>) -> Vec<LogMsg> {
+    messages.sort_by_key(|message| message.store_id().is_recording());
+    messages
 }
 
 /// The messages of a recording, and a warning where it is incomplete. Some kinds of damage make the decoder allocate more memory
@@ -128,7 +135,31 @@ fn has_end(file: &mut File) -> io::Result<bool> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
+    use super::super::{RecordOptions, Recorder, Sink};
     use super::*;
+    use crate::mesh::TriMesh;
+
+    #[test]
+    fn a_viewer_has_the_layout_before_the_data() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.rrd");
+        let options = RecordOptions { sinks: vec![Sink::File(path.clone())], ..RecordOptions::default() };
+        let mut recorder = Recorder::open(options).unwrap();
+        // The layout is sent with the first garment.
+        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Z];
+        recorder.garment(0, &TriMesh::new(corners, vec![[0, 1, 2]])).unwrap();
+        recorder.finish().unwrap();
+        let (messages, _) = read(&path).unwrap();
+        let count = messages.len();
+        let of_data = |message: &LogMsg| message.store_id().is_recording();
+        let sent = layout_first(messages);
+        let layout = sent.iter().position(of_data).unwrap();
+        assert!(layout > 1 && sent.len() == count && sent[layout..].iter().all(of_data));
+        // The command that shows the layout is the last of it.
+        assert!(matches!(sent[layout - 1], LogMsg::BlueprintActivationCommand(_)));
+    }
 
     #[test]
     fn a_truncated_recording_is_refused_or_reported_as_incomplete() {

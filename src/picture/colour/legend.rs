@@ -84,18 +84,22 @@ pub(crate) fn level_bar(levels: &[LevelCount]) -> Option<ColourBar> {
     (count > 0).then(|| ColourBar { title: "level, cm".to_owned(), bands: bands(hue), ticks })
 }
 
-/// Where the named levels begin along the bar, and their lower bounds. The last level is always named.
+/// Where the named levels begin along the bar, and their lower bounds; fewer if they would overlap. The last level is always named.
 fn level_ticks(occupied: &[(&LevelCount, Rgb)]) -> Vec<(f64, String)> {
-    let (count, named) = (occupied.len(), occupied.len().min(NAMED_LEVELS));
-    let index = |i: usize| if named < 2 { 0 } else { i * (count - 1) / (named - 1) };
-    (0..named)
-        .map(index)
-        .map(|i| {
-            // Rounded to a tenth of a millimetre: a scaled bound has many digits.
-            let cm = (100.0 * occupied[i].0.lower_cm).round() / 100.0;
-            (i as f64 / count as f64, number(cm))
-        })
-        .collect()
+    let count = occupied.len();
+    let tick = |i: usize| {
+        // Rounded to a tenth of a millimetre: a scaled bound has many digits.
+        let cm = (100.0 * occupied[i].0.lower_cm).round() / 100.0;
+        (i as f64 / count as f64, number(cm))
+    };
+    // Evenly spaced, rounded to whole levels.
+    let index = |i: usize, last: usize| if last == 0 { 0 } else { (2 * i * (count - 1) + last) / (2 * last) };
+    let named = |number: usize| (0..number).map(|i| tick(index(i, number - 1))).collect::<Vec<_>>();
+    let apart =
+        |two: &[(f64, String)]| MAX_DIGITS * (two[1].0 - two[0].0) >= 0.5 * (width(&two[0].1) + width(&two[1].1));
+    let most = count.min(NAMED_LEVELS);
+    let fitting = (3..=most).rev().map(named).find(|ticks| ticks.windows(2).all(apart));
+    fitting.unwrap_or_else(|| named(most.min(2)))
 }
 
 /// Width of a number, in digits.
@@ -167,6 +171,16 @@ mod tests {
         let many = ticks(12);
         assert_eq!(many.len(), NAMED_LEVELS);
         assert_eq!(many.last(), Some(&(11.0 / 12.0, "5.5".to_owned())));
+        // The numbers of Table 3 have room below their bar; long ones are fewer.
+        let named = |lower_cm: &[f64]| {
+            let levels = lower_cm.iter().map(|&lower_cm| LevelCount { lower_cm, ..LevelCount::default() });
+            let levels: Vec<LevelCount> = levels.collect();
+            let occupied: Vec<(&LevelCount, Rgb)> = levels.iter().map(|level| (level, [0; 3])).collect();
+            level_ticks(&occupied).into_iter().map(|tick| tick.1).collect::<Vec<_>>().join(" ")
+        };
+        let table_3 = [0.5, 1.0, 1.25, 1.75, 2.0, 2.5, 3.5, 4.5, 7.0, 9.0, 10.0, 11.0];
+        assert_eq!(named(&table_3), "0.5 1.75 3.5 7 11");
+        assert_eq!(named(&[0.01, 10.25, 10.75, 11.25, 12.75, 13.25]), "0.01 11.2 13.2");
     }
 
     #[test]
