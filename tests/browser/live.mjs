@@ -217,6 +217,14 @@ try {
   assert.match(await saved(page, "save-job"), /\[settings/);
   assert.match(await saved(page, "save-obj"), /^v /m);
   said("a preset chosen; the table saved before loaded again");
+  await page.locator("#preset").selectOption("low-cut-dress-levels-and-extents");
+  await until(page, (now) => now.job.table.name === "low-cut-dress, levels and extents" && now.idle);
+  assert.equal(await page.locator("#preset").inputValue(), "low-cut-dress-levels-and-extents", "one name for one table");
+  const fields = await page.locator("#levels input").evaluateAll((inputs) => inputs.map((input) => input.value));
+  assert.deepEqual([fields[2], fields[5], fields[17], fields.at(-2)], ["", "31.9", "15.5 × 19.1", "∞"]);
+  await page.locator("#undo").click();
+  await until(page, (now) => JSON.stringify(now.job.table.levels) === JSON.stringify(edited) && now.idle);
+  said("extents of levels: cut, and not cut");
 
   await page.locator("#pin").click();
   await page.waitForSelector("#pins tbody tr");

@@ -15,7 +15,7 @@ export function node(name, attributes = {}, text) {
   return made;
 }
 
-export const cm = (value) => String(Math.round(value * 1000) / 1000);
+export const cm = (value) => (value === Infinity ? "∞" : String(Math.round(value * 1000) / 1000));
 const open = (value) => value === "inf" || value === Infinity;
 
 // A table's rows with numbers for all bounds.

@@ -8,8 +8,8 @@ export function centimetres(text, open = false) {
 }
 
 // Several numbers between separators; null if one of them is not a number.
-export function several(text, separators) {
-  const numbers = text.split(separators).filter((part) => part.trim() !== "").map((part) => centimetres(part));
+export function several(text, separators, open = false) {
+  const numbers = text.split(separators).filter((part) => part.trim() !== "").map((part) => centimetres(part, open));
   return numbers.includes(null) ? null : numbers;
 }
 

@@ -34,9 +34,12 @@ const kept = {
   extent: () => session.state.job.max_extent_cm.join(", "),
   level: (i, column) => {
     const [lower, upper, ...extent] = dial.levels[i];
-    return [cm(lower), upper === Infinity ? "inf" : cm(upper), extent.join(" × ")][column];
+    return [cm(lower), cm(upper), extent.some(Number.isFinite) ? extent.map(cm).join(" × ") : ""][column];
   },
 };
+
+// The name under which a table is offered: "Table 3" is `table-3`.
+const presetOf = (name) => choices.tables.find((known) => known === name.toLowerCase().replace(/[ ,]+/g, "-"));
 
 function showChoices(state) {
   const { job } = state;
@@ -47,9 +50,8 @@ function showChoices(state) {
   at("size").textContent = state.garment ? `${state.garment.vertices} vertices` : "";
   options(at("fabric"), choices.fabrics, typeof job.fabric === "string" ? job.fabric : job.fabric.name);
   const name = job.table.name ?? `${job.table.quantile} quantile levels`;
-  const preset = choices.tables.find((known) => known === name || (known === "table-3" && name.toLowerCase() === "table 3"));
   const tables = [...choices.tables, "5 quantile levels", "10 quantile levels", "20 quantile levels"];
-  options(at("preset"), tables, preset ?? name);
+  options(at("preset"), tables, presetOf(name) ?? name);
   options(at("beside"), ["no table", ...tables], at("beside").value || "no table");
   if (document.activeElement !== at("gap")) at("gap").value = job.table.gap ?? "extend-lower";
   write(at("extent"), kept.extent());
@@ -80,6 +82,7 @@ function showLevels(state) {
         inputMode: "decimal",
         id: `level-${i}-${column}`,
         value: kept.level(i, column),
+        placeholder: column === 2 ? "not cut" : "",
       });
       input.setAttribute("aria-label", `Level ${i + 1}, ${label}, cm`);
       onTyped(input, (text) => typedLevel(input, i, column, text), () => kept.level(i, column));
@@ -103,12 +106,12 @@ function showLevels(state) {
 
 function typedLevel(input, i, column, text) {
   if (column === 2) {
-    const extent = several(text, /[x×,;]/);
+    const extent = several(text, /[x×,;]/, true);
     if (extent === null || extent.length > 2) return refuse(input, expected(text, "one or two extents in cm such as 8 × 24"), kept.level(i, 2));
     return dial.set(i, 2, extent, input);
   }
   const value = centimetres(text, true);
-  if (value === null) return refuse(input, expected(text, "a number of centimetres, or inf"), kept.level(i, column));
+  if (value === null) return refuse(input, expected(text, "a number of centimetres, or ∞ (inf)"), kept.level(i, column));
   dial.set(i, column, value, input);
 }
 
