@@ -8,10 +8,10 @@
 //!
 //! With negative ease the cloth must stretch. If the curve encloses an arm, as at the bust of a pullover whose sleeves join lower, the
 //! plane is lowered until the curve encloses the trunk alone. A garment that is open at the bust, as a low neckline is, or that begins a
-//! little below the waist, as a skirt on the hips does, is measured at the highest plane below at which it is closed, against the body at
-//! that height. The hem is the lowest edge that runs around the trunk; its length as cut is compared with a tape around all of the body
-//! inside it, both legs for a skirt. Limits: the body's landmarks must be found; a garment that ends at the height on one side, or encloses the arms as a cape
-//! does, has no girth; of layered garments only the innermost is measured.
+//! little below the waist, as a skirt on the hips does, all around or in front alone, is measured at the highest plane below at which it
+//! is closed, against the body at that height. The hem is the lowest edge that runs around the trunk; its length as cut is compared with a
+//! tape around all of the body inside it, both legs for a skirt. Limits: the body's landmarks must be found; a garment that ends at the
+//! height on one side, or encloses the arms as a cape does, has no girth; of layered garments only the innermost is measured.
 
 use std::collections::BTreeSet;
 
@@ -54,7 +54,7 @@ impl GirthEase {
             let begins = !cuts(&garment, Plane::horizontal(marked)).is_empty();
             let steps = match at {
                 "bust" if begins => BUST_STEPS,
-                "waist" if !begins => WAIST_STEPS,
+                "waist" => WAIST_STEPS,
                 _ => 0,
             };
             // Sleeves are passed with the body at the mark itself, which the garment covers; an opening is not covered.
@@ -301,6 +301,13 @@ mod tests {
         let waist = &skirt[1];
         let below_cm = 100.0 * measures.waist_height - waist.height_cm;
         assert!((2.0..5.0).contains(&below_cm) && waist.garment_cm.is_some(), "{waist:?}");
+        // Behind, its edge is above the waist; in front, below it.
+        let scene = crate::SceneSpec::new("form", "flared-skirt@900").load().unwrap().scene;
+        let lowered = |p: &glam::DVec3| *p - (0.015 - 0.35 * p.y) * glam::DVec3::Z;
+        let slanted: Vec<_> = scene.garment.positions.iter().map(lowered).collect();
+        let waist = &GirthEase::all(&scene, &slanted)[1];
+        let below_cm = 100.0 * measures.waist_height - waist.height_cm;
+        assert!((2.0..8.0).contains(&below_cm) && waist.garment_cm.is_some(), "{waist:?}");
         assert_eq!(worn("flared-skirt@900", 0.15)[1].garment_cm, None, "15 cm below, that is no waist");
     }
 }
