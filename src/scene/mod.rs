@@ -9,6 +9,7 @@ mod details;
 mod error;
 mod layering;
 mod loaded;
+mod loading;
 mod materials;
 mod outfit;
 mod placement;
