@@ -72,15 +72,21 @@ function withoutHover() {
     event.stopImmediatePropagation();
     held.push(event);
   };
-  const press = async (event) => {
-    held = [];
+  // Presses one after another: a second one may come while the viewer still looks for what is under the first.
+  let pressed = Promise.resolve();
+  const press = (event) => {
+    const own = (held = []);
     hold(event);
-    await frames(FINDING);
-    for (const next of held) {
-      canvas.dispatchEvent(new PointerEvent(next.type, next));
-      await frames(2);
-    }
-    held = null;
+    pressed = pressed.then(async () => {
+      await frames(FINDING);
+      for (const next of own) {
+        canvas.dispatchEvent(new PointerEvent(next.type, next));
+        await frames(2);
+      }
+      if (held === own) held = null;
+      // The pointer rests again where it was released.
+      rest(own.at(-1));
+    });
   };
   const rest = (event) => {
     clearTimeout(timer);
