@@ -60,8 +60,8 @@ pub struct Reaction {
     pub normal: DVec3,
     /// Depth below the offset, m; zero of a place inside a triangle.
     pub depth: f64,
-    /// Contact stiffness, N/m: κ A of the penalty, or R·n over the depth where that is more, as it is where a solver has stiffened the
-    /// penalty so that it bears R at this depth.
+    /// Contact stiffness, N/m: κ A of the penalty, or R·n over the depth where that is more, as it is where the solver has stiffened the
+    /// penalty so that it bears R at this depth; at most what the solver stiffens to.
     pub stiffness: f64,
     /// The force R, N.
     pub force: DVec3,
@@ -217,7 +217,8 @@ fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cl
         let tangential = reaction.force - reaction.normal * reaction.normal_n;
         reaction.sticks = tangential.length() < STICKING_SHARE * reaction.friction * reaction.normal_n;
         if reaction.depth > 0.0 {
-            reaction.stiffness = reaction.stiffness.max(reaction.normal_n / reaction.depth);
+            let stiffest = cloth.solver.self_contact.max_stiffening.max(1.0) * reaction.stiffness;
+            reaction.stiffness = (reaction.normal_n / reaction.depth).clamp(reaction.stiffness, stiffest);
         }
     }
 }
