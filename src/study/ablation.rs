@@ -66,6 +66,7 @@ const OFF: &[(&str, f64)] = &[
     ("face_contact.max_new_places", 0.0),
     ("face_contact.min_spacing", 0.0),
     ("face_contact.near_share", 0.0),
+    ("face_contact.max_idle_updates", 1e5),
     ("self_contact.neighbour_share", 0.0),
     ("self_contact.stiffening", 1.0),
     ("self_contact.max_stiffening", 1.0),

@@ -61,7 +61,7 @@ enum Obstacle<'b> {
 pub(crate) enum FaceUpdate {
     /// The body does not intersect the cloth, or no place helps.
     Unchanged,
-    /// Places were added or raised.
+    /// Places were added, raised or released.
     Places,
     /// The cloth was moved off a protrusion of the body, and is far from equilibrium.
     Moved,
