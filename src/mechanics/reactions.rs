@@ -299,7 +299,35 @@ fn project_on_cone(needed: DVec3, n: DVec3, friction: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::GRAVITY;
+    use crate::mesh::samples::{cuboid, sheet};
     use proptest::prelude::*;
+
+    /// A sheet of 8 cm lies on a box; the deeper it lies, the softer a contact bears its weight.
+    #[test]
+    fn a_contact_is_as_stiff_as_its_force_over_its_depth() {
+        let mesh = sheet(4, 4, |i, j| DVec3::new(i - 2.0, j - 2.0, 0.0) * 0.02);
+        let cloth = Cloth::sample(&mesh, "denim", &[]);
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
+        let middle = 12;
+        let stiffness_at = |depth: f64| {
+            let x: Vec<DVec3> = mesh.positions.iter().zip(&cloth.offsets).map(|(x, h)| x.with_z(h - depth)).collect();
+            let mut contacts = cloth.new_contacts(&body);
+            contacts.update(&x);
+            let first = contacts.touches().iter().find(|t| t.vertex == middle).unwrap().stiffness;
+            let forces = Forces::new(&cloth, &body, &x);
+            let of_middle = |r: &&Reaction| r.shares == [(middle, 1.0)];
+            let reaction = forces.reactions.iter().find(of_middle).unwrap();
+            assert!((reaction.normal_n - GRAVITY * cloth.masses[middle as usize]).abs() < 1e-6 * reaction.normal_n);
+            (reaction.stiffness / first, reaction.normal_n / depth / first)
+        };
+        for depth in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] {
+            let (stiffness, secant) = stiffness_at(depth);
+            let expected = secant.clamp(1.0, cloth.solver.self_contact.max_stiffening);
+            assert!((stiffness / expected - 1.0).abs() < 1e-2, "depth {depth}: {stiffness} for {expected}");
+        }
+        assert!(stiffness_at(1e-4).0 < stiffness_at(1e-9).0);
+    }
 
     fn vector() -> impl Strategy<Value = DVec3> {
         [-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64].prop_map(DVec3::from_array)

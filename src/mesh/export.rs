@@ -2,7 +2,7 @@
 //! texture coordinates, unit and axes of its file, or any mesh.
 //!
 //! Vertices that no face uses are left out, so a file without any keeps its numbers. Normals are left out, as those of the
-//! file belong to its shape.
+//! file belong to its shape. Limit: faces without area are written too, and vertices of such faces alone stay where they were.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
