@@ -250,6 +250,11 @@ impl Work for Search<'_> {
         let mut found: Vec<Nearest> = Vec::with_capacity(self.points.len());
         let mut open: Vec<(f64, u32)> = Vec::new();
         for (i, &p) in self.points.iter().enumerate() {
+            if !p.is_finite() {
+                // Nothing is near it. Empty slots of a node would be as near as any other and lead back to the root.
+                found.push(Nearest { square: f64::INFINITY, triangle: 0 });
+                continue;
+            }
             let p = Vectors { x: Pack::splat(l, p.x), y: Pack::splat(l, p.y), z: Pack::splat(l, p.z) };
             let hint = self.hints.get(i).copied().filter(|hint| (*hint as usize) < leaf_of.len());
             let near = hint.unwrap_or_else(|| found.last().map_or(0, |before| before.triangle));
@@ -360,6 +365,17 @@ mod tests {
             let (y, x) = angle.sin_cos();
             DVec3::new(s * x, s * y, c) * (0.3 + dent * (7.0 * c + 3.0 * x).sin())
         })
+    }
+
+    #[test]
+    fn a_point_that_is_no_number_ends_the_search() {
+        // Five triangles leave slots of the root empty.
+        let mut mesh = ball(3, 4, 0.0);
+        mesh.triangles.truncate(5);
+        let points = [DVec3::NAN, DVec3::X, DVec3::new(0.0, f64::INFINITY, 0.0)];
+        let found = Tree::new(&mesh).nearest(&points);
+        assert!([0, 2].map(|i| found[i].square) == [f64::INFINITY; 2]);
+        assert!((found[1].square.sqrt() - by_brute_force(&mesh, DVec3::X)).abs() < 1e-12);
     }
 
     fn by_brute_force(mesh: &TriMesh, p: DVec3) -> f64 {
