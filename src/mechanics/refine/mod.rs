@@ -72,6 +72,10 @@ pub fn refine_with(
     options: &RefineOptions,
     observer: Observer<'_>,
 ) -> Result<Refined, SolveError> {
+    // Trees of triangles cannot be built from such positions.
+    if let Some(vertex) = start.iter().position(|x| !x.is_finite()) {
+        return Err(SolveError::NotPositive { index: 3 * vertex });
+    }
     // Inside the pool: a join from outside it suspends the caller, and each of hundreds of gradients is a join.
     rayon::scope(|_| settle::settle(cloth, contacts, start, options, observer))
 }
