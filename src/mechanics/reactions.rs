@@ -60,8 +60,8 @@ pub struct Reaction {
     pub normal: DVec3,
     /// Depth below the offset, m; zero of a place inside a triangle.
     pub depth: f64,
-    /// Contact stiffness, N/m: κ A of the penalty, or R·n over the depth where that is more, as it is where the solver has stiffened the
-    /// penalty so that it bears R at this depth; at most what the solver stiffens to.
+    /// Contact stiffness, N/m: the penalty's κ A, or R·n over the depth where that is larger, because the solver has stiffened the penalty so
+    /// that it bears R at this depth. At most `max_stiffening` times κ A.
     pub stiffness: f64,
     /// The force R, N.
     pub force: DVec3,

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use super::Scene;
 
 /// A connected part with less than this share of the area of the garment's largest part is a detail. Buttons, buckles and clasps of
-/// MakeHuman's suits have up to 0.3 %, their ties 7 % and more. A larger value holds belts and collars. A heuristic.
+/// MakeHuman's suits have up to 0.3 %, the next larger loose parts 7 % and more. A heuristic.
 const MAX_DETAIL_SHARE: f64 = 0.01;
 
 impl Scene {
@@ -46,10 +46,9 @@ mod tests {
     use super::*;
     use crate::SceneSpec;
 
-    /// A skirt and a triangle of 2 cm that belongs to nothing.
+    /// A skirt, of which nothing is held, and a triangle of this size that is joined to nothing.
     fn skirt_with_button(size_m: f64) -> Scene {
-        let mut scene = SceneSpec::new("form", "flared-skirt@900").load().unwrap().scene;
-        let mut garment = scene.garment.clone();
+        let Scene { body, mut garment, .. } = SceneSpec::new("form", "flared-skirt@900").load().unwrap().scene;
         let first = garment.vertex_count() as u32;
         let at = garment.positions[0];
         garment.positions.extend(
@@ -58,8 +57,7 @@ mod tests {
         garment.triangles.push([first, first + 1, first + 2]);
         garment.triangle_group.push(garment.triangle_group[0]);
         let rest = crate::mesh::RestShape::from_edges(&garment).unwrap();
-        scene.held.clear();
-        Scene { held: Vec::new(), ..Scene::new(scene.body, garment, rest) }
+        Scene::new(body, garment, rest)
     }
 
     #[test]

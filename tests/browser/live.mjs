@@ -219,9 +219,11 @@ try {
   said("a preset chosen; the table saved before loaded again");
   await page.locator("#preset").selectOption("low-cut-dress-levels-and-extents");
   await until(page, (now) => now.job.table.name === "low-cut-dress, levels and extents" && now.idle);
+  // The page shows a state later than the interface tells it.
+  await page.waitForFunction(() => document.querySelector("#level-1-2").value === "31.9");
   assert.equal(await page.locator("#preset").inputValue(), "low-cut-dress-levels-and-extents", "one name for one table");
   const fields = await page.locator("#levels input").evaluateAll((inputs) => inputs.map((input) => input.value));
-  assert.deepEqual([fields[2], fields[5], fields[17], fields.at(-2)], ["", "31.9", "15.5 × 19.1", "∞"]);
+  assert.deepEqual([fields[2], fields[17], fields.at(-2)], ["", "15.5 × 19.1", "∞"]);
   await page.locator("#undo").click();
   await until(page, (now) => JSON.stringify(now.job.table.levels) === JSON.stringify(edited) && now.idle);
   said("extents of levels: cut, and not cut");

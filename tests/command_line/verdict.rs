@@ -29,7 +29,7 @@ fn a_run_ends_with_its_verdict_and_strict_makes_it_an_exit_code() {
     bench.refuses(&["--strict", "--method", "zhu2016", "--no-save"], &["--strict", "zhu2016", "two-stage"]);
 }
 
-/// What a terminal shows of a drape: both streams in their order.
+/// The output of a drape as a terminal shows it: both streams in their order.
 fn shown(bench: &Bench, more: &[&str]) -> String {
     let path = bench.path("shown.txt");
     let file = std::fs::File::create(&path).unwrap();

@@ -70,7 +70,7 @@ impl TensionFields {
         let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
         let (mean, difference) = ((a + c) * half, (a - c) * half);
         let radius = (difference * difference + b * b).sqrt();
-        let (larger, smaller) = (mean + radius, (mean - radius).max(least));
+        let (larger, smaller) = ((mean + radius).max(least), (mean - radius).max(least));
         // cos² of the angle between the weft and the direction of the larger stretch.
         let along = (least - radius).if_negative((one + difference / radius) * half, half);
         let [first, second] = [self.ratio(l, larger, along, w), self.ratio(l, smaller, one - along, w)];
@@ -120,6 +120,12 @@ mod tests {
 
     fn fields(compliance: [f64; 3], compression: f64) -> TensionFields {
         TensionFields { compliance: compliance.map(|c| Four([c; 4])), compression: Four([compression; 4]) }
+    }
+
+    #[test]
+    fn a_triangle_without_extent_stays_without() {
+        let fields = fields([1e-2, 1e-3, 1e-2], 1.0);
+        assert_eq!(fields.proximal_of(0, [DVec3::ZERO; 2], 50.0), [DVec3::ZERO; 2]);
     }
 
     /// Singular values by the eigenvalues of FᵀF.

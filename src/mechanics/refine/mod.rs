@@ -72,7 +72,7 @@ pub fn refine_with(
     options: &RefineOptions,
     observer: Observer<'_>,
 ) -> Result<Refined, SolveError> {
-    // Trees of triangles cannot be built from such positions.
+    // No tree of triangles can be built from positions that are not finite.
     if let Some(vertex) = start.iter().position(|x| !x.is_finite()) {
         return Err(SolveError::NotPositive { index: 3 * vertex });
     }
@@ -90,4 +90,23 @@ pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>
     descent.untangle();
     let left = descent.contacts.proximity.as_mut().map_or(0, |proximity| proximity.crossings(&descent.x));
     (left == 0).then_some(descent.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::mesh::samples::sheet;
+
+    #[test]
+    fn a_start_that_is_not_finite_is_refused() {
+        let mesh = sheet(3, 3, |i, j| DVec3::new(i, 0.0, j) * 0.05);
+        let cloth = Cloth::sample(&mesh, "jersey", &[12, 13, 14, 15]);
+        let mut start = mesh.positions.clone();
+        start[5].y = f64::NAN;
+        let options = RefineOptions { self_contact: true, ..RefineOptions::default() };
+        let refused = refine_with(&cloth, Contacts::none(), start, &options, &mut |_| ControlFlow::Continue(()));
+        assert!(matches!(refused, Err(SolveError::NotPositive { index: 15 })), "{refused:?}");
+    }
 }

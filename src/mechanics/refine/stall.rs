@@ -1,11 +1,11 @@
 //! Detects a solve that makes no progress.
 //!
 //! Cloth that is strained far beyond what fabrics bear, because a garment is too small or caught, may have no state that its contacts leave
-//! unchanged: normals, anchors and gaps are renewed after every step, and the solve cycles, far from rest, where cycles are not damped
-//! ([`cycle_damping`](super::cycle_damping)), or in spite of the damping. Such a solve ends as [`Stop::Stalled`](super::Stop), after a hundred steps instead of thousands.
+//! unchanged. Normals, anchors and gaps are renewed after every step, and the solve cycles: far from rest, where cycles are not damped
+//! ([`cycle_damping`](super::cycle_damping)), or in spite of the damping. Such a solve ends as [`Stop::Stalled`](super::Stop).
 //!
-//! A step is progress if the residual has halved, or the energy has fallen by the weight times `stall_fall_m`, since the last progress. An
-//! equilibrium, and contact places that are added or removed, begin the count anew.
+//! A step is progress if the residual has halved, or the energy has fallen by the weight times `stall_fall_m`, since the last progress. The
+//! count restarts at an equilibrium and where contact places are added or removed.
 
 use crate::mechanics::newton::NewtonState;
 
