@@ -36,10 +36,11 @@ const MAX_BODY: usize = 1 << 20;
 const BODY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The page's own files.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 10] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("/main.js", "text/javascript; charset=utf-8", include_str!("page/main.js")),
+    ("/theme.js", "text/javascript; charset=utf-8", include_str!("page/theme.js")),
     ("/session.js", "text/javascript; charset=utf-8", include_str!("page/session.js")),
     ("/fields.js", "text/javascript; charset=utf-8", include_str!("page/fields.js")),
     ("/dial.js", "text/javascript; charset=utf-8", include_str!("page/dial.js")),

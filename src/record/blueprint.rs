@@ -21,9 +21,6 @@ use super::eye::Eye;
 use super::meshes::{colour, single};
 use super::paths;
 
-/// Background of the 3D views: a dark grey, a shade lighter than the viewer's own panels.
-const BACKDROP: [u8; 3] = [31, 34, 39];
-
 /// A view, or views in a container.
 pub(super) enum Node {
     /// One view.
@@ -62,17 +59,16 @@ impl View {
         self
     }
 
-    /// Meshes and arrows seen from `eye`.
+    /// Meshes and arrows seen from `eye`. The background is of one colour, which the viewer takes from its theme.
     pub(super) fn spatial(name: impl Into<String>, contents: &[&str], eye: &Eye) -> Self {
         let controls = EyeControls3D::new()
             .with_kind(Eye3DKind::Orbital)
             .with_position(single(eye.position))
             .with_look_target(single(eye.target))
             .with_eye_up([0.0, 0.0, 1.0]);
-        let backdrop = Background::new(BackgroundKind::SolidColor).with_color(colour(BACKDROP));
         Self::new("3D", name, contents)
             .with("EyeControls3D", &controls)
-            .with("Background", &backdrop)
+            .with("Background", &Background::new(BackgroundKind::SolidColor))
             .with("LineGrid3D", &LineGrid3D::new().with_visible(false))
             .with("SpatialInformation", &SpatialInformation::update_fields().with_show_axes(false))
     }

@@ -117,6 +117,19 @@ try {
     assert.ok(colours.size > 40, `${name}: ${colours.size} colours`);
   }
 
+  // The colour that most of the views' pixels have, of 0 (black) to 1.
+  const lightness = async () => {
+    const colours = [...looks(await picture(page), 0, 1, 0.2)].sort((a, b) => b[1] - a[1]);
+    return (colours[0][0] & 0xff) / 0xff;
+  };
+  assert.ok((await lightness()) > 0.8, "the views have the page's light theme");
+  for (const [dark, presses] of [[true, 2], [false, 2]]) {
+    for (let i = 0; i < presses; i += 1) await page.locator("#theme").click();
+    await page.waitForTimeout(1500);
+    assert.equal((await lightness()) < 0.2, dark, `dark: ${dark}`);
+  }
+  said("the views change their theme with the page");
+
   const bounds = await page.locator("[data-bound]").count();
   const dragged = bounds - 4;
   const [x, y] = await grip(page, dragged);

@@ -26,8 +26,8 @@ pub(crate) struct Entity {
 pub(crate) struct Contents {
     /// The data at each path of the recording.
     pub(crate) entities: BTreeMap<String, Entity>,
-    /// Paths of the blueprint.
-    pub(crate) blueprint: BTreeSet<String>,
+    /// Names of the components at each path of the blueprint.
+    pub(crate) blueprint: BTreeMap<String, BTreeSet<String>>,
     /// Recordings in the file.
     pub(crate) recordings: usize,
 }
@@ -41,15 +41,16 @@ pub(crate) fn read(path: &Path) -> Contents {
         contents.recordings += usize::from(id.is_recording());
         for chunk in store.iter_physical_chunks() {
             let name = chunk.entity_path().to_string();
+            let components = chunk.components().keys().map(ToString::to_string);
             if !id.is_recording() {
-                contents.blueprint.insert(name);
+                contents.blueprint.entry(name).or_default().extend(components);
                 continue;
             }
             let entity = contents.entities.entry(name).or_default();
             let rows = if chunk.is_static() { &mut entity.fixed_rows } else { &mut entity.rows };
             *rows += chunk.num_rows();
             entity.timelines.extend(chunk.timelines().keys().map(ToString::to_string));
-            entity.components.extend(chunk.components().keys().map(ToString::to_string));
+            entity.components.extend(components);
         }
     }
     contents

@@ -4,6 +4,7 @@ import { Dial, cm } from "./dial.js";
 import { acceptAll, centimetres, isRefused, onTyped, refuse, several } from "./fields.js";
 import { showNumbers, showPart, showPins } from "./numbers.js";
 import { Session, ask } from "./session.js";
+import "./theme.js";
 import { draw, start } from "./viewer.js";
 import { showViews } from "./views.js";
 
@@ -284,19 +285,6 @@ for (const [id, name] of Object.entries(SAVED)) {
   });
 }
 
-const THEMES = ["system", "light", "dark"];
-function theme(name) {
-  localStorage.setItem("theme", name);
-  document.documentElement.dataset.theme = name;
-  at("theme").textContent = `Theme: ${name}`;
-  return name;
-}
-const chosen = theme(localStorage.getItem("theme") ?? "system");
-at("theme").addEventListener("click", () => {
-  theme(THEMES[(THEMES.indexOf(document.documentElement.dataset.theme) + 1) % THEMES.length]);
-});
-const dark = chosen === "dark" || (chosen === "system" && matchMedia("(prefers-color-scheme: dark)").matches);
-
 ask("api/choices")
   .then((response) => response.json())
   .then((found) => {
@@ -310,4 +298,4 @@ at("part-close").addEventListener("click", () => {
   showPart(null);
   draw("api/outline");
 });
-start(dark ? "dark" : "light", (view, position) => pick(`on=${view}&at=${position.join(",")}`));
+start((view, position) => pick(`on=${view}&at=${position.join(",")}`));

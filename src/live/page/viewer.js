@@ -16,13 +16,13 @@ const turn = () => new Promise((done) => setTimeout(done));
 const failed = (error) => fail(error?.message ?? String(error), "All else on this page works without it.");
 
 // Starts the viewer; `picked(view, position)` is called for each click on a mesh.
-export async function start(theme, picked) {
+export async function start(picked) {
   try {
     const handle = await run(
       {
         url: [],
         persist: false,
-        theme,
+        theme: "system",
         panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden", time: "Hidden" },
         on_viewer_event: (json) => heard(JSON.parse(json), picked),
       },

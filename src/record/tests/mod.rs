@@ -89,10 +89,15 @@ fn a_recording_has_every_documented_path_the_timelines_and_a_blueprint() {
         assert!(contents.entities.contains_key(wanted), "{wanted} is missing of {:?}", contents.entities.keys());
     }
     for wanted in ["/viewport", "/time_panel", "/selection_panel", "/blueprint_panel"] {
-        assert!(contents.blueprint.contains(wanted), "{wanted} is missing of {:?}", contents.blueprint);
+        assert!(contents.blueprint.contains_key(wanted), "{wanted} is missing of {:?}", contents.blueprint);
     }
-    let eyes = contents.blueprint.iter().filter(|p| p.ends_with("/EyeControls3D")).count();
-    assert_eq!(eyes, 4, "one eye a stage");
+    let views: Vec<&str> = contents.blueprint.keys().filter_map(|p| p.strip_suffix("/EyeControls3D")).collect();
+    assert_eq!(views.len(), 4, "one eye a stage");
+    for view in views {
+        let background = &contents.blueprint[&format!("{view}/Background")];
+        assert!(background.contains("Background:kind"), "{background:?}");
+        assert!(!background.contains("Background:color"), "a colour of its own is wrong in one of the viewer's themes");
+    }
     for mesh in [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::DRAPE] {
         let components = &contents.entities[mesh].components;
         assert!(components.contains("Mesh3D:vertex_normals"), "{mesh} would be drawn unlit: {components:?}");
