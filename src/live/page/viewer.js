@@ -78,11 +78,13 @@ function withoutHover() {
     const own = (held = []);
     hold(event);
     pressed = pressed.then(async () => {
-      await frames(FINDING);
-      for (const next of own) {
-        canvas.dispatchEvent(new PointerEvent(next.type, next));
-        await frames(2);
+      // A pointer that rests draws no frames.
+      for (let i = 0; i < FINDING; i += 1) {
+        hover(event);
+        await frames(1);
       }
+      // Press and release in one frame: where frames take a second, a click would else be a long press, which selects nothing.
+      for (const next of own) canvas.dispatchEvent(new PointerEvent(next.type, next));
       if (held === own) held = null;
       // The pointer rests again where it was released.
       rest(own.at(-1));
@@ -96,10 +98,11 @@ function withoutHover() {
       canvas.dispatchEvent(new MouseEvent("mouseleave"));
     }, RESTING);
   };
-  const back = ({ isTrusted, clientX, clientY }) => {
-    if (!isTrusted || !taken) return;
+  const hover = ({ clientX, clientY }) => canvas.dispatchEvent(new MouseEvent("mousemove", { clientX, clientY, bubbles: true }));
+  const back = (event) => {
+    if (!event.isTrusted || !taken) return;
     taken = false;
-    canvas.dispatchEvent(new MouseEvent("mousemove", { clientX, clientY, bubbles: true }));
+    hover(event);
   };
   const on = (kind, act) => scene.addEventListener(kind, (event) => event.target === canvas && act(event), { capture: true, passive: true });
   on("pointerdown", (event) => {
