@@ -109,16 +109,20 @@ pub(super) fn log_numbers(
     recording.log(paths::ROWS, &cells)
 }
 
-/// The name of a line in a plot.
+/// The name of a line in a plot, as the tables of `sweep` and `compare` name the number. A legend has room for [`MAX_NAME`] letters.
 fn line_name(leaf: &str) -> String {
     match leaf {
-        "error/rms_mm" => "to its own rest".to_owned(),
-        "error/canonical_rms_mm" => "to the canonical drape".to_owned(),
-        "error/representable_rms_mm" => "best displacements, to the canonical drape".to_owned(),
-        "error/representable_affine_rms_mm" => "best affine maps, to the canonical drape".to_owned(),
+        "error/rms_mm" => "own".to_owned(),
+        "error/canonical_rms_mm" => "canonical".to_owned(),
+        "error/representable_rms_mm" => "best translation".to_owned(),
+        "error/representable_affine_rms_mm" => "best affine".to_owned(),
         other => other.trim_start_matches("error/").replace('_', " "),
     }
 }
+
+/// Letters of a name in the legend of a plot, in a window 1280 pixels wide: a longer one covers the lines.
+#[cfg(test)]
+const MAX_NAME: usize = 16;
 
 /// Logs a scalar, drawn as a line with a dot at each step, so that a single step is visible. `hue`: an index into the palette.
 pub(super) fn log_scalar(
@@ -140,6 +144,14 @@ pub(super) fn log_scalar(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_name_of_each_error_fits_its_legend() {
+        for leaf in ["rms_mm", "canonical_rms_mm", "representable_rms_mm", "representable_affine_rms_mm"] {
+            let name = line_name(&format!("error/{leaf}"));
+            assert!(name.chars().count() <= MAX_NAME && !name.contains("rms"), "{name}");
+        }
+    }
 
     #[test]
     fn bars_tile_their_level_and_count_every_vertex_once() {

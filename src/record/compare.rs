@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::error::RecordError;
-use super::legend::{Legend, view_caption};
+use super::legend::{Legend, shortened, view_caption};
 use super::meshes::{self, rerun_colours};
 use super::open_recording::OpenRecording;
 use super::paths;
@@ -81,5 +81,42 @@ pub(super) fn log(recording: &OpenRecording, compared: &Compared<'_>) -> Result<
     }
     let place = [compared.slot % columns, compared.slot / columns];
     let path = format!("{}/{}", paths::COMPARE_CAPTIONS, compared.slot);
-    view_caption(recording, &path, compared.caption, place, columns)
+    let title = recording.layout().compare.get(compared.slot).map_or("", String::as_str);
+    view_caption(recording, &path, &titled(title, compared.caption, columns), place, columns)
+}
+
+/// The caption of a view, in one of `columns`, below its title if the view's own title bar cuts that.
+fn titled(title: &str, caption: &str, columns: usize) -> String {
+    if title.chars().count() <= letters(columns, TITLE_BUTTONS) {
+        return caption.to_owned();
+    }
+    format!("{}\n{caption}", shortened(title, letters(columns, CAPTION_MARGIN)))
+}
+
+/// Width of a window, its letters, what a title bar has beside the title, and the margins of a caption's box, pixels.
+const WINDOW: usize = 1280;
+const LETTER: usize = 7;
+const TITLE_BUTTONS: usize = 110;
+const CAPTION_MARGIN: usize = 20;
+
+/// Letters that fit in one of `columns`, beside other things of this width in pixels.
+fn letters(columns: usize, beside: usize) -> usize {
+    (WINDOW / columns.max(1)).saturating_sub(beside) / LETTER
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_name_that_its_view_cuts_stands_in_the_caption() {
+        let caption = "380 PARTs · 217 ms · 29.5 mm";
+        assert_eq!(titled("table-3", caption, 6), caption);
+        assert_eq!(titled("20 quantile levels, 24 cm", caption, 2), caption);
+        let titled = titled("20 quantile levels, 24 cm then 12 cm", caption, 6);
+        let lines: Vec<&str> = titled.lines().collect();
+        assert_eq!(lines[1], caption);
+        assert!(lines[0].starts_with("20 quantile") && lines[0].ends_with("then 12 cm"), "{titled}");
+        assert!(lines.iter().all(|line| line.chars().count() <= letters(6, 0)), "{titled}");
+    }
 }

@@ -81,7 +81,7 @@ pub(super) fn visible_captions([columns, rows]: [usize; 2]) -> [[f64; 2]; 2] {
     [[0.0, columns as f64 * CELL[0]], [0.0, (rows as f64 - 0.5) * step]]
 }
 
-/// Logs a line of text for the view in this column and row of `columns`.
+/// Logs one or two lines of text for the view in this column and row of `columns`.
 pub(super) fn view_caption(
     recording: &OpenRecording,
     path: &str,
@@ -89,7 +89,9 @@ pub(super) fn view_caption(
     [column, row]: Cell,
     columns: usize,
 ) -> Result<(), RecordError> {
-    let place = [(column as f64 + 0.5) * CELL[0], row as f64 * CAPTION_ROW * columns as f64];
+    // A second line begins half as high again, so that both are in the middle of the row.
+    let line = row as f64 - 0.25 * text.matches('\n').count() as f64;
+    let place = [(column as f64 + 0.5) * CELL[0], line * CAPTION_ROW * columns as f64];
     recording.log(path, &texts(vec![single(place)], vec![text.to_owned()]))
 }
 
@@ -107,14 +109,21 @@ pub(super) fn caption(
 /// Letters that fit above the bars, in a window 1280 pixels wide.
 const MAX_CAPTION: usize = 40;
 
-/// A table's name and number of PARTs. A long name is shortened in its middle: names of a table search differ at the end.
+/// A table's name and number of PARTs.
 pub(super) fn table_title(table: &str, count: usize) -> String {
-    let letters: Vec<char> = format!("{table}, {count} PARTs").chars().collect();
-    match letters.len() {
-        0..=33 => format!("table: {table}, {count} PARTs"),
-        34..=MAX_CAPTION => letters.iter().collect(),
-        n => letters[..MAX_CAPTION / 2 - 1].iter().chain(&['…']).chain(&letters[n - MAX_CAPTION / 2..]).collect(),
+    let text = format!("{table}, {count} PARTs");
+    if text.chars().count() <= MAX_CAPTION - 7 { format!("table: {text}") } else { shortened(&text, MAX_CAPTION) }
+}
+
+/// A text of at most `most` letters. A long one is shortened in its middle: names of a table search differ at the end.
+pub(super) fn shortened(text: &str, most: usize) -> String {
+    let letters: Vec<char> = text.chars().collect();
+    let n = letters.len();
+    if n <= most {
+        return text.to_owned();
     }
+    let half = most / 2;
+    letters[..most - half - 1].iter().chain(&['…']).chain(&letters[n - half..]).collect()
 }
 
 fn single(place: [f64; 2]) -> [f32; 2] {

@@ -118,7 +118,8 @@ impl Tabs<'_> {
     }
 
     fn numbers(&self) -> Node {
-        let mut plots = vec![(1.0, self.plot("Time of each stage, ms", paths::STAGE_MS, true))];
+        // The legend has a line for each stage, seven, and a line for each error, four.
+        let mut plots = vec![(1.5, self.plot("Time of each stage, ms", paths::STAGE_MS, true))];
         if self.layout.error {
             plots.push((1.0, self.plot("Error, mm", "/numbers/error", true)));
         }

@@ -122,7 +122,8 @@ export function showPins(state, remove) {
     const row = document.createElement("tr");
     const { parts, two_stages_ms, preview_error_mm, bound_mm } = pin.numbers;
     const cut = pin.max_extent_cm?.length ? `, cut to ${pin.max_extent_cm.join(", ")} cm` : "";
-    const label = `${pin.label}: ${pin.garment}, ${pin.fabric}, ${pin.table}${cut}`;
+    const table = pin.table === pin.label ? "" : `, ${pin.table}`;
+    const label = `${pin.label}: ${pin.garment}, ${pin.fabric}${table}${cut}`;
     for (const text of [label, parts, digits(two_stages_ms), `${digits(preview_error_mm)} / ${digits(bound_mm)}`]) {
       row.insertCell().textContent = text;
     }
