@@ -109,7 +109,7 @@ pub(super) fn log_numbers(
     recording.log(paths::ROWS, &cells)
 }
 
-/// The name of a line in a plot, as the tables of `sweep` and `compare` name the number. A legend has room for [`MAX_NAME`] letters.
+/// The name of a line in a plot, as the tables of `sweep` and `compare` name the number. A legend has room for few letters.
 fn line_name(leaf: &str) -> String {
     match leaf {
         "error/rms_mm" => "own".to_owned(),
