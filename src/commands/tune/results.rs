@@ -91,9 +91,9 @@ pub(super) fn verdicts(all: &[Verdict]) -> String {
             ("levels", v.levels.to_string()),
             ("cut", v.cut_levels.to_string()),
             ("PARTs", v.parts.to_string()),
-            ("Table 3", v.table_3_parts.to_string()),
+            ("of Table 3", v.table_3_parts.to_string()),
             ("error mm", format!("{:.1}", v.error_mm)),
-            ("Table 3", format!("{:.1}", v.table_3_error_mm)),
+            ("of Table 3, mm", format!("{:.1}", v.table_3_error_mm)),
             ("ratio", format!("{:.2}", v.ratio)),
         ]
     };
