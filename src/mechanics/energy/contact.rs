@@ -33,7 +33,8 @@ use super::face_contacts::FaceContacts;
 use super::field::{Field, SIDE};
 use super::friction::{Friction, Touch};
 use super::membrane::outer;
-use super::proximity::Proximity;
+use super::passage::passages;
+use super::proximity::{Proximity, StepCheck};
 use crate::body::distance::{Body, pull_off_protrusions};
 use crate::mechanics::solver_options::BodyContactOptions;
 use crate::mesh::TriMesh;
@@ -338,6 +339,22 @@ impl<'b> Contacts<'b> {
         *x = garment.positions;
         let changed = self.face_contacts.update(body, x, &pairs);
         if changed > 0 { FaceUpdate::Places } else { FaceUpdate::Unchanged }
+    }
+
+    /// Checks the step from `from`, where the last one ended, to `to`: see [`StepCheck`]. Nothing is checked
+    /// without contact of the cloth with itself.
+    pub(crate) fn check_step(&mut self, from: &[DVec3], to: &mut [DVec3]) -> Option<StepCheck> {
+        self.proximity.as_ref()?;
+        // A vertex that stays farther from the body than its move is long cannot have come through it.
+        let may_pass = |&v: &usize| {
+            let bound = self.queried_distance[v] - to[v].distance(self.queried_at[v]);
+            !self.held[v] && bound < from[v].distance(to[v])
+        };
+        let shares = self.body().map_or_else(Vec::new, |body| {
+            let near: Vec<u32> = (0..to.len()).filter(may_pass).map(|v| v as u32).collect();
+            passages(body, &near, from, to)
+        });
+        self.proximity.as_mut().map(|proximity| proximity.check_step(from, to, &shares))
     }
 
     /// Removes all contact places permanently, because the solve does not converge with them.

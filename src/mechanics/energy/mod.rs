@@ -25,6 +25,7 @@ pub(crate) mod friction;
 pub mod membrane;
 mod membrane_simd;
 pub(crate) mod ordering;
+mod passage;
 mod proximity;
 pub mod sparsity;
 mod vertex_ring;

@@ -56,11 +56,9 @@ fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>]) -> bool {
         let [one, other] = [1.0, -1.0].map(|side| lowest_along(state, direction, side));
         let (_, t) = if other.0 < one.0 { other } else { one };
         let mut to: Vec<DVec3> = state.x.iter().zip(direction).map(|(x, z)| *x + *z * t).collect();
-        let proximity = state.contacts.proximity.as_mut();
         // A long move of which parts are held back is not the one whose energy was found lower.
-        if t != 0.0
-            && proximity.is_none_or(|p| matches!(p.check_step(&state.x, &mut to), StepCheck::Clear | StepCheck::Cut))
-        {
+        let taken = |check| matches!(check, None | Some(StepCheck::Clear | StepCheck::Cut));
+        if t != 0.0 && taken(state.contacts.check_step(&state.x, &mut to)) {
             state.x = to;
             escaped = true;
         }

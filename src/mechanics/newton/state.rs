@@ -116,7 +116,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         trial.clone_from(x);
         let iterations = cloth.solver.relaxation.iterations;
         let (_, out) = rayon::join(|| relaxation.run(cloth, contacts, x, iterations), beside);
-        match contacts.proximity.as_mut().map(|p| p.check_step(trial, x)) {
+        match contacts.check_step(trial, x) {
             None | Some(StepCheck::Clear) => {}
             Some(StepCheck::Cut) => contacts.update(x),
             Some(check) => {
@@ -184,7 +184,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                     trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *step_share));
                     contacts.update(trial);
                 }
-                match contacts.proximity.as_mut().map(|p| p.check_step(x, trial)) {
+                match contacts.check_step(x, trial) {
                     None | Some(StepCheck::Clear) => break true,
                     Some(StepCheck::Cut) => {
                         contacts.update(trial);

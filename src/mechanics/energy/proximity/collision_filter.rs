@@ -121,8 +121,9 @@ impl CollisionFilter {
         found
     }
 
-    /// Checks the step from `from`, where the last one ended, to `to`, and holds back the parts that would intersect.
-    pub(super) fn check(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
+    /// Checks the step from `from`, where the last one ended, to `to`, and holds back the parts that would intersect, and those vertices that
+    /// may go only up to a share of their move.
+    pub(super) fn check(&mut self, from: &[DVec3], to: &mut [DVec3], shares: &[(u32, f64)]) -> StepCheck {
         self.current(from);
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.surface.edge_m;
         let stages = (longest / self.options.check_spacing).ceil().clamp(1.0, self.options.max_stages.max(1.0));
@@ -130,6 +131,10 @@ impl CollisionFilter {
         // Largest difference of the shares of neighbours.
         let gain = self.options.max_spread / longest;
         let mut limits = vec![1.0_f64; from.len()];
+        for &(v, share) in shares {
+            limits[v as usize] = share;
+        }
+        self.spread(shares.iter().map(|(v, _)| *v).collect(), gain, &mut limits);
         let at = |limits: &[f64], share: f64| -> Vec<DVec3> {
             from.iter().zip(&*to).zip(limits).map(|((a, b), limit)| a.lerp(*b, limit.min(share))).collect()
         };
@@ -197,6 +202,22 @@ mod tests {
     use crate::mesh::samples::sheet;
 
     #[test]
+    fn a_vertex_that_may_go_half_the_way_holds_its_neighbours_back() {
+        let mesh = sheet(20, 20, |i, j| DVec3::new(i, j, 0.0) * 0.01);
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
+        let surface = Arc::new(Surface::new(&cloth.triangles, mesh.vertex_count()));
+        let options = CollisionFilterOptions::default();
+        let list = VerletList::new(Arc::clone(&surface), 1e-3, 0.5 * surface.edge_m);
+        let mut filter = CollisionFilter::new(surface, list, options);
+        let mut to: Vec<DVec3> = mesh.positions.iter().map(|x| *x + DVec3::new(0.0, 0.0, 0.05)).collect();
+        let middle = 10 * 21 + 10;
+        assert_eq!(filter.check(&mesh.positions, &mut to, &[(middle as u32, 0.5)]), StepCheck::HeldBack);
+        assert!((to[middle].z - 0.025).abs() < 1e-12);
+        assert!(to.iter().all(|x| x.z >= to[middle].z) && to[0].z == 0.05);
+        assert!(to[middle + 1].z < 0.035, "a triangle is torn: {}", to[middle + 1]);
+    }
+
+    #[test]
     fn a_long_step_holds_back_only_the_part_that_would_intersect() {
         // A sheet of 15 by 41 vertices folded over: two layers 6 mm apart, edges of 1 cm.
         let mesh = sheet(14, 40, |i, j| DVec3::new(i.min(14.0 - i), j, 0.6 * ((i - 6.0) / 2.0).clamp(0.0, 1.0)) * 0.01);
@@ -215,7 +236,7 @@ mod tests {
         let wanted: Vec<DVec3> = from.iter().map(moved).collect();
         assert!(!filter.crossing_at(&wanted).is_empty());
         let mut to = wanted.clone();
-        assert_eq!(filter.check(from, &mut to), StepCheck::HeldBack);
+        assert_eq!(filter.check(from, &mut to, &[]), StepCheck::HeldBack);
         assert!(filter.crossing_at(&to).is_empty());
         let kept = from.iter().zip(&to).zip(&wanted).filter(|((p, _), _)| p.y > 0.3);
         assert!(kept.clone().count() > 100 && kept.into_iter().all(|((_, to), wanted)| to == wanted));
@@ -233,7 +254,7 @@ mod tests {
         let mut short: Vec<DVec3> = from.iter().zip(&wanted).map(|(a, b)| a.lerp(*b, 0.25)).collect();
         short.iter_mut().zip(from).for_each(|(to, from)| to.y = from.y);
         filter.begin(Vec::new());
-        assert_eq!(filter.check(from, &mut short), StepCheck::Cut);
+        assert_eq!(filter.check(from, &mut short, &[]), StepCheck::Cut);
         assert!(filter.crossing_at(&short).is_empty());
     }
 }

@@ -212,9 +212,9 @@ impl Proximity {
         self.gaps.iter().map(|gap| gap.normal * (gap.stiffness * gap.depth(x).max(0.0)))
     }
 
-    /// Checks the step from `from`, where the last one ended, to `to`: see [`StepCheck`].
-    pub(crate) fn check_step(&mut self, from: &[DVec3], to: &mut [DVec3]) -> StepCheck {
-        self.filter.check(from, to)
+    /// Checks the step from `from`, where the last one ended, to `to`, of which some vertices may go only up to a share: see [`StepCheck`].
+    pub(super) fn check_step(&mut self, from: &[DVec3], to: &mut [DVec3], shares: &[(u32, f64)]) -> StepCheck {
+        self.filter.check(from, to, shares)
     }
 
     /// Number of pairs of triangles that intersect at `x`, where the last step ended.
