@@ -122,16 +122,16 @@ impl Gap {
         Some(block)
     }
 
-    /// Takes over the slip and the raised stiffness of the same gap before the refresh. The stiffness and the plane approach their new values
-    /// by this share: where the nearest points of two states lie on two faces of the body or of the cloth, either state leads to the other, and
-    /// a plane between both holds the gap at rest.
+    /// Takes over the slip and the raised stiffness of the same gap before the refresh, if the two places have not changed sides. The
+    /// stiffness and the plane approach their new values by this share: where the nearest points of two states lie on two faces of the body or
+    /// of the cloth, either state leads to the other, and a plane between both holds the gap at rest.
     pub(super) fn inherit(&mut self, before: &Self, x: &[DVec3], share: f64) {
+        // Gaps near an intersection are left out, so a place on the other side went round an edge of the cloth.
+        if before.normal.dot(self.normal) < 0.0 {
+            return;
+        }
         let end = if self.vanishing { 0.0 } else { self.stiffness.max(before.stiffness) };
         self.stiffness = if share < 1.0 { before.stiffness + share * (end - before.stiffness) } else { end };
-        // A place that passed through the other has the opposite normal now, and must return.
-        if before.normal.dot(self.normal) < 0.0 {
-            self.normal = -self.normal;
-        }
         if share < 1.0 {
             self.normal = before.normal.lerp(self.normal, share).normalize_or(self.normal);
             self.body = before.body.lerp(self.body, share);
@@ -155,4 +155,25 @@ pub(super) fn keep_vanishing(before: &[Gap], gaps: &mut Vec<Gap>, vanished_share
     }
     gaps.extend(vanishing);
     gaps.sort_unstable_by_key(|gap| gap.key);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_that_went_round_an_edge_is_pushed_to_the_side_where_it_is() {
+        let x = [DVec3::new(0.0, 0.0, 1e-3), DVec3::ZERO];
+        let key = Key { kind: Kind::Vertex, vertices: [0, 1, NONE, NONE, NONE], place: NONE };
+        let gap = |normal: DVec3, stiffness: f64| {
+            let mut gap = Gap::new(key, [1.0, -1.0, 0.0, 0.0, 0.0], 2e-3, stiffness);
+            (gap.normal, gap.from) = (normal, gap.across(&x));
+            gap
+        };
+        for (before, stiffness) in [(DVec3::Z, 64.0), (DVec3::NEG_Z, 1.0)] {
+            let mut now = gap(DVec3::Z, 1.0);
+            now.inherit(&gap(before, 64.0), &x, 1.0);
+            assert_eq!((now.normal, now.stiffness), (DVec3::Z, stiffness));
+        }
+    }
 }
