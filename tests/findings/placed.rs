@@ -108,3 +108,32 @@ fn a_skirt_too_wide_for_the_hips_ends_once_it_lies_below_the_crotch() {
     let low = Scene::of_meshes(&form, leg).unwrap();
     assert!(!draped(&low).0.verdict.contains("trunk"));
 }
+
+#[test]
+fn a_dress_as_cut_for_one_size_rests_on_its_neighbours() {
+    let folder = tempfile::tempdir().unwrap();
+    let [dress, form] = ["dress.obj", "form.toml"].map(|name| folder.path().join(name).display().to_string());
+    let cut = SceneSpec { garment: "long-sleeved-dress@2000".to_owned(), ..SceneSpec::default() };
+    write_mesh(dress.as_ref(), &cut.load().unwrap().scene.garment).unwrap();
+    // The form is of EU 38. On EU 36 a step carried a cuff through the wrist, and the dress was caught.
+    for size in [-2.0, -1.0, 1.0, 2.0] {
+        let (bust, hip) = (4.0 / 6.7 * size, 4.0 / 6.1 * size);
+        let rows = [
+            ("bust", 88.0 + 4.0 * size),
+            ("underbust", 75.0 + 4.0 * size),
+            ("waist", 72.0 + 4.0 * size),
+            ("hip", 96.0 + 4.0 * size),
+            ("neck", 31.7 + 1.3 * bust),
+            ("biceps", 27.9 + 2.7 * bust),
+            ("wrist", 15.4 + 0.1 * bust),
+            ("thigh", 57.0 + 4.6 * hip),
+            ("knee", 36.1 + 1.2 * hip),
+            ("calf", 36.1 + 1.2 * hip),
+            ("ankle", 21.3 + 0.3 * hip),
+        ];
+        std::fs::write(&form, rows.map(|(name, cm)| format!("{name}_cm = {cm}\n")).concat()).unwrap();
+        let loaded = SceneSpec::new(&form, &dress).load().unwrap();
+        let (metrics, ..) = draped(&loaded.scene);
+        assert_eq!(metrics.verdict, RESTS, "{size} sizes up");
+    }
+}
