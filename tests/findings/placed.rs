@@ -7,7 +7,7 @@ use partwise::Job;
 use partwise::SceneSpec;
 use partwise::drape::{Refine, Scene, Settings, drape, unobserved};
 use partwise::mesh::TriMesh;
-use partwise::mesh::export::write_mesh;
+use partwise::mesh::export::{write_mesh, write_textured};
 use partwise::study::metrics::{Metrics, RESTS};
 
 use super::{cone, draped, draped_by, sphere, turned};
@@ -114,8 +114,9 @@ fn a_dress_as_cut_for_one_size_rests_on_its_neighbours() {
     let folder = tempfile::tempdir().unwrap();
     let [dress, form] = ["dress.obj", "form.toml"].map(|name| folder.path().join(name).display().to_string());
     let cut = SceneSpec { garment: "long-sleeved-dress@2000".to_owned(), ..SceneSpec::default() };
-    write_mesh(dress.as_ref(), &cut.load().unwrap().scene.garment).unwrap();
-    // The form is of EU 38. On EU 36 a step carried a cuff through the wrist, and the dress was caught.
+    let Scene { garment, rest, .. } = cut.load().unwrap().scene;
+    write_textured(dress.as_ref(), &garment, &rest.corners).unwrap();
+    // The form is of EU 38.
     for size in [-2.0, -1.0, 1.0, 2.0] {
         let (bust, hip) = (4.0 / 6.7 * size, 4.0 / 6.1 * size);
         let rows = [
