@@ -185,8 +185,8 @@ options! {
         min_spacing: f64 = 0.2,
         /// Share of its offset below which the distance of a place makes it a contact. Heuristic.
         near_share: f64 = 0.5,
-        /// Updates without fewer intersections after which the intersecting triangles are released. Without it a dress that is caught on a
-        /// smaller body takes 378 steps for 47.
+        /// Updates without fewer intersections after which the intersecting triangles are released. Without it two patterns that are strained
+        /// by over 100 % end after 365 and 585 steps for 214 and 156.
         max_idle_updates: usize = 3,
     }
 
