@@ -57,6 +57,6 @@ mod tests {
         assert_eq!(found.iter().map(|(v, _)| *v).collect::<Vec<_>>(), [0]);
         // The way enters the arm after 1 cm of its 6.
         let free = 0.06 * found[0].1;
-        assert!(free <= 0.01 && free >= 0.01 - SPACING_M, "{free} m");
+        assert!((0.01 - SPACING_M..=0.01).contains(&free), "{free} m");
     }
 }
