@@ -271,7 +271,7 @@ fn the_representable_error_is_reported_in_words_and_numbers() {
          without steps of single vertices"
     );
     assert!(message.contains(&words), "{words}: {message}");
-    // A drape can be nearer than that bound, and nearer to the rest of its own: each figure says what it is a distance to.
+    // A drape can be nearer than that bound. Each error names the drape that it is a distance to.
     let [own, canonical] = ["rms_mm", "canonical_rms_mm"].map(|key| figures[key].as_f64().unwrap());
     let words = format!("{own:.2} mm RMS to the rest it converges to by itself, {canonical:.1} to the canonical drape");
     assert!(message.contains(&words), "{words}: {message}");

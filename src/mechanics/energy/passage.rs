@@ -50,7 +50,7 @@ mod tests {
         // An arm 4 cm thick.
         let body = Body::new(&cuboid(DVec3::new(-0.02, -0.02, -0.5), DVec3::new(0.02, 0.02, 0.5))).unwrap();
         let at = |x: f64, y: f64| DVec3::new(x, y, 0.0);
-        // Through the arm; from within it; into it; beside it; along its surface; to the other side by a way about it, too short to be seen.
+        // Through the arm; from inside it; into it; beside it; along its surface; into it by less than two samples.
         let from = [at(0.03, 0.0), at(0.01, 0.0), at(0.03, 0.0), at(0.03, 0.03), at(0.021, 0.02), at(0.021, 0.0)];
         let to = [at(-0.03, 0.0), at(-0.03, 0.0), at(0.01, 0.0), at(-0.03, 0.03), at(0.021, -0.02), at(0.0195, 0.0)];
         let found = passages(&body, &[0, 1, 2, 3, 4, 5], &from, &to);

@@ -96,7 +96,7 @@ fn a_recording_has_every_documented_path_the_timelines_and_a_blueprint() {
     for view in views {
         let background = &contents.blueprint[&format!("{view}/Background")];
         assert!(background.contains("Background:kind"), "{background:?}");
-        assert!(!background.contains("Background:color"), "a colour of its own is wrong in one of the viewer's themes");
+        assert!(!background.contains("Background:color"), "a fixed colour is wrong in one of the viewer's themes");
     }
     for mesh in [paths::BODY, paths::GARMENT, paths::DISTANCE, paths::PARTS, paths::FORCE, paths::DRAPE] {
         let components = &contents.entities[mesh].components;
