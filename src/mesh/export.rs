@@ -136,12 +136,11 @@ fn imported_text(imported: &Imported, positions: &[DVec3]) -> Result<String, Mes
     }
     for file_vertex in (0..used.len()).filter(|&v| used[v]) {
         let v = imported.mesh_vertex[file_vertex];
-        // A vertex that did not move keeps its digits; so does one of degenerate faces only, which is in no triangle.
-        let p = match (positions.get(v as usize), imported.mesh.positions.get(v as usize)) {
-            (Some(now), Some(then)) if now != then => frame.to_file(*now),
-            _ => source.positions[file_vertex],
-        };
-        write_vertex(&mut text, p);
+        // A vertex that did not move keeps its digits; so does one of degenerate faces only, which is in no triangle. The file tells
+        // where it was, not the mesh, whose open seams may have been drawn shut since.
+        let own = source.positions[file_vertex];
+        let moved = positions.get(v as usize).filter(|now| **now != frame.to_metres(own));
+        write_vertex(&mut text, moved.map_or(own, |now| frame.to_file(*now)));
     }
     for uv in (0..textured.len()).filter(|&t| textured[t]).map(|t| source.textures[t]) {
         let _ = writeln!(text, "vt {} {}", uv.x, uv.y);

@@ -228,6 +228,11 @@ fn an_export_gives_faces_groups_and_texture_back() {
     let same = fs::read_to_string(&path).unwrap();
     let vertices = |text: &str| text.lines().filter(|l| l.starts_with("v ")).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(vertices(&same), vertices(&text));
+    // A mesh that moved after it was read, as one whose seams are drawn shut does, is written where it is.
+    let mut shut = imported.clone();
+    shut.mesh.positions.clone_from(&moved);
+    write_imported(&path, &shut, &moved).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), written);
     let short = write_imported(&path, &imported, &moved[1..]);
     assert!(matches!(short, Err(MeshError::WrongCount { found: 5, expected: 6 })));
 }
