@@ -100,6 +100,14 @@ impl FullSpace {
         Ok(())
     }
 
+    /// Frees the numbers, which every step computes anew, and keeps the analysis.
+    pub(crate) fn release(&mut self) {
+        self.blocks = Vec::new();
+        if let Some(solver) = &mut self.solver {
+            solver.release();
+        }
+    }
+
     /// After a rejected step: switches to the projected Hessian; returns whether the step had the true one.
     pub(crate) fn fall_back(&mut self, cloth: &Cloth) -> bool {
         self.projected_left = cloth.solver.newton.max_projected_steps.max(1);

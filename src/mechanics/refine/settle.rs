@@ -194,6 +194,8 @@ impl Settling<'_, '_, '_> {
         if self.rest.is_first() && self.observe(true) {
             return Ok(Some(Stop::Interrupted));
         }
+        // The check has a factor of its own.
+        self.tangent.release();
         let ended = match self.rest.check(&mut self.descent)? {
             Verdict::Rests => Some(Stop::Converged),
             Verdict::Unsettled(criterion) => Some(Stop::Unsettled(criterion)),
