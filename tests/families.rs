@@ -16,6 +16,7 @@ use partwise::body::{BodySpec, dress_form};
 use partwise::drape::drape;
 use partwise::garment::fabric::Fabric;
 use partwise::mechanics::refine::Stop;
+use partwise::mechanics::solver_options::SolverOptions;
 use partwise::mesh::export::write_mesh;
 use partwise::mesh::{Axis, TriMesh, Unit};
 use partwise::{SceneSpec, Settings};
@@ -240,7 +241,13 @@ fn outcome(folder: &Path, name: &str, (pair, vertices, defect, fabric): (usize, 
         Ok(loaded) => loaded.scene,
         Err(e) => return format!("refused: {e}"),
     };
-    let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), ..Settings::default() };
+    // `PARTWISE_FAMILIES_SOLVER=GROUP.KEY=VALUE,...` sets options of the solver.
+    let changes = std::env::var("PARTWISE_FAMILIES_SOLVER").unwrap_or_default();
+    let mut solver = SolverOptions::default();
+    for change in changes.split(',').filter(|change| !change.is_empty()) {
+        solver = solver.assign(change).unwrap();
+    }
+    let settings = Settings { fabric: Fabric::by_name(fabric).unwrap(), solver, ..Settings::default() };
     let mut residual = f64::NAN;
     let trace = std::env::var_os("PARTWISE_FAMILIES_TRACE").is_some();
     let found = drape(&scene, &settings, &mut |step| {

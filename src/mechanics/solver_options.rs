@@ -103,8 +103,8 @@ options! {
         short_step: f64 = 0.3,
         /// Residual over weight below which the cloth is near rest. Heuristic.
         near_rest: f64 = 1e-2,
-        /// Largest extrapolation of a step near rest: see `newton::extrapolation`. With 2 the five garments at ten sizes, knit and woven, take
-        /// 354 steps together, with 1 363.
+        /// Largest extrapolation of a step near rest: see `newton::extrapolation`. With 2 six garments sewn from patterns take 316 steps together, with
+        /// 1 379; the built-in ones take as many.
         max_extrapolation: f64 = 2.0,
         /// Cosine with the previous step above which a step continues it. Heuristic.
         continues_cosine: f64 = 0.8,
@@ -153,7 +153,7 @@ options! {
         return_share: f64 = 0.3,
         /// Least share of a step that is taken. Heuristic.
         min_step_share: f64 = 0.125,
-        /// Least under-relaxation of gaps. Heuristic.
+        /// Least under-relaxation of gaps. With 1 three of 48 garments of two layers (60 and 250 vertices) do not rest.
         min_under_relaxation: f64 = 1.0 / 64.0,
     }
 
