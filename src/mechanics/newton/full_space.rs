@@ -100,7 +100,7 @@ impl FullSpace {
         Ok(())
     }
 
-    /// Frees the numbers, which every step computes anew, and keeps the analysis.
+    /// Frees the matrix and its factor, which every step recomputes, and keeps the analysis of the pattern.
     pub(crate) fn release(&mut self) {
         self.blocks = Vec::new();
         if let Some(solver) = &mut self.solver {

