@@ -68,21 +68,35 @@ impl<'a> Sheet<'a> {
         let widths: Vec<usize> =
             (0..columns).map(|column| ((2.0 * half_width(column) * scale).round() as usize).max(MIN_WIDTH)).collect();
         let has_bars = figures().any(|figure| figure.bar.is_some());
-        let below = Size::Caption.height() + 8 + if has_bars { BAR + Size::Tick.height() + 14 } else { 0 };
-        let top = if self.title.is_empty() { GAP } else { GAP + Size::Title.height() + GAP / 2 };
+        let captions: Vec<Vec<Vec<String>>> = self
+            .rows
+            .iter()
+            .map(|row| {
+                row.iter().zip(&widths).map(|(figure, &width)| Size::Caption.wrapped(&figure.caption, width)).collect()
+            })
+            .collect();
+        let lines = captions.iter().flatten().map(Vec::len).max().unwrap_or(0).max(1);
+        let caption_height = lines * Size::Caption.height();
+        let below = caption_height + 8 + if has_bars { BAR + Size::Tick.height() + 14 } else { 0 };
         let width = widths.iter().sum::<usize>() + GAP * (columns + 1);
+        let title = Size::Title.wrapped(&self.title, width.saturating_sub(2 * GAP));
+        let top = if title.is_empty() { GAP } else { GAP + title.len() * Size::Title.height() + GAP / 2 };
         let mut sheet = Pixels::white([width, top + self.rows.len() * (height + below + GAP)]);
-        sheet.write(&Size::Title.shortened(&self.title, width.saturating_sub(2 * GAP)), [GAP, GAP], Size::Title);
-        for (row, figures) in self.rows.iter().enumerate() {
+        for (line, text) in title.iter().enumerate() {
+            sheet.write(text, [GAP, GAP + line * Size::Title.height()], Size::Title);
+        }
+        for (row, (figures, captions)) in self.rows.iter().zip(&captions).enumerate() {
             let top = top + row * (height + below + GAP);
             let mut left = GAP;
-            for (figure, &width) in figures.iter().zip(&widths) {
+            for ((figure, caption), &width) in figures.iter().zip(captions).zip(&widths) {
                 sheet.put(&figure.draw([width, height], scale), [left, top]);
-                let caption = Size::Caption.shortened(&figure.caption, width);
-                let inset = (width - Size::Caption.width(&caption)) / 2;
-                sheet.write(&caption, [left + inset, top + height + 6], Size::Caption);
+                for (line, text) in caption.iter().enumerate() {
+                    let inset = width.saturating_sub(Size::Caption.width(text)) / 2;
+                    let down = height + 6 + line * Size::Caption.height();
+                    sheet.write(text, [left + inset, top + down], Size::Caption);
+                }
                 if let Some(bar) = &figure.bar {
-                    draw_bar(&mut sheet, bar, [left, top + height + Size::Caption.height() + 14], width);
+                    draw_bar(&mut sheet, bar, [left, top + height + caption_height + 14], width);
                 }
                 left += width + GAP;
                 progress();

@@ -41,8 +41,23 @@ impl Size {
         text.chars().count() * self.letter()
     }
 
+    /// The text in lines of at most this width, broken at spaces; a longer word is shortened in its middle.
+    pub(super) fn wrapped(self, text: &str, width: usize) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        for word in text.split_whitespace().map(|word| self.shortened(word, width)) {
+            match lines.last_mut() {
+                Some(line) if self.width(line) + self.width(&word) + self.letter() <= width => {
+                    line.push(' ');
+                    line.push_str(&word);
+                }
+                _ => lines.push(word),
+            }
+        }
+        lines
+    }
+
     /// The text, shortened in its middle to this width.
-    pub(super) fn shortened(self, text: &str, width: usize) -> String {
+    fn shortened(self, text: &str, width: usize) -> String {
         let (letters, room): (Vec<char>, _) = (text.chars().collect(), width / self.letter());
         if letters.len() <= room {
             return text.to_owned();
@@ -129,14 +144,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_is_as_wide_as_its_letters_and_is_shortened_in_the_middle() {
+    fn a_text_is_as_wide_as_its_letters_and_is_broken_at_spaces() {
         let mut sheet = Pixels::white([200, 40]);
         sheet.write("|µm²–|", [10, 4], Size::Caption);
         let dark = |column: usize| (0..40).any(|row| sheet.pixels[row * 200 + column][0] < 128);
         let width = Size::Caption.width("|µm²–|");
         assert!((10..10 + width).any(dark) && !(0..10).any(dark) && !(10 + width..200).any(dark));
-        let short = Size::Tick.shortened("a very long name of a table, 66 PARTs", Size::Tick.width("123456789012"));
-        assert_eq!(short, "a ver..PARTs");
+        let lines = Size::Tick.wrapped("a very long name of a-table-with-hyphens", Size::Tick.width("123456789012"));
+        assert_eq!(lines, ["a very long", "name of", "a-tab..phens"]);
+        assert!(Size::Tick.wrapped("", 100).is_empty());
     }
 
     #[test]
