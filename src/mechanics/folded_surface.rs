@@ -161,7 +161,7 @@ pub(crate) fn folded_surface(
     let mut positions = drawn(x, &normals, &moves);
     let still: Vec<bool> = moves.iter().zip(&cloth.held).map(|(&d, &held)| held || d == 0.0).collect();
     positions.iter_mut().zip(x).zip(&still).filter(|(_, still)| **still).for_each(|((moved, x), _)| *moved = *x);
-    Clearance::new(x, surface).push_out(body, &still, &cloth.offsets, &mut positions);
+    Clearance::new(x, &surface).push_out(body, &still, &cloth.offsets, &mut positions);
     FoldedSurface { positions, counts }
 }
 

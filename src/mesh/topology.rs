@@ -3,11 +3,9 @@
 //! Edges are sorted by (smaller vertex, larger vertex); neighbours are sorted by index; so everything that iterates over
 //! them sums in the same order on any number of threads.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
-use ordered_float::OrderedFloat;
 
 use super::csr::Csr;
 use super::{TriMesh, pieces};
@@ -140,7 +138,16 @@ impl Topology {
     }
 }
 
+/// Buckets of a [`Dijkstra`] at most; the last one holds all vertices that are farther.
+const MAX_BUCKETS: usize = 1 << 16;
+
+/// Edges whose mean length is the width of a bucket.
+const SAMPLED_EDGES: usize = 256;
+
 /// Dijkstra's algorithm along the edges of a mesh, its memory kept from run to run.
+///
+/// Vertices wait in buckets of equal width for a heap: within a bucket a vertex may be visited more than once, and the distances are
+/// the same. Source: Meyer and Sanders: "Δ-stepping: a parallelizable shortest path algorithm" (2003).
 pub(crate) struct Dijkstra<'a> {
     pub(crate) topology: &'a Topology,
     /// Positions of the vertices, m.
@@ -151,14 +158,22 @@ pub(crate) struct Dijkstra<'a> {
     pub(crate) source: Vec<u32>,
     /// The vertices reached, sources first.
     pub(crate) reached: Vec<u32>,
-    heap: BinaryHeap<Reverse<(OrderedFloat<f64>, u32)>>,
+    /// Vertices with the distances at which they were added; all empty between runs.
+    buckets: Vec<Vec<(f64, u32)>>,
+    /// Buckets in 1 m.
+    buckets_per_m: f64,
 }
 
 impl<'a> Dijkstra<'a> {
     pub(crate) fn new(topology: &'a Topology, positions: &'a [DVec3]) -> Self {
         let n = positions.len();
         let (distance, source) = (vec![f64::INFINITY; n], vec![0; n]);
-        Self { topology, positions, distance, source, reached: Vec::new(), heap: BinaryHeap::new() }
+        let edges = topology.edges.iter().step_by(topology.edges.len() / SAMPLED_EDGES + 1);
+        let (sum, count) = edges.fold((0.0, 0.0), |(sum, count), &[a, b]| {
+            (sum + positions[a as usize].distance(positions[b as usize]), count + 1.0)
+        });
+        let buckets_per_m = count / f64::max(sum, f64::MIN_POSITIVE);
+        Self { topology, positions, distance, source, reached: Vec::new(), buckets: Vec::new(), buckets_per_m }
     }
 
     /// Computes the distances from `sources` over `allowed` vertices, below `limit`, m.
@@ -170,9 +185,14 @@ impl<'a> Dijkstra<'a> {
             self.distance[v as usize] = 0.0;
             self.source[v as usize] = v;
             self.reached.push(v);
-            self.heap.push(Reverse((OrderedFloat(0.0), v)));
+            self.add(0.0, v);
         }
-        while let Some(Reverse((OrderedFloat(d), v))) = self.heap.pop() {
+        let mut at = 0;
+        while at < self.buckets.len() {
+            let Some((d, v)) = self.buckets[at].pop() else {
+                at += 1;
+                continue;
+            };
             if d > self.distance[v as usize] {
                 continue;
             }
@@ -185,10 +205,18 @@ impl<'a> Dijkstra<'a> {
                     }
                     self.distance[w as usize] = there;
                     self.source[w as usize] = self.source[v as usize];
-                    self.heap.push(Reverse((OrderedFloat(there), w)));
+                    self.add(there, w);
                 }
             }
         }
+    }
+
+    fn add(&mut self, distance: f64, v: u32) {
+        let bucket = ((distance * self.buckets_per_m) as usize).min(MAX_BUCKETS - 1);
+        if bucket >= self.buckets.len() {
+            self.buckets.resize_with(bucket + 1, Vec::new);
+        }
+        self.buckets[bucket].push((distance, v));
     }
 }
 
@@ -209,6 +237,32 @@ mod tests {
         assert_eq!(topology.neighbours(2), [0, 1, 3]);
         assert_eq!(topology.boundary_loops(), [vec![0, 1, 2, 3]]);
         assert_eq!(topology.components().1, 1);
+    }
+
+    #[test]
+    fn distances_from_buckets_are_the_shortest_along_edges() {
+        // A folded sheet of 30 by 30 with uneven edges, against relaxation until nothing changes (Bellman and Ford).
+        let at = |i: f64, j: f64| DVec3::new(i + 0.4 * (3.0 * j).sin(), j * j / 30.0, (0.7 * i * j).sin());
+        let mesh = crate::mesh::samples::sheet(30, 30, at);
+        let topology = Topology::new(&mesh);
+        let mut dijkstra = Dijkstra::new(&topology, &mesh.positions);
+        for (sources, limit) in [(vec![0, 700], f64::INFINITY), (vec![444], 6.0)] {
+            dijkstra.run(&sources, limit, |v| v % 11 != 3);
+            let mut expected = vec![f64::INFINITY; mesh.vertex_count()];
+            sources.iter().for_each(|&v| expected[v as usize] = 0.0);
+            let mut changes = true;
+            while std::mem::take(&mut changes) {
+                for (a, b) in topology.edges.iter().flat_map(|&[a, b]| [(a, b), (b, a)]) {
+                    let length = mesh.positions[a as usize].distance(mesh.positions[b as usize]);
+                    let there = expected[a as usize] + length;
+                    if b % 11 != 3 && there < limit && there < expected[b as usize] {
+                        (expected[b as usize], changes) = (there, true);
+                    }
+                }
+            }
+            assert_eq!(dijkstra.distance, expected);
+            assert_eq!(dijkstra.reached.len(), expected.iter().filter(|d| d.is_finite()).count());
+        }
     }
 
     #[test]

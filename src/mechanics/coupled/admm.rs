@@ -33,10 +33,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::elements::{Half, Near, Touch, padded, position, unpadded};
+use super::clearance::TangentPlane;
+use super::elements::{Half, Touch, padded, position, unpadded};
 use super::motions::Motions;
 use super::part_matrix::{PartFactor, PartMatrix};
-use super::sampling::{parts_of, sample};
+use super::sampling::{sampled_triangles, sampled_vertices};
 use crate::GRAVITY;
 use crate::body::distance::{Body, SurfacePoint};
 use crate::mechanics::energy::Cloth;
@@ -64,11 +65,6 @@ const VERTICES_PER_ROOT: f64 = 1.5;
 /// Distance to the body at the start, beyond that of the nearest vertex, within which vertices touch it, m. The penalty slows cloth that does not touch: with all vertices in
 /// it, dresses end 5 to 10 mm farther off.
 const NEAR_M: f64 = 0.03;
-
-/// Distance that a vertex moves before its tangent plane of the body is updated, m, and the share of its distance to the body that
-/// replaces it where larger. Heuristic: a larger one saves queries and makes contact on curved skin less accurate.
-const PLANE_RADIUS_M: f64 = 2e-3;
-const PLANE_RADIUS_SHARE: f64 = 0.3;
 
 /// Forces of the elements on the vertices, N.
 #[derive(Debug, Clone)]
@@ -110,20 +106,18 @@ impl<'a> Admm<'a> {
     ) -> Result<Self, SolveError> {
         let tension = cloth.weight / cloth.areas.iter().sum::<f64>() * height_m;
         let (penalty, contact_penalty) = (MEMBRANE_PENALTY * tension, CONTACT_PENALTY * tension);
-        let rate = |per_root: f64| move |size: f64| per_root / size.sqrt();
         let parts = motions.first.len();
         let (functions, (triangles, vertices)) = rayon::join(
             || motions.functions_at(start),
             || {
-                let of_triangle = parts_of(&motions.weights, &cloth.triangles);
-                let triangles = sample(parts, &of_triangle, rate(TRIANGLES_PER_ROOT));
                 let near_m = NEAR_M + surface.iter().map(|s| s.signed_distance).fold(f64::INFINITY, f64::min).max(0.0);
-                let mut near_part = Csr::default();
-                for (v, s) in surface.iter().enumerate() {
-                    let heaviest = motions.weights.of(v).iter().max_by(|a, b| a.1.total_cmp(&b.1));
-                    near_part.push(heaviest.filter(|_| s.signed_distance < near_m).map(|w| w.0));
-                }
-                (triangles, sample(parts, &near_part, rate(VERTICES_PER_ROOT)))
+                let heaviest = |(v, s): (usize, &SurfacePoint)| {
+                    let weights = motions.weights.of(v).iter().filter(|_| s.signed_distance < near_m);
+                    weights.max_by(|a, b| a.1.total_cmp(&b.1)).map(|w| w.0)
+                };
+                let near_part: Vec<Option<u32>> = surface.iter().enumerate().map(heaviest).collect();
+                let triangles = sampled_triangles(parts, &motions.weights, &cloth.triangles, TRIANGLES_PER_ROOT);
+                (triangles, sampled_vertices(parts, &near_part, VERTICES_PER_ROOT))
             },
         );
         let ((triangles_a, triangles_b), (vertices_a, vertices_b)) =
@@ -136,10 +130,10 @@ impl<'a> Admm<'a> {
         };
         let halves = rayon::join(|| half(triangles_a, vertices_a), || half(triangles_b, vertices_b));
         let halves = [halves.0, halves.1];
-        let assembled = || {
+        let assembled = |half: &Half| {
             let mut matrix = PartMatrix::new(&motions.first, &motions.count);
-            halves.iter().for_each(|half| half.assemble_membranes(&mut matrix));
-            halves.iter().for_each(|half| half.assemble_nears(contact_penalty, &mut matrix));
+            half.assemble_membranes(&mut matrix);
+            half.assemble_nears(contact_penalty, &mut matrix);
             matrix
         };
         let loads = || {
@@ -153,7 +147,9 @@ impl<'a> Admm<'a> {
             }
             (load, damping)
         };
-        let (matrix, (load, damping)) = rayon::join(assembled, loads);
+        let ((mut matrix, (load, damping)), second) =
+            rayon::join(|| (assembled(&halves[0]), loads()), || assembled(&halves[1]));
+        matrix.add_matrix(&second);
         let factor = matrix.factor(&damping)?;
         let q = vec![DVec3::ZERO; motions.unknowns()];
         Ok(Self { cloth, body, functions, halves, load, damping, penalty, contact_penalty, factor, q })
@@ -186,15 +182,17 @@ impl<'a> Admm<'a> {
     /// Restarts the maps from other positions x (m), keeping copies and multipliers.
     pub(super) fn rebase(&mut self, x: &[DVec3]) {
         self.q.fill(DVec3::ZERO);
-        for half in &mut self.halves {
+        let triangles = &self.cloth.triangles;
+        let restart = |half: &mut Half| {
             for membranes in &mut half.membranes {
-                membranes.start =
-                    membranes.numbers.map(|t| self.cloth.triangles[t as usize].deformation(x).map(padded));
+                membranes.start = membranes.numbers.map(|t| triangles[t as usize].deformation(x).map(padded));
             }
             for near in &mut half.nears {
                 near.start = x[near.vertex as usize];
             }
-        }
+        };
+        let [first, second] = &mut self.halves;
+        rayon::join(|| restart(first), || restart(second));
     }
 
     /// One iteration. Returns the root mean square change of the unknowns, m.
@@ -212,19 +210,16 @@ impl<'a> Admm<'a> {
         (square / self.q.len() as f64).sqrt()
     }
 
-    /// Updates the tangent planes of near vertices that have moved too far.
+    /// Renews the tangent planes of near vertices that have moved too far.
     fn update_planes(&mut self) {
-        let stale = |(touch, near): &(&mut Touch, &Near)| {
-            let radius = (PLANE_RADIUS_SHARE * (touch.plane.signed_distance - near.offset)).max(PLANE_RADIUS_M);
-            touch.position.distance_squared(touch.plane_at) > radius * radius
-        };
         let all = self.halves.iter_mut().flat_map(|half| half.touches.iter_mut().zip(&half.nears));
-        let stale: Vec<&mut Touch> = all.filter(stale).map(|(touch, _)| touch).collect();
         // At C, which is outside, and not at c: a vertex pulled deep into the body still leaves it where it entered.
+        let stale = all.filter(|(touch, near)| touch.plane.is_stale(touch.position, near.offset));
+        let stale: Vec<&mut Touch> = stale.map(|(touch, _)| touch).collect();
         let at: Vec<DVec3> = stale.iter().map(|touch| touch.position).collect();
         let hints: Vec<u32> = stale.iter().map(|touch| touch.plane.triangle).collect();
-        for (touch, found) in stale.into_iter().zip(self.body.nearest_all_from(&at, &hints)) {
-            (touch.plane_at, touch.plane) = (touch.position, found);
+        for ((touch, &at), found) in stale.into_iter().zip(&at).zip(&self.body.nearest_all_from(&at, &hints)) {
+            touch.plane = TangentPlane::new(at, found);
         }
     }
 

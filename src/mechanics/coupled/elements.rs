@@ -10,6 +10,7 @@
 
 use glam::DVec3;
 
+use super::clearance::TangentPlane;
 use super::local_step::TensionFields;
 use super::part_matrix::PartMatrix;
 use crate::base::simd::{Four, Lanes, Pack, Vectors, Work, run};
@@ -57,8 +58,7 @@ pub(super) struct Near {
 pub(super) struct Touch {
     pub(super) position: DVec3,
     pub(super) v: DVec3,
-    pub(super) plane_at: DVec3,
-    pub(super) plane: SurfacePoint,
+    pub(super) plane: TangentPlane,
     pub(super) anchor: DVec3,
 }
 
@@ -136,8 +136,7 @@ impl Half {
             self.touches.push(Touch {
                 position: start[v],
                 v: DVec3::ZERO,
-                plane_at: start[v],
-                plane: surface[v],
+                plane: TangentPlane::new(start[v], &surface[v]),
                 anchor: start[v],
             });
         }
@@ -208,7 +207,7 @@ impl Near {
     #[inline(always)]
     pub(super) fn separate(&self, touch: &mut Touch, x: DVec3) -> bool {
         let free = x + touch.v;
-        let depth = self.offset - touch.plane.signed_distance - touch.plane.normal.dot(free - touch.plane_at);
+        let depth = self.offset - touch.plane.distance(free);
         if depth <= 0.0 {
             (touch.position, touch.anchor) = (free, x);
             return false;

@@ -15,9 +15,11 @@
 //! too near.
 //!
 //! Source: Luo, Jiang and Cong's two stages, with one displacement a PART generalised to an affine map, and "the force from the adjacent
-//! PARTs" to the energy of the cloth between them. Limits: no folds, however narrow the PARTs; forces are sums over sampled elements.
+//! PARTs" to the energy of the cloth between them. Limits: no folds, however narrow the PARTs; forces are sums over sampled
+//! elements, shared between PARTs by the blending weights.
 
 mod admm;
+mod clearance;
 mod elements;
 mod folding;
 mod local_step;
@@ -30,6 +32,8 @@ mod weights;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+pub(super) use clearance::Clearance;
+pub use clearance::push_out;
 pub(crate) use folding::is_flat;
 use glam::DVec3;
 pub use motions::Motions;
@@ -41,14 +45,8 @@ use super::energy::Cloth;
 use crate::GRAVITY;
 use crate::body::distance::{Body, SurfacePoint};
 use crate::mesh::{Topology, TriMesh};
-use crate::parts::Parts;
+use crate::parts::{Parts, UNASSIGNED};
 use admm::Admm;
-
-/// Most moves of a vertex out of the body: the second is for narrow places (an armpit). Heuristic.
-const MAX_PUSHES: usize = 4;
-
-/// Share of its offset below which a vertex is pushed out; the rest is tolerance for rounding. Heuristic.
-const NEAR_SHARE: f64 = 0.875;
 
 /// The garment at one resolution.
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +119,7 @@ pub(crate) fn solve_from(
 
     let began = Instant::now();
     let mut positions = start.to_vec();
-    let mut clearance = Clearance::new(start, surface.to_vec());
+    let mut clearance = Clearance::new(start, surface);
     let limit = options.max_iterations as f64 * (parts.len() as f64 / PARTS_OF_LIMIT).sqrt().max(1.0);
     let limit = limit as usize;
     for iteration in 1..=limit {
@@ -136,22 +134,25 @@ pub(crate) fn solve_from(
         if ends {
             break;
         }
-        clearance.push_out(body, &cloth.held, &cloth.offsets, &mut positions);
+        clearance.push_out_of_planes(body, &cloth.held, &cloth.offsets, &mut positions);
         admm.rebase(&positions);
     }
     let forces = admm.forces();
     let residual_over_weight = admm.residual_over_weight(&forces);
     let pushed_out = clearance.push_out(body, &cloth.held, &cloth.offsets, &mut positions);
-    let results = parts.map(|_, part| {
-        let over = |of: &dyn Fn(usize) -> DVec3| -> DVec3 { part.vertices.iter().map(|&v| of(v as usize)).sum() };
-        let reaction = over(&|v| forces.body[v]);
+    let gravity = |v: usize| DVec3::NEG_Z * (cloth.masses[v] * GRAVITY);
+    let pull = |v: usize| if cloth.held[v] { DVec3::ZERO } else { forces.cloth[v] };
+    let [gravity, reaction, pull] =
+        [&gravity as Field<'_>, &|v| forces.body[v], &pull].map(|force| on_parts(parts, &motions.weights, force));
+    let results = parts.map(|p, part| {
+        let displacement: DVec3 = part.vertices.iter().map(|&v| positions[v as usize] - start[v as usize]).sum();
         PartResult {
-            displacement: over(&|v| positions[v] - start[v]) / part.vertices.len() as f64,
-            gravity: over(&|v| DVec3::NEG_Z * (cloth.masses[v] * GRAVITY)),
-            reaction,
-            pull: over(&|v| if cloth.held[v] { DVec3::ZERO } else { forces.cloth[v] }),
-            resultant: reaction.length(),
-            in_contact: reaction != DVec3::ZERO,
+            displacement: displacement / part.vertices.len() as f64,
+            gravity: gravity[p],
+            reaction: reaction[p],
+            pull: pull[p],
+            resultant: reaction[p].length(),
+            in_contact: reaction[p] != DVec3::ZERO,
             held: part.vertices.iter().any(|&v| cloth.held[v as usize]),
         }
     });
@@ -166,52 +167,23 @@ pub(crate) fn solve_from(
     })
 }
 
+/// A force at each vertex, N.
+type Field<'a> = &'a dyn Fn(usize) -> DVec3;
+
+/// The forces on the PARTs: the force at a vertex is shared by its weights, so forces that balance in the PARTs' coordinates cancel on every
+/// PART. A held vertex has no weights and counts for its own PART.
+fn on_parts(parts: &Parts, weights: &Weights, force: Field<'_>) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; parts.len()];
+    for v in 0..weights.len() {
+        let held = [(parts.part_of_vertex[v], 1.0)];
+        let shares = if weights.of(v).is_empty() { &held } else { weights.of(v) };
+        for &(p, share) in shares.iter().filter(|share| share.0 != UNASSIGNED) {
+            sums[p as usize] += force(v) * share;
+        }
+    }
+    sums
+}
+
 fn check(what: &'static str, found: usize, expected: usize) -> Result<(), CoupledError> {
     if found == expected { Ok(()) } else { Err(CoupledError::Count { what, found, expected }) }
-}
-
-/// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
-pub fn push_out(body: &Body, held: &[bool], offsets_m: &[f64], positions: &mut [DVec3]) -> usize {
-    let mut clearance = Clearance::new(positions, body.nearest_all(positions));
-    clearance.push_out(body, held, offsets_m, positions)
-}
-
-/// The last known point of the body of each vertex. A vertex that has moved by less than its distance since does not touch the body.
-pub(super) struct Clearance {
-    /// Position of each vertex at its last query, m.
-    at: Vec<DVec3>,
-    surface: Vec<SurfacePoint>,
-}
-
-impl Clearance {
-    /// The vertices at these positions (m) with their points of the body.
-    pub(super) fn new(at: &[DVec3], surface: Vec<SurfacePoint>) -> Self {
-        Self { at: at.to_vec(), surface }
-    }
-
-    /// Moves every vertex that is not held to at least its offset (m) from the body; returns how many moved.
-    pub(super) fn push_out(&mut self, body: &Body, held: &[bool], offsets_m: &[f64], x: &mut [DVec3]) -> usize {
-        let clear = |v: usize| held[v] || self.surface[v].signed_distance - x[v].distance(self.at[v]) > offsets_m[v];
-        let mut left: Vec<u32> = (0..x.len()).filter(|&v| !clear(v)).map(|v| v as u32).collect();
-        let mut moved = 0;
-        for push in 0..MAX_PUSHES {
-            let points: Vec<DVec3> = left.iter().map(|&v| x[v as usize]).collect();
-            let hints: Vec<u32> = left.iter().map(|&v| self.surface[v as usize].triangle).collect();
-            let mut found = body.nearest_all_from(&points, &hints).into_iter();
-            left.retain(|&v| {
-                let v = v as usize;
-                let Some(near) = found.next() else { return false };
-                (self.at[v], self.surface[v]) = (x[v], near);
-                let inside = near.signed_distance < NEAR_SHARE * offsets_m[v];
-                if inside {
-                    x[v] += near.normal * (offsets_m[v] - near.signed_distance);
-                }
-                inside
-            });
-            if push == 0 {
-                moved = left.len();
-            }
-        }
-        moved
-    }
 }

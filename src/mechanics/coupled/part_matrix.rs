@@ -69,20 +69,26 @@ impl PartMatrix {
                 let q = self.part_of_unknown[unknowns[j] as usize];
                 let columns = usize::from(self.count[q as usize]);
                 if self.first[q as usize] <= self.first[p] {
-                    let row = &mut self.rows[p];
-                    let at = row.iter().position(|e| e.0 == q).unwrap_or_else(|| {
-                        row.push((q, [0.0; 16]));
-                        row.len() - 1
-                    });
+                    let block = block_of(&mut self.rows[p], q);
                     for a in 0..rows {
                         for b in 0..columns {
-                            row[at].1[4 * a + b] += value(i + a, j + b);
+                            block[4 * a + b] += value(i + a, j + b);
                         }
                     }
                 }
                 j += columns;
             }
             i += rows;
+        }
+    }
+
+    /// Adds another matrix of the same unknowns.
+    pub(super) fn add_matrix(&mut self, other: &Self) {
+        for (row, others) in self.rows.iter_mut().zip(&other.rows) {
+            for &(q, block) in others {
+                let sum = block_of(row, q);
+                sum.iter_mut().zip(block).for_each(|(sum, value)| *sum += value);
+            }
         }
     }
 
@@ -120,6 +126,15 @@ impl PartMatrix {
         let index = sums.iter().position(|sum| !(sum.is_finite() && *sum >= 0.0)).unwrap_or(0);
         factored(diagonal.len(), &entries).ok_or(SolveError::NotPositive { index })
     }
+}
+
+/// The entries with PART q in the row of a PART.
+fn block_of(row: &mut Vec<(u32, [f64; 16])>, q: u32) -> &mut [f64; 16] {
+    let at = row.iter().position(|block| block.0 == q).unwrap_or_else(|| {
+        row.push((q, [0.0; 16]));
+        row.len() - 1
+    });
+    &mut row[at].1
 }
 
 /// Factors a matrix given by its lower triangle; `None` where it is not positive definite.

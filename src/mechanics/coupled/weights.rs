@@ -1,6 +1,6 @@
 //! Blending weights: how much of each PART's motion a vertex takes.
 //!
-//! w_p(v) = κ(δ_p(v)/b_p) / Σ_q κ(δ_q(v)/b_q), κ(t) = (1 − t)² for t < 1, else 0,
+//! w_p(v) = κ(δ_p(v)/r b_p) / Σ_q κ(δ_q(v)/r b_q), κ(t) = (1 − t)² for t < 1, else 0,
 //!
 //! with δ_p(v) the distance from v to PART p along garment edges, zero on p itself, and b_p p's half-width: how far its innermost
 //! vertex is from its seams. So two PARTs share a seam in halves, with one slope on both sides of it, and no farther
@@ -24,8 +24,9 @@ use rayon::prelude::*;
 use crate::mesh::{Csr, Dijkstra, Topology};
 use crate::parts::{Parts, UNASSIGNED};
 
-/// Weights under this share are left out: they cost as much as any and move nothing.
-const MIN_WEIGHT: f64 = 0.03;
+/// r: reach of a PART in half-widths. A larger one has more PARTs at a vertex and takes longer: with 1, local steps take a tenth more time, and
+/// 120 settings of the dial have the same error on average (0.95 to 1.05 times).
+const REACH: f64 = 0.85;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -76,8 +77,6 @@ impl Bands {
             row.clear();
             row.extend_from_slice(rows.of(v));
             let sum: f64 = row.iter().map(|e| e.1).sum();
-            row.retain(|e| e.1 >= MIN_WEIGHT * sum);
-            let sum: f64 = row.iter().map(|e| e.1).sum();
             row.sort_unstable_by_key(|e| e.0);
             weights.0.push(row.iter().map(|&(p, kernel)| (p, kernel / sum)));
         }
@@ -94,6 +93,11 @@ impl Weights {
     #[must_use]
     pub fn new(topology: &Topology, placed: &[DVec3], parts: &Parts) -> Self {
         Bands::default().weights(topology, placed, parts)
+    }
+
+    /// Number of vertices.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
     }
 
     /// PARTs and weights of a vertex, by PART number.
@@ -145,11 +149,12 @@ fn band(dijkstra: &mut Dijkstra<'_>, owner: &[u32], p: u32, members: &[u32]) -> 
     // The seam runs half an edge beyond the PART's own vertices.
     let half = 0.5 * sum / count;
     dijkstra.run(&seam, f64::INFINITY, inside);
-    let reach = half + dijkstra.reached.iter().map(|&v| dijkstra.distance[v as usize]).fold(0.0, f64::max);
-    dijkstra.run(&seam, reach + half, |v| !inside(v));
+    let half_width = half + dijkstra.reached.iter().map(|&v| dijkstra.distance[v as usize]).fold(0.0, f64::max);
+    let reach = REACH * half_width;
+    dijkstra.run(&seam, half + reach, |v| !inside(v));
     let kernel = |v: u32| {
         let t = (dijkstra.distance[v as usize] - half).max(0.0) / reach;
-        (!inside(v) && t < 1.0).then_some((v, (1.0 - t) * (1.0 - t)))
+        (!inside(v)).then_some((v, (1.0 - t) * (1.0 - t)))
     };
     dijkstra.reached.iter().filter_map(|&v| kernel(v)).collect()
 }

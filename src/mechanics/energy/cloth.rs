@@ -40,11 +40,11 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that compresses half the thickness of the cloth, Pa. 2 kPa is the pressure of a tight elastic garment (compression
 /// stockings: 2 to 5 kPa), so a looser garment stays well off the skin.
-const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
+pub(super) const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
 
 /// Smallest radius of curvature of the body at which contact at vertices also keeps triangles outside, m: the ridge of a shoulder, the
 /// apex of the bust.
-const MIN_BODY_RADIUS_M: f64 = 0.03;
+pub(crate) const MIN_BODY_RADIUS_M: f64 = 0.03;
 
 /// Largest distance that a coarse mesh adds to the offset, m: the gap that cloth simulators commonly keep.
 const MAX_SAG_M: f64 = 3e-3;

@@ -30,8 +30,8 @@ mod proximity;
 pub mod sparsity;
 mod vertex_ring;
 
-pub(crate) use cloth::ContactBlock;
 pub use cloth::{Cloth, Scratch};
+pub(crate) use cloth::{ContactBlock, MIN_BODY_RADIUS_M};
 pub use contact::Contacts;
 pub(crate) use contact::FaceUpdate;
 pub use error::EnergyError;
