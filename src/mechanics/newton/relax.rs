@@ -24,8 +24,8 @@ use super::vectors::{self, MEMORY, Pair};
 use crate::mechanics::energy::membrane::outer;
 use crate::mechanics::energy::{Cloth, Contacts, Scratch};
 
-/// The share of the predicted decrease that an iteration must bring.
-const ARMIJO: f64 = 1e-4;
+/// Armijo's constant: the share of the predicted decrease that an iteration or a step must bring.
+pub(super) const ARMIJO: f64 = 1e-4;
 
 /// Shorter than this share of an iteration is rounding.
 const MIN_STEP_LENGTH: f64 = 1e-3;

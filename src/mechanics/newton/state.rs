@@ -5,13 +5,10 @@ use glam::{DMat3, DVec3};
 use super::extrapolation::Extrapolation;
 use super::factor::SolveError;
 use super::full_space::{FullSpace, State};
-use super::relax::Relaxation;
+use super::relax::{ARMIJO, Relaxation};
 use crate::mechanics::energy::{Cloth, Contacts, Scratch, StepCheck};
 use crate::mechanics::linear_algebra::{dot, norm};
 use crate::mechanics::solver_options::SolverOptions;
-
-/// Armijo's constant: the share of the predicted decrease that a step must bring.
-const ARMIJO: f64 = 1e-4;
 
 /// Step length below which the line search ends: rounding.
 const MIN_STEP_LENGTH: f64 = 1e-6;

@@ -1,7 +1,6 @@
 //! Levenberg's damping ε from step to step.
 //!
-//! ε falls while whole steps succeed, faster near rest, where only the softest directions are left, and grows where the line search cuts a
-//! step short (Levenberg 1944, Marquardt 1963). Its unit is g/L, the square of the frequency at which a garment of length L swings:
+//! ε falls while whole steps succeed, and grows where the line search cuts a step short (Levenberg 1944, Marquardt 1963). Its unit is g/L, the square of the frequency at which a garment of length L swings:
 //! cloth with this damping moves by about L in a step under its own weight.
 //!
 //! | symbol | meaning | unit |
@@ -41,13 +40,11 @@ impl Damping {
         self.unit * self.options.min_damping
     }
 
-    /// The damping after a step of which this share was taken, with this residual over weight after it; 1/s².
-    pub(super) fn after_step(&self, damping: f64, share: f64, residual: f64) -> f64 {
+    /// The damping after a step of which this share was taken, 1/s².
+    pub(super) fn after_step(&self, damping: f64, share: f64) -> f64 {
         let options = &self.options;
         if share >= 1.0 {
-            let near_rest = residual < options.near_rest;
-            let less = if near_rest { options.damping_decrease_near_rest } else { options.damping_decrease };
-            (damping * less).max(self.least())
+            (damping * options.damping_decrease).max(self.least())
         } else if share < options.short_step {
             (damping * options.damping_increase).min(self.unit * options.max_damping)
         } else {
@@ -64,12 +61,11 @@ mod tests {
     fn damping_falls_with_whole_steps_grows_with_short_ones_and_keeps_its_bounds() {
         let damping = Damping { options: NewtonOptions::default(), unit: 10.0 };
         let first = damping.initial(false);
-        let after = |value, share, residual| damping.after_step(value, share, residual);
-        assert!(after(first, 1.0, 1.0) < first && after(first, 1.0, 1e-4) < after(first, 1.0, 1.0));
-        assert!(after(first, 0.1, 1.0) > first && after(first, 0.6, 1.0) == first);
-        assert_eq!(after(damping.least(), 1.0, 1e-4), damping.least());
+        let after = |value, share| damping.after_step(value, share);
+        assert!(after(first, 1.0) < first && after(first, 0.1) > first && after(first, 0.6) == first);
+        assert_eq!(after(damping.least(), 1.0), damping.least());
         let most = 10.0 * NewtonOptions::default().max_damping;
-        assert_eq!(after(most, 0.1, 1.0), most);
+        assert_eq!(after(most, 0.1), most);
         assert!(damping.initial(true) < first);
     }
 }

@@ -249,8 +249,7 @@ impl Settling<'_, '_, '_> {
             self.descent.evaluate();
             self.stall = StallDetection::default();
         } else {
-            let NewtonState { damping: before, residual, .. } = self.descent;
-            self.descent.damping = self.damping.after_step(before, advance.share, residual);
+            self.descent.damping = self.damping.after_step(self.descent.damping, advance.share);
         }
         self.cycles.after_step(&mut self.descent);
         if advance.accepted {
