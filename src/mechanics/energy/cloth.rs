@@ -40,7 +40,7 @@ use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Contact pressure that compresses half the thickness of the cloth, Pa. 2 kPa is the pressure of a tight elastic garment (compression
 /// stockings: 2 to 5 kPa), so a looser garment stays well off the skin.
-pub(super) const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
+const HALF_THICKNESS_PRESSURE: f64 = 2000.0;
 
 /// Smallest radius of curvature of the body at which contact at vertices also keeps triangles outside, m: the ridge of a shoulder, the
 /// apex of the bust.

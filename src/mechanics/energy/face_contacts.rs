@@ -16,13 +16,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::cloth::HALF_THICKNESS_PRESSURE;
 use super::membrane::Triangle;
 use super::proximity::gap::{Gap, Key, Kind};
 use crate::body::distance::{Body, OUTWARD, SurfacePoint};
 use crate::mechanics::solver_options::FaceContactOptions;
 use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{NONE, TriMesh, lattice};
+
+/// Pressure that compresses half the offset, Pa: the value used for contact at vertices.
+const HALF_OFFSET_PRESSURE: f64 = 2000.0;
 
 /// A contact place within a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -207,7 +209,7 @@ impl FaceContacts {
         let (corners, longest) = (triangle.vertices, triangle.longest_side_m());
         let options = self.options;
         let offset = place_offset(&self.thickness, triangle, &options);
-        let stiffness = 2.0 * HALF_THICKNESS_PRESSURE / offset * triangle.area / 3.0;
+        let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
         let all: Vec<Place> =
             lattice::lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
