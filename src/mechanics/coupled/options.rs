@@ -92,7 +92,7 @@ impl Default for CoupledOptions {
 pub struct PartResult {
     /// Mean displacement of its vertices from their start, D, m.
     pub displacement: DVec3,
-    /// Its weight F⁰, N.
+    /// Its weight F⁰, N: the force at a vertex is shared by the blending weights of its PARTs, here and below.
     pub gravity: DVec3,
     /// The body's reaction on it, friction included, F¹, N.
     pub reaction: DVec3,
