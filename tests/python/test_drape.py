@@ -142,6 +142,8 @@ def test_a_panic_is_an_exception() -> None:
 
 
 def test_ctrl_c_ends_a_drape() -> None:
+    # A shell without job control starts background processes with SIGINT ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     began = threading.Event()
 
     def interrupt() -> None:
