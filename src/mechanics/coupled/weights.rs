@@ -24,8 +24,8 @@ use rayon::prelude::*;
 use crate::mesh::{Csr, Dijkstra, Topology};
 use crate::parts::{Parts, UNASSIGNED};
 
-/// r: reach of a PART in half-widths. A larger one has more PARTs at a vertex and takes longer: with 1, local steps take a tenth more time, and
-/// 120 settings of the dial have the same error on average (0.95 to 1.05 times).
+/// r: reach of a PART in half-widths. With 0.75 local steps take a tenth less time, and one of 120 settings of the dial ends 2 mm farther off; with
+/// 1 and weights under 3 % left out, they take as long.
 const REACH: f64 = 0.85;
 
 /// The PARTs that move each vertex, and by how much; sorted by PART.

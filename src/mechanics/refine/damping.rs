@@ -1,7 +1,7 @@
 //! Levenberg's damping ε from step to step.
 //!
-//! ε falls while whole steps succeed, and grows where the line search cuts a step short (Levenberg 1944, Marquardt 1963). Its unit is g/L, the square of the frequency at which a garment of length L swings:
-//! cloth with this damping moves by about L in a step under its own weight.
+//! ε falls while whole steps succeed, and grows where the line search cuts a step short (Levenberg 1944, Marquardt 1963). Its unit is g/L,
+//! the square of the frequency at which a garment of length L swings: cloth with this damping moves by about L in a step under its own weight.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
