@@ -24,8 +24,15 @@ use super::energy::{Cloth, ContactBlock, Contacts, HessianLayout, Scratch};
 use super::linear_algebra::{Basis, dot_flat, symmetric_eigen};
 use super::newton::Solver;
 
-/// Steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ later.
+/// Most steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ later.
 pub(crate) const MAX_LANCZOS_STEPS: usize = 40;
+
+/// Ratio of the residual of the smallest λ to it below which it is known: it is within this share of a true one, and by the square of it
+/// where the next one is far. Of eleven equilibria (1,000 to 6,463 vertices, two fabrics) nine reach it after 12 to 24 steps.
+const CONVERGED: f64 = 0.05;
+
+/// Steps between two checks of that.
+const CHECK_INTERVAL: usize = 4;
 
 /// Damping ε in B for that decision, 1/s²: under a thousandth of the squared frequency of hanging cloth (g over a metre).
 pub(crate) const LANCZOS_DAMPING: f64 = 1e-2;
@@ -101,6 +108,9 @@ impl HessianOperator<'_> {
         let size = max_steps.min(3 * n);
         // Row by row.
         let mut matrix = vec![0.0; size * size];
+        let ritz = |matrix: &[f64], steps: usize| {
+            symmetric_eigen((0..steps).flat_map(|i| matrix[i * size..][..steps].iter().copied()).collect(), steps)
+        };
         // A start without symmetry, the same on every machine: multiples of the golden section.
         let start = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let begin: Vec<DVec3> =
@@ -119,6 +129,13 @@ impl HessianOperator<'_> {
             if norm.is_nan() || norm <= EXHAUSTED * norm_before {
                 break;
             }
+            if steps > 0 && steps.is_multiple_of(CHECK_INTERVAL) {
+                let (values, shares) = ritz(&matrix, steps);
+                // The residual of the smallest Ritz value.
+                if norm * shares[0][steps - 1].abs() <= CONVERGED * values[0].abs() {
+                    break;
+                }
+            }
             y.iter_mut().for_each(|y| *y /= norm);
             let product = self.apply(&solver.upper(&y), &mut scratch);
             basis.push(std::mem::replace(&mut y, solver.lower(&product)));
@@ -129,8 +146,7 @@ impl HessianOperator<'_> {
             }
             steps += 1;
         }
-        let small: Vec<f64> = (0..steps).flat_map(|i| matrix[i * size..][..steps].iter().copied()).collect();
-        let (values, shares) = symmetric_eigen(small, steps);
+        let (values, shares) = ritz(&matrix, steps);
         let wanted = values.iter().filter(|l| **l < NEGATIVE_CURVATURE).count().max(1);
         let vector = |k: usize| shares.get(k).map_or(vec![DVec3::ZERO; n], |shares| solver.upper(&basis.times(shares)));
         let vectors = (0..wanted).map(vector).collect();

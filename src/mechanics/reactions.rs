@@ -259,11 +259,13 @@ fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> 
     // The rounded distance exceeds the exact one by less than the side of the lattice. The solver raises the offsets of vertices that are
     // inside by the exact one alone, so the smaller of the two decides.
     let margin = TOUCH_MARGIN_M + SIDE;
-    let mut contacts = cloth.new_contacts(body).with_margin(margin);
+    let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
+    let contacts = cloth.new_contacts(body).with_margin(margin);
+    let mut contacts = contacts.with_distances(x, distances.iter().copied());
     contacts.update(x);
     let touches = |t: &&Touch| {
         let v = t.vertex as usize;
-        t.depth > SIDE || body.nearest(x[v]).signed_distance < cloth.offsets[v] + TOUCH_MARGIN_M
+        t.depth > SIDE || distances[v] < cloth.offsets[v] + TOUCH_MARGIN_M
     };
     let of_vertex = |t: &Touch| {
         let friction = cloth.friction[t.vertex as usize];
@@ -272,7 +274,7 @@ fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> 
         Reaction { depth, ..Reaction::at(vec![(t.vertex, 1.0)], normal, t.stiffness, friction, true) }
     };
     let mut all: Vec<Reaction> = contacts.touches().iter().filter(touches).map(of_vertex).collect();
-    for place in cloth.face_contacts().touching_places(body, x, PLACE_MARGIN_M) {
+    for place in cloth.face_contacts().touching_places(body, x, &distances, PLACE_MARGIN_M) {
         let shares = || place.corners.into_iter().zip(place.shares);
         let mean = |of: &[f64]| shares().map(|(v, w)| of[v as usize] * w).sum::<f64>();
         let (stiffness, friction) = (contacts.stiffness() * mean(&cloth.areas), mean(&cloth.friction));

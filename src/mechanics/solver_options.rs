@@ -36,10 +36,9 @@ macro_rules! options {
 options! {
     /// Nested iteration: a large garment rests on coarser cloth first.
     NestedIterationOptions {
-        /// Vertices that a coarser garment must have to be brought to rest first. On one machine within hours, without and with: a knit
-        /// skirt of 64,000 vertices 77 and 20 s, a dress of 16,000 19.6 and 6.8 s (cotton 23 and 16); a pullover of 5,000, whose coarser one has
-        /// 1,275, would take 1.2 for 0.9 (cotton 3.3 for 2.4). A dress of 10,861 in cotton loses, 15 for 9, and one of 9,867 gains, 8 for 10.
-        min_vertices: usize = 1500,
+        /// Vertices that a coarser garment must have to be brought to rest first. Without and with, processor time: two garments of 16,000
+        /// vertices 54 and 23 s in knit (25 and 6 steps), 189 and 111 s in cotton; four of 6,463 to 10,861 12 and 14 s, and 44 and 43 s.
+        min_vertices: usize = 3000,
         /// Most steps on a coarser garment. A stiff one takes over a hundred to its rest, of which the first bring it into the right
         /// folds. With 80, five stiff garments of 16,000 take 239 steps at full resolution for 213.
         max_steps: usize = 20,
@@ -99,24 +98,20 @@ options! {
         damping_increase: f64 = 2.0,
         /// Share of its length below which a step is short.
         short_step: f64 = 0.3,
-        /// Residual over weight below which steps are extrapolated. Heuristic.
-        near_rest: f64 = 1e-2,
-        /// Largest extrapolation of a step near rest: see `newton::extrapolation`. With 2 six garments sewn from patterns take 316 steps together, with
+        /// Largest extrapolation of a step: see `newton::extrapolation`. With 2 six garments sewn from patterns take 316 steps together, with
         /// 1 379; fourteen built-in ones 304 and 305.
         max_extrapolation: f64 = 2.0,
         /// Cosine with the previous step above which a step continues it. Heuristic.
         continues_cosine: f64 = 0.8,
-        /// Most steps with the projected Hessian after one whose true Hessian was indefinite.
-        max_projected_steps: usize = 4,
     }
 
     /// Relaxation of steps by L-BFGS: see `newton::relax`.
     RelaxationOptions {
         /// Iterations at the start and after a step; 0 for none.
         iterations: usize = 20,
-        /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. With 25 the five
-        /// garments and two plain skirts of 4,000 and 16,000 vertices, all knit, take 42 steps together, with 60 31, with 80 34 (damping from 100).
-        trial_iterations: usize = 60,
+        /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. Ten garments of 1,000 to
+        /// 5,500 vertices take 109 steps in knit and 326 in cotton with 60, 94 and 229 with 120, in less time; with 160 some fewer, in as much.
+        trial_iterations: usize = 120,
         /// Most trials of a line search that are relaxed. Heuristic.
         max_trials: usize = 2,
         /// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that

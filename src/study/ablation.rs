@@ -48,7 +48,6 @@ const OFF: &[(&str, f64)] = &[
     ("softening.strain", 0.0),
     ("newton.stall_steps", 1e5),
     ("newton.max_extrapolation", 1.0),
-    ("newton.max_projected_steps", 1.0),
     ("relaxation.iterations", 0.0),
     ("relaxation.trial_iterations", 0.0),
     ("relaxation.max_trials", 0.0),

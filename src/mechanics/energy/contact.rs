@@ -150,7 +150,7 @@ impl<'b> Contacts<'b> {
     }
 
     /// The same with signed distances (m) of the vertices at `at` as the first query.
-    pub(super) fn with_distances(mut self, at: &[DVec3], distance_m: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn with_distances(mut self, at: &[DVec3], distance_m: impl Iterator<Item = f64>) -> Self {
         // The rounded distance is smaller than the exact one by at most the side of the lattice.
         let rounding = if matches!(self.obstacle, Obstacle::Rounded(_)) { SIDE } else { 0.0 };
         for (v, (x, distance)) in at.iter().zip(distance_m).enumerate() {

@@ -130,12 +130,18 @@ impl FaceContacts {
         Self { triangles, thickness, options, ..Self::default() }
     }
 
-    /// Lattice points of the triangles that lie within `margin` (m) of their offset from the body. Where the body rises between the points,
+    /// Lattice points of the triangles that lie within `margin` (m) of their offset from the body, for vertices at `x` and at these signed
+    /// distances (m). Where the body rises between the points,
     /// the solver raises their offset until it no longer crosses the triangle: the points of a triangle that itself is within `margin` of its
     /// offset therefore touch from up to `max_offset_raise_m` farther. The distance to the body is Lipschitz with constant one, so the
     /// distances of the corners exclude most points without a query.
-    pub(crate) fn touching_places(&self, body: &Body, x: &[DVec3], margin: f64) -> Vec<TouchingPlace> {
-        let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
+    pub(crate) fn touching_places(
+        &self,
+        body: &Body,
+        x: &[DVec3],
+        distances: &[f64],
+        margin: f64,
+    ) -> Vec<TouchingPlace> {
         let (triangles, options) = (&*self.triangles, &self.options);
         let reach = |t: &Triangle| place_offset(&self.thickness, t, options) + margin;
         let mut candidates: Vec<(usize, [f64; 3], DVec3)> = Vec::new();

@@ -1,7 +1,7 @@
 //! Newton steps of the whole cloth, every vertex its own unknown, and which Hessian they are taken with.
 //!
 //! The true Hessian ([`HessianKind::True`]) keeps compression up to the buckling stress of a triangle. It is closer to the energy and
-//! may be indefinite. Then the projected Hessian replaces it for a few steps, more each time.
+//! may be indefinite. Then the projected Hessian replaces it for this step, and after a rejected step for the next.
 
 use glam::{DMat3, DVec3};
 
@@ -31,10 +31,8 @@ pub(crate) struct FullSpace {
     pub(super) unknowns: Vec<DVec3>,
     /// Whether the last factorisation was of the true Hessian.
     is_true: bool,
-    /// Steps left to be taken with the projected Hessian.
-    projected_left: usize,
-    /// Number of them the last time.
-    projected_steps: usize,
+    /// Whether the next step takes the projected Hessian.
+    projects: bool,
 }
 
 impl FullSpace {
@@ -74,17 +72,9 @@ impl FullSpace {
         own: &mut Vec<DMat3>,
     ) -> Result<(), SolveError> {
         let State { cloth, x, .. } = *here;
-        let max_projected = cloth.solver.newton.max_projected_steps.max(1);
         self.couple(here);
-        let mut solved = false;
-        if self.projected_left == 0 {
-            solved = self.solve(here, HessianKind::True).is_ok();
-            self.projected_steps = if solved { 0 } else { (2 * self.projected_steps).clamp(1, max_projected) };
-            self.projected_left = self.projected_steps;
-        }
-        self.is_true = solved;
-        if !solved {
-            self.projected_left -= 1;
+        self.is_true = !std::mem::take(&mut self.projects) && self.solve(here, HessianKind::True).is_ok();
+        if !self.is_true {
             self.solve(here, HessianKind::Projected)?;
         }
         d.clear();
@@ -108,9 +98,9 @@ impl FullSpace {
         }
     }
 
-    /// After a rejected step: switches to the projected Hessian; returns whether the step had the true one.
-    pub(crate) fn fall_back(&mut self, cloth: &Cloth) -> bool {
-        self.projected_left = cloth.solver.newton.max_projected_steps.max(1);
+    /// After a rejected step: the next one takes the projected Hessian; returns whether this one had the true one.
+    pub(crate) fn fall_back(&mut self) -> bool {
+        self.projects = true;
         std::mem::take(&mut self.is_true)
     }
 }

@@ -67,8 +67,6 @@ pub(crate) struct NewtonState<'c, 'b> {
     pub(super) direction: Vec<DVec3>,
     pub(super) trial: Vec<DVec3>,
     pub(super) trial_gradient: Vec<DVec3>,
-    /// Largest factor by which a step that continues the previous one is extrapolated.
-    pub(crate) max_extrapolation: f64,
     pub(super) extrapolation: Extrapolation,
     pub(super) scratch: Scratch,
 }
@@ -90,7 +88,6 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             blocks: Vec::new(),
             direction: Vec::new(),
             trial_gradient: Vec::new(),
-            max_extrapolation: 1.0,
             extrapolation: Extrapolation::default(),
             scratch: Scratch::default(),
         };
@@ -147,7 +144,6 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             trial_gradient,
             scratch,
             step_share,
-            max_extrapolation,
             extrapolation,
             ..
         } = self;
@@ -157,7 +153,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let slope = dot(gradient, direction);
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (newton.longest_move_m / longest).min(1.0);
-        let mut t = (first * extrapolation.factor(direction, *max_extrapolation, newton.continues_cosine))
+        let mut t = (first * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
             .min(newton.longest_move_m / longest);
         let (mut relaxed, mut crossed) = (0, 0);
         let accepted = loop {

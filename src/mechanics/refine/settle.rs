@@ -217,7 +217,6 @@ impl Settling<'_, '_, '_> {
 
     /// One step, with what comes before and after it.
     fn step(&mut self) -> Result<State, SolveError> {
-        let newton = &self.cloth.solver.newton;
         if self.iteration >= self.limit {
             return Ok(State::Ended(Stop::StepsDone));
         }
@@ -229,12 +228,10 @@ impl Settling<'_, '_, '_> {
             let solver = self.descent.relax(|| analysed.unwrap_or_else(|| Solver::new(cloth.pattern())));
             self.tangent.solver = Some(solver);
         }
-        let near_rest = !self.soft && self.descent.residual < newton.near_rest;
-        self.descent.max_extrapolation = if near_rest { newton.max_extrapolation.max(1.0) } else { 1.0 };
         let advance = self.descent.advance(&mut self.tangent)?;
         self.iteration += usize::from(advance.accepted);
         // The true Hessian may give no direction of descent, and the softened cloth need not converge.
-        let astray = !advance.accepted && !self.tangent.fall_back(self.cloth);
+        let astray = !advance.accepted && !self.tangent.fall_back();
         if astray && !self.soft {
             let failed = self.rest.failed().filter(|_| self.descent.residual < self.tolerance);
             return Ok(State::Ended(failed.map_or(Stop::Stalled, Stop::Unsettled)));

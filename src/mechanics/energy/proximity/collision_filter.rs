@@ -95,11 +95,11 @@ impl CollisionFilter {
 
     /// Pairs of triangles that intersect at `x`.
     pub(super) fn crossing_at(&mut self, x: &[DVec3]) -> Vec<[u32; 2]> {
-        self.list.update(x);
-        let Self { surface, list, .. } = &*self;
-        let corners = |t: usize| surface.triangles[t].map(|v| x[v as usize]);
-        let crossing = list.pairs(0.0).filter(|&[t, u]| cross(corners(t), corners(u)));
-        let mut pairs: Vec<[u32; 2]> = crossing.map(|pair| pair.map(|t| t as u32)).collect();
+        let overlapping = self.list.overlapping(x);
+        let corners = |t: u32| self.surface.triangles[t as usize].map(|v| x[v as usize]);
+        let crossing = overlapping.into_par_iter().with_min_len(512).filter(|&[t, u]| cross(corners(t), corners(u)));
+        let mut pairs: Vec<[u32; 2]> = crossing.collect();
+        pairs.sort_unstable();
         // A sliver inverts by rounding, and then intersects its neighbours by its own height.
         pairs.retain(|pair| {
             let [a, b] = pair.map(|t| self.surface.triangles[t as usize]);
