@@ -24,11 +24,12 @@ use super::energy::{Cloth, ContactBlock, Contacts, HessianLayout, Scratch};
 use super::linear_algebra::{Basis, dot_flat, symmetric_eigen};
 use super::newton::Solver;
 
-/// Most steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ later.
+/// Most steps of Lanczos' method that decide whether an equilibrium is stable. Evidence: of some twenty searches none found a negative λ
+/// later.
 pub(crate) const MAX_LANCZOS_STEPS: usize = 40;
 
-/// Ratio of the residual of the smallest λ to it below which it is known: it is within this share of a true one, and by the square of it
-/// where the next one is far. Of eleven equilibria (1,000 to 6,463 vertices, two fabrics) nine reach it after 12 to 24 steps.
+/// Ratio of the residual of the smallest λ to it below which the search ends: an eigenvalue is within this share of it. Evidence: of thirteen
+/// searches each ends after 8 to 28 steps.
 const CONVERGED: f64 = 0.05;
 
 /// Steps between two checks of that.

@@ -23,7 +23,7 @@
 //! | r | unbalanced force ([`reactions`](crate::mechanics::reactions)) | N |
 //! | d | −B⁻¹ r: the next Newton step | m |
 //!
-//! Limits: contacts are fixed, so an instability that lifts cloth off the body is not detected; ω² comes from `MAX_LANCZOS_STEPS` steps of
+//! Limits: contacts are fixed, so an instability that lifts cloth off the body is not detected; ω² comes from at most `MAX_LANCZOS_STEPS` steps of
 //! Lanczos' method and is an upper bound.
 
 use glam::{DMat3, DVec3};

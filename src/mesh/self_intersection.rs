@@ -33,21 +33,30 @@ const CLEAR_SINE: f64 = 1e-6;
 /// corner do not.
 #[must_use]
 pub fn self_intersecting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
-    pairs(mesh, mesh, |t, u| t < u)
+    pairs(mesh, mesh, &tree_of(mesh), |t, u| t < u)
 }
 
 /// Pairs of a triangle of `a` and one of `b` that cross, sorted.
 #[must_use]
 pub fn crossing_pairs(a: &TriMesh, b: &TriMesh) -> Vec<[u32; 2]> {
-    pairs(a, b, |_, _| true)
+    crossing_pairs_in(a, b, &tree_of(b))
 }
 
-fn pairs(a: &TriMesh, b: &TriMesh, wanted: impl Fn(u32, u32) -> bool + Sync) -> Vec<[u32; 2]> {
+/// The same where the tree of `b` is there already.
+pub(crate) fn crossing_pairs_in(a: &TriMesh, b: &TriMesh, tree: &Bvh) -> Vec<[u32; 2]> {
+    pairs(a, b, tree, |_, _| true)
+}
+
+/// The boxes of the triangles of a mesh as a tree.
+pub(crate) fn tree_of(mesh: &TriMesh) -> Bvh {
+    let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|u| bounds(mesh, u)).collect();
+    Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes)
+}
+
+fn pairs(a: &TriMesh, b: &TriMesh, tree: &Bvh, wanted: impl Fn(u32, u32) -> bool + Sync) -> Vec<[u32; 2]> {
     if a.triangles.is_empty() || b.triangles.is_empty() {
         return Vec::new();
     }
-    let boxes: Vec<Aabb> = (0..b.triangles.len()).map(|u| bounds(b, u)).collect();
-    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
     (0..a.triangles.len())
         .into_par_iter()
         .with_min_len(128)

@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::SceneError;
 use crate::base::quantiles::Percentiles;
 use crate::body::distance::Body;
-use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{Topology, TriMesh};
 
 /// Largest distance, m, from the body to the nearest vertex of a garment that is worn: the loosest gown hangs from a
@@ -43,7 +42,7 @@ impl Placement {
         Self {
             penetrating_vertices: distance.iter().filter(|&&q| q < 0.0).count(),
             deepest_m: distance.iter().fold(0.0, |deepest, &q| f64::max(deepest, -q)),
-            crossing_pairs: crossing_pairs(garment, body.mesh()).len(),
+            crossing_pairs: body.crossing_pairs(garment).len(),
             clearance_m: Percentiles::of(&distance),
         }
     }

@@ -19,7 +19,6 @@ use crate::garment::MeshCache;
 use crate::garment::fabric::{Fabric, FabricError};
 use crate::mechanics::refine::Stop;
 use crate::mechanics::solver_options::SolverOptions;
-use crate::mesh::self_intersection::crossing_pairs;
 use crate::scene::{Scene, SceneError, SceneSpec};
 use crate::study::evaluate::perturbed;
 
@@ -50,7 +49,6 @@ const OFF: &[(&str, f64)] = &[
     ("newton.max_extrapolation", 1.0),
     ("relaxation.iterations", 0.0),
     ("relaxation.trial_iterations", 0.0),
-    ("relaxation.max_trials", 0.0),
     ("relaxation.max_rejected", 0.0),
     ("rest_check.max_checks", 0.0),
     ("cycles.max_residual", 0.0),
@@ -103,7 +101,7 @@ impl Case {
             steps: state.map_or(0, |state| state.steps),
             seconds,
             crossing: draped.self_intersecting_pairs,
-            through: crossing_pairs(&self.scene.garment.with_positions(draped.positions), self.scene.body.mesh()).len(),
+            through: self.scene.body.crossing_pairs(&self.scene.garment.with_positions(draped.positions)).len(),
             inside: draped.penetrating_vertices,
         }
     }

@@ -34,7 +34,7 @@ use serde::Serialize;
 
 use super::Body;
 use crate::mesh::lattice::{lattice, place};
-use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
+use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::mesh::{Topology, TriMesh, longest_side};
 
 /// Beyond this depth, m, the nearest surface may be that of the far side: half the thickness of a slender forearm.
@@ -264,7 +264,7 @@ pub(crate) fn pull_off_protrusions(body: &Body, garment: &TriMesh, held: &[bool]
 }
 
 fn protrusions(body: &Body, mesh: &TriMesh) -> Vec<Protrusion> {
-    let mut triangles: Vec<u32> = crossing_pairs(mesh, body.mesh()).into_iter().map(|[t, _]| t).collect();
+    let mut triangles: Vec<u32> = body.crossing_pairs(mesh).into_iter().map(|[t, _]| t).collect();
     triangles.dedup();
     triangles.into_iter().filter_map(|t| protrusion(body, mesh, t as usize)).collect()
 }

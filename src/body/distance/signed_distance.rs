@@ -27,9 +27,10 @@
 //! a covering cloth are those of its normals; in a pleat the nearest sheet decides.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use glam::{DVec3, IVec3};
+use parry3d_f64::partitioning::Bvh;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 use rayon::prelude::*;
@@ -37,6 +38,7 @@ use rayon::prelude::*;
 use super::tree::{Nearest, Tree};
 use crate::base::math;
 use crate::mesh::morton::along_a_curve;
+use crate::mesh::self_intersection::{crossing_pairs_in, tree_of};
 use crate::mesh::winding::signed_volumes;
 use crate::mesh::{Csr, Topology, TriMesh};
 
@@ -106,6 +108,8 @@ pub struct Body {
     /// Signed distances at lattice points that were computed before, m. A value depends on its point alone, so the cache
     /// does not change results.
     lattice: Arc<Mutex<HashMap<IVec3, f64>>>,
+    /// The boxes of the triangles, made at the first use.
+    boxes: Arc<OnceLock<Bvh>>,
 }
 
 /// A cloth that covers a body.
@@ -151,7 +155,7 @@ impl Body {
         let fans = || Csr::gathered(mesh.vertex_count(), corners);
         let (fans, tree) = rayon::join(fans, || Tree::new(mesh));
         let (mesh, fans, tree) = (Arc::new(mesh.clone()), Arc::new(fans), Arc::new(tree));
-        Ok(Self { mesh, fans, tree, cover: None, lattice: Arc::default() })
+        Ok(Self { mesh, fans, tree, cover: None, lattice: Arc::default(), boxes: Arc::default() })
     }
 
     /// The body half-way to another pose, `other`: each vertex at the mean of both. `None` where they are not one mesh.
@@ -177,6 +181,12 @@ impl Body {
     #[must_use]
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
+    }
+
+    /// Pairs of a triangle of `cloth` and one of the body, without a covering cloth, that cross; sorted.
+    #[must_use]
+    pub fn crossing_pairs(&self, cloth: &TriMesh) -> Vec<[u32; 2]> {
+        crossing_pairs_in(cloth, &self.mesh, self.boxes.get_or_init(|| tree_of(&self.mesh)))
     }
 
     /// The nearest surface point to a finite `x`.

@@ -38,7 +38,6 @@ use super::proximity::{Proximity, StepCheck};
 use crate::body::distance::{Body, pull_off_protrusions};
 use crate::mechanics::solver_options::BodyContactOptions;
 use crate::mesh::TriMesh;
-use crate::mesh::self_intersection::crossing_pairs;
 
 /// Distance from its foot up to which a tangent plane replaces the body, m. On a radius of 5 cm its error is then 0.04 mm.
 const PLANE_RADIUS_M: f64 = 2e-3;
@@ -326,7 +325,7 @@ impl<'b> Contacts<'b> {
     pub(crate) fn update_face_contacts(&mut self, x: &mut Vec<DVec3>) -> FaceUpdate {
         let Some(body) = self.body().filter(|_| !self.face_contacts.closed) else { return FaceUpdate::Unchanged };
         let garment = self.garment(std::mem::take(x));
-        let pairs = crossing_pairs(&garment, body.mesh());
+        let pairs = body.crossing_pairs(&garment);
         if !pairs.is_empty() && self.face_contacts.protrusions < self.options.max_protrusion_fixes {
             self.face_contacts.protrusions += 1;
             let moved = pull_off_protrusions(body, &garment, &self.held);
@@ -368,7 +367,7 @@ impl<'b> Contacts<'b> {
         let FaceContacts { closed: false, places, triangles, .. } = &self.face_contacts else { return 0 };
         let (false, Some(body)) = (places.is_empty(), self.body()) else { return 0 };
         let triangles = std::sync::Arc::clone(triangles);
-        let pairs = crossing_pairs(&self.garment(x.to_vec()), body.mesh());
+        let pairs = body.crossing_pairs(&self.garment(x.to_vec()));
         let mut intersecting: Vec<u32> = pairs.into_iter().map(|[t, _]| t).collect();
         intersecting.dedup();
         intersecting.into_iter().map(|t| self.face_contacts.add(&triangles[t as usize], body, x, true)).sum()

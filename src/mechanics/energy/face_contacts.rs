@@ -20,7 +20,6 @@ use super::membrane::Triangle;
 use super::proximity::gap::{Gap, Key, Kind};
 use crate::body::distance::{Body, OUTWARD, SurfacePoint};
 use crate::mechanics::solver_options::FaceContactOptions;
-use crate::mesh::self_intersection::crossing_pairs;
 use crate::mesh::{NONE, TriMesh, lattice};
 
 /// Pressure that compresses half the offset, Pa: the value used for contact at vertices.
@@ -105,7 +104,7 @@ fn near_triangles(
         }
     }
     let mut near = vec![false; triangles.len()];
-    crossing_pairs(&moved, body.mesh()).iter().for_each(|[copy, _]| near[numbers[*copy as usize]] = true);
+    body.crossing_pairs(&moved).iter().for_each(|[copy, _]| near[numbers[*copy as usize]] = true);
     near
 }
 

@@ -153,9 +153,10 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let slope = dot(gradient, direction);
         let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
         let first = (newton.longest_move_m / longest).min(1.0);
-        let mut t = (first * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
-            .min(newton.longest_move_m / longest);
-        let (mut relaxed, mut crossed) = (0, 0);
+        let mut t = (first
+            * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
+        .min(newton.longest_move_m / longest);
+        let mut crossed = 0;
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
@@ -163,8 +164,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             let bound = *energy + ARMIJO * t * slope;
             let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound;
             if !falls {
-                relaxed += usize::from(t <= first);
-                falls = relaxed <= relaxing.max_trials
+                falls = t >= first
                     && crossed < relaxing.max_rejected
                     && relaxing.trial_iterations > 0
                     && relaxation.run(cloth, contacts, trial, relaxing.trial_iterations) <= bound;

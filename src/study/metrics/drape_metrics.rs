@@ -8,7 +8,7 @@ use crate::base::quantiles::nearest_rank;
 use crate::drape::Drape;
 use crate::mechanics::fit::{CRUSHED_SHARE, TORN_PERCENT};
 use crate::mechanics::refine::Stop;
-use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
+use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::Scene;
 use crate::study::accuracy::{Accuracy, rms_mm};
 use crate::study::evaluate::Evaluation;
@@ -130,7 +130,7 @@ impl Metrics {
             displacement_rms_mm: rms_mm(&drape.positions, &scene.garment.positions),
             penetrating_vertices: drape.penetrating_vertices,
             penetration_mm: 1e3 * drape.penetration,
-            body_crossing_pairs: crossing_pairs(&draped, scene.body.mesh()).len(),
+            body_crossing_pairs: scene.body.crossing_pairs(&draped).len(),
             top_sank_mm,
             slid,
             self_intersecting_pairs: drape.self_intersecting_pairs,

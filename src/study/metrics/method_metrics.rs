@@ -6,7 +6,7 @@ use super::drape_metrics::Metrics;
 use super::faults::{SlidPart, sinking};
 use crate::mechanics::fit::{Fit, fit};
 use crate::mechanics::methods::{Ended, MethodDrape, MethodInput};
-use crate::mesh::self_intersection::{crossing_pairs, self_intersecting_pairs};
+use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::study::accuracy::{State, rms_mm};
 
 /// Metrics of one drape by a reference method. Names shared with [`Metrics`] have the same meaning; energy and pressure are those of
@@ -58,7 +58,7 @@ impl MethodMetrics {
             displacement_rms_mm: rms_mm(x, &scene.garment.positions),
             penetrating_vertices: state.penetrating_vertices,
             penetration_mm: state.penetration_mm,
-            body_crossing_pairs: crossing_pairs(&garment, scene.body.mesh()).len(),
+            body_crossing_pairs: scene.body.crossing_pairs(&garment).len(),
             self_intersecting_pairs: self_intersecting_pairs(&garment).len(),
             top_sank_mm,
             slid,

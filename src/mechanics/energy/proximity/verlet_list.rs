@@ -58,8 +58,7 @@ impl VerletList {
         boxes.clear();
         boxes.extend(surface.triangles.iter().map(|t| bounds(t, x)));
         let limit = 0.25 * *margin * *margin;
-        built_at.len() == x.len()
-            && built_at.iter().zip(x).all(|(before, now)| before.distance_squared(*now) <= limit)
+        built_at.len() == x.len() && built_at.iter().zip(x).all(|(before, now)| before.distance_squared(*now) <= limit)
     }
 
     /// The pairs whose present boxes are nearer than this, m: boxes enlarged by half of it overlap. The tree is built once, and its boxes
