@@ -49,6 +49,7 @@ const OFF: &[(&str, f64)] = &[
     ("newton.max_extrapolation", 1.0),
     ("relaxation.iterations", 0.0),
     ("relaxation.trial_iterations", 0.0),
+    ("relaxation.max_trials", 0.0),
     ("relaxation.max_rejected", 0.0),
     ("rest_check.max_checks", 0.0),
     ("cycles.max_residual", 0.0),

@@ -156,7 +156,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let mut t = (first
             * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
         .min(newton.longest_move_m / longest);
-        let mut crossed = 0;
+        let (mut relaxed, mut crossed) = (0, 0);
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
@@ -164,7 +164,8 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             let bound = *energy + ARMIJO * t * slope;
             let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound;
             if !falls {
-                falls = t >= first
+                relaxed += usize::from(t <= first);
+                falls = relaxed <= relaxing.max_trials
                     && crossed < relaxing.max_rejected
                     && relaxing.trial_iterations > 0
                     && relaxation.run(cloth, contacts, trial, relaxing.trial_iterations) <= bound;
