@@ -37,8 +37,9 @@ options! {
     /// Nested iteration: a large garment rests on coarser cloth first.
     NestedIterationOptions {
         /// Vertices that a coarser garment must have to be brought to rest first. Without and with, processor time: two garments of 16,000
-        /// vertices 54 and 23 s in knit (25 and 6 steps), 189 and 111 s in cotton; four of 6,463 to 10,861 12 and 14 s, and 44 and 43 s.
-        min_vertices: usize = 3000,
+        /// vertices 54 and 23 s in knit (25 and 6 steps), 189 and 111 s in cotton; four of 6,463 to 10,861 12 and 14 s, and 44 and 43 s; a
+        /// jumpsuit sewn from its pattern 32 and 7 s, and 62 and 70 s.
+        min_vertices: usize = 1500,
         /// Most steps on a coarser garment. A stiff one takes over a hundred to its rest, of which the first bring it into the right
         /// folds. With 80, five stiff garments of 16,000 take 239 steps at full resolution for 213.
         max_steps: usize = 20,
