@@ -16,7 +16,8 @@
 //! | z | direction over all free vertices, of norm one by B | m |
 //!
 //! Source: Lanczos' method for a pencil (Parlett: "The Symmetric Eigenvalue Problem", chapter 15), with full reorthogonalisation. Limits:
-//! contacts are constant, so a direction that lifts cloth off the body is not found; λ is an upper bound after the given number of steps.
+//! contacts are constant, so a direction that lifts cloth off the body is not found; λ is an upper bound, and the method ends once the smallest is
+//! known, so that of several negative ones some may be missed.
 
 use glam::DVec3;
 

@@ -124,7 +124,7 @@ pub(crate) struct Linearised<'a> {
 pub struct Curvature {
     /// ω² of the softest mode, 1/s².
     pub lowest: f64,
-    /// Number of modes of negative curvature.
+    /// Number of modes of negative curvature that were found, a lower bound.
     pub unstable_modes: usize,
     /// The vertex with the largest displacement in the softest mode.
     pub at: usize,

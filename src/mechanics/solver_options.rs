@@ -108,7 +108,8 @@ options! {
         /// Iterations at the start and after a step; 0 for none.
         iterations: usize = 20,
         /// Iterations for a trial that failed: it has further to go, and a step cut short costs another factorisation. Ten garments of 1,000 to
-        /// 5,500 vertices take 109 steps in knit and 326 in cotton with 60, 94 and 229 with 120, in less time; with 160 some fewer, in as much.
+        /// 5,500 vertices take 109 steps in knit and 326 in cotton with 60, 94 and 229 with 120 (and fewer projected steps), in less time; with 160 some fewer, in
+        /// as much.
         trial_iterations: usize = 120,
         /// Most trials of a line search that are relaxed. With trials of whole steps alone a cape of 60 vertices with slivers does not rest.
         max_trials: usize = 2,
