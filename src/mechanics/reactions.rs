@@ -23,6 +23,7 @@ use glam::DVec3;
 use super::energy::field::SIDE;
 use super::energy::{Cloth, Contacts, Touch};
 use super::linear_algebra::norm;
+use super::rest::MAX_RESIDUAL;
 use crate::body::distance::Body;
 
 /// Distance beyond its offset up to which a vertex touches, m: a strain of a few percent changes the offset by a tenth of a millimetre.
@@ -40,9 +41,15 @@ const SWEEP_TOLERANCE: f64 = 1e-9;
 /// Residual over weight that ends the iteration: a tenth of the largest at rest. At a hundredth, the sweeps are half of a small drape.
 const BALANCED: f64 = 1e-4;
 
-/// Sweeps between two checks of the decrease, and the ratio of two residuals above which the iteration ends. Heuristic.
+/// Sweeps between two checks of the decrease, and the ratio of two residuals above which the iteration ends, where the residual is not
+/// that of a rest yet. Heuristic.
 const CHECK_INTERVAL: usize = 200;
 const MIN_DECREASE: f64 = 0.999;
+
+/// The same where it is: more sweeps change no verdict. A skirt of 16,000 vertices has 28,000 places that touch, over which 256 sweeps take
+/// less than one percent off the residual.
+const CHECK_INTERVAL_AT_REST: usize = 10;
+const MIN_DECREASE_AT_REST: f64 = 0.9;
 
 /// Share of μN below which a reaction sticks.
 const STICKING_SHARE: f64 = 0.999;
@@ -190,8 +197,11 @@ fn solve_reactions(reactions: &mut [Reaction], residual_forces: &mut [DVec3], cl
         if changed <= SWEEP_TOLERANCE * cloth.weight || residual <= BALANCED * cloth.weight {
             break;
         }
-        if sweep % CHECK_INTERVAL == 0 {
-            if residual > MIN_DECREASE * at_check {
+        let at_rest = residual <= MAX_RESIDUAL * cloth.weight;
+        let (interval, most) =
+            if at_rest { (CHECK_INTERVAL_AT_REST, MIN_DECREASE_AT_REST) } else { (CHECK_INTERVAL, MIN_DECREASE) };
+        if sweep % interval == 0 {
+            if residual > most * at_check {
                 break;
             }
             at_check = residual;

@@ -38,7 +38,7 @@ use super::reactions::Forces;
 use crate::body::distance::Body;
 
 /// Largest residual over weight at rest: [`RefineOptions::default`](super::refine::RefineOptions)'s tolerance.
-const MAX_RESIDUAL: f64 = 1e-3;
+pub(crate) const MAX_RESIDUAL: f64 = 1e-3;
 
 /// Largest difference of reactions and weight, over the weight. It exceeds [`MAX_RESIDUAL`], because residual forces in one direction add
 /// up.
