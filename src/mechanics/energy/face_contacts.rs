@@ -44,10 +44,10 @@ impl Place {
     }
 
     /// The gap to the body with this number; `None` where the way out of the body does not lead out of the cloth.
-    fn gap(&self, number: u32, body: &Body, x: &[DVec3], max_depth_m: f64) -> Option<Gap> {
+    fn gap(&self, number: u32, body: &Body, x: &[DVec3]) -> Option<Gap> {
         let ([a, b, c], [s, t, u]) = (self.corners, self.shares);
         let nearest = body.nearest(self.at(x));
-        if !self.leads_out(&nearest, x, max_depth_m) {
+        if !self.leads_out(&nearest, x) {
             return None;
         }
         let key = Key { kind: Kind::Body, vertices: [a, b, c, NONE, NONE], place: number };
@@ -57,10 +57,10 @@ impl Place {
     }
 
     /// Whether the way to the nearest point of the body leads to the outer side of the cloth, which is wound outward.
-    fn leads_out(&self, nearest: &SurfacePoint, x: &[DVec3], max_depth_m: f64) -> bool {
+    fn leads_out(&self, nearest: &SurfacePoint, x: &[DVec3]) -> bool {
         let [a, b, c] = self.corners.map(|v| x[v as usize]);
         let out = (b - a).cross(c - a).normalize_or_zero();
-        nearest.signed_distance >= 0.0 || nearest.signed_distance > -max_depth_m && nearest.normal.dot(out) > OUTWARD
+        nearest.signed_distance >= 0.0 || nearest.normal.dot(out) > OUTWARD
     }
 }
 
@@ -175,7 +175,7 @@ impl FaceContacts {
     pub(super) fn gaps(&self, body: Option<&Body>, x: &[DVec3]) -> Vec<Gap> {
         let Some(body) = body else { return Vec::new() };
         let active = (0..).zip(&self.places).filter(|(_, place)| place.stiffness > 0.0);
-        active.filter_map(|(number, place)| place.gap(number, body, x, self.options.max_depth_m)).collect()
+        active.filter_map(|(number, place)| place.gap(number, body, x)).collect()
     }
 
     /// Updates the places about these `pairs` of triangles of cloth and body that intersect. Returns how many places were added, raised or
@@ -210,32 +210,33 @@ impl FaceContacts {
 
     /// Adds the points of a triangle that are deepest in the body; returns how many.
     pub(super) fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], intersects: bool) -> usize {
-        let (corners, longest) = (triangle.vertices, triangle.longest_side_m());
+        let corners = triangle.vertices;
         let options = self.options;
         let offset = place_offset(&self.thickness, triangle, &options);
         let stiffness = 2.0 * HALF_OFFSET_PRESSURE / offset * triangle.area / 3.0;
-        let all: Vec<Place> =
-            lattice::lattice(longest).map(|shares| Place { corners, shares, offset, stiffness }).collect();
+        let all: Vec<Place> = lattice::lattice(triangle.longest_side_m())
+            .map(|shares| Place { corners, shares, offset, stiffness })
+            .collect();
         let at: Vec<DVec3> = all.iter().map(|place| place.at(x)).collect();
         let found = body.nearest_all(&at);
-        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x, options.max_depth_m));
+        let out = found.iter().zip(0..).filter(|(nearest, i)| all[*i].leads_out(nearest, x));
         let mut deepest: Vec<(f64, usize)> = out.map(|(nearest, i)| (nearest.signed_distance, i)).collect();
         deepest.sort_by(|a, b| a.0.total_cmp(&b.0));
         let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
-        let mut added: Vec<DVec3> = Vec::new();
+        let mut added = 0;
         for (distance, i) in deepest {
-            let first = intersects && added.is_empty() && distance < offset;
+            let first = intersects && added == 0 && distance < offset;
             let wanted = first || distance < 0.0;
-            if !wanted || added.len() == options.max_new_places {
+            if !wanted || added == options.max_new_places {
                 break;
             }
             let is_new = present.iter().all(|p| p.shares != all[i].shares);
-            if is_new && added.iter().all(|p| p.distance(at[i]) > options.min_spacing * longest) {
-                added.push(at[i]);
+            if is_new {
+                added += 1;
                 self.places.push(all[i]);
             }
         }
-        added.len()
+        added
     }
 
     /// Raises the offset of the places of a triangle; returns how many.

@@ -15,6 +15,7 @@ use super::state::NewtonState;
 use crate::mechanics::energy::StepCheck;
 use crate::mechanics::reactions::Forces;
 use crate::mechanics::rest::{Criterion, Linearised};
+use crate::mechanics::solver_options::SolverOptions;
 
 /// Result of a check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,9 +77,9 @@ fn escape(state: &mut NewtonState<'_, '_>, directions: &[Vec<DVec3>]) -> bool {
 /// The lowest energy (J) at 1, 2, 4, ... times the shortest move to one side, as long as it falls, and its step length.
 fn lowest_along(state: &mut NewtonState<'_, '_>, direction: &[DVec3], side: f64) -> (f64, f64) {
     let NewtonState { cloth, contacts, x, trial, trial_gradient, scratch, energy, .. } = state;
-    let range = cloth.solver.rest_check;
     let longest = direction.iter().map(|d| d.length()).fold(0.0, f64::max);
-    let (mut far, limit) = (range.shortest_escape_m, range.longest_escape_m);
+    let SolverOptions { rest_check, newton, .. } = &cloth.solver;
+    let (mut far, limit) = (rest_check.shortest_escape_m, newton.longest_move_m);
     let mut best = (*energy, 0.0);
     while far < limit {
         let t = side * far / longest;

@@ -44,9 +44,9 @@ impl Damping {
     pub(super) fn after_step(&self, damping: f64, share: f64) -> f64 {
         let options = &self.options;
         if share >= 1.0 {
-            (damping * options.damping_decrease).max(self.least())
+            (damping / options.damping_factor).max(self.least())
         } else if share < options.short_step {
-            (damping * options.damping_increase).min(self.unit * options.max_damping)
+            damping * options.damping_factor
         } else {
             damping
         }
@@ -58,14 +58,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn damping_falls_with_whole_steps_grows_with_short_ones_and_keeps_its_bounds() {
+    fn damping_falls_with_whole_steps_to_its_least_and_grows_with_short_ones() {
         let damping = Damping { options: NewtonOptions::default(), unit: 10.0 };
         let first = damping.initial(false);
         let after = |value, share| damping.after_step(value, share);
         assert!(after(first, 1.0) < first && after(first, 0.1) > first && after(first, 0.6) == first);
         assert_eq!(after(damping.least(), 1.0), damping.least());
-        let most = 10.0 * NewtonOptions::default().max_damping;
-        assert_eq!(after(most, 0.1), most);
         assert!(damping.initial(true) < first);
     }
 }

@@ -4,8 +4,8 @@
 //! unchanged. Normals, anchors and gaps are renewed after every step, and the solve cycles: far from rest, where cycles are not damped
 //! ([`cycle_damping`](super::cycle_damping)), or in spite of the damping. Such a solve ends as [`Stop::Stalled`](super::Stop).
 //!
-//! A step is progress if the residual has halved, or the energy has fallen by the weight times `stall_fall_m`, since the last progress. The
-//! count restarts at an equilibrium and where contact places are added or removed.
+//! A step is progress if the residual has halved, or the energy has fallen by the work of a tolerated residual over the longest step,
+//! since the last progress. The count restarts at an equilibrium and where contact places are added or removed.
 
 use crate::mechanics::newton::NewtonState;
 
@@ -28,7 +28,8 @@ impl StallDetection {
     /// Accounts for a step; returns whether the solve has stalled.
     pub(super) fn after_step(&mut self, descent: &NewtonState<'_, '_>) -> bool {
         let options = &descent.cloth.solver.newton;
-        let fall = descent.cloth.weight * options.stall_fall_m;
+        // The work of a residual that is tolerated, over the longest step.
+        let fall = descent.cloth.weight * options.tolerance * options.longest_move_m;
         self.account(descent.residual, descent.energy, fall);
         self.steps >= options.stall_steps
     }

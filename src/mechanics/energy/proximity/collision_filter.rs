@@ -126,7 +126,7 @@ impl CollisionFilter {
     pub(super) fn check(&mut self, from: &[DVec3], to: &mut [DVec3], shares: &[(u32, f64)]) -> StepCheck {
         self.current(from);
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.surface.edge_m;
-        let stages = (longest / self.options.check_spacing).ceil().clamp(1.0, self.options.max_stages.max(1.0));
+        let stages = (longest / self.options.check_spacing).ceil().max(1.0);
         let is_long = longest > self.options.max_cut_move;
         // Largest difference of the shares of neighbours.
         let gain = self.options.max_spread / longest;

@@ -46,8 +46,6 @@ pub(crate) struct Gap {
     pub(crate) stiffness: f64,
     /// Initial κ A, N/m.
     pub(super) first: f64,
-    /// Whether the gap no longer exists and its stiffness falls to zero.
-    vanishing: bool,
     /// Σ w x at the refresh, m: the origin of the slip.
     pub(super) from: DVec3,
     /// Elastic slip at the refresh, m.
@@ -60,7 +58,7 @@ impl Gap {
     /// A gap without history; its plane is set by the caller.
     pub(crate) fn new(key: Key, weights: [f64; 5], goal: f64, stiffness: f64) -> Self {
         let [body, normal, from, slip] = [DVec3::ZERO; 4];
-        Self { key, weights, body, normal, goal, stiffness, first: stiffness, vanishing: false, from, slip, limit: 0.0 }
+        Self { key, weights, body, normal, goal, stiffness, first: stiffness, from, slip, limit: 0.0 }
     }
 
     /// Σ w x minus the point of the body, m: from the second place to the first.
@@ -130,7 +128,7 @@ impl Gap {
         if before.normal.dot(self.normal) < 0.0 {
             return;
         }
-        let end = if self.vanishing { 0.0 } else { self.stiffness.max(before.stiffness) };
+        let end = self.stiffness.max(before.stiffness);
         self.stiffness = if share < 1.0 { before.stiffness + share * (end - before.stiffness) } else { end };
         if share < 1.0 {
             self.normal = before.normal.lerp(self.normal, share).normalize_or(self.normal);
@@ -139,22 +137,6 @@ impl Gap {
         let u = before.tangential_slip(before.across(x));
         self.slip = u - self.normal * self.normal.dot(u);
     }
-}
-
-/// Adds to `gaps` those of `before` that are no longer found, until their stiffness is below this share of the initial
-/// one.
-pub(super) fn keep_vanishing(before: &[Gap], gaps: &mut Vec<Gap>, vanished_share: f64) {
-    let mut now = gaps.iter().map(|gap| gap.key).peekable();
-    let mut vanishing = Vec::new();
-    for gap in before {
-        while now.next_if(|key| *key < gap.key).is_some() {}
-        let gone = now.peek() != Some(&gap.key) && gap.key.kind != Kind::Crossing;
-        if gone && gap.stiffness > vanished_share * gap.first {
-            vanishing.push(Gap { vanishing: true, ..*gap });
-        }
-    }
-    gaps.extend(vanishing);
-    gaps.sort_unstable_by_key(|gap| gap.key);
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@
 //!
 //! **Under-relaxation.** The set of gaps changes discontinuously: two edges form a gap only while the nearest points lie between their ends,
 //! and a gap whose feature pair changes is a new gap without history. Cloth at such a discontinuity has no state that a refresh
-//! leaves unchanged, and the solver cycles between two. With under-relaxation a gap gains or loses only a share of its stiffness at a
+//! leaves unchanged, and the solver cycles between two. With under-relaxation a gap gains only a share of its stiffness at a
 //! refresh, so that the cloth converges to a mean of both forces (Filippov's solution of an equation with a discontinuous right side).
 //!
 //! **Steps without penetration.** A penalty alone does not prevent cloth from passing through cloth. Each step is therefore checked before
@@ -80,7 +80,7 @@ pub struct Proximity {
     gaps: Vec<Gap>,
     filter: CollisionFilter,
     untangling: UntanglingOptions,
-    /// Share of its stiffness that a gap gains or loses at a refresh.
+    /// Share of its stiffness that a gap gains at a refresh.
     under_relaxation: f64,
     /// Fewest intersections so far, and the number of refreshes since.
     fewest: usize,
@@ -135,9 +135,6 @@ impl Proximity {
         gaps.extend(to_body);
         gaps.sort_unstable_by_key(|gap| gap.key);
         let share = self.under_relaxation;
-        if share < 1.0 {
-            gap::keep_vanishing(&self.gaps, &mut gaps, options.vanished_share);
-        }
         let mut before = self.gaps.iter().peekable();
         for gap in &mut gaps {
             while before.next_if(|b| b.key < gap.key).is_some() {}
@@ -161,7 +158,7 @@ impl Proximity {
         self.gaps = gaps;
     }
 
-    /// Sets the share of its stiffness that a gap gains or loses at a refresh; 1 turns under-relaxation off.
+    /// Sets the share of its stiffness that a gap gains at a refresh; 1 turns under-relaxation off.
     pub(crate) fn set_under_relaxation(&mut self, share: f64) {
         self.under_relaxation = share;
     }
