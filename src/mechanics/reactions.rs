@@ -23,8 +23,10 @@ use glam::DVec3;
 use super::energy::field::SIDE;
 use super::energy::{Cloth, Contacts, Touch};
 use super::linear_algebra::norm;
-use super::rest::MAX_RESIDUAL;
 use crate::body::distance::Body;
+
+/// Largest residual over weight at rest: [`RefineOptions::default`](super::refine::RefineOptions)'s tolerance.
+pub(crate) const MAX_RESIDUAL: f64 = 1e-3;
 
 /// Distance beyond its offset up to which a vertex touches, m: a strain of a few percent changes the offset by a tenth of a millimetre.
 const TOUCH_MARGIN_M: f64 = 2e-4;

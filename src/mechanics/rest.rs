@@ -34,11 +34,8 @@ use super::energy::membrane::outer;
 use super::energy::{Cloth, ContactBlock, Contacts, HessianKind, HessianLayout, Scratch};
 use super::linear_algebra::dot;
 use super::newton::{SolveError, Solver};
-use super::reactions::Forces;
+use super::reactions::{Forces, MAX_RESIDUAL};
 use crate::body::distance::Body;
-
-/// Largest residual over weight at rest: [`RefineOptions::default`](super::refine::RefineOptions)'s tolerance.
-pub(crate) const MAX_RESIDUAL: f64 = 1e-3;
 
 /// Largest difference of reactions and weight, over the weight. It exceeds [`MAX_RESIDUAL`], because residual forces in one direction add
 /// up.
