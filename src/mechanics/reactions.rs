@@ -48,8 +48,8 @@ const BALANCED: f64 = 1e-4;
 const CHECK_INTERVAL: usize = 200;
 const MIN_DECREASE: f64 = 0.999;
 
-/// The same where it is: more sweeps change no verdict. A skirt of 16,000 vertices has 28,000 places that touch, over which 256 sweeps take
-/// less than one percent off the residual.
+/// The same where it is. A skirt of 16,000 vertices has 28,000 places that touch, over which 256 sweeps take less than one percent off the
+/// residual.
 const CHECK_INTERVAL_AT_REST: usize = 10;
 const MIN_DECREASE_AT_REST: f64 = 0.9;
 

@@ -131,8 +131,8 @@ impl FaceContacts {
 
     /// Lattice points of the triangles that lie within `margin` (m) of their offset from the body, for vertices at `x` (m) and at these signed
     /// distances (m). Where the body rises between the points, the solver raises their offset until it no longer crosses the triangle: the
-    /// points of a triangle that itself is within `margin` of its offset therefore touch from up to `max_offset_raise_m` farther. The distance to the body is Lipschitz with constant one, so the
-    /// distances of the corners exclude most points without a query.
+    /// points of a triangle that itself is within `margin` of its offset therefore touch from up to `max_offset_raise_m` farther. The distance
+    /// to the body is Lipschitz with constant one, so the distances of the corners exclude most points without a query.
     pub(crate) fn touching_places(
         &self,
         body: &Body,
