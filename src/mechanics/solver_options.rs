@@ -81,10 +81,7 @@ options! {
         longest_move_m: f64 = 0.1,
         /// Damping ε to begin with, in g/L ([`refine`](super::refine)). Evidence: decision 33.
         damping: f64 = 8.0,
-        /// Damping to begin with from a drape that rested, in g/L. Nine changes between four knits took a long dress 41 steps until its forces
-        /// balanced, with thirty times as much 51.
-        damping_from_rest: f64 = 0.8,
-        /// Least damping, in g/L. Heuristic.
+        /// Least damping, and that to begin with from a drape that rested, in g/L. Heuristic.
         min_damping: f64 = 0.1,
         /// Factor on the damping after a short step; after a whole one it is divided by it.
         damping_factor: f64 = 2.0,
@@ -107,9 +104,6 @@ options! {
         trial_iterations: usize = 120,
         /// Most trials of a line search that are relaxed. With trials of whole steps alone a cape of 60 vertices with slivers does not rest.
         max_trials: usize = 2,
-        /// Line-search trials that may be rejected because relaxation caused an intersection. After that, relaxation is skipped: cloth that
-        /// starts far from its rest shape is moved as far by its relaxation however short the step.
-        max_rejected: usize = 8,
         /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
         longest_move_m: f64 = 3e-3,
         /// Scale γ of the first iteration: neighbours pull as much as a vertex itself.
@@ -204,8 +198,6 @@ options! {
         /// Longest move of a step that is taken with parts held back even if its energy rises, in mean edges; a longer one must lower it. With 0
         /// garments rest as soon, but two sheets that start intersecting stall.
         max_cut_move: f64 = 1.0,
-        /// Most by which the moves of neighbours differ about a part that is held back, in mean edges. Heuristic.
-        max_spread: f64 = 0.5,
         /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. Heuristic.
         max_halvings: usize = 4,
         /// Most times that a step is cut. Heuristic.

@@ -54,11 +54,12 @@ pub enum Repair {
     BridgesShut { triangles: usize, longest_m: f64, usual_m: f64 },
     /// Open seams were drawn shut over the body.
     #[error(
-        "drew open seams, bridged by triangles up to {:.0} cm long, shut over the body in {steps} steps; a vertex went up to {:.0} cm",
+        "drew open seams, bridged by triangles up to {:.0} cm long, shut over the body in {steps} steps; a vertex went up to {:.0} cm{}",
         1e2 * .longest_m,
-        1e2 * .farthest_m
+        1e2 * .farthest_m,
+        if *.held > 0 { "; no shoulders to hang from: held by its top edge until it is at rest, then released" } else { "" }
     )]
-    SeamsDrawnShut { longest_m: f64, steps: usize, farthest_m: f64 },
+    SeamsDrawnShut { longest_m: f64, steps: usize, farthest_m: f64, held: usize },
     /// Faces outside the chosen group were left out.
     #[error("took group \"{name}\" and left {left_out} faces out")]
     GroupChosen { name: String, left_out: usize },

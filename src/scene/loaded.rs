@@ -144,6 +144,8 @@ pub(super) struct Unplaced {
     pub(super) mesh: TriMesh,
     pub(super) rest: RestShape,
     pub(super) held: Vec<u32>,
+    /// Whether they are released once the garment is at rest.
+    pub(super) releases_held: bool,
     pub(super) cut: Cut,
     pub(super) tailored: Option<Tailored>,
     pub(super) imported: Option<Imported>,
@@ -153,7 +155,7 @@ pub(super) struct Unplaced {
 impl Unplaced {
     pub(super) fn new(mesh: TriMesh, rest: RestShape) -> Self {
         let (held, cut) = (Vec::new(), Cut::default());
-        Self { mesh, rest, held, cut, tailored: None, imported: None, flat_pattern: None }
+        Self { mesh, rest, held, releases_held: false, cut, tailored: None, imported: None, flat_pattern: None }
     }
 
     /// The layer of the vertices and triangles after the given counts.
@@ -168,5 +170,6 @@ impl Unplaced {
         let before = join(&mut self.mesh, &mut self.rest, outer.mesh, outer.rest);
         self.held.extend(outer.held.iter().map(|v| v + before));
         (self.tailored, self.imported, self.flat_pattern) = (None, None, None);
+        self.releases_held = false;
     }
 }

@@ -77,7 +77,7 @@ impl SceneSpec {
             .map_err(SceneError::about(&self.garment))?;
         (scene.layers, scene.distance_to) = (layers, self.distance_to);
         scene.own_fabrics = unplaced.cut.fabrics;
-        scene.releases_held = self.hold.is_none() && unplaced.tailored.is_some();
+        scene.releases_held = self.hold.is_none() && unplaced.releases_held;
         scene.held = match &self.hold {
             None => unplaced.held,
             Some(edges) => scene.edges(edges).map_err(SceneError::about(&self.garment))?,
@@ -162,11 +162,15 @@ impl SceneSpec {
         let auto = self.rest == REST_AUTO;
         let flat_pattern = if auto { FlatPattern::find(&imported.mesh, &imported.texture) } else { None };
         let rest = self.imported_rest(&mut imported, flat_pattern)?;
-        if self.push_out {
-            draw_shut(&mut imported, &rest, body);
-        }
+        let held = if self.push_out { draw_shut(&mut imported, &rest, body) } else { Vec::new() };
         let mesh = imported.mesh.clone();
-        Ok(Unplaced { imported: Some(imported), flat_pattern, ..Unplaced::new(mesh, rest) })
+        Ok(Unplaced {
+            releases_held: !held.is_empty(),
+            held,
+            imported: Some(imported),
+            flat_pattern,
+            ..Unplaced::new(mesh, rest)
+        })
     }
 
     /// A sewing pattern, sewn and put on the body.
@@ -176,7 +180,8 @@ impl SceneSpec {
         let put_on = put_on(&pattern, body, 0.01 * self.edge_cm, front).map_err(SceneError::about(&self.garment))?;
         let SewnGarment { mesh, rest, .. } = &put_on.garment;
         let (mesh, rest, held) = (mesh.clone(), rest.clone(), put_on.held.clone());
-        Ok(Unplaced { held, tailored: Some(Tailored { pattern, put_on }), ..Unplaced::new(mesh, rest) })
+        let tailored = Some(Tailored { pattern, put_on });
+        Ok(Unplaced { held, releases_held: true, tailored, ..Unplaced::new(mesh, rest) })
     }
 
     /// The rest shape of a garment from a file, which loses the triangles that have no area in it.

@@ -50,7 +50,6 @@ const OFF: &[(&str, f64)] = &[
     ("relaxation.iterations", 0.0),
     ("relaxation.trial_iterations", 0.0),
     ("relaxation.max_trials", 0.0),
-    ("relaxation.max_rejected", 0.0),
     ("rest_check.max_checks", 0.0),
     ("cycles.max_residual", 0.0),
     ("cycles.min_step_share", 1.0),
@@ -66,7 +65,6 @@ const OFF: &[(&str, f64)] = &[
     ("self_contact.stiffening", 1.0),
     ("self_contact.max_stiffening", 1.0),
     ("collision_filter.max_cut_move", 0.0),
-    ("collision_filter.max_spread", 1e9),
     ("collision_filter.max_halvings", 0.0),
     ("collision_filter.tangled_rings", 0.0),
 ];

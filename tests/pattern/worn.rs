@@ -161,6 +161,27 @@ fn a_mesh_with_open_seams_has_the_rest_area_of_its_pattern() {
     assert_seams_closed(&found);
 }
 
+#[test]
+fn a_skirt_with_open_seams_is_closed_inside_the_hands_and_held_at_its_waist() {
+    let pattern = read(Path::new(&asset("skirt"))).unwrap();
+    let sewn = sew(&pattern, 0.02).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("box.obj").display().to_string();
+    partwise::mesh::export::write_textured(Path::new(&path), &sewn.mesh, &sewn.laid_out(&pattern)).unwrap();
+    let spec = SceneSpec { unit: Some(Unit::M), up: Some(Axis::Z), ..SceneSpec::new("form", &path) };
+    let found = spec.load().unwrap();
+    assert_seams_closed(&found);
+    let scene = &found.scene;
+    assert!(scene.releases_held && scene.held.len() > 20, "{} held", scene.held.len());
+    assert!(found.notes().iter().any(|note| note.contains("held by its top edge until it is at rest")));
+    for &v in &scene.held {
+        let [placed, closed] = [&sewn.mesh, &scene.garment].map(|mesh| mesh.positions[v as usize].z);
+        assert!((placed - closed).abs() < 0.02, "vertex {v} went from {placed} to {closed} m");
+    }
+    let told = SceneSpec { hold: Some("top".into()), ..spec }.load().unwrap();
+    assert!(!told.scene.releases_held);
+}
+
 /// The garment, in edges of 2 cm, has no open seam, no self-intersection and no vertex inside the body.
 fn assert_seams_closed(found: &Loaded) {
     assert!(found.notes().iter().any(|note| note.contains("drew open seams")), "{:?}", found.notes());

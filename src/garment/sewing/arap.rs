@@ -6,16 +6,17 @@
 //!
 //! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²
 //!
-//! is minimised in turn over the isometries R_t nearest to F_t (a polar decomposition each) and over x (a sparse solve with
-//! three right-hand sides). A vertex nearer to the body than the gap is attracted to y_c, the point at the gap above its
+//! is minimised in turn over R_t and over x (a sparse solve with three right-hand sides). R_t is the isometry nearest to F_t by a
+//! polar decomposition; where triangles resist compression by a share c alone, R_t keeps 1 − c of it. A vertex nearer to the body than the gap is attracted to y_c, the point at the gap above its
 //! nearest body point, and is free again once the cloth pulls it away. No vertex moves farther in a step than a limb is thick,
 //! so that none passes through one. There is no friction and no bending. Gravity acts only on a skirt that hangs from its held
-//! waist between the arms (− Σ γ A_i z_i, added to E). The result is a placement, not a drape.
+//! waist (− Σ γ A_i z_i, added to E). The result is a placement, not a drape.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
 //! | A_t | rest area | m² |
 //! | w | weight of a contact, [`CONTACT`] | – |
+//! | c | resistance to compression, as a share of that to stretch | – |
 //! | m | weight of the proximal term, [`PROXIMAL`], for vertices that nothing else fixes | – |
 //! | x' | positions before the step | m |
 //! | γ | weight over stiffness, [`HANGING`] | 1/m |
@@ -44,18 +45,41 @@ const MAX_STEP: f64 = 0.02;
 /// γ, 1/m: half a metre of hanging cloth stretches by a fortieth.
 const HANGING: f64 = 0.1;
 
-/// Proximal weight of held vertices.
+/// Proximal weight of vertices that keep their places.
 const HELD: f64 = 1e3;
 
 /// Most steps of [`laid_flat`], and the displacement, m, at which they end.
 const MAX_FLATTENING_STEPS: usize = 100;
 const FLAT_CONVERGED: f64 = 2e-5;
 
+/// What holds a garment while its seams close.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Hold<'a> {
+    /// Nothing.
+    Nothing,
+    /// These vertices do not sink.
+    Height(&'a [u32]),
+    /// These vertices keep their places, and the others hang.
+    Place(&'a [u32]),
+}
+
+impl<'a> Hold<'a> {
+    /// The vertices.
+    pub(super) fn vertices(self) -> &'a [u32] {
+        match self {
+            Self::Nothing => &[],
+            Self::Height(vertices) | Self::Place(vertices) => vertices,
+        }
+    }
+}
+
 /// Options of [`close`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Closing<'a> {
-    /// Vertices that are held while the others hang; without any there is no gravity.
-    pub(super) held: &'a [u32],
+    /// What is held.
+    pub(super) hold: Hold<'a>,
+    /// Share of its resistance that a triangle has against compression.
+    pub(super) compression: f64,
     /// Distance kept from the body, m.
     pub(super) gap: f64,
     /// Most steps.
@@ -114,7 +138,7 @@ impl System {
     }
 
     /// Right-hand side: Σ A ∇ᵀ R + m x'.
-    fn right_side(&self, x: &[DVec3], nearest: fn(DVec3, DVec3) -> [DVec3; 2]) -> Vec<DVec3> {
+    fn right_side(&self, x: &[DVec3], nearest: impl Fn(DVec3, DVec3) -> [DVec3; 2]) -> Vec<DVec3> {
         let mut side: Vec<DVec3> = x.iter().map(|x| PROXIMAL * *x).collect();
         for ((triangle, of), area) in self.triangles.iter().zip(&self.gradients).zip(&self.areas) {
             let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
@@ -131,19 +155,21 @@ impl System {
     }
 }
 
-/// R of F = R S, S = (FᵀF)^½ by Cayley and Hamilton.
-fn nearest_isometry(u: DVec3, v: DVec3) -> [DVec3; 2] {
+/// R S' of F = R S: the singular values of S' are 1 for stretches, and 1 − (1 − c) (1 − s) for a compression s.
+fn nearest_in_space(u: DVec3, v: DVec3, compression: f64) -> [DVec3; 2] {
     let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
-    let root = (a * c - b * b).max(0.0).sqrt();
-    let trace = (a + c + 2.0 * root).sqrt();
-    // S⁻¹ = (FᵀF + √det)⁻¹ · trace; a triangle folded to a line takes its normalised edges.
-    let (p, q) = (a + root, c + root);
-    let determinant = p * q - b * b;
-    if determinant <= 1e-18 * (p * q).max(1e-300) {
-        return [u.normalize_or(DVec3::X), v.normalize_or(DVec3::Y)];
-    }
-    let scale = trace / determinant;
-    [(u * q - v * b) * scale, (v * p - u * b) * scale]
+    // Eigenvalues of S² = FᵀF, and its eigenvectors by half the angle of their axes.
+    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+    let radius = half.hypot(b);
+    let ratio = |square: f64| {
+        let s = square.max(0.0).sqrt();
+        if s > 1.0 { 1.0 / s } else { 1.0 + compression * (1.0 - s) / s.max(1e-9) }
+    };
+    let (p, q) = (ratio(mean + radius), ratio(mean - radius));
+    let (cos, sin) = if radius > 0.0 { (half / radius, b / radius) } else { (1.0, 0.0) };
+    let (middle, spread) = (0.5 * (p + q), 0.5 * (p - q));
+    let (xx, xy, yy) = (middle + spread * cos, spread * sin, middle - spread * cos);
+    [u * xx + v * xy, u * xy + v * yy]
 }
 
 /// Closes the seams of a garment at `start` (m); returns the positions and the number of steps.
@@ -155,16 +181,18 @@ pub(super) fn close(
     options: Closing<'_>,
 ) -> (Vec<DVec3>, usize) {
     let n = start.len();
-    let mut system = System::new(mesh, rest, options.held);
+    let (held, hangs) = (options.hold.vertices(), matches!(options.hold, Hold::Place(_)));
+    let placed = if hangs { held } else { &[] };
+    let mut system = System::new(mesh, rest, placed);
     let diagonal: Vec<usize> =
         (system.entries.iter().enumerate()).filter(|(_, e)| e.row == e.col).map(|(i, _)| i).collect();
     let own: Vec<f64> = diagonal.iter().map(|&i| system.entries[i].val).collect();
     let mut x = start.to_vec();
     let mut symbolic: Option<SymbolicCholesky<u32>> = None;
     for step in 0..options.max_steps {
-        let mut side = system.right_side(&x, nearest_isometry);
-        options.held.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
-        if !options.held.is_empty() {
+        let mut side = system.right_side(&x, |u, v| nearest_in_space(u, v, options.compression));
+        placed.iter().for_each(|&v| side[v as usize] += HELD * x[v as usize]);
+        if hangs {
             system.hang(&mut side);
         }
         for (v, near) in body.nearest_all(&x).iter().enumerate() {
@@ -175,12 +203,12 @@ pub(super) fn close(
             }
         }
         let Some(solved) = solve(&system.entries, n, &side, &mut symbolic) else { return (x, step) };
-        let mut farthest = 0.0_f64;
+        let before = x.clone();
         for (x, to) in x.iter_mut().zip(solved) {
-            let displacement = (to - *x).clamp_length_max(MAX_STEP);
-            farthest = farthest.max(displacement.length());
-            *x += displacement;
+            *x += (to - *x).clamp_length_max(MAX_STEP);
         }
+        held.iter().map(|&v| v as usize).for_each(|v| x[v].z = x[v].z.max(start[v].z));
+        let farthest = x.iter().zip(&before).map(|(x, before)| x.distance(*before)).fold(0.0, f64::max);
         if farthest < options.converged {
             return (x, step + 1);
         }
@@ -286,15 +314,23 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_isometry_of_a_rotation_is_itself_and_of_r_s_is_r() {
+    fn stretches_are_taken_back_and_compressions_by_a_share() {
         let turned = [DVec3::new(0.0, 0.6, 0.8), DVec3::new(1.0, 0.0, 0.0)];
-        let [u, v] = nearest_isometry(turned[0], turned[1]);
-        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-14);
-        // R S with S symmetric and positive gives R back.
-        let s = [[1.3, 0.2], [0.2, 0.4]];
-        let [u, v] = [0, 1].map(|k| turned[0] * s[0][k] + turned[1] * s[1][k]);
-        let [u, v] = nearest_isometry(u, v);
-        assert!((u - turned[0]).length() + (v - turned[1]).length() < 1e-12, "{u} {v}");
-        assert!(nearest_isometry(DVec3::X, DVec3::X).iter().all(|c| c.is_finite()));
+        let with = |s: [[f64; 2]; 2], c: f64| {
+            let [u, v] = [0, 1].map(|k| turned[0] * s[0][k] + turned[1] * s[1][k]);
+            nearest_in_space(u, v, c)
+        };
+        let is = |[u, v]: [DVec3; 2], s: [[f64; 2]; 2]| {
+            let [p, q] = [0, 1].map(|k| turned[0] * s[0][k] + turned[1] * s[1][k]);
+            assert!((u - p).length() + (v - q).length() < 1e-12, "{u} {v}");
+        };
+        let one = [[1.0, 0.0], [0.0, 1.0]];
+        is(with(one, 0.1), one);
+        is(with([[1.3, 0.2], [0.2, 1.4]], 0.1), one);
+        is(with([[1.7, 0.0], [0.0, 0.5]], 0.1), [[1.0, 0.0], [0.0, 0.55]]);
+        is(with([[1.3, 0.2], [0.2, 0.4]], 1.0), one);
+        // Stretched along one diagonal and compressed along the other.
+        is(with([[0.85, 0.35], [0.35, 0.85]], 0.1), [[0.775, 0.225], [0.225, 0.775]]);
+        assert!(nearest_in_space(DVec3::X, DVec3::X, 1.0).iter().all(|c| c.is_finite()));
     }
 }

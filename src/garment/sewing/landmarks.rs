@@ -27,6 +27,9 @@ const MAX_HEIGHT: f64 = 5.0;
 const SPREAD: f64 = 1.5;
 /// Least girth of an arm, m; fingers have less.
 const MIN_ARM_GIRTH: f64 = 0.1;
+/// A garment whose top is farther below the armpits than this, m, has no shoulders to hang from.
+const MIN_BELOW_ARMPITS: f64 = 0.03;
+
 /// Least distance of an arm from the side of the trunk, m.
 const MIN_BESIDE: f64 = 0.01;
 /// Least number of curves of an arm.
@@ -119,6 +122,11 @@ impl Landmarks {
         let half = |l: &Level| Some((l.z, extent_from(l.trunk.as_ref()?, middle, across)));
         let trunk = levels.iter().filter(|l| l.z < armpit_z.unwrap_or(top)).filter_map(half).collect();
         Self { middle, facing, shoulder_z, waist_z, hip_z, bust_z, armpit_z, arm_fall, trunk }
+    }
+
+    /// Whether a garment with its top at this height, m, has no shoulders to hang from.
+    pub(super) fn is_below_armpits(&self, top_z: f64) -> bool {
+        self.armpit_z.or(self.shoulder_z).is_some_and(|armpit| top_z <= armpit - MIN_BELOW_ARMPITS)
     }
 
     /// The body without its arms, open where they were, for garments that hang between the arms. `None` where no arms were found.

@@ -6,6 +6,9 @@
 //! beyond repair. So steps and fairing alternate, long waves first, as a splitting of the bending energy would. Where the cloth
 //! still intersects itself it is faired over longer waves.
 //!
+//! A garment without shoulders is closed over the body without its arms first and hangs from its top edge, held: its panels stand before
+//! and behind the hands, which would else be sewn into it.
+//!
 //! Source: own; steps and fairing are those of [`arap`](super::arap). Limits: there is no coarser level, so a step costs what
 //! the mesh costs. Self-intersections after the last round are left to the drape, which separates or reports them.
 
@@ -14,12 +17,13 @@ use std::time::{Duration, Instant};
 
 use glam::{DVec2, DVec3};
 
-use super::arap::{Closing, close, faired};
+use super::arap::{Closing, Hold, close, faired};
 use super::arrange::{Arranged, arrange};
 use super::landmarks::Landmarks;
 use crate::body::distance::Body;
 use crate::garment::pattern::{PatternError, SewingPattern, SewnGarment, sew};
 use crate::mesh::bridges::Bridges;
+use crate::mesh::coarse::Coarse;
 use crate::mesh::import::Imported;
 use crate::mesh::report::{Remark, Repair};
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -46,9 +50,6 @@ const MAX_LAST_STEPS: usize = 25;
 /// Steps end when no vertex moves farther, m.
 const CONVERGED: f64 = 1e-3;
 
-/// A garment whose top is farther below the armpits than this, m, has no shoulders to hang from.
-const MIN_BELOW_ARMPITS: f64 = 0.03;
-
 /// Prefixes of the labels of edges that hold a garment without shoulders, the upper edge first.
 const HOLDING: [&str; 2] = ["strapless", "lower_interface"];
 
@@ -57,6 +58,10 @@ const OPEN_RATIO: f64 = 3.0;
 
 /// Most steps until the seams are closed: three times those of a T-shirt's 34 cm.
 const MAX_CLOSING_STEPS: usize = 100;
+
+/// Share of its resistance that a triangle of such a mesh has against compression: cloth buckles, and gathers are wider than what they are
+/// sewn to. With 1 the waistband of a ruffled skirt is stretched by 43 %, and more garments intersect themselves.
+const COMPRESSION: f64 = 0.1;
 
 /// Fairings in a round, each followed by two steps; the first removes waves of [`WAVELENGTH`] (m), each further one
 /// [`NARROWING`] times as long. With 2 to 3 cm GarmentCode's T-shirt ends without an intersection, with 1 cm it ends with 152.
@@ -110,13 +115,13 @@ pub(crate) fn put_on(
             continue;
         }
         let start = start(&garment, coarse.as_ref());
-        let options = Closing { held: &[], gap, max_steps, converged: CONVERGED };
+        let options = Closing { hold: Hold::Nothing, compression: 1.0, gap, max_steps, converged: CONVERGED };
         let first = armless.as_ref().filter(|_| coarse.is_none());
         let (mut x, mut taken) = close(&garment.mesh, &garment.rest, first.unwrap_or(body), &start, options);
         if let Some(body) = first {
             let (held, _) = held(&garment, &x, &landmarks);
             let hung;
-            (x, hung) = close(&garment.mesh, &garment.rest, body, &x, Closing { held: &held, ..options });
+            (x, hung) = close(&garment.mesh, &garment.rest, body, &x, Closing { hold: Hold::Place(&held), ..options });
             taken += hung;
         }
         steps += taken;
@@ -125,7 +130,7 @@ pub(crate) fn put_on(
     let mut garment = sew(&pattern, edge_m)?;
     let start = start(&garment, coarse.as_ref());
     let max_steps = if coarse.is_some() { MAX_LAST_STEPS } else { COARSER[0].max_steps };
-    let options = Closing { held: &[], gap: LAST_GAP, max_steps, converged: CONVERGED };
+    let options = Closing { hold: Hold::Nothing, compression: 1.0, gap: LAST_GAP, max_steps, converged: CONVERGED };
     let (x, taken) = close(&garment.mesh, &garment.rest, body, &start, options);
     garment.mesh.positions = x;
     let (held, held_by) = held(&garment, &garment.mesh.positions, &landmarks);
@@ -139,8 +144,7 @@ fn start(garment: &SewnGarment, coarse: Option<&(SewnGarment, Vec<DVec3>)>) -> V
 /// The vertices that hold a garment without shoulders, by label or of its highest edge, and the label.
 fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Option<String>) {
     let top = x.iter().fold(f64::NEG_INFINITY, |top, x| top.max(x.z));
-    let Some(armpit) = body.armpit_z.or(body.shoulder_z) else { return (Vec::new(), None) };
-    if top > armpit - MIN_BELOW_ARMPITS {
+    if !body.is_below_armpits(top) {
         return (Vec::new(), None);
     }
     for holding in HOLDING {
@@ -150,10 +154,14 @@ fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Opti
             return (vertices, Some((*label).clone()));
         }
     }
-    let topology = Topology::new(&garment.mesh);
+    (top_edge(&garment.mesh, x).map(|(edge, _)| edge).unwrap_or_default(), Some("top edge".to_owned()))
+}
+
+/// The highest edge at `x` (m), by the mean of its vertices, and that height, m.
+fn top_edge(mesh: &TriMesh, x: &[DVec3]) -> Option<(Vec<u32>, f64)> {
     let height = |edge: &[u32]| edge.iter().map(|&v| x[v as usize].z).sum::<f64>() / edge.len().max(1) as f64;
-    let highest = topology.boundary_loops().into_iter().max_by(|a, b| height(a).total_cmp(&height(b)));
-    highest.map_or((Vec::new(), None), |edge| (edge, Some("top edge".to_owned())))
+    let edges = Topology::new(mesh).boundary_loops().into_iter().map(|edge| (height(&edge), edge));
+    edges.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(z, edge)| (edge, z))
 }
 
 impl PutOn {
@@ -189,41 +197,94 @@ impl PutOn {
 }
 
 /// Closes over `body` the seams that long triangles of `imported` bridge and that are closed in the rest shape, and adds the
-/// repair to the report. Any other garment is left unchanged.
-pub(crate) fn draw_shut(imported: &mut Imported, rest: &RestShape, body: &Body) {
-    let Some(Bridges { longest_m, .. }) = Bridges::of(&imported.mesh) else { return };
+/// repair to the report. Returns the vertices to hold until the drape is at rest: the top edge of a garment without shoulders. Any other
+/// garment is left unchanged.
+pub(crate) fn draw_shut(imported: &mut Imported, rest: &RestShape, body: &Body) -> Vec<u32> {
+    let Some(Bridges { longest_m, .. }) = Bridges::of(&imported.mesh) else { return Vec::new() };
     let at_rest = rest.corners.iter().map(|c| longest_side(c.map(|p| p.extend(0.0))));
     if OPEN_RATIO * at_rest.fold(0.0, f64::max) > longest_m {
-        return;
+        return Vec::new();
     }
-    let (x, steps) = closed(&imported.mesh, rest, body);
+    let landmarks = Landmarks::of(body.mesh());
+    let top = top_edge(&imported.mesh, &imported.mesh.positions).filter(|(_, z)| landmarks.is_below_armpits(*z));
+    let held = top.map(|(edge, _)| edge).unwrap_or_default();
+    let armless = if held.is_empty() { None } else { landmarks.without_arms(body.mesh()) };
+    let armless = armless.and_then(|mesh| Body::new_open(&mesh).ok());
+    let (x, steps) = closed(&imported.mesh, rest, body, armless.as_ref(), &held);
     let farthest_m = x.iter().zip(&imported.mesh.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     // This repairs the difference between worn and rest lengths.
     imported.report.remarks.retain(|remark| !matches!(remark, Remark::OtherThanWorn { .. }));
-    imported.report.repairs.push(Repair::SeamsDrawnShut { longest_m, steps, farthest_m });
+    imported.report.repairs.push(Repair::SeamsDrawnShut { longest_m, steps, farthest_m, held: held.len() });
     imported.mesh.positions = x;
+    held
 }
 
-/// The closed positions, m, and the number of steps.
-fn closed(mesh: &TriMesh, rest: &RestShape, body: &Body) -> (Vec<DVec3>, usize) {
-    let mut taken = 0;
-    let mut step = |x: &[DVec3], gap, steps| {
-        let options = Closing { held: &[], gap, max_steps: steps, converged: CONVERGED };
-        let (x, steps) = close(mesh, rest, body, x, options);
-        taken += steps;
-        x
-    };
+/// The closed positions, m, and the number of steps; a garment that hangs from `held` is closed over the body without arms first.
+fn closed(mesh: &TriMesh, rest: &RestShape, body: &Body, armless: Option<&Body>, held: &[u32]) -> (Vec<DVec3>, usize) {
     let [_, Level { gap, .. }] = COARSER;
-    let mut x = step(&mesh.positions, gap, MAX_CLOSING_STEPS);
+    let (compression, max_steps) = (COMPRESSION, MAX_CLOSING_STEPS);
+    let options = Closing { hold: Hold::Nothing, compression, gap, max_steps, converged: CONVERGED };
+    let hold = if held.is_empty() { Hold::Nothing } else { Hold::Height(held) };
+    let first = armless.unwrap_or(body);
+    let (x, steps) = close(mesh, rest, first, &mesh.positions, Closing { hold, ..options });
+    let (x, more) = faired_apart(mesh, rest, first, x, Closing { hold, ..options });
+    let Some(armless) = armless else { return (x, steps + more) };
+    let (x, hanging) = hung(mesh, rest, [armless, body], &x, held);
+    let hold = Hold::Place(held);
+    let (x, last) = close(mesh, rest, body, &x, Closing { hold, max_steps: MAX_LAST_STEPS, ..options });
+    let (x, again) = faired_apart(mesh, rest, body, x, Closing { hold, ..options });
+    (x, steps + more + hanging + last + again)
+}
+
+/// Rounds of fairings and steps until the cloth at `x` does not intersect itself, or no less than before; the positions, m, and the number of steps.
+fn faired_apart(
+    mesh: &TriMesh,
+    rest: &RestShape,
+    body: &Body,
+    mut x: Vec<DVec3>,
+    options: Closing<'_>,
+) -> (Vec<DVec3>, usize) {
+    let (mut taken, mut least) = (0, usize::MAX);
     for round in 0..MAX_ROUNDS {
-        if self_intersecting_pairs(&mesh.with_positions(x.clone())).is_empty() {
+        let pairs = self_intersecting_pairs(&mesh.with_positions(x.clone())).len();
+        if pairs == 0 || pairs >= least {
             break;
         }
-        for fairing in 0..FAIRINGS {
-            let length = WAVELENGTH * 2f64.powi(round) * NARROWING.powi(fairing);
-            x = step(&faired(mesh, rest, &x, length), gap, 2);
+        least = pairs;
+        for fairing in 0..=FAIRINGS {
+            let (start, options) = if fairing < FAIRINGS {
+                let mut smooth = faired(mesh, rest, &x, WAVELENGTH * 2f64.powi(round) * NARROWING.powi(fairing));
+                options.hold.vertices().iter().for_each(|&v| smooth[v as usize] = x[v as usize]);
+                (smooth, Closing { max_steps: 2, ..options })
+            } else {
+                (x, Closing { gap: LAST_GAP, max_steps: MAX_LAST_STEPS, ..options })
+            };
+            let steps;
+            (x, steps) = close(mesh, rest, body, &start, options);
+            taken += steps;
         }
-        x = step(&x, LAST_GAP, MAX_LAST_STEPS);
     }
     (x, taken)
+}
+
+/// A closed garment at `x` (m) comes to hang from the vertices `held`, over each body in turn; the positions, m, and the number of steps.
+/// It hangs as a coarser one, which turns in fewer steps.
+fn hung(mesh: &TriMesh, rest: &RestShape, bodies: [&Body; 2], x: &[DVec3], held: &[u32]) -> (Vec<DVec3>, usize) {
+    let [Level { edge_m, gap, max_steps }, _] = COARSER;
+    let area: f64 = rest.corners.iter().map(|[a, b, c]| 0.5 * (*b - *a).perp_dot(*c - *a)).sum();
+    let count = 2.0 * area / (3f64.sqrt() * edge_m * edge_m);
+    let Some(coarse) = Coarse::new(&mesh.with_positions(x.to_vec()), rest, count as usize) else {
+        return (x.to_vec(), 0);
+    };
+    let mut is_held = vec![false; x.len()];
+    held.iter().for_each(|&v| is_held[v as usize] = true);
+    let held: Vec<u32> = (0..).zip(coarse.restrict(&is_held)).filter(|(_, held)| *held).map(|(v, _)| v).collect();
+    let options = Closing { hold: Hold::Place(&held), compression: COMPRESSION, gap, max_steps, converged: CONVERGED };
+    let (mut end, mut taken) = (coarse.mesh.positions.clone(), 0);
+    for body in bodies {
+        let steps;
+        (end, steps) = close(&coarse.mesh, &coarse.rest, body, &end, options);
+        taken += steps;
+    }
+    (coarse.prolong(x, &end), taken)
 }

@@ -156,7 +156,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let mut t = (first
             * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
         .min(newton.longest_move_m / longest);
-        let (mut relaxed, mut crossed) = (0, 0);
+        let mut relaxed = 0;
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
@@ -166,14 +166,11 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             if !falls {
                 relaxed += usize::from(t <= first);
                 falls = relaxed <= relaxing.max_trials
-                    && crossed < relaxing.max_rejected
                     && relaxing.trial_iterations > 0
                     && relaxation.run(cloth, contacts, trial, relaxing.trial_iterations) <= bound;
             }
             if falls {
-                if crossed < relaxing.max_rejected {
-                    relaxation.run(cloth, contacts, trial, relaxing.iterations);
-                }
+                relaxation.run(cloth, contacts, trial, relaxing.iterations);
                 if *step_share < 1.0 {
                     trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *step_share));
                     contacts.update(trial);
@@ -189,9 +186,8 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                         if cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound {
                             break true;
                         }
-                        crossed += 1;
                     }
-                    Some(StepCheck::Crosses) => crossed += 1,
+                    Some(StepCheck::Crosses) => {}
                 }
             }
             t = if t > first { first } else { 0.5 * t };

@@ -32,7 +32,7 @@ impl Damping {
 
     /// The damping to begin with, from a drape that rested or from any other start; 1/s².
     pub(super) fn initial(&self, from_rest: bool) -> f64 {
-        self.unit * if from_rest { self.options.damping_from_rest } else { self.options.damping }
+        if from_rest { self.least() } else { self.unit * self.options.damping }
     }
 
     /// The least damping, 1/s².

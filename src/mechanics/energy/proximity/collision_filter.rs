@@ -3,22 +3,12 @@
 //! A step from x to x' is followed in stages. At the end of each, all intersecting pairs of triangles are found exactly
 //! (`mesh::self_intersection`). Corners of pairs that did not intersect at x go back towards the stage before, half the way each time, and
 //! after a few times all the way, together with their neighbours; there they stay while the rest of the cloth goes on. Since x has no
-//! intersection, this terminates. Around such a part the moves of neighbours differ by at most a share of an edge, so the cloth is not torn:
-//!
-//! s(w) L ≤ s(v) L + β e  for neighbours v, w.
-//!
-//! | symbol | meaning | unit |
-//! |---|---|---|
-//! | s | share of its displacement that a vertex makes | – |
-//! | L | longest displacement of the step | m |
-//! | e | mean edge | m |
-//! | β | `max_spread` of the options | – |
+//! intersection, this terminates.
 //!
 //! Limits: a part that passes through completely between two stages, a few centimetres apart, is not detected. Near pairs that
 //! intersect at x already, new intersections are allowed: these parts are being untangled ([`untangle`](super::untangle)). A long step after
 //! which more pairs intersect than before is rejected, and the caller tries half of it.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -128,13 +118,10 @@ impl CollisionFilter {
         let longest = from.iter().zip(&*to).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.surface.edge_m;
         let stages = (longest / self.options.check_spacing).ceil().max(1.0);
         let is_long = longest > self.options.max_cut_move;
-        // Largest difference of the shares of neighbours.
-        let gain = self.options.max_spread / longest;
         let mut limits = vec![1.0_f64; from.len()];
         for &(v, share) in shares {
             limits[v as usize] = share;
         }
-        self.spread(shares.iter().map(|(v, _)| *v).collect(), gain, &mut limits);
         let at = |limits: &[f64], share: f64| -> Vec<DVec3> {
             from.iter().zip(&*to).zip(limits).map(|((a, b), limit)| a.lerp(*b, limit.min(share))).collect()
         };
@@ -150,11 +137,10 @@ impl CollisionFilter {
                 }
                 let back = if cut < self.options.max_halvings { 0.5 } else { 0.0 };
                 let near = self.vertices_about(new.iter(), cut.saturating_sub(self.options.max_halvings));
-                for &v in &near {
+                for v in near {
                     let limit = &mut limits[v as usize];
                     *limit = limit.min(before + back * (limit.min(share) - before).max(0.0));
                 }
-                self.spread(near, gain, &mut limits);
             }
             stage += 1.0;
         }
@@ -174,20 +160,6 @@ impl CollisionFilter {
         }
     }
 
-    /// Lowers the limits about these vertices until no limit exceeds that of a neighbour by more than `gain`.
-    fn spread(&self, from: Vec<u32>, gain: f64, limits: &mut [f64]) {
-        let mut queue = VecDeque::from(from);
-        while let Some(v) = queue.pop_front() {
-            let limit = limits[v as usize] + gain;
-            for &w in self.surface.topology.neighbours(v) {
-                if limits[w as usize] > limit {
-                    limits[w as usize] = limit;
-                    queue.push_back(w);
-                }
-            }
-        }
-    }
-
     /// Triangles of the pairs that are not being untangled.
     fn new_crossings(&self, crossing: &[[u32; 2]]) -> Vec<u32> {
         let tangled = |t: u32| self.surface.triangles[t as usize].iter().all(|&v| self.is_tangled(v));
@@ -202,7 +174,7 @@ mod tests {
     use crate::mesh::samples::sheet;
 
     #[test]
-    fn a_vertex_that_may_go_half_the_way_holds_its_neighbours_back() {
+    fn a_vertex_that_may_go_half_the_way_goes_as_far() {
         let mesh = sheet(20, 20, |i, j| DVec3::new(i, j, 0.0) * 0.01);
         let cloth = Cloth::sample(&mesh, "jersey", &[]);
         let surface = Arc::new(Surface::new(&cloth.triangles, mesh.vertex_count()));
@@ -213,8 +185,7 @@ mod tests {
         let middle = 10 * 21 + 10;
         assert_eq!(filter.check(&mesh.positions, &mut to, &[(middle as u32, 0.5)]), StepCheck::HeldBack);
         assert!((to[middle].z - 0.025).abs() < 1e-12);
-        assert!(to.iter().all(|x| x.z >= to[middle].z) && to[0].z == 0.05);
-        assert!(to[middle + 1].z < 0.035, "a triangle is torn: {}", to[middle + 1]);
+        assert!(to.iter().enumerate().all(|(v, x)| v == middle || x.z == 0.05));
     }
 
     #[test]
@@ -242,14 +213,6 @@ mod tests {
         assert!(kept.clone().count() > 100 && kept.into_iter().all(|((_, to), wanted)| to == wanted));
         let moves: Vec<f64> = from.iter().zip(&to).map(|(a, b)| a.distance(*b)).collect();
         assert!(moves.iter().any(|m| *m < 0.03), "nothing was held back");
-        for v in 0..from.len() as u32 {
-            for &w in surface.topology.neighbours(v) {
-                let apart = (moves[v as usize] - moves[w as usize]).abs();
-                // Their own displacements differ, too.
-                let wanted = (wanted[v as usize] - from[v as usize]).distance(wanted[w as usize] - from[w as usize]);
-                assert!(apart <= options.max_spread * edge_m + wanted + 1e-12, "vertices {v} and {w}: {apart}");
-            }
-        }
         // A short step is cut.
         let mut short: Vec<DVec3> = from.iter().zip(&wanted).map(|(a, b)| a.lerp(*b, 0.25)).collect();
         short.iter_mut().zip(from).for_each(|(to, from)| to.y = from.y);
