@@ -131,8 +131,7 @@ options! {
         return_share: f64 = 0.3,
         /// Least share of a step that is taken. With 1 one of 192 coarse garments (60 and 250 vertices) stalls, which one depends on other options.
         min_step_share: f64 = 0.125,
-        /// Least under-relaxation of gaps. With 1 three of 48 garments of two layers (60 and 250 vertices) did not rest; since 27 November 2026
-        /// all do.
+        /// Least under-relaxation of gaps. With 1 two of 96 garments of 1,000 vertices do not rest.
         min_under_relaxation: f64 = 1.0 / 64.0,
     }
 
