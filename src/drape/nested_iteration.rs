@@ -52,6 +52,8 @@ pub(crate) fn approach(
             return start.to_vec();
         }
         let mut prolonged = levels.prolong(number, &reached, rested.positions);
+        // The coarse cloth turns about its held vertices, and takes those between them along.
+        scene.held.iter().map(|&v| v as usize).for_each(|v| prolonged[v] = mesh.positions[v]);
         let (next, cloth) = match number.checked_sub(2) {
             Some(finer) => (levels.coarser(scene)[finer].mesh(), levels.coarser(scene)[finer].cloth()),
             None => (mesh, &levels.cloth),
