@@ -60,7 +60,7 @@ const OPEN_RATIO: f64 = 3.0;
 const MAX_CLOSING_STEPS: usize = 100;
 
 /// Share of its resistance that a triangle of such a mesh has against compression: cloth buckles, and gathers are wider than what they are
-/// sewn to. With 1 the waistband of a ruffled skirt is closed to 121 cm for 84, so to 103.
+/// sewn to. With a tenth the waistband of 84 cm of a ruffled skirt is closed to 103 cm.
 const COMPRESSION: f64 = 0.1;
 
 /// Fairings in a round, each followed by two steps; the first removes waves of [`WAVELENGTH`] (m), each further one
