@@ -160,7 +160,7 @@ fn nearest_in_space(u: DVec3, v: DVec3, compression: f64) -> [DVec3; 2] {
     let (a, b, c) = (u.dot(u), u.dot(v), v.dot(v));
     // Eigenvalues of S² = FᵀF, and its eigenvectors by half the angle of their axes.
     let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-    let radius = half.hypot(b);
+    let radius = (half * half + b * b).sqrt();
     let ratio = |square: f64| {
         let s = square.max(0.0).sqrt();
         if s > 1.0 { 1.0 / s } else { 1.0 + compression * (1.0 - s) / s.max(1e-9) }
