@@ -162,7 +162,7 @@ fn a_mesh_with_open_seams_has_the_rest_area_of_its_pattern() {
 }
 
 #[test]
-fn a_skirt_with_open_seams_is_closed_inside_the_hands_and_held_at_its_waist() {
+fn a_skirt_with_open_seams_is_closed_and_held_at_its_waist() {
     let pattern = read(Path::new(&asset("skirt"))).unwrap();
     let sewn = sew(&pattern, 0.02).unwrap();
     let folder = tempfile::tempdir().unwrap();

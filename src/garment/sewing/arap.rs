@@ -7,8 +7,8 @@
 //! E = Σ_t A_t |F_t − R_t|² + Σ_c w |x_c − y_c|² + Σ_i m |x_i − x'_i|²
 //!
 //! is minimised in turn over R_t and over x (a sparse solve with three right-hand sides). R_t is the isometry nearest to F_t by a
-//! polar decomposition; where triangles resist compression by a share c alone, R_t keeps 1 − c of it. A vertex nearer to the body than the gap is attracted to y_c, the point at the gap above its
-//! nearest body point, and is free again once the cloth pulls it away. No vertex moves farther in a step than a limb is thick,
+//! polar decomposition; where triangles resist compression by a share c alone, R_t keeps 1 − c of it. A vertex nearer to the body than the
+//! gap is attracted to y_c, the point at the gap above its nearest body point, and is free again once the cloth pulls it away. No vertex moves farther in a step than a limb is thick,
 //! so that none passes through one. There is no friction and no bending. Gravity acts only on a skirt that hangs from its held
 //! waist (− Σ γ A_i z_i, added to E). The result is a placement, not a drape.
 //!
@@ -52,10 +52,10 @@ const HELD: f64 = 1e3;
 const MAX_FLATTENING_STEPS: usize = 100;
 const FLAT_CONVERGED: f64 = 2e-5;
 
-/// What holds a garment while its seams close.
+/// Vertices whose place or height is kept while seams close.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Hold<'a> {
-    /// Nothing.
+    /// None.
     Nothing,
     /// These vertices do not sink.
     Height(&'a [u32]),
@@ -76,7 +76,7 @@ impl<'a> Hold<'a> {
 /// Options of [`close`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Closing<'a> {
-    /// What is held.
+    /// Vertices that keep their place or height.
     pub(super) hold: Hold<'a>,
     /// Share of its resistance that a triangle has against compression.
     pub(super) compression: f64,

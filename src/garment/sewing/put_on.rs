@@ -9,8 +9,8 @@
 //! A garment without shoulders is closed over the body without its arms first and hangs from its top edge, held: its panels stand before
 //! and behind the hands, which would else be sewn into it.
 //!
-//! Source: own; steps and fairing are those of [`arap`](super::arap). Limits: there is no coarser level, so a step costs what
-//! the mesh costs. Self-intersections after the last round are left to the drape, which separates or reports them.
+//! Source: own; steps and fairing are those of [`arap`](super::arap). Limits: seams are closed without a coarser level, so a step
+//! costs what the mesh costs. Self-intersections after the last round are left to the drape, which separates or reports them.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -154,7 +154,7 @@ fn held(garment: &SewnGarment, x: &[DVec3], body: &Landmarks) -> (Vec<u32>, Opti
             return (vertices, Some((*label).clone()));
         }
     }
-    (top_edge(&garment.mesh, x).map(|(edge, _)| edge).unwrap_or_default(), Some("top edge".to_owned()))
+    top_edge(&garment.mesh, x).map_or((Vec::new(), None), |(edge, _)| (edge, Some("top edge".to_owned())))
 }
 
 /// The highest edge at `x` (m), by the mean of its vertices, and that height, m.
@@ -236,7 +236,8 @@ fn closed(mesh: &TriMesh, rest: &RestShape, body: &Body, armless: Option<&Body>,
     (x, steps + more + hanging + last + again)
 }
 
-/// Rounds of fairings and steps until the cloth at `x` does not intersect itself, or no less than before; the positions, m, and the number of steps.
+/// Rounds of fairings and steps until the cloth at `x` does not intersect itself, or no less than before; the positions, m, and the number
+/// of steps.
 fn faired_apart(
     mesh: &TriMesh,
     rest: &RestShape,

@@ -13,7 +13,8 @@
 //! **Under-relaxation.** The set of gaps changes discontinuously: two edges form a gap only while the nearest points lie between their ends,
 //! and a gap whose feature pair changes is a new gap without history. Cloth at such a discontinuity has no state that a refresh
 //! leaves unchanged, and the solver cycles between two. With under-relaxation a gap gains only a share of its stiffness at a
-//! refresh (one that is no longer found is gone at once), so that the cloth converges to a mean of both forces (Filippov's solution of an equation with a discontinuous right side).
+//! refresh (one that is no longer found is gone at once), so that the cloth converges to a mean of both forces (Filippov's solution of an
+//! equation with a discontinuous right side).
 //!
 //! **Steps without penetration.** A penalty alone does not prevent cloth from passing through cloth. Each step is therefore checked before
 //! it is taken ([`collision_filter`]): a step that would cause an intersection is shortened or cut, and the next refresh finds gaps there.
