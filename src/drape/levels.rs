@@ -16,9 +16,6 @@ use super::settings::Settings;
 /// Vertices of a level over those of the next coarser.
 const RATIO: usize = 4;
 
-/// No level is made with fewer vertices than this: there is nothing left to save.
-const MIN_LEVEL_VERTICES: usize = 400;
-
 /// The cloth of `scene` in the fabric of `settings`, for their solver, with these vertices held.
 pub(super) fn cloth_of(scene: &Scene, settings: &Settings, held: &[u32]) -> Result<Cloth, EnergyError> {
     let Scene { garment, topology, rest, .. } = scene;
@@ -61,7 +58,7 @@ impl Levels {
         Ok(levels)
     }
 
-    /// As many coarser ones as there are; `scene` is that of the full garment.
+    /// The coarser ones that are brought to rest first; `scene` is that of the full garment.
     pub(crate) fn coarser(&self, scene: &Scene) -> &[Level] {
         self.coarser.get_or_init(|| {
             let mut coarser: Vec<Level> = Vec::new();
@@ -96,7 +93,7 @@ impl Level {
     fn below(scene: &Scene, above: Option<&Self>, full: &Cloth) -> Option<Self> {
         let (mesh, rest) = above.map_or((&scene.garment, &scene.rest), |a| (&a.coarse.mesh, &a.coarse.rest));
         let count = mesh.vertex_count() / RATIO;
-        if count < MIN_LEVEL_VERTICES {
+        if count < full.solver.nested_iteration.min_vertices {
             return None;
         }
         Self::of(scene, above, Arc::new(Coarse::new(mesh, rest, count)?), full)

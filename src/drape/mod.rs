@@ -20,6 +20,7 @@ use std::ops::ControlFlow;
 
 use pipeline::drape_prepared;
 
+use crate::base::pool::within_awake_pool;
 use crate::mechanics::refine::{Observer, Step};
 pub use crate::scene::Scene;
 pub(crate) use distances::Distances;
@@ -43,7 +44,7 @@ pub(crate) use stages::{StageResults, StartsFrom, folds_of, refine_from, settled
 /// [`DrapeError`] where a constant of the fabric or an option cannot be used.
 pub fn drape(scene: &Scene, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {
     // Inside the pool: each of hundreds of short joins from outside it would suspend the caller.
-    rayon::scope(|_| run(scene, &Prepared::new(scene, settings)?, settings, observer))
+    within_awake_pool(|| run(scene, &Prepared::new(scene, settings)?, settings, observer))
 }
 
 /// [`drape`] with distances and cloth of earlier drapes of the same scene in the same fabric, to the same bits.
@@ -56,7 +57,7 @@ pub fn drape_again(
     settings: &Settings,
     observer: Observer<'_>,
 ) -> Result<Drape, DrapeError> {
-    rayon::scope(|_| run(scene, prepared, settings, observer))
+    within_awake_pool(|| run(scene, prepared, settings, observer))
 }
 
 fn run(scene: &Scene, prepared: &Prepared, settings: &Settings, observer: Observer<'_>) -> Result<Drape, DrapeError> {

@@ -10,7 +10,7 @@
 
 use glam::DVec3;
 
-use super::levels::{Level, Levels};
+use super::levels::Levels;
 use super::settings::{Model, Refine, Settings};
 use crate::mechanics::coupled::is_flat;
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
@@ -35,8 +35,7 @@ pub(crate) fn approach(
     }
     let Scene { garment: mesh, body, .. } = scene;
     let options = settings.solver.nested_iteration;
-    let large = |level: &&Level| level.mesh().vertex_count() >= options.min_vertices;
-    let coarsest = levels.coarser(scene).iter().take_while(large).count();
+    let coarsest = levels.coarser(scene).len();
     let self_contact = settings.self_contact;
     let at_most = RefineOptions { max_steps: Some(options.max_steps), self_contact, ..RefineOptions::default() };
     let mut reached = start.to_vec();

@@ -21,6 +21,7 @@ use super::release::Release;
 use super::result::{Drape, PartOutcome, StageTimes};
 use super::settings::Settings;
 use super::stages::{StageResults, StartsFrom, refine_from, settled};
+use crate::base::pool::within_awake_pool;
 use crate::mechanics::energy::{Cloth, Contacts};
 use crate::mechanics::refine::Observer;
 use crate::mesh::self_intersection::self_intersecting_pairs;
@@ -41,7 +42,7 @@ pub fn next_pose(
     settings: &Settings,
     observer: Observer<'_>,
 ) -> Result<Drape, DrapeError> {
-    rayon::scope(|_| follow(last, scene, settings, observer, MAX_HALVINGS))
+    within_awake_pool(|| follow(last, scene, settings, observer, MAX_HALVINGS))
 }
 
 /// [`next_pose`] with at most this many halvings.

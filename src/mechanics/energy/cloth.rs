@@ -327,6 +327,24 @@ impl Cloth {
 
     /// [`gradient`](Self::gradient) with buffers to reuse.
     pub fn evaluate(&self, x: &[DVec3], contacts: &Contacts, gradient: &mut Vec<DVec3>, scratch: &mut Scratch) -> f64 {
+        let elastic = self.elastic(x, scratch);
+        self.with_contact(x, contacts, elastic, gradient, scratch)
+    }
+
+    /// Updates `contacts` at `x`, and [evaluates](Self::evaluate) there; the elastic energy beside the update.
+    pub(crate) fn evaluate_at(
+        &self,
+        x: &[DVec3],
+        contacts: &mut Contacts,
+        gradient: &mut Vec<DVec3>,
+        scratch: &mut Scratch,
+    ) -> f64 {
+        let ((), elastic) = rayon::join(|| contacts.update(x), || self.elastic(x, scratch));
+        self.with_contact(x, contacts, elastic, gradient, scratch)
+    }
+
+    /// Energy of membrane and bending at `x`, J; their gradient stays in `scratch`.
+    fn elastic(&self, x: &[DVec3], scratch: &mut Scratch) -> f64 {
         let Scratch { x: padded, halves: [one, other] } = scratch;
         padded.resize(x.len(), Four::ZERO);
         let chunks = padded.par_chunks_mut(VERTICES_PER_TASK).zip(x.par_chunks(VERTICES_PER_TASK));
@@ -339,12 +357,24 @@ impl Cloth {
         let half = |packs, vertices, gradient| Half { cloth: self, packs, vertices, x: x_of_all, gradient };
         let (a, b) =
             rayon::join(|| run(half((first, ratios), above, one)), || run(half((second, other_ratios), below, other)));
+        a + b
+    }
+
+    /// The energy with gravity, contact and friction, J, and its gradient.
+    fn with_contact(
+        &self,
+        x: &[DVec3],
+        contacts: &Contacts,
+        elastic: f64,
+        gradient: &mut Vec<DVec3>,
+        Scratch { x: padded, halves: [one, other] }: &Scratch,
+    ) -> f64 {
         let weight = self.join(padded, [one, other], gradient);
         contacts.add_gradient(gradient);
         contacts.friction.add_gradient(x, gradient);
         let with_itself = contacts.proximity.as_ref().map_or(0.0, |p| p.add_gradient(x, &self.held, gradient));
         let between_yarns = self.bending.friction.add_gradient(x, &self.held, gradient);
-        weight + (a + b) + contacts.energy() + contacts.friction.energy(x) + with_itself + between_yarns
+        weight + elastic + contacts.energy() + contacts.friction.energy(x) + with_itself + between_yarns
     }
 
     /// Adds the gradients of both halves and of gravity, zero at held vertices; returns the energy of gravity.

@@ -87,6 +87,8 @@ pub struct Contacts<'b> {
     /// Position (m) and distance (m) of each vertex at its last query.
     queried_at: Vec<DVec3>,
     queried_distance: Vec<f64>,
+    /// Whether every free vertex was queried.
+    queried: bool,
     /// Normals of the tangent planes; zero before the first query.
     normals: Vec<DVec3>,
     /// Square of the move from the last query below which a vertex cannot touch, m²; negative where it touched there.
@@ -265,6 +267,9 @@ impl<'b> Contacts<'b> {
     /// much. The rounded distance is smaller by at most the side of the lattice.
     fn query_new(&mut self, x: &[DVec3]) {
         let Obstacle::Rounded(field) = &self.obstacle else { return };
+        if std::mem::replace(&mut self.queried, true) {
+            return;
+        }
         let body = field.body();
         let is_new = |&v: &usize| !self.held[v] && self.queried_distance[v] == f64::NEG_INFINITY;
         let new: Vec<usize> = (0..x.len()).filter(is_new).collect();

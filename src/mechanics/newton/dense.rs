@@ -244,16 +244,18 @@ impl<T: Precision> Work for Product<'_, T> {
         for (s, strip) in strips.chunks_exact_mut(TILE_COLUMNS * depth).enumerate() {
             let from = first + s * TILE_COLUMNS;
             let width = TILE_COLUMNS.min(columns - s * TILE_COLUMNS);
-            for (to, column) in strip.chunks_exact_mut(TILE_COLUMNS).zip(l.chunks_exact(height)) {
-                to[..width].copy_from_slice(&column[from..from + width]);
+            for (to, column) in strip.as_chunks_mut::<TILE_COLUMNS>().0.iter_mut().zip(l.chunks_exact(height)) {
+                match column[from..].first_chunk() {
+                    Some(all) if width == TILE_COLUMNS => *to = *all,
+                    _ => to[..width].copy_from_slice(&column[from..from + width]),
+                }
             }
         }
         let mut packed = vec![T::default(); tile * depth];
         for i in (0..rows).step_by(tile) {
             let some = tile.min(rows - i);
             for (to, column) in packed.chunks_exact_mut(tile).zip(l.chunks_exact(height)) {
-                to[..some].copy_from_slice(&column[first + i..first + i + some]);
-                to[some..].fill(T::default());
+                copy_tile(lanes, to, &column[first + i..][..some]);
             }
             // Columns whose diagonal lies above the end of these rows.
             let wanted = columns.min(i + some);
@@ -274,6 +276,19 @@ impl<T: Precision> Work for Product<'_, T> {
     }
 }
 
+/// Copies rows of a column into a tile, filled up with zeros. Whole tiles go by registers: a call of `memcpy` costs more than their copy.
+#[inline(always)]
+fn copy_tile<T: Precision, L: Lanes>(l: L, to: &mut [T], from: &[T]) {
+    if from.len() == to.len() {
+        for r in 0..TILE_REGISTERS {
+            T::store(l, T::load(l, &from[r * T::WIDTH..]), &mut to[r * T::WIDTH..]);
+        }
+    } else {
+        to[..from.len()].copy_from_slice(from);
+        to[from.len()..].fill(T::default());
+    }
+}
+
 /// A tile of a product: `some` rows and columns from `row` on of columns of this height.
 #[inline(always)]
 fn multiply<T: Precision, L: Lanes>(
@@ -290,7 +305,7 @@ fn multiply<T: Precision, L: Lanes>(
     let mut buffer = [T::default(); 16];
     if onto {
         for (k, sum) in sums.iter_mut().enumerate().take(width) {
-            buffer[..rows].copy_from_slice(&columns[k * height + row..][..rows]);
+            copy_tile(l, &mut buffer[..tile], &columns[k * height + row..][..rows]);
             for (r, sum) in sum.iter_mut().enumerate() {
                 *sum = T::load(l, &buffer[r * T::WIDTH..]);
             }
@@ -306,10 +321,14 @@ fn multiply<T: Precision, L: Lanes>(
         }
     }
     for (k, sum) in sums.iter().enumerate().take(width) {
+        let target = &mut columns[k * height + row..][..rows];
+        let to = if rows == tile { &mut *target } else { &mut buffer[..] };
         for (r, sum) in sum.iter().enumerate() {
-            T::store(l, *sum, &mut buffer[r * T::WIDTH..]);
+            T::store(l, *sum, &mut to[r * T::WIDTH..]);
         }
-        columns[k * height + row..][..rows].copy_from_slice(&buffer[..rows]);
+        if rows < tile {
+            target.copy_from_slice(&buffer[..rows]);
+        }
     }
 }
 

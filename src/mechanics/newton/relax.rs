@@ -86,8 +86,7 @@ impl Relaxation {
             let mut t = (options.longest_move_m / longest).min(1.0);
             loop {
                 self.direction.added_to(x, t, &mut self.trial);
-                contacts.update(&self.trial);
-                let there = cloth.evaluate(&self.trial, contacts, &mut self.gradient, &mut self.scratch);
+                let there = cloth.evaluate_at(&self.trial, contacts, &mut self.gradient, &mut self.scratch);
                 if there <= energy + ARMIJO * t * slope {
                     energy = there;
                     break;

@@ -85,8 +85,7 @@ fn lowest_along(state: &mut NewtonState<'_, '_>, direction: &[DVec3], side: f64)
         let t = side * far / longest;
         trial.clear();
         trial.extend(x.iter().zip(direction).map(|(x, z)| *x + *z * t));
-        contacts.update(trial);
-        let there = cloth.evaluate(trial, contacts, trial_gradient, scratch);
+        let there = cloth.evaluate_at(trial, contacts, trial_gradient, scratch);
         if there.is_nan() || there >= best.0 {
             break;
         }

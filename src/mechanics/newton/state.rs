@@ -160,9 +160,8 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
-            contacts.update(trial);
             let bound = *energy + ARMIJO * t * slope;
-            let mut falls = cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound;
+            let mut falls = cloth.evaluate_at(trial, contacts, trial_gradient, scratch) <= bound;
             if !falls {
                 relaxed += usize::from(t <= first);
                 falls = relaxed <= relaxing.max_trials
@@ -182,8 +181,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                         break true;
                     }
                     Some(StepCheck::HeldBack) => {
-                        contacts.update(trial);
-                        if cloth.evaluate(trial, contacts, trial_gradient, scratch) <= bound {
+                        if cloth.evaluate_at(trial, contacts, trial_gradient, scratch) <= bound {
                             break true;
                         }
                     }

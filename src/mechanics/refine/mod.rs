@@ -38,6 +38,7 @@ use self::damping::Damping;
 use super::energy::{Cloth, Contacts};
 use super::newton::NewtonState;
 pub use super::newton::{Record, SolveError, Solver};
+use crate::base::pool::within_awake_pool;
 use crate::body::distance::Body;
 pub(crate) use types::Observer;
 pub use types::{RefineOptions, Refined, Step, Stop};
@@ -77,7 +78,7 @@ pub fn refine_with(
         return Err(SolveError::NotPositive { index: 3 * vertex });
     }
     // Inside the pool: a join from outside it suspends the caller, and each of hundreds of gradients is a join.
-    rayon::scope(|_| settle::settle(cloth, contacts, start, options, observer))
+    within_awake_pool(|| settle::settle(cloth, contacts, start, options, observer))
 }
 
 /// `x` relaxed until nothing crosses, in a few rounds; `None` where something still does.
