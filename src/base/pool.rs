@@ -5,6 +5,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Vertices that a thread passes over at a time in a loop of a few operations each. Sums are of so many, whatever the number of threads. With
+/// 2048 and 4096 ten garments of 1,000 to 7,000 vertices take no less time.
+pub(crate) const VERTICES_PER_TASK: usize = 16_384;
+
 /// Whether a thread is kept awake. One is enough, as work is divided in two; and two keepers could each wait for the work of the other.
 static IS_KEPT: AtomicBool = AtomicBool::new(false);
 
@@ -21,7 +25,8 @@ pub(crate) fn within_awake_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let keeper = || {
         while !ended.load(Ordering::Acquire) {
             if rayon::yield_now() != Some(rayon::Yield::Executed) {
-                std::hint::spin_loop();
+                // Other processes may have the core meanwhile.
+                std::thread::yield_now();
             }
         }
     };

@@ -121,7 +121,8 @@ options! {
 
     /// Damping of cycles: see [`refine`](super::refine).
     CycleOptions {
-        /// Ratio to the least residual so far below which a residual is progress, which ends a cycle. Heuristic.
+        /// Ratio to the least residual so far below which a residual is progress, which ends a cycle. With 1 three of 72
+        /// garments of two layers (60 to 1,000 vertices) do not rest.
         progress_ratio: f64 = 0.9,
         /// Residual over weight above which steps do not count as a cycle; 0 turns the damping of cycles off. Heuristic.
         max_residual: f64 = 0.1,
@@ -155,7 +156,7 @@ options! {
         max_offset_raise_m: f64 = 4e-3,
         /// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
         min_offset_m: f64 = 6e-4,
-        /// Most places that are added to a triangle at a time. Heuristic.
+        /// Most places that are added to a triangle at a time. With 1000 a poncho of 60 vertices with slivers does not rest.
         max_new_places: usize = 6,
         /// Updates without fewer intersections after which the intersecting triangles are released. Without it two patterns that are strained
         /// by over 100 % end after 365 and 585 steps for 214 and 156.
@@ -183,7 +184,8 @@ options! {
         narrow_share: f64 = 0.25,
         /// Factor by which a narrow gap grows stiffer at a refresh. With 1, two of eight trousers of 250 vertices do not rest.
         stiffening: f64 = 2.0,
-        /// Largest ratio of the stiffness of a gap to its initial one. Heuristic.
+        /// Largest ratio of the stiffness of a gap to its initial one. With 1e9 17 of 72 garments of two layers (60 to 1,000 vertices) do not
+        /// rest or are pierced.
         max_stiffening: f64 = 64.0,
         /// Margin of the list of near triangles in mean edges. A larger one is rebuilt less often and gives a longer list. Heuristic.
         list_margin_of_edge: f64 = 0.5,

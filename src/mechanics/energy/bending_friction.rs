@@ -27,6 +27,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::bending_matrix::ROWS_PER_TASK;
 use super::membrane::outer;
 use crate::garment::fabric::Fabric;
 
@@ -34,9 +35,6 @@ use crate::garment::fabric::Fabric;
 /// at its clamp ends 1.1 % from its closed form at 0.3, 5 % at 1 and 17 % at 3 (`tests/closed_forms/cantilever.rs`); one of twice the length 2.2 %
 /// at 0.3. Drape tests take as many steps at 0.1 as at 0.3.
 const WIDTH_PER_M: f64 = 0.1;
-
-/// Rings that a thread takes at least.
-const MIN_RINGS: usize = 256;
 
 /// Friction of the rings of a cloth; empty where no fabric has any.
 #[derive(Debug, Clone, Default)]
@@ -93,7 +91,7 @@ impl BendingFriction {
 
     /// Every ring at the positions `x`, m.
     pub(super) fn bent(&self, x: &[DVec3]) -> Vec<BentRing<'_>> {
-        self.rings.par_iter().with_min_len(MIN_RINGS).map(|ring| ring.at(x)).collect()
+        self.rings.par_iter().with_min_len(ROWS_PER_TASK).map(|ring| ring.at(x)).collect()
     }
 
     /// Adds the gradient (N) at the vertices that are not `held`; returns E, J.

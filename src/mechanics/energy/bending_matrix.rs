@@ -35,8 +35,8 @@ struct EntryPair {
     scalars: [f64; 2],
 }
 
-/// Rows that a thread takes at a time.
-const CHUNK: usize = 256;
+/// Rows, or rings, that a thread takes at a time.
+pub(super) const ROWS_PER_TASK: usize = 256;
 
 /// Appends row i from the elements that contain i, each with the position of i in it. Contributions are summed in the order of the elements.
 fn gather<'a>(
@@ -76,7 +76,7 @@ impl BendingMatrix {
             numbered.flat_map(|(e, element)| (0u32..).zip(element.0).map(move |(k, &v)| (v, (e, k))))
         });
         let numbers: Vec<usize> = (0..vertices).collect();
-        let chunks: Vec<Csr<EntryPair>> = (numbers.par_chunks(CHUNK))
+        let chunks: Vec<Csr<EntryPair>> = (numbers.par_chunks(ROWS_PER_TASK))
             .map(|chunk| {
                 let (mut rows, mut row) = (Csr::default(), Vec::new());
                 for &i in chunk {

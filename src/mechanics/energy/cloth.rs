@@ -32,6 +32,7 @@ use super::proximity::Proximity;
 use super::proximity::surface::Surface;
 use super::sparsity::{HELD, HessianLayout, Pattern};
 use crate::GRAVITY;
+use crate::base::pool::VERTICES_PER_TASK;
 use crate::base::simd::{Four, Lanes, Work, run};
 use crate::body::distance::Body;
 use crate::garment::fabric::{Fabric, at_vertices};
@@ -48,9 +49,6 @@ pub(crate) const MIN_BODY_RADIUS_M: f64 = 0.03;
 
 /// Largest distance that a coarse mesh adds to the offset, m: the gap that cloth simulators commonly keep.
 const MAX_SAG_M: f64 = 3e-3;
-
-/// Least number of vertices a thread passes over where memory bandwidth limits the loop.
-const VERTICES_PER_TASK: usize = 16_384;
 
 /// Buffers of an evaluation, reused by the next.
 #[derive(Debug, Clone, Default)]

@@ -35,15 +35,13 @@ use super::friction::{Friction, Touch};
 use super::membrane::outer;
 use super::passage::passages;
 use super::proximity::{Proximity, StepCheck};
+use crate::base::pool::VERTICES_PER_TASK;
 use crate::body::distance::{Body, pull_off_protrusions};
 use crate::mechanics::solver_options::BodyContactOptions;
 use crate::mesh::TriMesh;
 
 /// Distance from its foot up to which a tangent plane replaces the body, m. On a radius of 5 cm its error is then 0.04 mm.
 const PLANE_RADIUS_M: f64 = 2e-3;
-
-/// Least number of vertices a thread filters: the filter is one comparison a vertex.
-const MIN_VERTICES_PER_TASK: usize = 8192;
 
 /// The body, and the distance that contact takes from it.
 #[derive(Debug, Clone, Default)]
@@ -253,12 +251,12 @@ impl<'b> Contacts<'b> {
         let Self { candidates, queried_at, free_squared, .. } = self;
         let may_touch = |((x, queried), free): &((&DVec3, &DVec3), &f64)| x.distance_squared(**queried) > **free;
         candidates.clear();
-        if x.len() < 2 * MIN_VERTICES_PER_TASK {
+        if x.len() < VERTICES_PER_TASK {
             let vertices = (0..).zip(x.iter().zip(&*queried_at).zip(&*free_squared));
             candidates.extend(vertices.filter(|(_, vertex)| may_touch(vertex)).map(|(v, _)| v));
         } else {
             let vertices = x.par_iter().zip(&*queried_at).zip(&*free_squared).enumerate();
-            let candidate = vertices.with_min_len(MIN_VERTICES_PER_TASK).filter(|(_, vertex)| may_touch(vertex));
+            let candidate = vertices.with_min_len(VERTICES_PER_TASK / 2).filter(|(_, vertex)| may_touch(vertex));
             candidates.par_extend(candidate.map(|(v, _)| v as u32));
         }
     }

@@ -6,16 +6,14 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use crate::base::pool::VERTICES_PER_TASK;
 use crate::base::simd::{Four, Lanes, Pack, Vectors};
 
 /// Fours of a group: sixteen vertices, four registers a vector of four vertices.
 const GROUP: usize = 12;
 
-/// Vertices of a stretch, whole groups: what a thread passes over at a time. Fewer are passed over by one, whose sums are of one piece.
-pub(super) const STRETCH_VERTICES: usize = 16_384;
-
-/// Fours of a stretch.
-pub(super) const STRETCH: usize = STRETCH_VERTICES / 16 * GROUP;
+/// Fours of a stretch: of [`VERTICES_PER_TASK`], which are whole groups.
+pub(super) const STRETCH: usize = VERTICES_PER_TASK / 16 * GROUP;
 
 /// Coordinates of all vertices.
 #[derive(Debug, Clone, Default)]
@@ -25,14 +23,14 @@ impl Flat {
     /// Minus these vectors.
     pub(super) fn set_opposite(&mut self, vectors: &[DVec3]) {
         self.0.resize(vectors.len().div_ceil(16) * GROUP, Four::ZERO);
-        let stretches = self.0.par_chunks_mut(STRETCH).zip(vectors.par_chunks(STRETCH_VERTICES));
+        let stretches = self.0.par_chunks_mut(STRETCH).zip(vectors.par_chunks(VERTICES_PER_TASK));
         stretches.for_each(|(to, vectors)| set_opposite(to, vectors));
     }
 
     /// x + t times these, for as many vertices as x has.
     pub(super) fn added_to(&self, x: &[DVec3], t: f64, out: &mut Vec<DVec3>) {
         out.resize(x.len(), DVec3::ZERO);
-        let ends = out.par_chunks_mut(STRETCH_VERTICES).zip(x.par_chunks(STRETCH_VERTICES));
+        let ends = out.par_chunks_mut(VERTICES_PER_TASK).zip(x.par_chunks(VERTICES_PER_TASK));
         ends.zip(self.0.par_chunks(STRETCH)).for_each(|((to, from), d)| add(from, t, d, to));
     }
 }

@@ -204,8 +204,8 @@ impl Work for Longest<'_> {
 mod tests {
     use glam::{DMat3, DVec3};
 
-    use super::super::soa::STRETCH_VERTICES;
     use super::*;
+    use crate::base::pool::VERTICES_PER_TASK;
     use crate::mechanics::linear_algebra::dot as product;
     use crate::mesh::outer;
 
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn the_direction_is_that_of_the_two_loops_vertex_by_vertex() {
         // A group of sixteen, one of four and one left over; the same after two whole stretches.
-        for vertices in [21, 2 * STRETCH_VERTICES + 21] {
+        for vertices in [21, 2 * VERTICES_PER_TASK + 21] {
             agrees_with_the_two_loops(vertices);
         }
     }

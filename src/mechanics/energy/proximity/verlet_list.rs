@@ -43,7 +43,8 @@ impl VerletList {
             self.built_at.clear();
             self.built_at.extend_from_slice(x);
             self.pairs = self.found(self.reach + self.margin);
-            self.pairs.par_sort_unstable();
+            // By one number: a single comparison.
+            self.pairs.par_sort_unstable_by_key(|[t, u]| u64::from(*t) << 32 | u64::from(*u));
         }
     }
 
