@@ -66,9 +66,9 @@ mod tests {
         for threads in [1, 2, 4] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for _ in 0..50 {
-                let panicked =
+                let panicked: Result<(), _> =
                     catch_unwind(AssertUnwindSafe(|| pool.install(|| within_awake_pool(|| panic!("asked")))));
-                assert!(panicked.map(|()| ()).is_err());
+                assert!(panicked.is_err());
                 let (a, (b, c)) = pool.install(|| rayon::join(all, || rayon::join(all, all)));
                 assert_eq!([a, b, c], [499_500; 3]);
             }
