@@ -1,7 +1,8 @@
 //! Work within rayon's pool, beside a thread that stays awake.
 //!
-//! A thread of the pool that finds no work for some 30 µs goes to sleep, and waking it takes about as long as half a gradient of a small
-//! garment. A drape is thousands of such halves with short serial parts between them, most of which a sleeping thread would miss.
+//! A thread of the pool that has found no work a few dozen times goes to sleep, and has to be woken by the operating system. A drape is thousands
+//! of halves of a gradient, each some 50 µs in a small garment, with short serial parts between them: an awake thread saves 5 to 16 % of
+//! a drape of 1,000 to 6,500 vertices on two cores.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
