@@ -13,6 +13,10 @@ use crate::mechanics::solver_options::SolverOptions;
 /// Step length below which the line search ends: rounding.
 const MIN_STEP_LENGTH: f64 = 1e-6;
 
+/// Trials of a line search that the check of the step may reject, after which shorter ones are not relaxed: relaxation moves tangled cloth
+/// by millimetres however short the trial, so that each would be rejected.
+const MAX_REJECTED: usize = 8;
+
 /// Result of an iteration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Advance {
@@ -156,7 +160,7 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         let mut t = (first
             * extrapolation.factor(direction, newton.max_extrapolation.max(1.0), newton.continues_cosine))
         .min(newton.longest_move_m / longest);
-        let mut relaxed = 0;
+        let (mut relaxed, mut rejected) = (0, 0);
         let accepted = loop {
             trial.clear();
             trial.extend(x.iter().zip(&*direction).map(|(x, d)| *x + *d * t));
@@ -165,11 +169,14 @@ impl<'c, 'b> NewtonState<'c, 'b> {
             if !falls {
                 relaxed += usize::from(t <= first);
                 falls = relaxed <= relaxing.max_trials
+                    && rejected < MAX_REJECTED
                     && relaxing.trial_iterations > 0
                     && relaxation.run(cloth, contacts, trial, relaxing.trial_iterations) <= bound;
             }
             if falls {
-                relaxation.run(cloth, contacts, trial, relaxing.iterations);
+                if rejected < MAX_REJECTED {
+                    relaxation.run(cloth, contacts, trial, relaxing.iterations);
+                }
                 if *step_share < 1.0 {
                     trial.iter_mut().zip(&*x).for_each(|(to, from)| *to = from.lerp(*to, *step_share));
                     contacts.update(trial);
@@ -184,8 +191,9 @@ impl<'c, 'b> NewtonState<'c, 'b> {
                         if cloth.evaluate_at(trial, contacts, trial_gradient, scratch) <= bound {
                             break true;
                         }
+                        rejected += 1;
                     }
-                    Some(StepCheck::Crosses) => {}
+                    Some(StepCheck::Crosses) => rejected += 1,
                 }
             }
             t = if t > first { first } else { 0.5 * t };
