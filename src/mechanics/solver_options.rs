@@ -46,17 +46,6 @@ options! {
     UntanglingOptions {
         /// Most relaxations of an intersecting start; 0 leaves it as it is. Heuristic.
         max_rounds: usize = 60,
-        /// Refreshes without fewer intersections after which no further untangling is attempted. Heuristic.
-        max_refreshes: usize = 40,
-        /// Ratio of intersecting pairs after untangling to those at the clear positions above which the drape restarts from these. Restarting
-        /// whenever the clear positions have fewer is worse: coarse trousers of two layers, with 44 pairs as placed and 54 after their preview,
-        /// take 238 steps from the placement and an eighth of that time from the preview.
-        restart_ratio: f64 = 2.0,
-        /// Distance that an intersecting edge is pulled between two refreshes, in mean edges. Heuristic.
-        stride_of_edge: f64 = 0.5,
-        /// |G|² at which the edge is pulled by 1/√2 of that: |G| is two between two flat triangles and nearly zero on a smooth contour.
-        /// Heuristic.
-        half_at: f64 = 0.5,
     }
 
     /// Softened continuation: stiff cloth far from rest is settled with a capped stiffness first.

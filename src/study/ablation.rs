@@ -43,7 +43,6 @@ const QUICK: Sizes = Sizes { placed: &[800], perturbed: 800, starts: 1 };
 const OFF: &[(&str, f64)] = &[
     ("nested_iteration.min_vertices", 1e5),
     ("untangling.max_rounds", 0.0),
-    ("untangling.restart_ratio", 1e9),
     ("softening.strain", 0.0),
     ("newton.stall_steps", 1e5),
     ("newton.max_extrapolation", 1.0),

@@ -45,7 +45,7 @@ pub struct Record {
     pub largest_move_m: f64,
     /// Damping ε, 1/s².
     pub damping: f64,
-    /// Whether the energy is that of the softened cloth.
+    /// Whether the energy is that of the softened cloth, or of cloth without self-contact.
     pub softened: bool,
 }
 
@@ -215,29 +215,31 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         Ok(Advance { accepted, share: (t / first).min(1.0), step_length: t, largest_move_m })
     }
 
-    /// [`untangle`](Self::untangle); once more from the clear positions where much more is left than intersects there
-    /// ([`Proximity::restart`](crate::mechanics::energy::Proximity)).
-    pub(crate) fn untangle_or_restart(&mut self) {
-        self.untangle();
-        let Self { contacts, x, .. } = self;
-        if let Some(there) = contacts.proximity.as_mut().and_then(|proximity| proximity.restart(x)) {
-            *x = there;
-            contacts.update(x);
-            contacts.refresh(x);
-            self.evaluate();
-            self.untangle();
-        }
+    /// Begins contact of the cloth with itself.
+    pub(crate) fn begin_self_contact(&mut self) {
+        let Self { cloth, contacts, x, .. } = self;
+        contacts.proximity = Some(cloth.proximity());
+        contacts.update(x);
+        contacts.refresh(x);
+        self.evaluate();
     }
 
-    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in a limited number of relaxations. No factorisation
-    /// is needed.
-    pub(crate) fn untangle(&mut self) {
+    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in a limited number of relaxations; returns whether
+    /// that succeeded. No factorisation is needed.
+    pub(crate) fn untangle(&mut self) -> bool {
         for _ in 0..self.cloth.solver.untangling.max_rounds {
-            if self.contacts.proximity.as_mut().is_none_or(|proximity| proximity.crossings(&self.x) == 0) {
-                return;
+            if self.crossings() == 0 {
+                return true;
             }
             self.relax(|| ());
         }
+        self.crossings() == 0
+    }
+
+    /// Pairs of triangles that intersect.
+    pub(crate) fn crossings(&mut self) -> usize {
+        let Self { contacts, x, .. } = self;
+        contacts.proximity.as_mut().map_or(0, |proximity| proximity.crossings(x))
     }
 
     /// The record of the step `advance`.

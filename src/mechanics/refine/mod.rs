@@ -3,17 +3,17 @@
 //! The loop is a state machine (`settle`):
 //!
 //! ```text
-//!               untangling
-//!                   │
-//!      far from rest, stiff cloth?
-//!           yes │        │ no
-//!           softened → descent ⇄ equilibrium → converged, or unsettled
+//!             tangled? starts, untangling
+//!                          │
+//!      far from rest and stiff, or freed of self-contact?
+//!                  yes │        │ no
+//!                  softened → descent ⇄ equilibrium → converged, or unsettled
 //! ```
 //!
 //! | state | what it does | file |
 //! |---|---|---|
-//! | untangling | relaxes a start that intersects itself | `newton::state`, `energy::proximity` |
-//! | softened | steps with capped stiffness, until the residual is small | `softening` |
+//! | starts, untangling | settles cloth that intersects itself from up to three starts, and untangles them | `starts`, `newton::state`, `energy::proximity` |
+//! | softened | steps with capped stiffness, or without self-contact, until the residual is small | `softening` |
 //! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping`, no progress in `stall` |
 //! | equilibrium | forces balance: resolves penetrations, updates contact places, checks the rest | `face_contact_phase`, `rest_phase` |
 //!
@@ -30,6 +30,7 @@ mod rest_phase;
 mod settle;
 mod softening;
 mod stall;
+mod starts;
 mod types;
 
 use glam::DVec3;
@@ -78,7 +79,7 @@ pub fn refine_with(
         return Err(SolveError::NotPositive { index: 3 * vertex });
     }
     // Inside the pool: a join from outside it suspends the caller, and each of hundreds of gradients is a join.
-    within_awake_pool(|| settle::settle(cloth, contacts, start, options, observer))
+    within_awake_pool(|| starts::settle_from(cloth, &contacts, start, options, observer))
 }
 
 /// `x` relaxed until nothing crosses, in a few rounds; `None` where something still does.
@@ -88,9 +89,7 @@ pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>
     contacts.refresh(&x);
     let damping = Damping::new(cloth, &x).initial(false);
     let mut descent = NewtonState::new(cloth, contacts, x, damping);
-    descent.untangle();
-    let left = descent.contacts.proximity.as_mut().map_or(0, |proximity| proximity.crossings(&descent.x));
-    (left == 0).then_some(descent.x)
+    descent.untangle().then_some(descent.x)
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::mechanics::newton::{FullSpace, NewtonState, Record, SolveError, Solve
 /// Where a solve stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// Steps with capped stiffness follow.
+    /// Steps with capped stiffness, or without self-contact, follow.
     Softened,
     /// Steps with the true stiffness follow.
     Descent,
@@ -23,6 +23,12 @@ enum State {
     Equilibrium,
     /// The solve has ended.
     Ended(Stop),
+}
+
+/// The most steps of a run.
+pub(super) fn step_limit(cloth: &Cloth, options: &RefineOptions) -> usize {
+    let most = cloth.solver.newton.max_steps;
+    options.max_steps.map_or(most, |asked| asked.min(most))
 }
 
 /// A solve in progress.
@@ -40,8 +46,10 @@ struct Settling<'c, 'b, 'o> {
     /// Residual over weight of an equilibrium, and the smaller one that still follows.
     tolerance: f64,
     continued_to: Option<f64>,
-    /// Whether the steps are those of the softened cloth.
+    /// Whether the steps are those of the softened or the freed cloth.
     soft: bool,
+    /// Whether the cloth has no self-contact yet.
+    freed: bool,
     /// Whether the start of an energy is still to be relaxed.
     fresh: bool,
     rest: RestPhase,
@@ -50,20 +58,19 @@ struct Settling<'c, 'b, 'o> {
     stall: StallDetection,
 }
 
-/// Settles `cloth` from `start`: [`refine_with`](super::refine_with) within rayon's pool.
+/// Settles `cloth` from `start`; `freed` cloth has no self-contact until it is near rest.
 pub(super) fn settle(
     cloth: &Cloth,
     mut contacts: Contacts<'_>,
-    mut start: Vec<DVec3>,
+    start: Vec<DVec3>,
+    freed: bool,
     options: &RefineOptions,
     observer: Observer<'_>,
 ) -> Result<Refined, SolveError> {
     let newton = &cloth.solver.newton;
-    let limit = options.max_steps.map_or(newton.max_steps, |most| most.min(newton.max_steps));
+    let limit = step_limit(cloth, options);
     if options.self_contact && limit > 0 {
-        let mut proximity = cloth.proximity();
-        proximity.retreat(&mut start);
-        contacts.proximity = Some(proximity);
+        contacts.proximity = Some(cloth.proximity()).filter(|_| !freed);
         contacts.update(&start);
         contacts.refresh(&start);
     }
@@ -75,13 +82,14 @@ pub(super) fn settle(
         descent.evaluate();
     }
     if limit > 0 {
-        descent.untangle_or_restart();
+        descent.untangle();
     }
+    let soft = freed || softened.is_some();
     let settling = Settling {
         cloth,
         options,
         observer,
-        history: vec![descent.record(0, None, softened.is_some())],
+        history: vec![descent.record(0, None, soft)],
         descent,
         tangent: FullSpace::default(),
         iteration: 0,
@@ -89,7 +97,8 @@ pub(super) fn settle(
         damping,
         tolerance: newton.tolerance,
         continued_to: options.continued_to,
-        soft: softened.is_some(),
+        soft,
+        freed,
         fresh: true,
         rest: RestPhase::default(),
         faces: FaceContactPhase::default(),
@@ -110,11 +119,11 @@ impl Settling<'_, '_, '_> {
             };
         };
         if self.soft {
-            self.descent.cloth = self.cloth;
-            self.descent.evaluate();
+            self.harden();
         }
-        let Self { descent, history, iteration, .. } = self;
+        let Self { mut descent, history, iteration, .. } = self;
         Ok(Refined {
+            crossings: descent.crossings(),
             energy: descent.energy,
             residual_over_weight: descent.residual,
             steps: iteration,
@@ -128,6 +137,19 @@ impl Settling<'_, '_, '_> {
     /// The damping to begin an energy with, 1/s².
     fn initial_damping(&self) -> f64 {
         self.damping.initial(self.options.from_rest)
+    }
+
+    /// Gives the cloth its true stiffness and its self-contact; returns whether it was freed from that.
+    fn harden(&mut self) -> bool {
+        self.soft = false;
+        self.descent.cloth = self.cloth;
+        let freed = std::mem::take(&mut self.freed);
+        if freed {
+            self.descent.begin_self_contact();
+        } else {
+            self.descent.evaluate();
+        }
+        freed
     }
 
     /// Shows the cloth to the observer; the state that it is in.
@@ -239,11 +261,11 @@ impl Settling<'_, '_, '_> {
         let stalled = self.stall.after_step(&self.descent);
         let hardens = self.soft && (astray || stalled || self.descent.residual < self.cloth.solver.softening.tolerance);
         if hardens {
-            self.soft = false;
             self.fresh = true;
-            self.descent.cloth = self.cloth;
             self.descent.damping = self.initial_damping();
-            self.descent.evaluate();
+            if self.harden() {
+                self.descent.untangle();
+            }
             self.stall = StallDetection::default();
         } else {
             self.descent.damping = self.damping.after_step(self.descent.damping, advance.share);

@@ -69,7 +69,9 @@ pub struct Refined {
     pub energy: f64,
     /// ‖∇E‖₂ over the weight.
     pub residual_over_weight: f64,
-    /// Steps done.
+    /// Pairs of triangles that intersect; 0 without self-contact.
+    pub crossings: usize,
+    /// Steps done, those from other starts included ([`starts`](super::starts)).
     pub steps: usize,
     /// Every step, the start first.
     pub history: Vec<Record>,

@@ -21,15 +21,9 @@
 //! A garment without intersections stays without.
 //!
 //! **Starts that intersect.** Two states are known: the start, from a preview without self-contact, and the *clear* positions, which are mostly
-//! free of intersections: the placement, or the garment put over the layer below.
-//! 1. If the clear positions have no intersection, the start becomes the farthest point on the straight way from them to the start, at shares
-//!    0.7ⁿ, that has none ([`retreat`](Proximity::retreat)).
-//! 2. Otherwise the start is untangled ([`untangle`]). If more than twice as many pairs intersect afterwards as at the clear positions, the drape
-//!    starts from these, untangled in turn ([`restart`](Proximity::restart)).
-//!
-//! Restarting whenever the clear positions have fewer intersections is worse: coarse trousers of two layers, with 44 intersecting pairs as
-//! placed and 54 after their preview, converge in 238 steps from the placement and in an eighth of that time from the preview. Where
-//! restarting helps, the difference is large: a garment of 39,000 vertices in denim has 36 pairs as placed and 2,103 after untangling.
+//! free of intersections: the placement, or the garment put over the layer below. If the clear positions have no intersection, the start
+//! becomes the farthest point on the straight way from them to the start, at shares 0.7ⁿ, that has none ([`retreat`](Proximity::retreat)).
+//! Otherwise the cloth starts tangled, and is untangled ([`untangle`]; `refine::starts`).
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -54,14 +48,13 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::friction::ELASTIC_SLIP;
-use crate::mechanics::solver_options::{SolverOptions, UntanglingOptions};
+use crate::mechanics::solver_options::SolverOptions;
 use crate::mesh::NONE;
 use collision_filter::CollisionFilter;
 pub(crate) use collision_filter::StepCheck;
 use gap::{Gap, Kind};
 use search::Spacing;
 use surface::Surface;
-use untangle::Pull;
 use verlet_list::VerletList;
 
 /// Factor by which an intersecting start retreats at a time.
@@ -80,12 +73,8 @@ pub struct Proximity {
     friction: Arc<Vec<f64>>,
     gaps: Vec<Gap>,
     filter: CollisionFilter,
-    untangling: UntanglingOptions,
     /// Share of its stiffness that a gap gains at a refresh.
     under_relaxation: f64,
-    /// Fewest intersections so far, and the number of refreshes since.
-    fewest: usize,
-    since_fewest: usize,
 }
 
 impl Proximity {
@@ -96,24 +85,12 @@ impl Proximity {
         [thickness, friction]: [Arc<Vec<f64>>; 2],
         options: &SolverOptions,
     ) -> Self {
-        let SolverOptions { self_contact, untangling, collision_filter, .. } = *options;
+        let SolverOptions { self_contact, collision_filter, .. } = *options;
         let spacing = Spacing::new(thickness, surface.edge_m, self_contact);
         let reach = self_contact.search_reach * spacing.max_offset();
         let list = VerletList::new(Arc::clone(&surface), reach, self_contact.list_margin_of_edge * surface.edge_m);
         let filter = CollisionFilter::new(Arc::clone(&surface), list, collision_filter);
-        Self {
-            surface,
-            placed,
-            clear,
-            spacing,
-            friction,
-            gaps: Vec::new(),
-            filter,
-            untangling,
-            under_relaxation: 1.0,
-            fewest: usize::MAX,
-            since_fewest: 0,
-        }
+        Self { surface, placed, clear, spacing, friction, gaps: Vec::new(), filter, under_relaxation: 1.0 }
     }
 
     /// Searches the gaps at `x` (m), beside these gaps to the body; gaps that existed before keep their history.
@@ -122,16 +99,11 @@ impl Proximity {
         let (max_offset, options) = (spacing.max_offset(), spacing.options);
         let mut gaps = search::gaps(surface, filter.list(x), x, placed, spacing, options.search_reach * max_offset);
         let crossing = filter.current(x);
-        self.since_fewest = if crossing.len() < self.fewest { 0 } else { self.since_fewest + 1 };
-        self.fewest = self.fewest.min(crossing.len());
         if !crossing.is_empty() {
-            let untangling = (self.since_fewest < self.untangling.max_refreshes).then(|| {
-                let pull = Pull { stiffness: Spacing::stiffness(max_offset), options: self.untangling };
-                untangle::gaps(surface, x, crossing, pull)
-            });
+            let untangling = untangle::gaps(surface, x, crossing, Spacing::stiffness(max_offset));
             // Near an intersection the side of a gap is unknown.
             gaps.retain(|gap| !gap.members().any(|(v, _)| filter.is_tangled(v)));
-            gaps.extend(untangling.into_iter().flatten());
+            gaps.extend(untangling);
         }
         gaps.extend(to_body);
         gaps.sort_unstable_by_key(|gap| gap.key);
@@ -230,10 +202,21 @@ impl Proximity {
         moves
     }
 
-    /// Moves an intersecting `x` (m) back towards the clear positions until nothing intersects. Leaves it unchanged if these intersect, too.
-    pub(crate) fn retreat(&mut self, x: &mut Vec<DVec3>) {
-        if self.filter.current(x).is_empty() || !self.filter.crossing_at(&self.clear).is_empty() {
-            return;
+    /// The clear positions, m.
+    pub(crate) fn clear(&self) -> &[DVec3] {
+        &self.clear
+    }
+
+    /// Moves an intersecting `x` (m) back towards the clear positions until nothing intersects. If these intersect, too, leaves it
+    /// unchanged and returns whether they have fewer intersections.
+    pub(crate) fn retreat(&mut self, x: &mut Vec<DVec3>) -> Option<bool> {
+        let crossing = self.filter.current(x).len();
+        if crossing == 0 {
+            return None;
+        }
+        let at_clear = self.filter.crossing_at(&self.clear).len();
+        if at_clear > 0 {
+            return Some(at_clear < crossing);
         }
         let end = std::mem::replace(x, self.clear.to_vec());
         let mut share = 1.0;
@@ -246,21 +229,7 @@ impl Proximity {
             }
         }
         self.filter.begin(Vec::new());
-    }
-
-    /// The clear positions, if the intersections at `x` exceed theirs by more than the restart ratio. The next step then starts there.
-    pub(crate) fn restart(&mut self, x: &[DVec3]) -> Option<Vec<DVec3>> {
-        let left = self.crossings(x);
-        if left == 0 {
-            return None;
-        }
-        let there = self.filter.crossing_at(&self.clear);
-        if self.untangling.restart_ratio * there.len() as f64 >= left as f64 {
-            return None;
-        }
-        self.filter.begin(there);
-        (self.fewest, self.since_fewest) = (usize::MAX, 0);
-        Some(self.clear.to_vec())
+        None
     }
 }
 
@@ -289,30 +258,8 @@ mod tests {
         let tangled = folded(|j| j % 4 < 2).positions;
         let mut start = tangled.clone();
         let mut proximity = cloth.proximity();
-        proximity.retreat(&mut start);
+        assert_eq!(proximity.retreat(&mut start), None);
         assert!(start != tangled && start != mesh.positions, "a part of the way is free of intersections");
         assert_eq!(cloth.proximity().crossings(&start), 0);
-        assert!(proximity.restart(&start).is_none());
-    }
-
-    #[test]
-    fn a_start_with_over_twice_the_intersections_restarts_from_the_placement() {
-        let mesh = folded(|j| j < 1);
-        let cloth = Cloth::sample(&mesh, "jersey", &[]);
-        let there = cloth.proximity().crossings(&mesh.positions);
-        // Over twice as many intersections as placed, slightly more, and as many.
-        let many = folded(|j| j % 4 < 2).positions;
-        let few = folded(|j| j < 1 || j == 14).positions;
-        for (left, restarts) in [(&many, true), (&few, false), (&mesh.positions, false)] {
-            let mut proximity = cloth.proximity();
-            let crossing = proximity.crossings(left);
-            assert_eq!(crossing > 2 * there, restarts, "{crossing} and {there}");
-            let mut stays = left.clone();
-            proximity.retreat(&mut stays);
-            assert_eq!(&stays, left, "the placement intersects itself, too");
-            let restart = proximity.restart(left);
-            assert_eq!(restart.as_ref(), restarts.then_some(&mesh.positions));
-            assert_eq!(proximity.crossings(restart.as_ref().unwrap_or(left)), if restarts { there } else { crossing });
-        }
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! G = Σ (R − 2 (E·R)/(E·N) N)  over the triangles at the edge,
 //!
-//! so the edge is pulled along G, and the triangle against it, until no line is left. No choice of sides is needed.
+//! so the edge is pulled along G by a mean edge, and the triangle against it, until no line is left. No choice of sides is needed.
 //! Source: Volino and Magnenat-Thalmann: "Resolving surface collisions through intersection contour minimization", ACM TOG
 //! 25(3), 2006, equation 3.
 //!
@@ -18,26 +18,17 @@ use glam::DVec3;
 
 use super::gap::{Gap, Key, Kind};
 use super::surface::Surface;
-use crate::mechanics::solver_options::UntanglingOptions;
 use crate::mesh::NONE;
 
-/// How intersecting edges are pulled.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pull {
-    /// κ, N/m³.
-    pub(super) stiffness: f64,
-    pub(super) options: UntanglingOptions,
-}
-
-/// Gaps that pull apart the intersecting `pairs` of triangles at `x`.
-pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], pull: Pull) -> Vec<Gap> {
+/// Gaps of this stiffness, N/m³, that pull apart the intersecting `pairs` of triangles at `x`.
+pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], stiffness: f64) -> Vec<Gap> {
     let mut found = BTreeMap::new();
     for &[t, u] in pairs {
         for (one, other) in [(t, u), (u, t)] {
             let [a, b, c] = surface.triangles[one as usize];
             for side in [[a, b], [b, c], [c, a]] {
                 let edge = surface.topology.edge_between(side[0], side[1]);
-                if let Some(gap) = edge.and_then(|edge| crossing(surface, x, edge, other as usize, pull)) {
+                if let Some(gap) = edge.and_then(|edge| crossing(surface, x, edge, other as usize, stiffness)) {
                     found.insert(gap.key, gap);
                 }
             }
@@ -46,7 +37,7 @@ pub(super) fn gaps(surface: &Surface, x: &[DVec3], pairs: &[[u32; 2]], pull: Pul
     found.into_values().collect()
 }
 
-fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, pull: Pull) -> Option<Gap> {
+fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, stiffness: f64) -> Option<Gap> {
     let ([p, q], corners) = (surface.topology.edges[edge], surface.triangles[triangle]);
     if corners.contains(&p) || corners.contains(&q) {
         return None;
@@ -75,12 +66,10 @@ fn crossing(surface: &Surface, x: &[DVec3], edge: usize, triangle: usize, pull: 
         g += r - n * (2.0 * e.dot(r) / e.dot(n));
     }
     let length = g.length();
-    let UntanglingOptions { stride_of_edge, half_at, .. } = pull.options;
-    let stride = stride_of_edge * surface.edge_m * length / (length * length + half_at).sqrt();
     let key = Key { kind: Kind::Crossing, vertices: [p, q, corners[0], corners[1], corners[2]], place: NONE };
     let weights = [1.0 - share, share, -shares[0], -shares[1], -shares[2]];
-    let mut gap = Gap::new(key, weights, 0.0, pull.stiffness * surface.edge_areas[edge]);
+    let mut gap = Gap::new(key, weights, 0.0, stiffness * surface.edge_areas[edge]);
     gap.normal = g / length;
-    gap.goal = gap.normal.dot(gap.across(x)) + stride;
+    gap.goal = gap.normal.dot(gap.across(x)) + surface.edge_m;
     (length > 1e-6 && gap.goal.is_finite()).then_some(gap)
 }
