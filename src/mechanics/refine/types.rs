@@ -71,7 +71,7 @@ pub struct Refined {
     pub residual_over_weight: f64,
     /// Pairs of triangles that intersect; 0 without self-contact.
     pub crossings: usize,
-    /// Steps done, those from other starts included ([`starts`](super::starts)).
+    /// Steps done, those from other starts included (`refine::starts`).
     pub steps: usize,
     /// Every step, the start first.
     pub history: Vec<Record>,
