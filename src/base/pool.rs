@@ -6,8 +6,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Vertices that a thread passes over at a time in a loop of a few operations each. Sums are of so many on any number of threads. With
-/// 2048 and 4096 ten garments of 1,000 to 7,000 vertices take no less time.
+/// Vertices that a thread passes over at a time in a loop of a few operations each. A partial sum has this many terms whatever the number of
+/// threads. With 2048 and 4096 ten garments of 1,000 to 7,000 vertices take no less time.
 pub(crate) const VERTICES_PER_TASK: usize = 16_384;
 
 /// Whether a thread is kept awake. One is enough, as work is divided in two; and two keepers could each wait for the work of the other.

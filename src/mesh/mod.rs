@@ -216,6 +216,15 @@ pub(crate) mod samples {
         squares(columns + 1, columns, rows, at)
     }
 
+    /// A folded sheet whose upper layer lies under the lower one in some rows: the layers intersect where the order changes.
+    pub(crate) fn folded(under: impl Fn(u32) -> bool) -> TriMesh {
+        sheet(14, 14, |i, j| {
+            let upper = if under(j as u32) { -0.4 } else { 0.6 };
+            let height = upper * ((i - 6.0) / 2.0).clamp(0.0, 1.0);
+            DVec3::new(i.min(14.0 - i) + 0.3 * height, j, height) * 0.01
+        })
+    }
+
     /// A [`sheet`] whose sides are joined, open at both ends. `at` places vertices by angle and row; the outside is outward where
     /// rows go up.
     pub(crate) fn tube(around: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> TriMesh {

@@ -12,7 +12,8 @@
 //! The last one is the first where it has no more intersections than the clear positions. If every end fails, the one with the fewest
 //! intersections is the result.
 //!
-//! Limits: the observer sees the steps from each start, numbered anew. A run of a given number of steps has one start.
+//! Limits: the observer sees the steps from each start, numbered anew. A run that is asked for a number of steps takes them from the first
+//! start alone.
 
 use glam::DVec3;
 
@@ -79,16 +80,7 @@ fn starts(cloth: &Cloth, mut start: Vec<DVec3>, options: &RefineOptions) -> (Sta
 mod tests {
     use super::*;
     use crate::mesh::TriMesh;
-    use crate::mesh::samples::sheet;
-
-    /// A folded sheet whose upper layer lies under the lower one in some rows: the layers intersect where the order changes.
-    fn folded(under: impl Fn(u32) -> bool) -> TriMesh {
-        sheet(14, 14, |i, j| {
-            let upper = if under(j as u32) { -0.4 } else { 0.6 };
-            let height = upper * ((i - 6.0) / 2.0).clamp(0.0, 1.0);
-            DVec3::new(i.min(14.0 - i) + 0.3 * height, j, height) * 0.01
-        })
-    }
+    use crate::mesh::samples::folded;
 
     /// Starts of a cloth placed as `placed`, from `start`: whether each is the placement, and freed.
     fn starts_of(placed: &TriMesh, start: &TriMesh) -> Vec<(bool, bool)> {

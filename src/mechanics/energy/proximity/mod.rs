@@ -235,20 +235,8 @@ impl Proximity {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use crate::mechanics::energy::Cloth;
-    use crate::mesh::TriMesh;
-    use crate::mesh::samples::sheet;
-
-    /// A folded sheet whose upper layer lies under the lower one in some rows: the layers intersect where the order changes.
-    fn folded(under: impl Fn(u32) -> bool) -> TriMesh {
-        sheet(14, 14, |i, j| {
-            let upper = if under(j as u32) { -0.4 } else { 0.6 };
-            let height = upper * ((i - 6.0) / 2.0).clamp(0.0, 1.0);
-            DVec3::new(i.min(14.0 - i) + 0.3 * height, j, height) * 0.01
-        })
-    }
+    use crate::mesh::samples::folded;
 
     #[test]
     fn an_intersecting_start_retreats_to_a_state_without_intersections() {
