@@ -7,7 +7,6 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use crate::mechanics::energy::{Cloth, EnergyError};
-use crate::mesh::TriMesh;
 use crate::mesh::coarse::Coarse;
 use crate::scene::Scene;
 
@@ -104,10 +103,6 @@ impl Level {
         let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
         let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, &*full.fabrics, &held).ok()?;
         Some(Self { coarse, cloth: cloth.with_solver(full.solver) })
-    }
-
-    pub(crate) fn mesh(&self) -> &TriMesh {
-        &self.coarse.mesh
     }
 
     /// Its cloth.

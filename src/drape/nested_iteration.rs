@@ -5,8 +5,7 @@
 //! little more than in proportion to the vertices, and how far cloth goes does not shrink with them.
 //!
 //! Source: nested iteration (Hackbusch: "Multi-Grid Methods and Applications", 1985). Limits: a coarse cloth is stiffer in its folds, so the
-//! finer one still makes its own; a stiff fabric takes half its steps for that. Where a finer cloth would begin crossing itself, and no
-//! relaxation takes that apart, the coarser ones are left out.
+//! finer one still makes its own; a stiff fabric takes half its steps for that.
 
 use glam::DVec3;
 
@@ -14,7 +13,6 @@ use super::levels::Levels;
 use super::settings::{Model, Refine, Settings};
 use crate::mechanics::coupled::is_flat;
 use crate::mechanics::refine::{self, Observer, RefineOptions, Step, Stop};
-use crate::mesh::self_intersection::self_intersecting_pairs;
 use crate::scene::Scene;
 
 /// The start of the steps at full resolution: stage two's positions, or for a large garment its rest on coarser cloth. A garment that stage
@@ -53,16 +51,6 @@ pub(crate) fn approach(
         let mut prolonged = levels.prolong(number, &reached, rested.positions);
         // The coarse cloth turns about its held vertices, and takes those between them along.
         scene.held.iter().map(|&v| v as usize).for_each(|v| prolonged[v] = mesh.positions[v]);
-        let (next, cloth) = match number.checked_sub(2) {
-            Some(finer) => (levels.coarser(scene)[finer].mesh(), levels.coarser(scene)[finer].cloth()),
-            None => (mesh, &levels.cloth),
-        };
-        let there = next.with_positions(levels.restrict(number - 1, &prolonged));
-        if self_contact && !self_intersecting_pairs(&there).is_empty() {
-            let contacts = cloth.contacts(body, &there.positions);
-            let Some(apart) = refine::untangled(cloth, contacts, there.positions) else { return start.to_vec() };
-            prolonged = levels.prolong(number - 1, &prolonged, apart);
-        }
         reached = prolonged;
     }
     reached

@@ -42,12 +42,6 @@ options! {
         max_steps: usize = 20,
     }
 
-    /// Starts that intersect themselves: see `energy::proximity`.
-    UntanglingOptions {
-        /// Most relaxations of an intersecting start; 0 leaves it as it is. With 0 the 18 perturbed starts that fail most rest, too.
-        max_rounds: usize = 60,
-    }
-
     /// Softened continuation: stiff cloth far from rest is settled with a capped stiffness first.
     SofteningOptions {
         /// Strain under its own hanging weight at which the stiffness is capped; 0 for the true stiffness throughout: 681 steps.
@@ -210,8 +204,6 @@ options! {
 pub struct SolverOptions {
     /// Nested iteration on coarser cloth.
     pub nested_iteration: NestedIterationOptions,
-    /// Starts that intersect themselves.
-    pub untangling: UntanglingOptions,
     /// Softened continuation.
     pub softening: SofteningOptions,
     /// Newton's method.

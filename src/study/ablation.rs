@@ -42,7 +42,6 @@ const QUICK: Sizes = Sizes { placed: &[800], perturbed: 800, starts: 1 };
 /// Values that turn a mechanism off, where an option has one.
 const OFF: &[(&str, f64)] = &[
     ("nested_iteration.min_vertices", 1e5),
-    ("untangling.max_rounds", 0.0),
     ("softening.strain", 0.0),
     ("newton.stall_steps", 1e5),
     ("newton.max_extrapolation", 1.0),

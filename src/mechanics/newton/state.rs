@@ -224,18 +224,6 @@ impl<'c, 'b> NewtonState<'c, 'b> {
         self.evaluate();
     }
 
-    /// Relaxes an intersecting start under the untangling gaps until nothing intersects, in a limited number of relaxations; returns whether
-    /// that succeeded. No factorisation is needed.
-    pub(crate) fn untangle(&mut self) -> bool {
-        for _ in 0..self.cloth.solver.untangling.max_rounds {
-            if self.crossings() == 0 {
-                return true;
-            }
-            self.relax(|| ());
-        }
-        self.crossings() == 0
-    }
-
     /// Pairs of triangles that intersect.
     pub(crate) fn crossings(&mut self) -> usize {
         let Self { contacts, x, .. } = self;

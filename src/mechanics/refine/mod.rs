@@ -3,7 +3,7 @@
 //! The loop is a state machine (`settle`):
 //!
 //! ```text
-//!             tangled? starts, untangling
+//!                   tangled? starts
 //!                          │
 //!      far from rest and stiff, or freed of self-contact?
 //!                  yes │        │ no
@@ -12,7 +12,7 @@
 //!
 //! | state | what it does | file |
 //! |---|---|---|
-//! | starts, untangling | settles cloth that intersects itself from up to three starts, and untangles them | `starts`, `newton::state`, `energy::proximity` |
+//! | starts | settles cloth that intersects itself from up to three starts | `starts`, `energy::proximity` |
 //! | softened | steps with capped stiffness, or without self-contact, until the residual is small | `softening` |
 //! | descent | steps with the true stiffness | `newton::state`; damping in `damping`, cycles in `cycle_damping`, no progress in `stall` |
 //! | equilibrium | forces balance: resolves penetrations, updates contact places, checks the rest | `face_contact_phase`, `rest_phase` |
@@ -35,9 +35,7 @@ mod types;
 
 use glam::DVec3;
 
-use self::damping::Damping;
 use super::energy::{Cloth, Contacts};
-use super::newton::NewtonState;
 pub use super::newton::{Record, SolveError, Solver};
 use crate::base::pool::within_awake_pool;
 use crate::body::distance::Body;
@@ -80,16 +78,6 @@ pub fn refine_with(
     }
     // Inside the pool: a join from outside it suspends the caller, and each of hundreds of gradients is a join.
     within_awake_pool(|| starts::settle_from(cloth, &contacts, start, options, observer))
-}
-
-/// `x` relaxed until nothing crosses, in a few rounds; `None` where something still does.
-pub(crate) fn untangled(cloth: &Cloth, mut contacts: Contacts<'_>, x: Vec<DVec3>) -> Option<Vec<DVec3>> {
-    contacts.proximity = Some(cloth.proximity());
-    contacts.update(&x);
-    contacts.refresh(&x);
-    let damping = Damping::new(cloth, &x).initial(false);
-    let mut descent = NewtonState::new(cloth, contacts, x, damping);
-    descent.untangle().then_some(descent.x)
 }
 
 #[cfg(test)]

@@ -81,9 +81,6 @@ pub(super) fn settle(
         descent.cloth = softened;
         descent.evaluate();
     }
-    if limit > 0 {
-        descent.untangle();
-    }
     let soft = freed || softened.is_some();
     let settling = Settling {
         cloth,
@@ -139,17 +136,15 @@ impl Settling<'_, '_, '_> {
         self.damping.initial(self.options.from_rest)
     }
 
-    /// Gives the cloth its true stiffness and its self-contact; returns whether it was freed from that.
-    fn harden(&mut self) -> bool {
+    /// Gives the cloth its true stiffness and its self-contact.
+    fn harden(&mut self) {
         self.soft = false;
         self.descent.cloth = self.cloth;
-        let freed = std::mem::take(&mut self.freed);
-        if freed {
+        if std::mem::take(&mut self.freed) {
             self.descent.begin_self_contact();
         } else {
             self.descent.evaluate();
         }
-        freed
     }
 
     /// Shows the cloth to the observer; the state that it is in.
@@ -263,9 +258,7 @@ impl Settling<'_, '_, '_> {
         if hardens {
             self.fresh = true;
             self.descent.damping = self.initial_damping();
-            if self.harden() {
-                self.descent.untangle();
-            }
+            self.harden();
             self.stall = StallDetection::default();
         } else {
             self.descent.damping = self.damping.after_step(self.descent.damping, advance.share);

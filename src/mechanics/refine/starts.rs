@@ -6,7 +6,7 @@
 //! | start | what happens first |
 //! |---|---|
 //! | clear positions, freed | steps without self-contact until near rest: the membrane undoes most of the tangle |
-//! | clear positions | untangled at once (`energy::proximity::untangle`) |
+//! | clear positions | steps with self-contact, whose gaps pull intersections apart (`energy::proximity::untangle`) |
 //! | the start as given | the same |
 //!
 //! The last one is the first where it has no more intersections than the clear positions. If every end fails, the one with the fewest
