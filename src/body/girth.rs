@@ -83,6 +83,11 @@ pub(crate) fn hull(points: Vec<DVec2>) -> Vec<DVec2> {
     chains(points).iter().flat_map(without_last).collect()
 }
 
+/// Length of a closed curve of corners in a plane, m.
+pub(crate) fn perimeter(corners: &[DVec2]) -> f64 {
+    (0..corners.len()).map(|i| corners[i].distance(corners[(i + 1) % corners.len()])).sum()
+}
+
 /// The lower and the upper chain of the hull.
 fn chains(mut points: Vec<DVec2>) -> [Vec<DVec2>; 2] {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));

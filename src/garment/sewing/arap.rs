@@ -254,6 +254,15 @@ pub(super) fn faired(mesh: &TriMesh, rest: &RestShape, x: &[DVec3], length: f64)
     solve(&system.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
 }
 
+/// The harmonic functions over the rest shape with these values at some vertices, three at a time.
+pub(super) fn harmonic(mesh: &TriMesh, rest: &RestShape, values: &[(u32, DVec3)]) -> Option<Vec<DVec3>> {
+    let held: Vec<u32> = values.iter().map(|(v, _)| *v).collect();
+    let system = System::new(mesh, rest, &held);
+    let mut side = vec![DVec3::ZERO; mesh.vertex_count()];
+    values.iter().for_each(|&(v, value)| side[v as usize] = HELD * value);
+    solve(&system.entries, side.len(), &side, &mut None)
+}
+
 /// One solve with three right-hand sides; `None` where the matrix is not positive definite.
 fn solve(
     entries: &[Triplet<u32, u32, f64>],

@@ -124,6 +124,16 @@ impl Landmarks {
         Self { middle, facing, shoulder_z, waist_z, hip_z, bust_z, armpit_z, arm_fall, trunk }
     }
 
+    /// Heights at which the trunk was found, below the armpits, m.
+    pub(super) fn trunk_heights(&self) -> impl Iterator<Item = f64> + '_ {
+        self.trunk.iter().map(|(z, _)| *z)
+    }
+
+    /// The trunk's curve at the height `z`, m.
+    pub(super) fn trunk_at(&self, body: &TriMesh, z: f64) -> Option<SectionLoop> {
+        level(body, z, self.middle, math::unit(self.facing)).trunk
+    }
+
     /// Whether a garment with its top at this height, m, has no shoulders to hang from.
     pub(super) fn is_below_armpits(&self, top_z: f64) -> bool {
         self.armpit_z.or(self.shoulder_z).is_some_and(|armpit| top_z <= armpit - MIN_BELOW_ARMPITS)

@@ -8,6 +8,7 @@ mod arap;
 mod arrange;
 mod landmarks;
 mod put_on;
+mod tube;
 
 pub(crate) use arap::laid_flat;
 pub use landmarks::Landmarks;

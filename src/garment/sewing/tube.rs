@@ -1,0 +1,280 @@
+//! Tubes, as skirts and strapless tops are, hung around the trunk: the start from which their seams are closed.
+//!
+//! The panels of a skirt stand before and behind the body, a wide one's up to the shoulders and through each other and the hands. A garment with
+//! two edges and no shoulders needs no such start. It is put around the trunk by two coordinates over its rest shape:
+//!
+//! s with Δs = 0, s = 0 on the top edge, 1 on the hem; θ = arg c with Δc = 0, c = e^(iθ) on the top edge,
+//!
+//! at a height D s below the top edge, in the direction θ on the convex hull of the trunk's curves between. θ and s grow steadily, so cloth does
+//! not pass through cloth; it is compressed around the trunk, and widens when its seams are closed.
+//!
+//! **The top edge** lies at the height nearest to its own where its length spans the trunk's tape girth, or at the waist where it spans none,
+//! outside the hull by
+//!
+//! d = max((C − G) / 2π, gap),
+//!
+//! since a convex curve moved outwards by d grows by 2πd. Its vertices keep their distances along the edge, but for one common factor,
+//! and it is turned so that they move least.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | s, θ | share of the way from the top edge to the hem, and direction from the middle of the trunk | –, rad |
+//! | D | area over the mean of both edges' lengths | m |
+//! | C | length of the top edge at rest | m |
+//! | G | tape girth of the trunk there | m |
+//! | d | distance from the hull | m |
+//!
+//! Source: own; harmonic coordinates as in the parametrisation of surfaces (Floater, Hormann: "Surface parameterization: a tutorial and survey",
+//! 2005). Limits: the top edge lies in a plane until the drape is released. θ is not proved to grow where the hem is far from a circle about
+//! the top edge. An edge that does not run around the trunk once is not laid.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::arap::harmonic;
+use super::landmarks::Landmarks;
+use crate::base::math;
+use crate::body::girth::{hull, perimeter};
+use crate::mesh::{RestShape, Topology, TriMesh};
+
+/// Turns of the edge that are tried: a millimetre apart.
+const TURNS: usize = 1000;
+
+/// A closed curve by its corners, with the length up to each.
+struct Curve {
+    corners: Vec<DVec2>,
+    ends: Vec<f64>,
+}
+
+impl Curve {
+    /// The convex hull of `points` moved outwards by `distance`, m.
+    fn about(hull: &[DVec2], distance: f64) -> Self {
+        let mut corners = Vec::with_capacity(2 * hull.len());
+        for (i, &a) in hull.iter().enumerate() {
+            let b = hull[(i + 1) % hull.len()];
+            // Counter-clockwise, so the outside is on the right.
+            let out = distance * (a - b).perp().normalize_or_zero();
+            corners.extend([a + out, b + out]);
+        }
+        let mut ends = Vec::with_capacity(corners.len());
+        let mut length = 0.0;
+        for (i, a) in corners.iter().enumerate() {
+            length += a.distance(corners[(i + 1) % corners.len()]);
+            ends.push(length);
+        }
+        Self { corners, ends }
+    }
+
+    /// The point at a share of the length, counter-clockwise.
+    fn at(&self, share: f64) -> DVec2 {
+        let along = share.rem_euclid(1.0) * self.ends.last().copied().unwrap_or_default();
+        let side = self.ends.partition_point(|end| *end <= along).min(self.corners.len() - 1);
+        let from = if side == 0 { 0.0 } else { self.ends[side - 1] };
+        let [a, b] = [side, (side + 1) % self.corners.len()].map(|i| self.corners[i]);
+        a.lerp(b, ((along - from) / (self.ends[side] - from).max(f64::MIN_POSITIVE)).min(1.0))
+    }
+
+    /// The point in a direction from `middle`, which is inside.
+    fn towards(&self, middle: DVec2, direction: DVec2) -> DVec2 {
+        let ahead = |side: usize| {
+            let [a, b] = [side, (side + 1) % self.corners.len()].map(|i| self.corners[i] - middle);
+            let [from, to] = [direction.perp_dot(a), direction.perp_dot(b)];
+            (from <= 0.0 && to > 0.0).then(|| middle + a.lerp(b, from / (from - to)))
+        };
+        (0..self.corners.len()).find_map(ahead).unwrap_or(middle)
+    }
+}
+
+/// Positions (m) of a tube hung around `body` from its top edge `top`, at least `gap` (m) from the trunk; `None` for a garment that is no
+/// tube, or whose top edge does not run around the trunk once.
+pub(super) fn hung_around(
+    mesh: &TriMesh,
+    rest: &RestShape,
+    top: &[u32],
+    body: &TriMesh,
+    landmarks: &Landmarks,
+    gap: f64,
+) -> Option<Vec<DVec3>> {
+    let hem = other_edge(mesh, top)?;
+    let lengths = [top, &hem[..]].map(|edge| lengths_along(mesh, rest, edge));
+    let [of_top, of_hem] = lengths.each_ref().map(|ends| ends.last().copied().unwrap_or_default());
+    let placed: Vec<DVec3> = top.iter().map(|&v| mesh.positions[v as usize]).collect();
+    let (z, hull) = fitting(body, landmarks, of_top, placed.iter().map(|x| x.z).sum::<f64>() / placed.len() as f64)?;
+    let middle = hull.iter().sum::<DVec2>() / hull.len() as f64;
+    let outwards = ((of_top - perimeter(&hull)) / TAU).max(gap);
+    let laid = laid(&placed, &lengths[0], &Curve::about(&hull, outwards), middle)?;
+    let of_edge = |edge: &[u32], s: f64| edge.iter().map(|&v| (v, DVec3::splat(s))).collect::<Vec<_>>();
+    let shares = harmonic(mesh, rest, &[of_edge(top, 0.0), of_edge(&hem, 1.0)].concat())?;
+    let unit = |x: &DVec2| (*x - middle).normalize_or_zero().extend(0.0);
+    let directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
+    let height_m = 2.0 * rest.areas().iter().sum::<f64>() / (of_top + of_hem);
+    let curves: Vec<(f64, Curve)> =
+        hulls_below(body, landmarks, z, hull).into_iter().map(|(z, hull)| (z, Curve::about(&hull, outwards))).collect();
+    let at = |(share, direction): (&DVec3, &DVec3)| {
+        let z = z - height_m * share.x;
+        let below = curves.partition_point(|curve| curve.0 > z).min(curves.len() - 1);
+        curves[below].1.towards(middle, direction.truncate()).extend(z)
+    };
+    let mut x: Vec<DVec3> = shares.iter().zip(&directions).map(at).collect();
+    top.iter().zip(laid).for_each(|(&v, laid)| x[v as usize] = laid.extend(z));
+    Some(x)
+}
+
+/// The edge of a tube that is not `top`; `None` for another garment.
+fn other_edge(mesh: &TriMesh, top: &[u32]) -> Option<Vec<u32>> {
+    let topology = Topology::new(mesh);
+    let is_tube = mesh.vertex_count() + mesh.triangles.len() == topology.edges.len() && topology.components().1 == 1;
+    let [a, b] = <[Vec<u32>; 2]>::try_from(topology.boundary_loops()).ok().filter(|_| is_tube)?;
+    if a == top { Some(b) } else { (b == top).then_some(a) }
+}
+
+/// Places (m) along `curve` of a closed edge placed at `placed` (m), with these lengths up to the end of each side, turned so that they move least;
+/// `None` where the edge does not run around `middle` once.
+fn laid(placed: &[DVec3], ends: &[f64], curve: &Curve, middle: DVec2) -> Option<Vec<DVec2>> {
+    let around = turns(placed, middle);
+    if around.abs().round() != 1.0 {
+        return None;
+    }
+    let length = *ends.last()?;
+    let shares: Vec<f64> = std::iter::once(0.0).chain(ends.iter().map(|end| around.signum() * end / length)).collect();
+    let turned = |turn: f64| placed.iter().zip(&shares).map(move |(x, share)| (x, curve.at(turn + share)));
+    let moved = |turn: f64| turned(turn).map(|(x, to)| x.truncate().distance_squared(to)).sum::<f64>();
+    let all = (0..TURNS).map(|k| k as f64 / TURNS as f64).map(|turn| (moved(turn), turn));
+    let (_, turn) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(turned(turn).map(|(_, to)| to).collect())
+}
+
+/// Heights (m) from `z` down, and the hull of all curves of the trunk from there up to `z`, where it is `hull`.
+fn hulls_below(body: &TriMesh, landmarks: &Landmarks, z: f64, hull_at_z: Vec<DVec2>) -> Vec<(f64, Vec<DVec2>)> {
+    let mut heights: Vec<f64> = landmarks.trunk_heights().filter(|height| *height < z).collect();
+    heights.reverse();
+    let mut hulls = vec![(z, hull_at_z)];
+    for height in heights {
+        let above = hulls[hulls.len() - 1].1.iter().copied();
+        let here = landmarks.trunk_at(body, height).map(|curve| curve.points).unwrap_or_default();
+        hulls.push((height, hull(above.chain(here.iter().map(|p| p.truncate())).collect())));
+    }
+    hulls
+}
+
+/// Turns of a closed curve about `middle`, counter-clockwise.
+fn turns(x: &[DVec3], middle: DVec2) -> f64 {
+    let about = |i: usize| x[i % x.len()].truncate() - middle;
+    (0..x.len()).map(|i| math::atan2(about(i).perp_dot(about(i + 1)), about(i).dot(about(i + 1)))).sum::<f64>() / TAU
+}
+
+/// Rest length of the closed `edge` up to the end of each of its sides, m.
+fn lengths_along(mesh: &TriMesh, rest: &RestShape, edge: &[u32]) -> Vec<f64> {
+    let mut next = vec![None; mesh.vertex_count()];
+    for (i, &v) in edge.iter().enumerate() {
+        next[v as usize] = Some((edge[(i + 1) % edge.len()], i));
+    }
+    let mut lengths = vec![0.0; edge.len()];
+    for (triangle, corners) in mesh.triangles.iter().zip(&rest.corners) {
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            for (from, to) in [(i, j), (j, i)] {
+                if let Some((end, side)) = next[triangle[from] as usize]
+                    && end == triangle[to]
+                {
+                    lengths[side] = corners[i].distance(corners[j]);
+                }
+            }
+        }
+    }
+    lengths
+        .iter()
+        .scan(0.0, |sum, length| {
+            *sum += length;
+            Some(*sum)
+        })
+        .collect()
+}
+
+/// The height (m) nearest to `height` at which `length` spans the trunk, or the waist's, and the hull of the trunk there.
+fn fitting(body: &TriMesh, landmarks: &Landmarks, length: f64, height: f64) -> Option<(f64, Vec<DVec2>)> {
+    let mut heights: Vec<f64> = landmarks.trunk_heights().collect();
+    heights.sort_by(|a, b| (a - height).abs().total_cmp(&(b - height).abs()));
+    let fits = |found: &(f64, Vec<DVec2>)| perimeter(&found.1) <= length;
+    let at = |z: f64| Some((z, hull_at(body, landmarks, z)?));
+    heights.into_iter().filter_map(at).find(fits).or_else(|| landmarks.waist_z.and_then(at))
+}
+
+/// Hull of the trunk at the height `z`, m.
+fn hull_at(body: &TriMesh, landmarks: &Landmarks, z: f64) -> Option<Vec<DVec2>> {
+    Some(hull(landmarks.trunk_at(body, z)?.points.iter().map(|p| p.truncate()).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::samples::tube;
+    use crate::mesh::self_intersection::self_intersecting_pairs;
+
+    #[test]
+    fn a_curve_moved_outwards_grows_by_the_circle_and_is_followed_at_its_length() {
+        let square = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+        let curve = Curve::about(&square, 0.1);
+        let length = *curve.ends.last().unwrap();
+        // Four corners, each cut by a chord instead of a quarter of a circle.
+        assert!((length - (4.0 + 4.0 * 0.1 * 2f64.sqrt())).abs() < 1e-12, "{length}");
+        assert!(curve.at(0.0).distance(DVec2::new(0.0, -0.1)) < 1e-12);
+        assert!(curve.at(0.5 / length).distance(DVec2::new(0.5, -0.1)) < 1e-12);
+        assert!(curve.at(-0.5 / length).distance(curve.at(1.0 - 0.5 / length)) < 1e-12);
+    }
+
+    /// A trunk of 10 cm radius.
+    fn trunk() -> TriMesh {
+        tube(60, 90, |a, j| DVec3::new(0.1 * a.cos(), 0.1 * a.sin(), 0.02 * j))
+    }
+
+    /// A skirt of 40 cm in rows of 2 cm: a cone from a circle of 12 cm radius to one of 12 + `widening` cm.
+    fn skirt(widening: f64) -> TriMesh {
+        tube(60, 20, |a, j| {
+            let radius = 0.12 + 0.01 * widening * j / 20.0;
+            DVec3::new(radius * a.cos(), radius * a.sin(), 1.0 - 0.02 * j)
+        })
+    }
+
+    #[test]
+    fn a_skirt_as_two_panels_far_above_the_waist_is_hung_around_the_trunk_without_an_intersection() {
+        let (body, at_rest) = (trunk(), skirt(20.0));
+        let rest = RestShape::from_edges(&at_rest).unwrap();
+        let top: Vec<u32> = (0..60).collect();
+        // The front panel 30 cm before the body, the back behind it, both half a metre too high and turned by a fifth of a radian.
+        let apart = |x: &DVec3| DVec3::new(x.x - 0.2 * x.y, x.y + 0.2 * x.x + 0.3 * x.y.signum(), x.z + 0.5);
+        let mesh = at_rest.with_positions(at_rest.positions.iter().map(apart).collect());
+        let x = hung_around(&mesh, &rest, &top, &body, &Landmarks::of(&body), 0.004).unwrap();
+        for &v in &top {
+            let x = x[v as usize];
+            assert!((x.truncate().length() - 0.12).abs() < 1e-3, "{x}");
+        }
+        assert!(x.iter().all(|x| x.truncate().length() > 0.11));
+        let hem = x[20 * 60].z - x[0].z;
+        assert!((hem + 0.44).abs() < 0.04, "{hem}");
+        let below = |v: usize| x[v].z - x[v + 60].z;
+        assert!((0..20 * 60).all(|v| below(v) > 0.0), "heights fall from row to row");
+        assert!(self_intersecting_pairs(&mesh.with_positions(x.clone())).is_empty());
+    }
+
+    #[test]
+    fn an_edge_keeps_its_distances_and_one_beside_the_body_is_not_laid() {
+        let (body, at_rest) = (trunk(), skirt(0.0));
+        let rest = RestShape::from_edges(&at_rest).unwrap();
+        let (top, landmarks) = ((0..60).collect::<Vec<u32>>(), Landmarks::of(&body));
+        let flattened = |x: &DVec3| DVec3::new(1.6 * x.x, 2.5 * x.y, x.z);
+        let mesh = at_rest.with_positions(at_rest.positions.iter().map(flattened).collect());
+        let x = hung_around(&mesh, &rest, &top, &body, &landmarks, 0.004).unwrap();
+        for v in 0..60 {
+            assert!(
+                x[v].truncate().distance(at_rest.positions[v].truncate()) < 2e-3,
+                "{} {}",
+                x[v],
+                at_rest.positions[v]
+            );
+        }
+        let aside = mesh.with_positions(mesh.positions.iter().map(|x| *x + DVec3::X).collect());
+        assert!(hung_around(&aside, &rest, &top, &body, &landmarks, 0.004).is_none());
+        assert!(hung_around(&mesh, &rest, &[], &body, &landmarks, 0.004).is_none());
+    }
+}
