@@ -265,13 +265,8 @@ mod tests {
         let flattened = |x: &DVec3| DVec3::new(1.6 * x.x, 2.5 * x.y, x.z);
         let mesh = at_rest.with_positions(at_rest.positions.iter().map(flattened).collect());
         let x = hung_around(&mesh, &rest, &top, &body, &landmarks, 0.004).unwrap();
-        for v in 0..60 {
-            assert!(
-                x[v].truncate().distance(at_rest.positions[v].truncate()) < 2e-3,
-                "{} {}",
-                x[v],
-                at_rest.positions[v]
-            );
+        for (x, at) in x.iter().zip(&at_rest.positions).take(60) {
+            assert!(x.truncate().distance(at.truncate()) < 2e-3, "{x} {at}");
         }
         let aside = mesh.with_positions(mesh.positions.iter().map(|x| *x + DVec3::X).collect());
         assert!(hung_around(&aside, &rest, &top, &body, &landmarks, 0.004).is_none());
