@@ -21,17 +21,14 @@
 use glam::DVec3;
 
 use super::energy::field::SIDE;
-use super::energy::{Cloth, Contacts, Touch};
+use super::energy::{Cloth, Contacts, TOUCH_MARGIN_M, Touch};
 use super::linear_algebra::norm;
 use crate::body::distance::Body;
 
 /// Largest residual over weight at rest: [`RefineOptions::default`](super::refine::RefineOptions)'s tolerance.
 pub(crate) const MAX_RESIDUAL: f64 = 1e-3;
 
-/// Distance beyond its offset up to which a vertex touches, m: a strain of a few percent changes the offset by a tenth of a millimetre.
-const TOUCH_MARGIN_M: f64 = 2e-4;
-
-/// The same for a place inside a triangle, m. The solver raises the offset of such places where the body is rougher than that.
+/// [`TOUCH_MARGIN_M`] for a place inside a triangle, m. The solver raises the offset of such places where the body is rougher than that.
 const PLACE_MARGIN_M: f64 = 5e-4;
 
 /// Most sweeps over all cones. Heuristic.

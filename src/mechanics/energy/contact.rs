@@ -19,12 +19,14 @@
 //!
 //! **Penetration in narrow places.** At a concave edge q exceeds s by as much as a thin cloth is thick: a vertex may keep its offset
 //! h and still be inside the body. No stiffness changes that. Replacing h by h + q − s does, since κ A (h + q − s − q) = κ A (h − s).
-//! κ itself is too small only where q is negative. Limits: q − s is taken at the present position and changes as the vertex
-//! slides; vertices that do not touch by q are not examined; the contact pressure reported later (`mechanics::fit`) uses the
+//! κ itself is too small only where q is negative. q − s is taken at the present position and changes as the vertex
+//! slides: where a rest fails by its criteria, it is taken anew at vertices that do not touch by their own h. Limits: vertices that do not touch by q are not examined; the contact pressure reported later (`mechanics::fit`) uses the
 //! original h and is too small at such a vertex.
 //!
 //! Limits: contact is evaluated at vertices. Triangles that intersect the body between their vertices receive contact places
 //! ([`face_contacts`](super::face_contacts)).
+
+use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -42,6 +44,9 @@ use crate::mesh::TriMesh;
 
 /// Distance from its foot up to which a tangent plane replaces the body, m. On a radius of 5 cm its error is then 0.04 mm.
 const PLANE_RADIUS_M: f64 = 2e-3;
+
+/// Distance beyond its offset up to which a vertex touches, m: a strain of a few percent changes the offset by a tenth of a millimetre.
+pub(crate) const TOUCH_MARGIN_M: f64 = 2e-4;
 
 /// The body, and the distance that contact takes from it.
 #[derive(Debug, Clone, Default)]
@@ -80,6 +85,8 @@ pub struct Contacts<'b> {
     obstacle: Obstacle<'b>,
     /// h of each vertex, m.
     offsets: Vec<f64>,
+    /// The own h (m) of each vertex whose h was raised.
+    raised: BTreeMap<u32, f64>,
     areas: Vec<f64>,
     held: Vec<bool>,
     /// Position (m) and distance (m) of each vertex at its last query.
@@ -299,6 +306,7 @@ impl<'b> Contacts<'b> {
         let found: Vec<Penetration> = self.penetrations(x).collect();
         for &Penetration { vertex, rounded, exact } in &found {
             let v = vertex as usize;
+            self.raised.entry(vertex).or_insert(self.offsets[v]);
             self.offsets[v] += (rounded - exact).max(0.0);
             self.store_query(v, x[v], rounded);
         }
@@ -306,6 +314,20 @@ impl<'b> Contacts<'b> {
             self.stiffen(self.options.stiffening);
         }
         !found.is_empty()
+    }
+
+    /// Lowers raised offsets to what they would be by the distances at `x` (m), the positions of the last update, at vertices that would not touch
+    /// there by their own offset: they have slid. Takes effect with the next [`update`](Self::update).
+    pub(crate) fn lower_offsets(&mut self, x: &[DVec3]) {
+        let Some(body) = self.body() else { return };
+        let Self { raised, offsets, touches, .. } = self;
+        for Touch { vertex, depth, .. } in touches {
+            let (v, Some(own)) = (*vertex as usize, raised.get(vertex)) else { continue };
+            let (rounded, exact) = (offsets[v] - *depth, body.nearest(x[v]).signed_distance);
+            if exact > own + TOUCH_MARGIN_M {
+                offsets[v] = own + (rounded - exact).max(0.0);
+            }
+        }
     }
 
     fn penetrations(&self, x: &[DVec3]) -> impl Iterator<Item = Penetration> {
@@ -399,7 +421,36 @@ impl<'b> Contacts<'b> {
 mod tests {
     use super::*;
     use crate::mechanics::energy::Cloth;
-    use crate::mesh::samples::cuboid;
+    use crate::mesh::samples::{cuboid, sheet};
+
+    #[test]
+    fn a_raised_offset_is_lowered_where_the_vertex_does_not_touch_by_its_own() {
+        let body = Body::new(&cuboid(DVec3::new(-0.5, -0.5, -1.0), DVec3::new(0.5, 0.5, 0.0))).unwrap();
+        let mesh = sheet(1, 1, |i, j| DVec3::new(0.1 * i, 0.1 * j, 0.0));
+        let cloth = Cloth::sample(&mesh, "jersey", &[]);
+        // Two corners are a millimetre beyond their own offset, two a tenth of one. Over a flat face both distances agree.
+        let x: Vec<DVec3> =
+            (0..4).map(|v| mesh.positions[v].with_z(cloth.offsets[v] + if v < 2 { 1e-3 } else { 1e-4 })).collect();
+        let mut contacts = cloth.contacts(&body, &x);
+        for v in 0..4 {
+            contacts.raised.insert(v, contacts.offsets[v as usize]);
+            contacts.offsets[v as usize] += 2e-3;
+        }
+        contacts.update(&x);
+        assert_eq!(contacts.touches().len(), 4);
+        contacts.lower_offsets(&x);
+        contacts.update(&x);
+        let touching: Vec<u32> = contacts.touches().iter().map(|t| t.vertex).collect();
+        assert_eq!(touching, [2, 3]);
+        for v in 0..2 {
+            assert!(
+                (contacts.offsets[v] - cloth.offsets[v]).abs() < 1e-9,
+                "{} {}",
+                contacts.offsets[v],
+                cloth.offsets[v]
+            );
+        }
+    }
 
     #[test]
     fn contacts_from_known_distances_are_those_of_queries() {

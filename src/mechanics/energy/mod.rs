@@ -33,7 +33,7 @@ mod vertex_ring;
 pub use cloth::{Cloth, Scratch};
 pub(crate) use cloth::{ContactBlock, MIN_BODY_RADIUS_M};
 pub use contact::Contacts;
-pub(crate) use contact::FaceUpdate;
+pub(crate) use contact::{FaceUpdate, TOUCH_MARGIN_M};
 pub use error::EnergyError;
 pub use friction::{Friction, Touch};
 pub(crate) use membrane::HessianKind;

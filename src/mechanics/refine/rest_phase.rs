@@ -32,6 +32,7 @@ impl RestPhase {
             RestCheck::Rests => Verdict::Rests,
             RestCheck::Fails(criterion) => {
                 self.failed = criterion.name;
+                descent.contacts.lower_offsets(&descent.x);
                 Verdict::GoesOn { escaped: false }
             }
             RestCheck::Escaped => {
