@@ -63,7 +63,7 @@ const MAX_CLOSING_STEPS: usize = 100;
 const COMPRESSION: f64 = 0.1;
 
 /// The same of a tube, which begins compressed around the trunk. Pairs of triangles that intersect when a skirt of one and a half circles is closed:
-/// 154 with 0.1, none with 0.03 and 0.01. Steps at full resolution of one of half a circle: 19, 9, 26.
+/// 154 with 0.1, none with 0.03 and 0.01. Steps at full resolution of a narrower circle skirt: 19, 9, 26.
 const TUBE_COMPRESSION: f64 = 0.03;
 
 /// Fairings in a round, each followed by two steps; the first removes waves of [`WAVELENGTH`] (m), each further one
