@@ -3,7 +3,7 @@
 //! The panels of a skirt stand before and behind the body, a wide one's up to the shoulders and through each other and the hands. A garment with
 //! two edges and no shoulders needs no such start. It is put around the trunk by two coordinates over its rest shape:
 //!
-//! s with Δs = 0, s = 0 on the top edge, 1 on the hem; θ = arg c with Δc = 0, c = e^(iθ) on the top edge,
+//! s with Δs = 0, s = 0 on the top edge, 1 on the hem; θ = arg(c − mean of c over the hem) with Δc = 0, c = e^(iθ) on the top edge,
 //!
 //! at a height D s below the top edge, in the direction θ on the convex hull of the trunk's curves between. θ and s grow steadily, so cloth does
 //! not pass through cloth; it is compressed around the trunk, and widens when its seams are closed.
@@ -101,13 +101,16 @@ pub(super) fn hung_around(
     let [of_top, of_hem] = lengths.each_ref().map(|ends| ends.last().copied().unwrap_or_default());
     let placed: Vec<DVec3> = top.iter().map(|&v| mesh.positions[v as usize]).collect();
     let (z, hull) = fitting(body, landmarks, of_top, placed.iter().map(|x| x.z).sum::<f64>() / placed.len() as f64)?;
-    let middle = hull.iter().sum::<DVec2>() / hull.len() as f64;
+    let middle = landmarks.middle;
     let outwards = ((of_top - perimeter(&hull)) / TAU).max(gap);
     let laid = laid(&placed, &lengths[0], &Curve::about(&hull, outwards), middle)?;
     let of_edge = |edge: &[u32], s: f64| edge.iter().map(|&v| (v, DVec3::splat(s))).collect::<Vec<_>>();
     let shares = harmonic(mesh, rest, &[of_edge(top, 0.0), of_edge(&hem, 1.0)].concat())?;
     let unit = |x: &DVec2| (*x - middle).normalize_or_zero().extend(0.0);
-    let directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
+    let mut directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
+    // c falls off towards the hem, and its mean does not: where it is not zero, θ would be one direction there.
+    let mean = hem.iter().map(|&v| directions[v as usize]).sum::<DVec3>() / hem.len() as f64;
+    directions.iter_mut().for_each(|c| *c -= mean);
     let height_m = 2.0 * rest.areas().iter().sum::<f64>() / (of_top + of_hem);
     let curves: Vec<(f64, Curve)> =
         hulls_below(body, landmarks, z, hull).into_iter().map(|(z, hull)| (z, Curve::about(&hull, outwards))).collect();
