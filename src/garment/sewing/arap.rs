@@ -254,7 +254,8 @@ pub(super) fn faired(mesh: &TriMesh, rest: &RestShape, x: &[DVec3], length: f64)
     solve(&system.entries, x.len(), &side, &mut None).unwrap_or_else(|| x.to_vec())
 }
 
-/// The harmonic functions over the rest shape with these values at some vertices, three at a time.
+/// Three functions over the rest shape that are harmonic up to the small proximal term, with these values at some vertices; `None` where the
+/// system cannot be factorised.
 pub(super) fn harmonic(mesh: &TriMesh, rest: &RestShape, values: &[(u32, DVec3)]) -> Option<Vec<DVec3>> {
     let held: Vec<u32> = values.iter().map(|(v, _)| *v).collect();
     let system = System::new(mesh, rest, &held);

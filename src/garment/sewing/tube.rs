@@ -1,12 +1,14 @@
-//! Tubes, as skirts and strapless tops are, hung around the trunk: the start from which their seams are closed.
+//! Garments that are tubes, such as skirts, hung around the trunk: the start from which their seams are closed.
 //!
 //! The panels of a skirt stand before and behind the body, a wide one's up to the shoulders and through each other and the hands. A garment with
 //! two edges and no shoulders needs no such start. It is put around the trunk by two coordinates over its rest shape:
 //!
 //! s with Δs = 0, s = 0 on the top edge, 1 on the hem; θ = arg(c − mean of c over the hem) with Δc = 0, c = e^(iθ) on the top edge,
 //!
-//! at a height D s below the top edge, in the direction θ on the convex hull of the trunk's curves between. θ and s grow steadily, so cloth does
-//! not pass through cloth; it is compressed around the trunk, and widens when its seams are closed.
+//! at a height D s below the top edge, in the direction θ on the convex hull of the trunk's curves between. Where θ and s are monotone, the
+//! start does not intersect itself. It is compressed around the trunk, and widens when its seams are closed.
+//!
+//! c decreases towards the hem while its mean does not; without subtracting the mean, θ would be nearly constant at the hem of a long garment.
 //!
 //! **The top edge** lies at the height nearest to its own where its length spans the trunk's tape girth, or at the waist where it spans none,
 //! outside the hull by
@@ -25,8 +27,9 @@
 //! | d | distance from the hull | m |
 //!
 //! Source: own; harmonic coordinates as in the parametrisation of surfaces (Floater, Hormann: "Surface parameterization: a tutorial and survey",
-//! 2005). Limits: the top edge lies in a plane until the drape is released. θ is not proved to grow where the hem is far from a circle about
-//! the top edge. An edge that does not run around the trunk once is not laid.
+//! 2005). Limits: the top edge lies in a plane until the drape is released. θ need not be monotone, as c comes from a mesh and only its mean over the
+//! hem is subtracted; a function θ with a jump of 2π across a cut would be. A garment whose top edge does
+//! not run around the trunk once is not hung.
 
 use std::f64::consts::TAU;
 
@@ -48,7 +51,7 @@ struct Curve {
 }
 
 impl Curve {
-    /// The convex hull of `points` moved outwards by `distance`, m.
+    /// A convex `hull`, counter-clockwise, moved outwards by `distance` (m); each corner is cut by a chord.
     fn about(hull: &[DVec2], distance: f64) -> Self {
         let mut corners = Vec::with_capacity(2 * hull.len());
         for (i, &a) in hull.iter().enumerate() {
@@ -108,7 +111,6 @@ pub(super) fn hung_around(
     let shares = harmonic(mesh, rest, &[of_edge(top, 0.0), of_edge(&hem, 1.0)].concat())?;
     let unit = |x: &DVec2| (*x - middle).normalize_or_zero().extend(0.0);
     let mut directions = harmonic(mesh, rest, &top.iter().copied().zip(laid.iter().map(unit)).collect::<Vec<_>>())?;
-    // c falls off towards the hem, and its mean does not: where it is not zero, θ would be one direction there.
     let mean = hem.iter().map(|&v| directions[v as usize]).sum::<DVec3>() / hem.len() as f64;
     directions.iter_mut().for_each(|c| *c -= mean);
     let height_m = 2.0 * rest.areas().iter().sum::<f64>() / (of_top + of_hem);
@@ -258,6 +260,18 @@ mod tests {
         let below = |v: usize| x[v].z - x[v + 60].z;
         assert!((0..20 * 60).all(|v| below(v) > 0.0), "heights fall from row to row");
         assert!(self_intersecting_pairs(&mesh.with_positions(x.clone())).is_empty());
+    }
+
+    #[test]
+    fn the_hem_of_a_long_garment_goes_around_a_trunk_without_symmetry() {
+        let egg = |a: f64| 0.1 + 0.03 * a.cos();
+        let body = tube(60, 90, |a, j| DVec3::new(egg(a) * a.cos(), egg(a) * a.sin(), 0.02 * j));
+        let mesh = tube(60, 60, |a, j| DVec3::new(0.15 * a.cos(), 0.15 * a.sin(), 1.3 - 0.02 * j));
+        let rest = RestShape::from_edges(&mesh).unwrap();
+        let (top, landmarks) = ((0..60).collect::<Vec<_>>(), Landmarks::of(&body));
+        let x = hung_around(&mesh, &rest, &top, &body, &landmarks, 0.004).unwrap();
+        let out = |i: usize| x[60 * 60 + i % 60].truncate() - landmarks.middle;
+        assert!((0..60).all(|i| out(i).perp_dot(out(i + 1)) > 0.0));
     }
 
     #[test]

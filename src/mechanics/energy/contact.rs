@@ -20,7 +20,7 @@
 //! **Penetration in narrow places.** At a concave edge q exceeds s by as much as a thin cloth is thick: a vertex may keep its offset
 //! h and still be inside the body. No stiffness changes that. Replacing h by h + q − s does, since κ A (h + q − s − q) = κ A (h − s).
 //! κ itself is too small only where q is negative. q − s is taken at the present position and changes as the vertex
-//! slides: where a rest fails by its criteria, it is taken anew at vertices that do not touch by their own h. Limits: vertices that do not touch by q are not examined; the contact pressure reported later (`mechanics::fit`) uses the
+//! slides: where the check of a rest fails, it is computed again at vertices farther from the body than their original h. Limits: vertices that do not touch by q are not examined; the contact pressure reported later (`mechanics::fit`) uses the
 //! original h and is too small at such a vertex.
 //!
 //! Limits: contact is evaluated at vertices. Triangles that intersect the body between their vertices receive contact places
@@ -85,7 +85,7 @@ pub struct Contacts<'b> {
     obstacle: Obstacle<'b>,
     /// h of each vertex, m.
     offsets: Vec<f64>,
-    /// The own h (m) of each vertex whose h was raised.
+    /// The original h (m) of each vertex whose h was raised.
     raised: BTreeMap<u32, f64>,
     areas: Vec<f64>,
     held: Vec<bool>,
@@ -316,8 +316,8 @@ impl<'b> Contacts<'b> {
         !found.is_empty()
     }
 
-    /// Lowers raised offsets to what they would be by the distances at `x` (m), the positions of the last update, at vertices that would not touch
-    /// there by their own offset: they have slid. Takes effect with the next [`update`](Self::update).
+    /// Computes raised offsets again from the distances at `x` (m), the positions of the last update, for vertices that have slid away from the
+    /// narrow place: those farther from the body than their original offset. Takes effect with the next [`update`](Self::update).
     pub(crate) fn lower_offsets(&mut self, x: &[DVec3]) {
         let Some(body) = self.body() else { return };
         let Self { raised, offsets, touches, .. } = self;

@@ -12,8 +12,8 @@
 //! The last one is the first where it has no more intersections than the clear positions. If every end fails, the one with the fewest
 //! intersections is the result.
 //!
-//! Limits: the observer sees the steps from each start, numbered anew. A run that is asked for a number of steps takes them from the first
-//! start alone.
+//! Limits: the observer sees the steps from each start, each time numbered from zero. With `RefineOptions::max_steps` all steps are taken from the
+//! first start.
 
 use glam::DVec3;
 
