@@ -33,8 +33,8 @@ use super::energy::friction::ELASTIC_SLIP;
 use super::energy::membrane::outer;
 use super::energy::{Cloth, ContactBlock, Contacts, HessianKind, HessianLayout, Scratch};
 use super::linear_algebra::dot;
-use super::newton::{SolveError, Solver};
-use super::reactions::{Forces, MAX_RESIDUAL};
+use super::newton::{FullSpace, SolveError, Solver};
+use super::reactions::{Forces, MAX_RESIDUAL, Reaction};
 use crate::body::distance::Body;
 
 /// Largest difference of reactions and weight, over the weight. It exceeds [`MAX_RESIDUAL`], because residual forces in one direction add
@@ -105,13 +105,23 @@ impl Criterion {
     }
 }
 
+/// Reactions that push.
+fn pushing(forces: &Forces) -> impl Iterator<Item = &Reaction> {
+    forces.reactions.iter().filter(|t| t.normal_n > 0.0)
+}
+
+/// Pairs of vertices that these reactions couple.
+pub(crate) fn coupled_by(forces: &Forces) -> impl Iterator<Item = [u32; 2]> {
+    pushing(forces).flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])))
+}
+
 /// The energy to second order about a state of a cloth, with the reactions of its contacts.
 pub(crate) struct Linearised<'a> {
     cloth: &'a Cloth,
     x: &'a [DVec3],
-    layout: HessianLayout,
+    layout: &'a HessianLayout,
     contacts: Vec<ContactBlock>,
-    solver: Solver,
+    solver: &'a mut Solver,
     /// The next Newton step of every vertex, m; zero where held.
     pub(crate) step: Vec<DVec3>,
 }
@@ -132,29 +142,31 @@ pub struct Curvature {
 }
 
 impl<'a> Linearised<'a> {
-    /// About `x` (m), with the reactions of `forces`.
+    /// About `x` (m), with the reactions of `forces`; B is factorised in `space`.
     ///
     /// # Errors
     /// [`SolveError`] if B cannot be factorised.
-    pub(crate) fn new(cloth: &'a Cloth, forces: &Forces, x: &'a [DVec3]) -> Result<Self, SolveError> {
-        let pushing = || forces.reactions.iter().filter(|t| t.normal_n > 0.0);
-        let pairs = pushing().flat_map(|t| t.shares.iter().flat_map(|(a, _)| t.shares.iter().map(|(b, _)| [*a, *b])));
-        let layout = cloth.layout_with(x, pairs);
-        let mut blocks = Vec::new();
-        cloth.hessian_in(&layout, HessianKind::Projected, x, &Contacts::none(), &mut blocks);
+    pub(crate) fn new(
+        cloth: &'a Cloth,
+        forces: &Forces,
+        x: &'a [DVec3],
+        space: &'a mut FullSpace,
+    ) -> Result<Self, SolveError> {
+        space.couple(cloth, x, || coupled_by(forces));
+        let (layout, solver, blocks) = space.parts(cloth);
+        cloth.hessian_in(layout, HessianKind::Projected, x, &Contacts::none(), blocks);
         let mut contacts = Vec::new();
-        for t in pushing() {
+        for t in pushing(forces) {
             let along = outer(t.normal, t.normal);
             let across = if t.sticks { t.friction * t.normal_n / ELASTIC_SLIP } else { 0.0 };
             let block = along * t.stiffness + (DMat3::IDENTITY - along) * across;
             let members = layout.free(t.shares.iter().copied());
-            layout.add(&members, block, &mut blocks);
+            layout.add(&members, block, blocks);
             contacts.push(ContactBlock { members, block });
         }
         let damped: Vec<f64> = layout.order.iter().map(|&v| cloth.masses[v as usize] * LANCZOS_DAMPING).collect();
-        let mut solver = Solver::new(&layout.pattern);
         let mut unknowns: Vec<DVec3> = layout.order.iter().map(|&v| -forces.residual_forces[v as usize]).collect();
-        solver.solve(&layout.pattern, &blocks, &damped, true, &mut unknowns)?;
+        solver.solve(&layout.pattern, blocks, &damped, true, &mut unknowns)?;
         let mut step = vec![DVec3::ZERO; x.len()];
         layout.order.iter().zip(&unknowns).for_each(|(&v, d)| step[v as usize] = *d);
         Ok(Self { cloth, x, layout, contacts, solver, step })
@@ -162,9 +174,9 @@ impl<'a> Linearised<'a> {
 
     /// The softest modes.
     pub(crate) fn curvature(self) -> Curvature {
-        let Self { cloth, x, layout, contacts, mut solver, step } = self;
-        let hessian = HessianOperator { cloth, layout: &layout, x, contacts };
-        let ritz = hessian.lanczos(MAX_LANCZOS_STEPS, &mut solver);
+        let Self { cloth, x, layout, contacts, solver, step } = self;
+        let hessian = HessianOperator { cloth, layout, x, contacts };
+        let ritz = hessian.lanczos(MAX_LANCZOS_STEPS, solver);
         let softest = &ritz.vectors[0];
         let turned = hessian.apply(softest, &mut Scratch::default());
         let mass: f64 =
@@ -197,7 +209,7 @@ impl RestState {
     /// [`SolveError`] if the projected Hessian cannot be factorised.
     pub(crate) fn new(cloth: &Cloth, body: Option<&Body>, x: &[DVec3]) -> Result<Self, SolveError> {
         let forces = Forces::on(cloth, body, x);
-        let curvature = Linearised::new(cloth, &forces, x)?.curvature();
+        let curvature = Linearised::new(cloth, &forces, x, &mut FullSpace::default())?.curvature();
         let [residual, balance, friction] = Criterion::of_forces(&forces, cloth);
         let [moving, distance] = Criterion::of_step(&curvature.step);
         let lowest = Criterion::of_curvature(&curvature);

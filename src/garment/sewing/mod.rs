@@ -9,6 +9,7 @@ mod arrange;
 mod landmarks;
 mod put_on;
 mod tube;
+mod waves;
 
 pub(crate) use arap::laid_flat;
 pub use landmarks::Landmarks;

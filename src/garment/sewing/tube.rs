@@ -6,7 +6,8 @@
 //! s with Δs = 0, s = 0 on the top edge, 1 on the hem; θ = arg(c − mean of c over the hem) with Δc = 0, c = e^(iθ) on the top edge,
 //!
 //! at a height D s below the top edge, in the direction θ on the convex hull of the trunk's curves between. Where θ and s are monotone, the
-//! start does not intersect itself. It is compressed around the trunk, and widens when its seams are closed.
+//! start does not intersect itself. Where the garment is wider than the trunk it is laid in regular folds ([`waves`](super::waves)), as wide at the top edge as
+//! [`FOLD_WIDTH_M`]; its girth grows evenly from one edge to the other.
 //!
 //! c decreases towards the hem while its mean does not; without subtracting the mean, θ would be nearly constant at the hem of a long garment.
 //!
@@ -37,12 +38,17 @@ use glam::{DVec2, DVec3};
 
 use super::arap::harmonic;
 use super::landmarks::Landmarks;
+use super::waves::Waves;
 use crate::base::math;
 use crate::body::girth::{hull, perimeter};
 use crate::mesh::{RestShape, Topology, TriMesh};
 
 /// Turns of the edge that are tried: a millimetre apart.
 const TURNS: usize = 1000;
+
+/// Width of a fold at the top edge, m. Steps at full resolution of a skirt of one and a half circles (26,000 vertices) and of an asymmetric
+/// circle skirt in knit: 15 and 6; with 4 cm 28 and 48; with 12 cm no rest in 130 s, and 22. Without folds 122 and 8.
+const FOLD_WIDTH_M: f64 = 0.06;
 
 /// A closed curve by its corners, with the length up to each.
 struct Curve {
@@ -69,9 +75,13 @@ impl Curve {
         Self { corners, ends }
     }
 
+    fn length(&self) -> f64 {
+        self.ends.last().copied().unwrap_or_default()
+    }
+
     /// The point at a share of the length, counter-clockwise.
     fn at(&self, share: f64) -> DVec2 {
-        let along = share.rem_euclid(1.0) * self.ends.last().copied().unwrap_or_default();
+        let along = share.rem_euclid(1.0) * self.length();
         let side = self.ends.partition_point(|end| *end <= along).min(self.corners.len() - 1);
         let from = if side == 0 { 0.0 } else { self.ends[side - 1] };
         let [a, b] = [side, (side + 1) % self.corners.len()].map(|i| self.corners[i]);
@@ -114,12 +124,28 @@ pub(super) fn hung_around(
     let mean = hem.iter().map(|&v| directions[v as usize]).sum::<DVec3>() / hem.len() as f64;
     directions.iter_mut().for_each(|c| *c -= mean);
     let height_m = 2.0 * rest.areas().iter().sum::<f64>() / (of_top + of_hem);
-    let curves: Vec<(f64, Curve)> =
-        hulls_below(body, landmarks, z, hull).into_iter().map(|(z, hull)| (z, Curve::about(&hull, outwards))).collect();
+    let folds = (of_top / FOLD_WIDTH_M).round().max(1.0);
+    let level = |(height, hull): (f64, Vec<DVec2>)| {
+        let curve = Curve::about(&hull, outwards);
+        let share = ((z - height) / height_m).min(1.0);
+        let waves = Waves::new(folds, curve.length(), of_top + share * (of_hem - of_top));
+        (height, curve, waves)
+    };
+    let levels: Vec<(f64, Curve, Waves)> = hulls_below(body, landmarks, z, hull).into_iter().map(level).collect();
     let at = |(share, direction): (&DVec3, &DVec3)| {
         let z = z - height_m * share.x;
-        let below = curves.partition_point(|curve| curve.0 > z).min(curves.len() - 1);
-        curves[below].1.towards(middle, direction.truncate()).extend(z)
+        let below = levels.partition_point(|(height, ..)| *height > z).min(levels.len() - 1);
+        let above = below.saturating_sub(1);
+        let [upper, lower] = [above, below].map(|level| levels[level].0);
+        let share = if upper > lower { ((upper - z) / (upper - lower)).min(1.0) } else { 0.0 };
+        let along = math::atan2(direction.y, direction.x) / TAU;
+        let [upper, lower] = [above, below].map(|level| {
+            let (_, curve, waves) = &levels[level];
+            let (around, out) = waves.at(along);
+            let outwards = math::unit(TAU * around);
+            curve.towards(middle, outwards) + out * outwards
+        });
+        upper.lerp(lower, share).extend(z)
     };
     let mut x: Vec<DVec3> = shares.iter().zip(&directions).map(at).collect();
     top.iter().zip(laid).for_each(|(&v, laid)| x[v as usize] = laid.extend(z));
@@ -220,7 +246,7 @@ mod tests {
     fn a_curve_moved_outwards_grows_by_the_circle_and_is_followed_at_its_length() {
         let square = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
         let curve = Curve::about(&square, 0.1);
-        let length = *curve.ends.last().unwrap();
+        let length = curve.length();
         // Four corners, each cut by a chord instead of a quarter of a circle.
         assert!((length - (4.0 + 4.0 * 0.1 * 2f64.sqrt())).abs() < 1e-12, "{length}");
         assert!(curve.at(0.0).distance(DVec2::new(0.0, -0.1)) < 1e-12);

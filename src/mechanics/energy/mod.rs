@@ -27,6 +27,7 @@ mod membrane_simd;
 pub(crate) mod ordering;
 mod passage;
 mod proximity;
+mod separator;
 pub mod sparsity;
 mod vertex_ring;
 

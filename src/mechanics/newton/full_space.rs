@@ -54,12 +54,16 @@ impl FullSpace {
         self.coupled.as_ref().unwrap_or_else(|| cloth.layout())
     }
 
-    /// Extends the layout by every pair of vertices that a gap couples.
-    pub(super) fn couple(&mut self, here: &State<'_>) {
-        let State { cloth, x, contacts, .. } = *here;
-        let Some(proximity) = &contacts.proximity else { return };
-        if !self.layout(cloth).has(proximity.pairs()) {
-            self.coupled = Some(cloth.layout_with(x, proximity.pairs()));
+    /// The layout of the Hessian, the solver of matrices in it, and blocks to fill.
+    pub(crate) fn parts<'a>(&'a mut self, cloth: &'a Cloth) -> (&'a HessianLayout, &'a mut Solver, &'a mut Vec<DMat3>) {
+        let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
+        (layout, self.solver.get_or_insert_with(|| Solver::new(&layout.pattern)), &mut self.blocks)
+    }
+
+    /// Makes a layout with blocks for these pairs of vertices, ordered for the positions `x` (m), unless the present one has them.
+    pub(crate) fn couple<P: Iterator<Item = [u32; 2]>>(&mut self, cloth: &Cloth, x: &[DVec3], pairs: impl Fn() -> P) {
+        if !self.layout(cloth).has(pairs()) {
+            self.coupled = Some(cloth.layout_with(x, pairs()));
             self.solver = None;
         }
     }
@@ -71,8 +75,10 @@ impl FullSpace {
         d: &mut Vec<DVec3>,
         own: &mut Vec<DMat3>,
     ) -> Result<(), SolveError> {
-        let State { cloth, x, .. } = *here;
-        self.couple(here);
+        let State { cloth, x, contacts, .. } = *here;
+        if let Some(proximity) = &contacts.proximity {
+            self.couple(cloth, x, || proximity.pairs());
+        }
         self.is_true = !std::mem::take(&mut self.projects) && self.solve(here, HessianKind::True).is_ok();
         if !self.is_true {
             self.solve(here, HessianKind::Projected)?;
@@ -88,14 +94,6 @@ impl FullSpace {
             own[v as usize] = self.blocks[starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(self.damped[i]));
         }
         Ok(())
-    }
-
-    /// Frees the matrix and its factor, which every step recomputes, and keeps the analysis of the pattern.
-    pub(crate) fn release(&mut self) {
-        self.blocks = Vec::new();
-        if let Some(solver) = &mut self.solver {
-            solver.release();
-        }
     }
 
     /// After a rejected step: the next one takes the projected Hessian; returns whether this one had the true one.

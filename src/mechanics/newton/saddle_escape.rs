@@ -11,10 +11,11 @@
 use glam::DVec3;
 
 use super::factor::SolveError;
+use super::full_space::FullSpace;
 use super::state::NewtonState;
-use crate::mechanics::energy::StepCheck;
+use crate::mechanics::energy::{Proximity, StepCheck};
 use crate::mechanics::reactions::Forces;
-use crate::mechanics::rest::{Criterion, Linearised};
+use crate::mechanics::rest::{Criterion, Linearised, coupled_by};
 use crate::mechanics::solver_options::SolverOptions;
 
 /// Result of a check.
@@ -28,16 +29,23 @@ pub(crate) enum RestCheck {
     Escaped,
 }
 
-/// Checks the equilibrium of `state`. Unstable modes are searched if all else passes, or in any case if `always_search`. The cloth leaves an
-/// unstable equilibrium and is relaxed.
-pub(crate) fn check_rest(state: &mut NewtonState<'_, '_>, always_search: bool) -> Result<RestCheck, SolveError> {
+/// Checks the equilibrium of `state`, with the layout and the solver of its `tangent`. Unstable modes are searched if all else passes, or in any
+/// case if `always_search`. The cloth leaves an unstable equilibrium and is relaxed.
+pub(crate) fn check_rest(
+    state: &mut NewtonState<'_, '_>,
+    tangent: &mut FullSpace,
+    always_search: bool,
+) -> Result<RestCheck, SolveError> {
     let first_failed = |criteria: &[Criterion]| criteria.iter().find(|criterion| !criterion.passes).copied();
     let forces = Forces::on(state.cloth, state.contacts.body(), &state.x);
     let unbalanced = first_failed(&Criterion::of_forces(&forces, state.cloth));
     if let Some(unbalanced) = unbalanced.filter(|_| !always_search) {
         return Ok(RestCheck::Fails(unbalanced));
     }
-    let linearised = Linearised::new(state.cloth, &forces, &state.x)?;
+    // The gaps as well, so that the steps that follow need no other layout.
+    let gaps = || state.contacts.proximity.iter().flat_map(Proximity::pairs);
+    tangent.couple(state.cloth, &state.x, || gaps().chain(coupled_by(&forces)));
+    let linearised = Linearised::new(state.cloth, &forces, &state.x, tangent)?;
     let failed = unbalanced.or(first_failed(&Criterion::of_step(&linearised.step)));
     if let Some(failed) = failed.filter(|_| !always_search) {
         return Ok(RestCheck::Fails(failed));

@@ -51,12 +51,6 @@ impl Solver {
         Self { symbolic: SymbolicFactor::new(pattern), single: Some(Factor::default()), double: Factor::default() }
     }
 
-    /// Frees the factor, which the next [`solve`](Self::solve) recomputes in the same precision.
-    pub(crate) fn release(&mut self) {
-        self.single = self.single.take().map(|_| Factor::default());
-        self.double = Factor::default();
-    }
-
     /// Numbers in the factor: a measure of its cost.
     #[must_use]
     pub(crate) fn factor_len(&self) -> usize {

@@ -1,6 +1,6 @@
 //! Checks of equilibria, until one lasts.
 
-use crate::mechanics::newton::{NewtonState, RestCheck, SolveError, check_rest};
+use crate::mechanics::newton::{FullSpace, NewtonState, RestCheck, SolveError, check_rest};
 
 /// Result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,13 +22,17 @@ pub(super) struct RestPhase {
 }
 
 impl RestPhase {
-    /// Checks the equilibrium that `descent` has reached.
-    pub(super) fn check(&mut self, descent: &mut NewtonState<'_, '_>) -> Result<Verdict, SolveError> {
+    /// Checks the equilibrium that `descent` has reached with the steps of `tangent`.
+    pub(super) fn check(
+        &mut self,
+        descent: &mut NewtonState<'_, '_>,
+        tangent: &mut FullSpace,
+    ) -> Result<Verdict, SolveError> {
         if self.checks == descent.cloth.solver.rest_check.max_checks {
             return Ok(Verdict::Unsettled(self.failed));
         }
         self.checks += 1;
-        Ok(match check_rest(descent, self.checks > 1)? {
+        Ok(match check_rest(descent, tangent, self.checks > 1)? {
             RestCheck::Rests => Verdict::Rests,
             RestCheck::Fails(criterion) => {
                 self.failed = criterion.name;

@@ -211,9 +211,7 @@ impl Settling<'_, '_, '_> {
         if self.rest.is_first() && self.observe(true) {
             return Ok(Some(Stop::Interrupted));
         }
-        // The check computes another factor; with both a skirt of 64,000 vertices takes 1.6 times the memory.
-        self.tangent.release();
-        let ended = match self.rest.check(&mut self.descent)? {
+        let ended = match self.rest.check(&mut self.descent, &mut self.tangent)? {
             Verdict::Rests => Some(Stop::Converged),
             Verdict::Unsettled(criterion) => Some(Stop::Unsettled(criterion)),
             Verdict::GoesOn { escaped } => {
