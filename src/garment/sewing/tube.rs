@@ -137,7 +137,7 @@ pub(super) fn hung_around(
         let below = levels.partition_point(|(height, ..)| *height > z).min(levels.len() - 1);
         let above = below.saturating_sub(1);
         let [upper, lower] = [above, below].map(|level| levels[level].0);
-        let share = if upper > lower { ((upper - z) / (upper - lower)).min(1.0) } else { 0.0 };
+        let between = if upper > lower { ((upper - z) / (upper - lower)).min(1.0) } else { 0.0 };
         let along = math::atan2(direction.y, direction.x) / TAU;
         let [upper, lower] = [above, below].map(|level| {
             let (_, curve, waves) = &levels[level];
@@ -145,7 +145,7 @@ pub(super) fn hung_around(
             let outwards = math::unit(TAU * around);
             curve.towards(middle, outwards) + out * outwards
         });
-        upper.lerp(lower, share).extend(z)
+        upper.lerp(lower, between).extend(z)
     };
     let mut x: Vec<DVec3> = shares.iter().zip(&directions).map(at).collect();
     top.iter().zip(laid).for_each(|(&v, laid)| x[v as usize] = laid.extend(z));

@@ -9,7 +9,7 @@
 //! A separator is bisected recursively, too, so that neighbours have close numbers: the updates from both sides then consist
 //! of a few long runs.
 //!
-//! The halves run in parallel. Each half reads only its own vertices' numbers.
+//! The halves run in parallel. The number of a vertex names it in its own set alone, so what another half writes meanwhile has no effect.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -21,8 +21,8 @@ use crate::mesh::{Csr, box_about};
 /// Largest set that is not dissected, in vertices: a separator of fewer costs as much as it saves.
 const MAX_LEAF: usize = 24;
 
-/// Least set whose separator is improved, in vertices. Operations of a factor of a folded skirt of 26,000 vertices, and time of its order on one thread: without
-/// a lower bound 24.1 Gflop and 173 ms, with 100 23.7 and 113, with 500 25.1 and 74, never 33.4 and 38.
+/// Least set whose separator is improved, in vertices. Operations of a factor of a folded skirt of 26,000 vertices cut across three directions, and time of
+/// its order on one thread: without a bound 24.1 Gflop and 173 ms, with 100 24.1 and 106, with 500 25.1 and 74, never 33.4 and 38.
 const MIN_REFINED: usize = 100;
 
 /// Least number of vertices that are worth another thread. Heuristic.

@@ -11,13 +11,14 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Most passes over the separator. With ten instead of four the separators of six garments stay the same.
+/// Most passes over the separator. With 4 passes of 100 idle moves factors take up to 2 % fewer operations than with 2 of 30, with 10 of 400 no fewer
+/// (six garments).
 const MAX_PASSES: usize = 2;
 
-/// Moves without a smaller separator that end a pass. With 400 instead of 100 they stay the same.
+/// Moves without a smaller separator that end a pass: see [`MAX_PASSES`].
 const MAX_IDLE_MOVES: usize = 50;
 
-/// Largest share of the vertices in a half. With 0.55 and 0.7 the factor has as many operations.
+/// Largest share of the vertices in a half. With 0.55 and 0.7 factors of the six take as many operations, within 2 %.
 const MAX_SHARE: f64 = 0.6;
 
 /// Where a vertex is.
