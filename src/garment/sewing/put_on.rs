@@ -63,12 +63,12 @@ const MAX_CLOSING_STEPS: usize = 100;
 /// sewn to. A heuristic.
 const COMPRESSION: f64 = 0.1;
 
-/// The same of a tube, which begins compressed around the trunk. Pairs of triangles that intersect when a skirt of one and a half circles is closed:
+/// The same of a tube. Measured while tubes began compressed around the trunk, and not since they begin in folds. Pairs of triangles that intersect when a skirt of one and a half circles is closed:
 /// 154 with 0.1, none with 0.03 and 0.01. Steps at full resolution of a narrower circle skirt: 19, 9, 26.
 const TUBE_COMPRESSION: f64 = 0.03;
 
-/// Height over which a body's feet widen, as a share of its own: legs as long as that enclose them as placed. A jumpsuit whose legs reach below the soles rests after
-/// 25 steps, with 0.05 after 99, and as placed not in 155 s, with skin inside.
+/// Height of the instep over that of the body. Legs that reach lower enclose the feet as placed. A jumpsuit with such legs rests after
+/// 25 steps, with 0.05 after 99, with 0.1 after 110; started as placed it did not rest in 155 s, with skin inside.
 const INSTEP: f64 = 0.07;
 
 /// Fairings in a round, each followed by two steps; the first removes waves of [`WAVELENGTH`] (m), each further one

@@ -11,8 +11,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Most passes over the separator. With 4 passes of 100 idle moves factors take up to 2 % fewer operations than with 2 of 30, with 10 of 400 no fewer
-/// (six garments).
+/// Most passes over the separator. Over six garments, 4 passes of 100 idle moves save up to 2 % of a factor's operations against 2 passes of 30;
+/// 10 passes of 400 save the same.
 const MAX_PASSES: usize = 2;
 
 /// Moves without a smaller separator that end a pass: see [`MAX_PASSES`].
@@ -63,7 +63,7 @@ fn pass<N: Iterator<Item = usize>>(sides: &mut [Side], neighbours: impl Fn(usize
     let mut moves: BinaryHeap<Move> = separator.flat_map(|v| of(sides, v)).collect();
     let mut has_moved = vec![false; sides.len()];
     let start = sizes[Side::Separator as usize];
-    // What has changed, with what was before, and how much of it leads to the best state.
+    // Vertices that changed sides, with their sides before; the first `kept` of them lead to the best state.
     let (mut changes, mut kept, mut idle) = (Vec::<(usize, Side)>::new(), 0, 0);
     let state = |sizes: &[usize; 3]| (sizes[Side::Separator as usize], sizes[0].abs_diff(sizes[1]));
     let mut best = state(&sizes);
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_ragged_separator_of_a_grid_becomes_a_column_between_the_halves() {
-        // Its column goes to and fro by eight columns from row to row.
+        // The cut alternates between two columns, eight apart, from row to row.
         let middle = |j: usize| if j.is_multiple_of(2) { 11 } else { 19 };
         let mut sides: Vec<Side> =
             (0..600).map(|v| if v % 30 < middle(v / 30) { Side::Low } else { Side::High }).collect();
