@@ -70,7 +70,7 @@ pub(super) fn in_order(scene: &Scene, settings: &Settings, observer: Observer<'_
         let cloth = cloth_of(scene, settings, &scene.held)?.clear_at(before);
         let (steps, stopped) = (worn.history.last().map_or(0, |r| r.iteration), worn.stopped);
         let start = scene.lift_layers(worn.positions.clone());
-        let refined = refine_from(scene, settings, &cloth, None, (start, StartsFrom::Parts), &mut |step| {
+        let refined = refine_from(scene, settings, &cloth, None, (start, StartsFrom::Parts), None, &mut |step| {
             if stopped {
                 return ControlFlow::Break(());
             }

@@ -32,10 +32,10 @@ pub(crate) use next_pose::reactions;
 pub(crate) use parts::{StageTwo, stage_one, stage_two};
 pub use pipeline::Prepared;
 pub use release::Release;
-pub(crate) use release::{ReleasedDrape, let_go};
+pub(crate) use release::{ReleasedDrape, settle_and_release};
 pub use result::{ClothState, Drape, PartOutcome, StageTimes};
 pub use settings::{DEFAULT_EXTENTS_CM, Model, Refine, Settings};
-pub(crate) use stages::{StageResults, StartsFrom, folds_of, refine_from, settled};
+pub(crate) use stages::{StageResults, StartsFrom, folds_of, settled};
 
 /// Runs both stages, then as many steps at full resolution as the settings ask for; `observer` is called after each and may end
 /// them.

@@ -89,7 +89,7 @@ fn settle(
     let held: &[u32] = if released { &[] } else { &scene.held };
     let cloth = cloth_of(scene, settings, held)?;
     let carried = scene.garment.positions.clone();
-    let refined = refine_from(scene, settings, &cloth, Some(&ground), (start, StartsFrom::Rest), observer)?;
+    let refined = refine_from(scene, settings, &cloth, Some(&ground), (start, StartsFrom::Rest), None, observer)?;
     let (positions, state) = settled(scene, settings, &cloth, Some(&ground), refined);
     let forces = reactions(&cloth, &positions, &state.fit.pressure_kpa);
     let mut outcomes: Vec<PartOutcome> = Vec::with_capacity(before.parts.len());

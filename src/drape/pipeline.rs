@@ -11,10 +11,10 @@ use super::error::DrapeError;
 use super::levels::Levels;
 use super::nested_iteration::approach;
 use super::parts::{StageTwo, stage_one, stage_two};
-use super::release::{Release, ReleasedDrape, let_go};
+use super::release::{Release, ReleasedDrape, settle_and_release};
 use super::result::{ClothState, Drape, StageTimes};
 use super::settings::{Model, Refine, Settings};
-use super::stages::{StageResults, StartsFrom, folds_of, refine_from, settled};
+use super::stages::{StageResults, StartsFrom, folds_of, settled};
 use crate::mechanics::folded_surface::FoldableCloth;
 use crate::mechanics::folds::Folds;
 use crate::mechanics::refine::Observer;
@@ -118,10 +118,9 @@ pub(super) fn moved(
     })?;
     let folds = folds_of(settings, cloth, &stage);
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
-    let ReleasedDrape { cloth, refined, let_go } = timed(&mut times.refine, || {
-        let start = approach(scene, settings, levels, &stage.positions, observer);
-        let refined = refine_from(scene, settings, &levels.cloth, Some(ground), (start, StartsFrom::Parts), observer)?;
-        let_go(scene, settings, refined, observer)
+    let ReleasedDrape { cloth, refined, let_go, .. } = timed(&mut times.refine, || {
+        let start = (approach(scene, settings, levels, &stage.positions, observer), StartsFrom::Parts);
+        settle_and_release(scene, settings, &levels.cloth, Some(ground), start, observer)
     })?;
     let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
     let state = Some(settled(scene, settings, cloth, Some(ground), refined));

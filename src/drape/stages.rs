@@ -43,13 +43,15 @@ pub(crate) enum StartsFrom {
     Rest,
 }
 
-/// Steps at full resolution. [`Refine::Steps`]`(0)` takes none, but measures the coupled model's energy and residual.
+/// Steps at full resolution, to a rest or `until` the residual over weight is so small. [`Refine::Steps`]`(0)` takes none, but measures the
+/// coupled model's energy and residual.
 pub(crate) fn refine_from(
     scene: &Scene,
     settings: &Settings,
     cloth: &Cloth,
     ground: Option<&Distances>,
     (start, from): (Vec<DVec3>, StartsFrom),
+    until: Option<f64>,
     observer: Observer<'_>,
 ) -> Result<Refined, DrapeError> {
     let max_steps = match settings.refine {
@@ -57,8 +59,8 @@ pub(crate) fn refine_from(
         Refine::Converged => None,
     };
     let from_rest = from == StartsFrom::Rest;
-    let options =
-        RefineOptions { max_steps, from_rest, self_contact: settings.self_contact, ..RefineOptions::default() };
+    let self_contact = settings.self_contact;
+    let options = RefineOptions { max_steps, from_rest, self_contact, until, ..RefineOptions::default() };
     let contacts = contacts_at(cloth, scene, settings.refine, ground, &start);
     let refined = refine::refine_with(cloth, contacts, start, &options, &mut |step| {
         if scene.fallen(step.positions).is_some() { ControlFlow::Break(()) } else { observer(step) }

@@ -15,7 +15,7 @@ use super::task::{Refinement, Target, Task};
 use crate::base::error_text::with_causes;
 use crate::drape::{
     ClothState, Distances, Drape, DrapeError, Levels, Model, Refine, ReleasedDrape, Settings, StageResults, StageTimes,
-    StageTwo, StartsFrom, approach, drape, folds_of, let_go, reactions, refine_from, settled, stage_two,
+    StageTwo, StartsFrom, approach, drape, folds_of, reactions, settle_and_release, settled, stage_two,
 };
 use crate::garment::MeshCache;
 use crate::garment::fabric::Fabric;
@@ -238,11 +238,10 @@ impl Worker {
             }
             task.check()
         };
-        let refined = refine_from(scene, settings, &levels.cloth, distances, (start, from), &mut observer)?;
-        let held_positions = Arc::new(refined.positions.clone());
-        let generation = task.loaded_scene().generation;
+        let drape = settle_and_release(scene, settings, &levels.cloth, distances, (start, from), &mut observer)?;
+        let ReleasedDrape { cloth, refined, held_positions, let_go } = drape;
+        let (held_positions, generation) = (Arc::new(held_positions), task.loaded_scene().generation);
         self.rest = Some(WarmStart { generation, positions: Arc::clone(&held_positions) });
-        let ReleasedDrape { cloth, refined, let_go } = let_go(scene, settings, refined, &mut observer)?;
         // A drape that falls off the body is interrupted, too, and published.
         if refined.stop == Stop::Interrupted && task.check().is_break() {
             return Ok(());

@@ -3,13 +3,15 @@
 use std::path::Path;
 
 use partwise::body::{BodySpec, dress_form};
+use partwise::drape::{Release, drape, unobserved};
 use partwise::garment::pattern::{SewingPattern, read, sew, to_svg};
 use partwise::garment::sewing::Landmarks;
+use partwise::mechanics::refine::Stop;
 use partwise::mesh::import::{Beside, ImportOptions, import_garment};
 use partwise::mesh::self_intersection::self_intersecting_pairs;
 use partwise::mesh::{Axis, Front, Unit};
 use partwise::scene::Loaded;
-use partwise::{DVec3, SceneSpec};
+use partwise::{DVec3, SceneSpec, Settings};
 
 fn asset(name: &str) -> String {
     format!("{}/assets/patterns/{name}.json", env!("CARGO_MANIFEST_DIR"))
@@ -101,6 +103,29 @@ fn seams_of_patterns_are_closed_outside_the_body() {
         assert!(scene.releases_held);
         let again = SceneSpec { edge_cm: 2.5, ..SceneSpec::new("form", asset(name)) }.load().unwrap();
         assert_eq!(again.scene.garment, scene.garment);
+    }
+}
+
+/// The history counts the steps before and after the release once each, and both ends are rests.
+#[test]
+fn a_waist_is_released_where_friction_holds_it_and_stays_held_where_it_slides() {
+    let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("skirt")) }.load().unwrap();
+    let scene = &loaded.scene;
+    for (friction, stays) in [(0.0, false), (0.8, true)] {
+        let mut settings = Settings::default();
+        settings.fabric.friction = friction;
+        let drape = drape(scene, &settings, &mut unobserved).unwrap();
+        assert_eq!(matches!(drape.let_go, Some(Release::Stays { .. })), stays, "{friction}: {:?}", drape.let_go);
+        let waist_moved = scene.held.iter().any(|&v| {
+            let v = v as usize;
+            drape.positions[v] != scene.garment.positions[v]
+        });
+        assert_eq!(waist_moved, stays, "{friction}");
+        let state = drape.state.unwrap();
+        assert_eq!(state.stop, Stop::Converged, "{friction}");
+        assert!(state.residual_over_weight < 1e-3, "{friction}: {}", state.residual_over_weight);
+        assert!(state.history.iter().enumerate().all(|(k, record)| record.iteration == k), "{friction}");
+        assert_eq!(state.history.len(), state.steps + 1, "{friction}");
     }
 }
 

@@ -153,6 +153,8 @@ impl Settling<'_, '_, '_> {
             State::Ended(Stop::Interrupted)
         } else if self.soft {
             State::Softened
+        } else if self.options.until.is_some_and(|until| self.descent.residual < until) {
+            State::Ended(Stop::Converged)
         } else if self.descent.residual < self.tolerance {
             State::Equilibrium
         } else {

@@ -17,13 +17,15 @@ pub struct RefineOptions {
     pub self_contact: bool,
     /// Whether a rest must last: hardly anything moves by the next step, and no way leads out on which the energy falls.
     pub lasting: bool,
+    /// Residual over weight at which the run ends, whether or not the cloth rests there; `None` for a rest.
+    pub until: Option<f64>,
     /// Residual over weight to which a rest is continued with its own contacts; `None` ends there. For checks of a rest.
     pub continued_to: Option<f64>,
 }
 
 impl Default for RefineOptions {
     fn default() -> Self {
-        Self { max_steps: None, from_rest: false, self_contact: true, lasting: true, continued_to: None }
+        Self { max_steps: None, from_rest: false, self_contact: true, lasting: true, until: None, continued_to: None }
     }
 }
 
@@ -47,7 +49,8 @@ pub struct Step<'a> {
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The residual is under the tolerance, and the cloth rests by every criterion of [`rest`](crate::mechanics::rest).
+    /// The residual is under the tolerance, and the cloth rests by every criterion of [`rest`](crate::mechanics::rest); or it is under the one
+    /// that the run was to reach.
     Converged,
     /// The residual is under the tolerance, but this criterion of rest keeps failing.
     Unsettled(&'static str),
