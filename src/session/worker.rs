@@ -229,7 +229,7 @@ impl Worker {
         let from = if warm { StartsFrom::Rest } else { StartsFrom::Parts };
         let mut balanced = false;
         let mut observer = |step: &Step<'_>| {
-            // A garment that is held balances once before its release, which does not count.
+            // A garment whose edges are released may balance held, which does not count.
             balanced |= step.at_rest && !scene.releases_held;
             if step.iteration > 0 || balanced {
                 let at = refinement.at(step.positions, step.residual_over_weight, step.iteration);
