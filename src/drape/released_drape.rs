@@ -25,7 +25,7 @@ const MAX_SINK_M: f64 = 0.1;
 /// rests held, and 50, 35 and 41 if released at 0.01, 0.03 and 0.1.
 const RELEASE_RESIDUAL: f64 = 0.03;
 
-/// Steps it may take to rest after that: the most observed are 91, those before it included.
+/// Steps it may take to rest after that. Heuristic: skirts of 10,000 to 26,000 vertices in cotton take 35 to 91 in all.
 const MAX_RELEASED_STEPS: usize = 160;
 
 /// A drape, after the release of its held edges if the scene asks for it.
@@ -86,7 +86,7 @@ pub(crate) fn settle_and_release(
         let refined = Refined { stop: Stop::Interrupted, ..held };
         return Ok(ReleasedDrape { cloth: None, refined, held_positions, let_go });
     }
-    let start = (held.positions.clone(), StartsFrom::Rest);
+    let start = (held_positions, StartsFrom::Rest);
     let rested = refine_from(scene, settings, cloth, ground, start, None, &mut |step| {
         observer(&Step { iteration: held.steps + step.iteration, ..*step })
     })?;

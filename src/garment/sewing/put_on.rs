@@ -63,8 +63,9 @@ const MAX_CLOSING_STEPS: usize = 100;
 /// sewn to. A heuristic.
 const COMPRESSION: f64 = 0.1;
 
-/// The same of a tube. Measured while tubes began compressed around the trunk, and not since they begin in folds. Pairs of triangles that intersect when a skirt of one and a half circles is closed:
-/// 154 with 0.1, none with 0.03 and 0.01. Steps at full resolution of a narrower circle skirt: 19, 9, 26.
+/// The same of a tube. Measured while tubes began compressed around the trunk, and not since they begin in folds. Pairs of triangles that
+/// intersect when a skirt of one and a half circles is closed: 154 with 0.1, none with 0.03 and 0.01. Steps at full resolution of a narrower
+/// circle skirt: 19, 9, 26.
 const TUBE_COMPRESSION: f64 = 0.03;
 
 /// Height of the instep over that of the body. Legs that reach lower enclose the feet as placed. A jumpsuit with such legs rests after

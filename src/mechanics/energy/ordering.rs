@@ -21,8 +21,9 @@ use crate::mesh::{Csr, box_about};
 /// Largest set that is not dissected, in vertices: a separator of fewer costs as much as it saves.
 const MAX_LEAF: usize = 24;
 
-/// Least set, in vertices, whose separator is improved and whose halves are worth a thread each. Operations of a factor of a folded skirt of 26,000 vertices cut across three directions, and time of
-/// its order on one thread: without a bound 24.1 Gflop and 173 ms, with 100 24.1 and 106, with 500 25.1 and 74, never 33.4 and 38.
+/// Least set whose separator is improved, and least half that goes to another thread, in vertices; the second is a heuristic. Operations of a
+/// factor of a folded skirt of 26,000 vertices cut across three directions, and time of its order on one thread: without a bound on the first
+/// 24.1 Gflop and 173 ms, with 100 24.1 and 106, with 500 25.1 and 74, never 33.4 and 38.
 const MIN_REFINED: usize = 100;
 
 /// Directions across which sets are cut. The horizontal diagonals take a tenth off the operations of a skirt before it is draped; four more and
