@@ -6,117 +6,10 @@
 //!
 //! Matrices are slices of whole columns, all of the same height. A matrix of many columns is cut in halves for the threads there are.
 
-use std::ops::{AddAssign, DivAssign, Mul, Neg, SubAssign};
+use crate::base::simd::{Lanes, Work, run};
 
-use crate::base::simd::{Four, Lanes, Work, run};
-
-/// The two precisions, and their arithmetic by registers.
-pub(super) trait Precision:
-    Copy
-    + Default
-    + Send
-    + Sync
-    + PartialOrd
-    + Into<f64>
-    + Neg<Output = Self>
-    + Mul<Output = Self>
-    + AddAssign
-    + SubAssign
-    + DivAssign
-{
-    type Register<L: Lanes>: Copy;
-    /// Numbers in a register.
-    const WIDTH: usize;
-
-    fn of(number: f64) -> Self;
-    fn sqrt(self) -> Self;
-    fn recip(self) -> Self;
-    /// The first numbers of a slice that holds enough for a register.
-    fn load<L: Lanes>(l: L, from: &[Self]) -> Self::Register<L>;
-    fn store<L: Lanes>(l: L, a: Self::Register<L>, to: &mut [Self]);
-    fn splat<L: Lanes>(l: L, a: Self) -> Self::Register<L>;
-    fn plus<L: Lanes>(l: L, a: Self::Register<L>, b: Self::Register<L>) -> Self::Register<L>;
-    fn minus<L: Lanes>(l: L, a: Self::Register<L>, b: Self::Register<L>) -> Self::Register<L>;
-    fn times<L: Lanes>(l: L, a: Self::Register<L>, b: Self::Register<L>) -> Self::Register<L>;
-}
-
-macro_rules! precision {
-    ($type:ident, $register:ident, $width:literal, $load:expr, $store:expr, $splat:ident $add:ident $sub:ident $mul:ident) => {
-        impl Precision for $type {
-            type Register<L: Lanes> = L::$register;
-            const WIDTH: usize = $width;
-
-            #[inline(always)]
-            fn of(number: f64) -> Self {
-                number as Self
-            }
-
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                self.sqrt()
-            }
-
-            #[inline(always)]
-            fn recip(self) -> Self {
-                1.0 / self
-            }
-
-            #[inline(always)]
-            fn load<L: Lanes>(l: L, from: &[Self]) -> L::$register {
-                let all: [Self; $width] = from.first_chunk().copied().unwrap_or_default();
-                $load(l, all)
-            }
-
-            #[inline(always)]
-            fn store<L: Lanes>(l: L, a: L::$register, to: &mut [Self]) {
-                to[..$width].copy_from_slice(&$store(l, a));
-            }
-
-            #[inline(always)]
-            fn splat<L: Lanes>(l: L, a: Self) -> L::$register {
-                l.$splat(a)
-            }
-
-            #[inline(always)]
-            fn plus<L: Lanes>(l: L, a: L::$register, b: L::$register) -> L::$register {
-                l.$add(a, b)
-            }
-
-            #[inline(always)]
-            fn minus<L: Lanes>(l: L, a: L::$register, b: L::$register) -> L::$register {
-                l.$sub(a, b)
-            }
-
-            #[inline(always)]
-            fn times<L: Lanes>(l: L, a: L::$register, b: L::$register) -> L::$register {
-                l.$mul(a, b)
-            }
-        }
-    };
-}
-
-#[inline(always)]
-fn load_singles<L: Lanes>(l: L, all: [f32; 8]) -> L::Singles {
-    l.load_singles(all)
-}
-
-#[inline(always)]
-fn store_singles<L: Lanes>(l: L, a: L::Singles) -> [f32; 8] {
-    l.store_singles(a)
-}
-
-#[inline(always)]
-fn load_doubles<L: Lanes>(l: L, all: [f64; 4]) -> L::Register {
-    l.load(&Four(all))
-}
-
-#[inline(always)]
-fn store_doubles<L: Lanes>(l: L, a: L::Register) -> [f64; 4] {
-    l.store(a).0
-}
-
-precision!(f32, Singles, 8, load_singles, store_singles, splat_single add_singles sub_singles mul_singles);
-precision!(f64, Register, 4, load_doubles, store_doubles, splat add sub mul);
+/// Numbers in a register.
+const WIDTH: usize = 8;
 
 /// Columns that are factored one by one.
 const NARROW: usize = 16;
@@ -128,38 +21,44 @@ const PRODUCTS_PER_TASK: usize = 1 << 20;
 const TILE_REGISTERS: usize = 2;
 const TILE_COLUMNS: usize = 4;
 
-/// Factors a panel of `height` rows, its diagonal block on top, lower half. The error is the column whose pivot is not positive.
-pub(super) fn factor_panel<T: Precision>(panel: &mut [T], height: usize) -> Result<(), usize> {
-    factor_below(panel, height, 0)
+/// Factors a panel of `height` rows, its diagonal block on top, lower half. A pivot that is zero or negative, or rounding beside the entry of
+/// `diagonal` for its column, is replaced by that entry, as if nothing pulled there but the unknown itself; without `diagonal`
+/// it is an error.
+///
+/// # Errors
+/// The column whose pivot is not finite, or not positive where none is replaced.
+pub(super) fn factor_panel(panel: &mut [f32], height: usize, diagonal: Option<&[f32]>) -> Result<(), usize> {
+    factor_below(panel, height, 0, diagonal)
 }
 
 /// The same for columns whose diagonal block begins at row `top`.
-fn factor_below<T: Precision>(panel: &mut [T], height: usize, top: usize) -> Result<(), usize> {
+fn factor_below(panel: &mut [f32], height: usize, top: usize, diagonal: Option<&[f32]>) -> Result<(), usize> {
     let columns = panel.len() / height;
     if columns <= NARROW {
-        return run(Narrow { panel, height, top }).map_or(Ok(()), Err);
+        return run(Narrow { panel, height, top, diagonal }).map_or(Ok(()), Err);
     }
     let half = (columns / 2).next_multiple_of(NARROW);
     let (left, right) = panel.split_at_mut(half * height);
-    factor_below(left, height, top)?;
+    factor_below(left, height, top, diagonal)?;
     let below = top + half;
     subtract(Target { columns: right, height, skipped: below, onto: true }, left, height, below);
-    factor_below(right, height, below).map_err(|index| half + index)
+    factor_below(right, height, below, diagonal).map_err(|index| half + index)
 }
 
-/// Factors a few columns, one after the other; the result is the column whose pivot is not positive.
-struct Narrow<'a, T> {
-    panel: &'a mut [T],
+/// Factors a few columns, one after the other; the result is the column whose pivot is refused.
+struct Narrow<'a> {
+    panel: &'a mut [f32],
     height: usize,
     top: usize,
+    diagonal: Option<&'a [f32]>,
 }
 
-impl<T: Precision> Work for Narrow<'_, T> {
+impl Work for Narrow<'_> {
     type Output = Option<usize>;
 
     #[inline(always)]
     fn with<L: Lanes>(self, l: L) -> Option<usize> {
-        let Self { panel, height, top } = self;
+        let Self { panel, height, top, diagonal } = self;
         for j in 0..panel.len() / height {
             let (before, rest) = panel.split_at_mut(j * height);
             let column = &mut rest[top + j..height];
@@ -167,21 +66,22 @@ impl<T: Precision> Work for Narrow<'_, T> {
                 let done = &done[top + j..];
                 subtract_scaled(l, column, done, done[0]);
             }
-            let pivot = column[0];
-            // Not positive, or NaN.
-            if !(pivot > T::default() && pivot.into().is_finite()) {
-                return Some(j);
-            }
+            let pivot = match (column[0], diagonal.map(|all| all[top + j].abs())) {
+                (pivot, _) if !pivot.is_finite() => return Some(j),
+                (pivot, Some(own)) if pivot <= f32::EPSILON * own => own.max(f32::MIN_POSITIVE),
+                (pivot, _) if pivot <= 0.0 => return Some(j),
+                (pivot, _) => pivot,
+            };
             let root = pivot.sqrt();
             let scale = root.recip();
             column[0] = root;
-            let factor = T::splat(l, scale);
-            let mut registers = column[1..].chunks_exact_mut(T::WIDTH);
+            let factor = l.splat_single(scale);
+            let mut registers = column[1..].chunks_exact_mut(WIDTH);
             for c in &mut registers {
-                T::store(l, T::times(l, T::load(l, c), factor), c);
+                store(l, l.mul_singles(load(l, c), factor), c);
             }
             for c in registers.into_remainder() {
-                *c = *c * scale;
+                *c *= scale;
             }
         }
         None
@@ -189,7 +89,7 @@ impl<T: Precision> Work for Narrow<'_, T> {
 }
 
 /// −L Lᵀ in the lower trapezoid of `update`, whose rows and columns are the rows of L from `first` on.
-pub(super) fn set_product<T: Precision>(update: &mut [T], panel: &[T], height: usize, first: usize) {
+pub(super) fn set_product(update: &mut [f32], panel: &[f32], height: usize, first: usize) {
     let rows = height - first;
     if rows > 0 {
         subtract(Target { columns: update, height: rows, skipped: 0, onto: false }, panel, height, first);
@@ -197,8 +97,8 @@ pub(super) fn set_product<T: Precision>(update: &mut [T], panel: &[T], height: u
 }
 
 /// The columns that a product is subtracted from.
-struct Target<'a, T> {
-    columns: &'a mut [T],
+struct Target<'a> {
+    columns: &'a mut [f32],
     height: usize,
     /// Row of the first column's diagonal entry.
     skipped: usize,
@@ -207,7 +107,7 @@ struct Target<'a, T> {
 }
 
 /// C − L Lᵀ in the lower trapezoid of C, whose diagonal begins at row `first` of the columns of L.
-fn subtract<T: Precision>(c: Target<'_, T>, l: &[T], height: usize, first: usize) {
+fn subtract(c: Target<'_>, l: &[f32], height: usize, first: usize) {
     let columns = c.columns.len() / c.height;
     let products = columns * (height - first) * (l.len() / height);
     if products > PRODUCTS_PER_TASK && columns >= 2 * NARROW {
@@ -224,23 +124,23 @@ fn subtract<T: Precision>(c: Target<'_, T>, l: &[T], height: usize, first: usize
     }
 }
 
-struct Product<'a, T> {
-    c: Target<'a, T>,
-    l: &'a [T],
+struct Product<'a> {
+    c: Target<'a>,
+    l: &'a [f32],
     height: usize,
     first: usize,
 }
 
-impl<T: Precision> Work for Product<'_, T> {
+impl Work for Product<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with<L: Lanes>(self, lanes: L) {
         let Self { c, l, height, first } = self;
         let (rows, columns) = (c.height - c.skipped, c.columns.len() / c.height);
-        let (tile, depth) = (TILE_REGISTERS * T::WIDTH, l.len() / height);
+        let (tile, depth) = (TILE_REGISTERS * WIDTH, l.len() / height);
         // Rows of L for the columns of C, by strips of a few, filled up with zeros.
-        let mut strips = vec![T::default(); columns.next_multiple_of(TILE_COLUMNS) * depth];
+        let mut strips = vec![0.0; columns.next_multiple_of(TILE_COLUMNS) * depth];
         for (s, strip) in strips.chunks_exact_mut(TILE_COLUMNS * depth).enumerate() {
             let from = first + s * TILE_COLUMNS;
             let width = TILE_COLUMNS.min(columns - s * TILE_COLUMNS);
@@ -251,7 +151,7 @@ impl<T: Precision> Work for Product<'_, T> {
                 }
             }
         }
-        let mut packed = vec![T::default(); tile * depth];
+        let mut packed = vec![0.0; tile * depth];
         for i in (0..rows).step_by(tile) {
             let some = tile.min(rows - i);
             for (to, column) in packed.chunks_exact_mut(tile).zip(l.chunks_exact(height)) {
@@ -278,45 +178,45 @@ impl<T: Precision> Work for Product<'_, T> {
 
 /// Copies rows of a column into a tile, filled up with zeros. Whole tiles go by registers: a call of `memcpy` costs more than their copy.
 #[inline(always)]
-fn copy_tile<T: Precision, L: Lanes>(l: L, to: &mut [T], from: &[T]) {
+fn copy_tile<L: Lanes>(l: L, to: &mut [f32], from: &[f32]) {
     if from.len() == to.len() {
         for r in 0..TILE_REGISTERS {
-            T::store(l, T::load(l, &from[r * T::WIDTH..]), &mut to[r * T::WIDTH..]);
+            store(l, load(l, &from[r * WIDTH..]), &mut to[r * WIDTH..]);
         }
     } else {
         to[..from.len()].copy_from_slice(from);
-        to[from.len()..].fill(T::default());
+        to[from.len()..].fill(0.0);
     }
 }
 
 /// A tile of a product: `some` rows and columns from `row` on of columns of this height.
 #[inline(always)]
-fn multiply<T: Precision, L: Lanes>(
+fn multiply<L: Lanes>(
     l: L,
-    (packed, strip): (&[T], &[T]),
-    columns: &mut [T],
+    (packed, strip): (&[f32], &[f32]),
+    columns: &mut [f32],
     (height, row): (usize, usize),
     [rows, width]: [usize; 2],
     onto: bool,
 ) {
-    let tile = TILE_REGISTERS * T::WIDTH;
-    let mut sums = [[T::splat(l, T::default()); TILE_REGISTERS]; TILE_COLUMNS];
+    let tile = TILE_REGISTERS * WIDTH;
+    let mut sums = [[l.splat_single(0.0); TILE_REGISTERS]; TILE_COLUMNS];
     // As wide as the widest tile.
-    let mut buffer = [T::default(); 16];
+    let mut buffer = [0.0; 16];
     if onto {
         for (k, sum) in sums.iter_mut().enumerate().take(width) {
             copy_tile(l, &mut buffer[..tile], &columns[k * height + row..][..rows]);
             for (r, sum) in sum.iter_mut().enumerate() {
-                *sum = T::load(l, &buffer[r * T::WIDTH..]);
+                *sum = load(l, &buffer[r * WIDTH..]);
             }
         }
     }
     for (a, b) in packed.chunks_exact(tile).zip(strip.chunks_exact(TILE_COLUMNS)) {
-        let a: [T::Register<L>; TILE_REGISTERS] = std::array::from_fn(|r| T::load(l, &a[r * T::WIDTH..]));
+        let a: [L::Singles; TILE_REGISTERS] = std::array::from_fn(|r| load(l, &a[r * WIDTH..]));
         for k in 0..TILE_COLUMNS {
-            let b = T::splat(l, b[k]);
+            let b = l.splat_single(b[k]);
             for r in 0..TILE_REGISTERS {
-                sums[k][r] = T::minus(l, sums[k][r], T::times(l, a[r], b));
+                sums[k][r] = l.sub_singles(sums[k][r], l.mul_singles(a[r], b));
             }
         }
     }
@@ -324,7 +224,7 @@ fn multiply<T: Precision, L: Lanes>(
         let target = &mut columns[k * height + row..][..rows];
         let to = if rows == tile { &mut *target } else { &mut buffer[..] };
         for (r, sum) in sum.iter().enumerate() {
-            T::store(l, *sum, &mut to[r * T::WIDTH..]);
+            store(l, *sum, &mut to[r * WIDTH..]);
         }
         if rows < tile {
             target.copy_from_slice(&buffer[..rows]);
@@ -332,15 +232,27 @@ fn multiply<T: Precision, L: Lanes>(
     }
 }
 
+/// The first numbers of a slice that holds enough for a register.
+#[inline(always)]
+fn load<L: Lanes>(l: L, from: &[f32]) -> L::Singles {
+    l.load_singles(from.first_chunk().copied().unwrap_or_default())
+}
+
+/// Writes a register to the first numbers of a slice.
+#[inline(always)]
+fn store<L: Lanes>(l: L, a: L::Singles, to: &mut [f32]) {
+    to[..WIDTH].copy_from_slice(&l.store_singles(a));
+}
+
 /// x ← x − share · l.
 #[inline(always)]
-fn subtract_scaled<T: Precision, L: Lanes>(l: L, x: &mut [T], of: &[T], share: T) {
-    let factor = T::splat(l, share);
+fn subtract_scaled<L: Lanes>(l: L, x: &mut [f32], of: &[f32], share: f32) {
+    let factor = l.splat_single(share);
     let of = &of[..x.len()];
-    let (mut to, from) = (x.chunks_exact_mut(T::WIDTH), of.chunks_exact(T::WIDTH));
+    let (mut to, from) = (x.chunks_exact_mut(WIDTH), of.chunks_exact(WIDTH));
     let rest = from.remainder();
     for (x, of) in (&mut to).zip(from) {
-        T::store(l, T::minus(l, T::load(l, x), T::times(l, T::load(l, of), factor)), x);
+        store(l, l.sub_singles(load(l, x), l.mul_singles(load(l, of), factor)), x);
     }
     for (x, of) in to.into_remainder().iter_mut().zip(rest) {
         *x -= *of * share;
@@ -348,20 +260,20 @@ fn subtract_scaled<T: Precision, L: Lanes>(l: L, x: &mut [T], of: &[T], share: T
 }
 
 /// x ← L₁₁⁻¹ x; `rows` ← L₂₁ x.
-pub(super) fn solve_down<T: Precision>(panel: &[T], height: usize, x: &mut [T], rows: &mut Vec<T>) {
+pub(super) fn solve_down(panel: &[f32], height: usize, x: &mut [f32], rows: &mut Vec<f32>) {
     rows.clear();
-    rows.resize(height - x.len(), T::default());
+    rows.resize(height - x.len(), 0.0);
     run(Down { panel, height, x, rows });
 }
 
-struct Down<'a, T> {
-    panel: &'a [T],
+struct Down<'a> {
+    panel: &'a [f32],
     height: usize,
-    x: &'a mut [T],
-    rows: &'a mut [T],
+    x: &'a mut [f32],
+    rows: &'a mut [f32],
 }
 
-impl<T: Precision> Work for Down<'_, T> {
+impl Work for Down<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -378,18 +290,18 @@ impl<T: Precision> Work for Down<'_, T> {
 }
 
 /// x ← L₁₁⁻ᵀ (x − L₂₁ᵀ rows).
-pub(super) fn solve_up<T: Precision>(panel: &[T], height: usize, x: &mut [T], rows: &[T]) {
+pub(super) fn solve_up(panel: &[f32], height: usize, x: &mut [f32], rows: &[f32]) {
     run(Up { panel, height, x, rows });
 }
 
-struct Up<'a, T> {
-    panel: &'a [T],
+struct Up<'a> {
+    panel: &'a [f32],
     height: usize,
-    x: &'a mut [T],
-    rows: &'a [T],
+    x: &'a mut [f32],
+    rows: &'a [f32],
 }
 
-impl<T: Precision> Work for Up<'_, T> {
+impl Work for Up<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -407,23 +319,23 @@ impl<T: Precision> Work for Up<'_, T> {
 
 /// a · b, in the partial sums of two registers; their number depends on the precision alone.
 #[inline(always)]
-fn dot<T: Precision, L: Lanes>(l: L, a: &[T], b: &[T]) -> T {
+fn dot<L: Lanes>(l: L, a: &[f32], b: &[f32]) -> f32 {
     let b = &b[..a.len()];
-    let (a, b) = (a.chunks_exact(2 * T::WIDTH), b.chunks_exact(2 * T::WIDTH));
+    let (a, b) = (a.chunks_exact(2 * WIDTH), b.chunks_exact(2 * WIDTH));
     let rest = a.remainder().iter().zip(b.remainder());
-    let mut sums = [T::splat(l, T::default()); 2];
+    let mut sums = [l.splat_single(0.0); 2];
     for (a, b) in a.zip(b) {
         for (r, sum) in sums.iter_mut().enumerate() {
-            *sum = T::plus(l, *sum, T::times(l, T::load(l, &a[r * T::WIDTH..]), T::load(l, &b[r * T::WIDTH..])));
+            *sum = l.add_singles(*sum, l.mul_singles(load(l, &a[r * WIDTH..]), load(l, &b[r * WIDTH..])));
         }
     }
-    let mut parts = [T::default(); 8];
-    T::store(l, T::plus(l, sums[0], sums[1]), &mut parts);
-    let mut total = T::default();
+    let mut parts = [0.0; 8];
+    store(l, l.add_singles(sums[0], sums[1]), &mut parts);
+    let mut total = 0.0;
     for (a, b) in rest {
         total += *a * *b;
     }
-    for part in &parts[..T::WIDTH] {
+    for part in &parts[..WIDTH] {
         total += *part;
     }
     total
@@ -435,75 +347,87 @@ mod tests {
     use crate::base::simd::portable;
 
     /// A panel of a positive definite matrix with `columns` columns, and the matrix's lower entries as a function.
-    fn panel<T: Precision>(height: usize, columns: usize) -> (Vec<T>, impl Fn(usize, usize) -> f64) {
+    fn panel(height: usize, columns: usize) -> (Vec<f32>, impl Fn(usize, usize) -> f64) {
         let entry = move |i: usize, j: usize| {
             let noise = ((i * 31 + j * 17) % 23) as f64 / 23.0 - 0.5;
             if i == j { height as f64 } else { noise }
         };
-        ((0..columns).flat_map(|j| (0..height).map(move |i| T::of(entry(i, j)))).collect(), entry)
+        ((0..columns).flat_map(|j| (0..height).map(move |i| entry(i, j) as f32)).collect(), entry)
+    }
+
+    /// a · b in double precision.
+    fn exact(a: impl Iterator<Item = (f32, f32)>) -> f64 {
+        a.map(|(a, b)| f64::from(a) * f64::from(b)).sum()
     }
 
     #[test]
     fn the_factor_times_its_transpose_is_the_matrix() {
         for (height, columns) in [(1, 1), (7, 3), (40, 40), (75, 33), (130, 100)] {
-            let (mut l, entry) = panel::<f64>(height, columns);
-            factor_panel(&mut l, height).unwrap();
+            let (mut l, entry) = panel(height, columns);
+            factor_panel(&mut l, height, None).unwrap();
+            // A sum of as many products as columns, none of them larger than the diagonal.
+            let rounding = f64::from(f32::EPSILON) * (height * (columns + 1)) as f64;
             let at = |i: usize, j: usize| l[j * height + i];
             for (i, j) in (0..columns).flat_map(|j| (j..height).map(move |i| (i, j))) {
-                let product: f64 = (0..=j).map(|k| at(i, k) * at(j, k)).sum();
-                assert!((product - entry(i, j)).abs() < 1e-10, "{height} {columns}: {i} {j}");
+                let product = exact((0..=j).map(|k| (at(i, k), at(j, k))));
+                assert!((product - entry(i, j)).abs() < rounding, "{height} {columns}: {i} {j}");
             }
             let rows = height - columns;
-            let mut update = vec![f64::NAN; rows * rows];
+            let mut update = vec![f32::NAN; rows * rows];
             set_product(&mut update, &l, height, columns);
             for (i, j) in (0..rows).flat_map(|j| (j..rows).map(move |i| (i, j))) {
-                let product: f64 = (0..columns).map(|k| at(columns + i, k) * at(columns + j, k)).sum();
-                assert!((update[j * rows + i] + product).abs() < 1e-10);
+                let product = exact((0..columns).map(|k| (at(columns + i, k), at(columns + j, k))));
+                assert!((f64::from(update[j * rows + i]) + product).abs() < rounding);
             }
             // L₁₁ L₁₁ᵀ x = b, and the rows below.
-            let b: Vec<f64> = (0..columns).map(|i| (i % 5) as f64 - 1.7).collect();
+            let b: Vec<f32> = (0..columns).map(|i| (i % 5) as f32 - 1.7).collect();
             let (mut x, mut below) = (b.clone(), Vec::new());
             solve_down(&l, height, &mut x, &mut below);
             assert_eq!(below.len(), rows);
             for (i, below) in below.iter().enumerate() {
-                let product: f64 = (0..columns).map(|k| at(columns + i, k) * x[k]).sum();
-                assert!((below - product).abs() < 1e-10);
+                let product = exact((0..columns).map(|k| (at(columns + i, k), x[k])));
+                assert!((f64::from(*below) - product).abs() < rounding);
             }
             solve_up(&l, height, &mut x, &vec![0.0; rows]);
             for (i, b) in b.iter().enumerate() {
-                let sum: f64 = (0..columns).map(|j| entry(i.max(j), i.min(j)) * x[j]).sum();
-                assert!((sum - b).abs() < 1e-9, "{height} {columns}: {sum} and {b}");
+                let sum: f64 = (0..columns).map(|j| entry(i.max(j), i.min(j)) * f64::from(x[j])).sum();
+                assert!((sum - f64::from(*b)).abs() < rounding, "{height} {columns}: {sum} and {b}");
             }
         }
     }
 
     #[test]
-    fn a_pivot_that_is_not_positive_is_named() {
+    fn a_pivot_that_is_not_positive_is_named_or_replaced() {
         for bad in [0, 5, 20] {
-            let (mut l, _) = panel::<f32>(30, 25);
+            let (mut l, _) = panel(30, 25);
             l[bad * 30 + bad] = -1.0;
-            assert_eq!(factor_panel(&mut l, 30), Err(bad));
+            let (mut replaced, diagonal) = (l.clone(), vec![30.0; 25]);
+            assert_eq!(factor_panel(&mut l, 30, None), Err(bad));
+            factor_panel(&mut replaced, 30, Some(&diagonal)).unwrap();
+            assert_eq!(replaced[bad * 30 + bad], 30_f32.sqrt());
         }
+        let (mut l, _) = panel(30, 25);
+        l[7 * 30 + 7] = f32::NAN;
+        assert_eq!(factor_panel(&mut l, 30, Some(&[30.0; 25])), Err(7));
     }
 
     /// Lanes of another width, and pieces for threads, give the same bits.
     #[test]
     fn the_bits_depend_on_neither_lanes_nor_pieces() {
-        fn all<T: Precision>() -> Vec<u64> {
+        let all = || {
             let (height, columns) = (420, 230);
-            let (mut l, _) = panel::<T>(height, columns);
-            factor_panel(&mut l, height).unwrap();
-            let mut update = vec![T::default(); (height - columns).pow(2)];
+            let (mut l, _) = panel(height, columns);
+            factor_panel(&mut l, height, None).unwrap();
+            let mut update = vec![0.0; (height - columns).pow(2)];
             set_product(&mut update, &l, height, columns);
-            let (mut x, mut rows) = (vec![T::of(0.3); columns], Vec::new());
+            let (mut x, mut rows) = (vec![0.3; columns], Vec::new());
             solve_down(&l, height, &mut x, &mut rows);
             solve_up(&l, height, &mut x, &rows);
-            l.iter().chain(&update).chain(&x).map(|&n| Into::<f64>::into(n).to_bits()).collect()
-        }
-        let both = || (all::<f32>(), all::<f64>());
-        let widest = both();
-        assert!(widest == portable(both));
-        let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(both);
+            l.iter().chain(&update).chain(&x).map(|n| n.to_bits()).collect::<Vec<u32>>()
+        };
+        let widest = all();
+        assert!(widest == portable(all));
+        let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(all);
         assert!(widest == one_thread);
     }
 }

@@ -1,4 +1,4 @@
-//! A sparse Cholesky factor in single or double precision, recomputed in place by the multifrontal method.
+//! A sparse Cholesky factor in single precision, recomputed in place by the multifrontal method.
 //!
 //! Front by front, children first (Duff, Reid: "The multifrontal solution of indefinite sparse symmetric linear equations", ACM Trans.
 //! Math. Softw. 9(3), 1983): a front's panel takes the matrix's own blocks and the updates of its children; it is factored densely,
@@ -11,7 +11,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::dense::{Precision, factor_panel, set_product, solve_down, solve_up};
+use super::dense::{factor_panel, set_product, solve_down, solve_up};
 use super::symbolic::{Front, Subtree, SymbolicFactor};
 
 /// Why a linear system cannot be solved.
@@ -43,40 +43,42 @@ pub(super) struct Matrix<'a> {
     pub(super) blocks: &'a [DMat3],
     /// D, a number for each unknown, N/m.
     pub(super) diagonal: &'a [f64],
+    /// Whether pivots that are not positive are replaced ([`factor_panel`]); an error otherwise.
+    pub(super) replaces_pivots: bool,
 }
 
 /// The factor's numbers.
 #[derive(Default)]
-pub(super) struct Factor<T> {
-    subtrees: Vec<SubtreeFactor<T>>,
+pub(super) struct Factor {
+    subtrees: Vec<SubtreeFactor>,
     /// Panel and update of each front of the top.
-    top: Vec<(Vec<T>, Vec<T>)>,
-    right_side: Vec<T>,
+    top: Vec<(Vec<f32>, Vec<f32>)>,
+    right_side: Vec<f32>,
 }
 
 /// A subtree's numbers.
-struct SubtreeFactor<T> {
-    panels: Vec<T>,
+struct SubtreeFactor {
+    panels: Vec<f32>,
     /// Updates that no parent has taken yet, one on top of the other, and where each begins.
-    stack: Vec<T>,
+    stack: Vec<f32>,
     live: Vec<(u32, usize)>,
     /// Of a solve: what it adds to the top's unknowns, and a front's rows.
-    above: Vec<T>,
-    rows: Vec<T>,
+    above: Vec<f32>,
+    rows: Vec<f32>,
 }
 
-impl<T: Precision> Factor<T> {
-    /// Allocates at the first use: a solver seldom needs both precisions.
+impl Factor {
+    /// Allocates at the first use: a solver may be analysed and never used.
     fn allocate(&mut self, symbolic: &SymbolicFactor) -> Result<(), SolveError> {
         let unknowns = 3 * symbolic.order.len();
         if self.right_side.len() == unknowns {
             return Ok(());
         }
-        let room = |numbers: usize| -> Result<Vec<T>, SolveError> {
+        let room = |numbers: usize| -> Result<Vec<f32>, SolveError> {
             let mut all = Vec::new();
             let failed = |e: TryReserveError| SolveError::NoRoom { unknowns, reason: e.to_string() };
             all.try_reserve_exact(numbers).map_err(failed)?;
-            all.resize(numbers, T::default());
+            all.resize(numbers, 0.0);
             Ok(all)
         };
         for subtree in &symbolic.subtrees {
@@ -136,7 +138,7 @@ impl<T: Precision> Factor<T> {
 
     /// L⁻ᵀ y, of what is in the factor's own order.
     pub(super) fn upper(&mut self, symbolic: &SymbolicFactor, y: &[f64]) -> Vec<DVec3> {
-        self.right_side.iter_mut().zip(y).for_each(|(s, y)| *s = T::of(*y));
+        self.right_side.iter_mut().zip(y).for_each(|(s, y)| *s = *y as f32);
         self.backward(symbolic);
         let mut x = vec![DVec3::ZERO; symbolic.order.len()];
         self.give(symbolic, &mut x);
@@ -145,7 +147,7 @@ impl<T: Precision> Factor<T> {
 
     fn take(&mut self, symbolic: &SymbolicFactor, x: &[DVec3]) {
         for (s, &old) in self.right_side.chunks_exact_mut(3).zip(&symbolic.order) {
-            s.copy_from_slice(&x[old as usize].to_array().map(T::of));
+            s.copy_from_slice(&x[old as usize].to_array().map(|number| number as f32));
         }
     }
 
@@ -199,7 +201,7 @@ impl<T: Precision> Factor<T> {
 }
 
 /// The unknowns of each subtree, and the top's.
-fn by_subtree<'a, T>(symbolic: &SymbolicFactor, right_side: &'a mut [T]) -> (Vec<&'a mut [T]>, &'a mut [T]) {
+fn by_subtree<'a>(symbolic: &SymbolicFactor, right_side: &'a mut [f32]) -> (Vec<&'a mut [f32]>, &'a mut [f32]) {
     let (mut low, high) = right_side.split_at_mut(3 * symbolic.top.1);
     let mut own = Vec::with_capacity(symbolic.subtrees.len());
     for subtree in &symbolic.subtrees {
@@ -211,13 +213,13 @@ fn by_subtree<'a, T>(symbolic: &SymbolicFactor, right_side: &'a mut [T]) -> (Vec
 }
 
 /// The update that a front at the top of a subtree has left.
-fn left_in<'a, T>(subtrees: &'a [SubtreeFactor<T>], symbolic: &SymbolicFactor, front: u32) -> &'a [T] {
+fn left_in<'a>(subtrees: &'a [SubtreeFactor], symbolic: &SymbolicFactor, front: u32) -> &'a [f32] {
     let subtree = symbolic.subtrees.partition_point(|g| g.fronts.end <= front as usize);
     let found = subtrees[subtree].live.iter().find(|(f, _)| *f == front);
     found.map_or(&[], |&(_, at)| &subtrees[subtree].stack[at..])
 }
 
-impl<T: Precision> SubtreeFactor<T> {
+impl SubtreeFactor {
     fn factorise(
         &mut self,
         symbolic: &SymbolicFactor,
@@ -252,7 +254,7 @@ impl<T: Precision> SubtreeFactor<T> {
     }
 
     /// `own` are the subtree's unknowns; what it takes from the top's is summed up in `above`.
-    fn forward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [T]) {
+    fn forward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [f32]) {
         let Self { panels, above, rows, .. } = self;
         let mut panels = &panels[..];
         for front in &symbolic.fronts[subtree.fronts.clone()] {
@@ -277,7 +279,7 @@ impl<T: Precision> SubtreeFactor<T> {
         }
     }
 
-    fn backward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [T], high: &[T]) {
+    fn backward(&mut self, symbolic: &SymbolicFactor, subtree: &Subtree, own: &mut [f32], high: &[f32]) {
         let Self { panels, rows, .. } = self;
         let mut panels = &panels[..];
         for front in symbolic.fronts[subtree.fronts.clone()].iter().rev() {
@@ -294,36 +296,37 @@ impl<T: Precision> SubtreeFactor<T> {
 }
 
 /// Fills and factors a front's panel, and leaves its update.
-fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
+fn eliminate<'a, C: Iterator<Item = (&'a Front, &'a [f32])>>(
     symbolic: &SymbolicFactor,
     front: &Front,
     matrix: Matrix<'_>,
-    panel: &mut [T],
-    update: &mut [T],
+    panel: &mut [f32],
+    update: &mut [f32],
     children: impl Fn() -> C,
 ) -> Result<(), SolveError> {
     let height = front.height();
     let (columns, rows) = (3 * front.columns, 3 * front.rows.len());
-    panel.fill(T::default());
+    panel.fill(0.0);
     for entry in &symbolic.entries[front.entries.clone()] {
         let block = matrix.blocks[entry.block as usize];
         let block = if entry.transposed { block.transpose() } else { block };
         for (c, column) in block.to_cols_array_2d().into_iter().enumerate() {
             let at = entry.at as usize + c * height;
-            panel[at..at + 3].copy_from_slice(&column.map(T::of));
+            panel[at..at + 3].copy_from_slice(&column.map(|number| number as f32));
         }
     }
     for (k, &unknown) in symbolic.order[front.first..front.first + front.columns].iter().enumerate() {
-        let shift: T = T::of(matrix.diagonal[unknown as usize]);
+        let shift = matrix.diagonal[unknown as usize] as f32;
         for c in 3 * k..3 * k + 3 {
             panel[c * (height + 1)] += shift;
         }
     }
+    let diagonal: Vec<f32> = panel.iter().copied().step_by(height + 1).collect();
     for (child, numbers) in children() {
         extend(symbolic, child, numbers, 0..child.inner, panel, height, 0);
     }
     let lost = |index: usize| SolveError::NotPositive { index: 3 * front.first + index };
-    factor_panel(panel, height).map_err(lost)?;
+    factor_panel(panel, height, matrix.replaces_pivots.then_some(&diagonal)).map_err(lost)?;
     if rows > 0 {
         set_product(update, panel, height, columns);
         for (child, numbers) in children() {
@@ -334,12 +337,12 @@ fn eliminate<'a, T: Precision + 'a, C: Iterator<Item = (&'a Front, &'a [T])>>(
 }
 
 /// Adds columns of a child's update to a matrix whose first row is the parent's row `skip`.
-fn extend<T: Precision>(
+fn extend(
     symbolic: &SymbolicFactor,
     child: &Front,
-    update: &[T],
+    update: &[f32],
     columns: Range<usize>,
-    into: &mut [T],
+    into: &mut [f32],
     rows: usize,
     skip: usize,
 ) {
@@ -368,17 +371,12 @@ fn extend<T: Precision>(
 }
 
 /// x ← x − less, as many as these are.
-fn take<T: Precision>(x: &mut [T], less: &[T]) {
+fn take(x: &mut [f32], less: &[f32]) {
     x.iter_mut().zip(less).for_each(|(x, less)| *x -= *less);
 }
 
 /// The unknowns of a front's rows.
-fn gather<'a, T: Precision + 'a>(
-    symbolic: &SymbolicFactor,
-    front: &Front,
-    rows: &mut Vec<T>,
-    of: impl Fn(usize) -> &'a [T],
-) {
+fn gather<'a>(symbolic: &SymbolicFactor, front: &Front, rows: &mut Vec<f32>, of: impl Fn(usize) -> &'a [f32]) {
     rows.clear();
     for &row in &symbolic.rows[front.rows.clone()] {
         rows.extend_from_slice(&of(row as usize)[..3]);
