@@ -54,6 +54,9 @@ const MAX_STEP_RMS_MM: f64 = 1.0;
 /// not distinguishable from rounding.
 const MIN_CURVATURE: f64 = -1e-2;
 
+/// Largest residual of the next Newton step, relative to the residual of the forces.
+const STEP_TOLERANCE: f64 = 1e-4;
+
 /// One criterion of rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criterion {
@@ -166,7 +169,8 @@ impl<'a> Linearised<'a> {
         }
         let damped: Vec<f64> = layout.order.iter().map(|&v| cloth.masses[v as usize] * LANCZOS_DAMPING).collect();
         let mut unknowns: Vec<DVec3> = layout.order.iter().map(|&v| -forces.residual_forces[v as usize]).collect();
-        solver.solve(&layout.pattern, blocks, &damped, true, &mut unknowns)?;
+        solver.factorise(blocks, &damped)?;
+        solver.solve(&layout.pattern, blocks, &damped, STEP_TOLERANCE, &mut unknowns);
         let mut step = vec![DVec3::ZERO; x.len()];
         layout.order.iter().zip(&unknowns).for_each(|(&v, d)| step[v as usize] = *d);
         Ok(Self { cloth, x, layout, contacts, solver, step })

@@ -22,17 +22,16 @@ const TILE_REGISTERS: usize = 2;
 const TILE_COLUMNS: usize = 4;
 
 /// Factors a panel of `height` rows, its diagonal block on top, lower half. A pivot that is zero or negative, or rounding beside the entry of
-/// `diagonal` for its column, is replaced by that entry, as if nothing pulled there but the unknown itself; without `diagonal`
-/// it is an error.
+/// `diagonal` for its column, is replaced by that entry, as if nothing pulled there but the unknown itself.
 ///
 /// # Errors
-/// The column whose pivot is not finite, or not positive where none is replaced.
-pub(super) fn factor_panel(panel: &mut [f32], height: usize, diagonal: Option<&[f32]>) -> Result<(), usize> {
+/// The column whose pivot is not finite.
+pub(super) fn factor_panel(panel: &mut [f32], height: usize, diagonal: &[f32]) -> Result<(), usize> {
     factor_below(panel, height, 0, diagonal)
 }
 
 /// The same for columns whose diagonal block begins at row `top`.
-fn factor_below(panel: &mut [f32], height: usize, top: usize, diagonal: Option<&[f32]>) -> Result<(), usize> {
+fn factor_below(panel: &mut [f32], height: usize, top: usize, diagonal: &[f32]) -> Result<(), usize> {
     let columns = panel.len() / height;
     if columns <= NARROW {
         return run(Narrow { panel, height, top, diagonal }).map_or(Ok(()), Err);
@@ -45,12 +44,12 @@ fn factor_below(panel: &mut [f32], height: usize, top: usize, diagonal: Option<&
     factor_below(right, height, below, diagonal).map_err(|index| half + index)
 }
 
-/// Factors a few columns, one after the other; the result is the column whose pivot is refused.
+/// Factors a few columns, one after the other; the result is the column whose pivot is not finite.
 struct Narrow<'a> {
     panel: &'a mut [f32],
     height: usize,
     top: usize,
-    diagonal: Option<&'a [f32]>,
+    diagonal: &'a [f32],
 }
 
 impl Work for Narrow<'_> {
@@ -66,13 +65,12 @@ impl Work for Narrow<'_> {
                 let done = &done[top + j..];
                 subtract_scaled(l, column, done, done[0]);
             }
-            let pivot = match (column[0], diagonal.map(|all| all[top + j].abs())) {
-                (pivot, _) if !pivot.is_finite() => return Some(j),
-                (pivot, Some(own)) if pivot <= f32::EPSILON * own => own.max(f32::MIN_POSITIVE),
-                (pivot, _) if pivot <= 0.0 => return Some(j),
-                (pivot, _) => pivot,
-            };
-            let root = pivot.sqrt();
+            let (pivot, own) = (column[0], diagonal[top + j].abs());
+            if !pivot.is_finite() {
+                return Some(j);
+            }
+            let lost = pivot <= f32::EPSILON * own;
+            let root = if lost { own.max(f32::MIN_POSITIVE) } else { pivot }.sqrt();
             let scale = root.recip();
             column[0] = root;
             let factor = l.splat_single(scale);
@@ -364,7 +362,7 @@ mod tests {
     fn the_factor_times_its_transpose_is_the_matrix() {
         for (height, columns) in [(1, 1), (7, 3), (40, 40), (75, 33), (130, 100)] {
             let (mut l, entry) = panel(height, columns);
-            factor_panel(&mut l, height, None).unwrap();
+            factor_panel(&mut l, height, &vec![0.0; columns]).unwrap();
             // A sum of as many products as columns, none of them larger than the diagonal.
             let rounding = f64::from(f32::EPSILON) * (height * (columns + 1)) as f64;
             let at = |i: usize, j: usize| l[j * height + i];
@@ -397,18 +395,16 @@ mod tests {
     }
 
     #[test]
-    fn a_pivot_that_is_not_positive_is_named_or_replaced() {
+    fn a_pivot_that_is_not_positive_is_replaced_and_one_that_is_not_finite_named() {
         for bad in [0, 5, 20] {
             let (mut l, _) = panel(30, 25);
             l[bad * 30 + bad] = -1.0;
-            let (mut replaced, diagonal) = (l.clone(), vec![30.0; 25]);
-            assert_eq!(factor_panel(&mut l, 30, None), Err(bad));
-            factor_panel(&mut replaced, 30, Some(&diagonal)).unwrap();
-            assert_eq!(replaced[bad * 30 + bad], 30_f32.sqrt());
+            factor_panel(&mut l, 30, &[30.0; 25]).unwrap();
+            assert_eq!(l[bad * 30 + bad], 30_f32.sqrt());
         }
         let (mut l, _) = panel(30, 25);
         l[7 * 30 + 7] = f32::NAN;
-        assert_eq!(factor_panel(&mut l, 30, Some(&[30.0; 25])), Err(7));
+        assert_eq!(factor_panel(&mut l, 30, &[30.0; 25]), Err(7));
     }
 
     /// Lanes of another width, and pieces for threads, give the same bits.
@@ -417,7 +413,7 @@ mod tests {
         let all = || {
             let (height, columns) = (420, 230);
             let (mut l, _) = panel(height, columns);
-            factor_panel(&mut l, height, None).unwrap();
+            factor_panel(&mut l, height, &vec![0.0; columns]).unwrap();
             let mut update = vec![0.0; (height - columns).pow(2)];
             set_product(&mut update, &l, height, columns);
             let (mut x, mut rows) = (vec![0.3; columns], Vec::new());

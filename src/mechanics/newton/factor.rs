@@ -25,7 +25,7 @@ pub enum SolveError {
         /// The message of the allocator.
         reason: String,
     },
-    /// A pivot is not positive.
+    /// A pivot is not finite.
     #[error(
         "the forces of the cloth are not finite (unknown {index}): expected finite positions; check that rest shape and garment have the \
          same unit"
@@ -43,8 +43,6 @@ pub(super) struct Matrix<'a> {
     pub(super) blocks: &'a [DMat3],
     /// D, a number for each unknown, N/m.
     pub(super) diagonal: &'a [f64],
-    /// Whether pivots that are not positive are replaced ([`factor_panel`]); an error otherwise.
-    pub(super) replaces_pivots: bool,
 }
 
 /// The factor's numbers.
@@ -326,7 +324,7 @@ fn eliminate<'a, C: Iterator<Item = (&'a Front, &'a [f32])>>(
         extend(symbolic, child, numbers, 0..child.inner, panel, height, 0);
     }
     let lost = |index: usize| SolveError::NotPositive { index: 3 * front.first + index };
-    factor_panel(panel, height, matrix.replaces_pivots.then_some(&diagonal)).map_err(lost)?;
+    factor_panel(panel, height, &diagonal).map_err(lost)?;
     if rows > 0 {
         set_product(update, panel, height, columns);
         for (child, numbers) in children() {

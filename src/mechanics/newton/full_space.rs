@@ -1,13 +1,17 @@
-//! Newton steps of the whole cloth, every vertex its own unknown, and which Hessian they are taken with.
+//! Newton steps of the whole cloth, every vertex its own unknown.
 //!
-//! The true Hessian ([`HessianKind::True`]) keeps compression up to the buckling stress of a triangle. It is closer to the energy and
-//! may be indefinite. Then the projected Hessian replaces it for this step, and after a rejected step for the next.
+//! The true Hessian ([`HessianKind::True`]) keeps compression up to the buckling stress of a triangle. It is closer to the energy than the projected
+//! one and may be indefinite. A step solves with it inexactly, by conjugate gradients that the factor of the projected Hessian preconditions
+//! ([`Solver`]); after a rejected step the next one solves with the projected Hessian.
 
 use glam::{DMat3, DVec3};
 
 use super::factor::SolveError;
 use super::solver::Solver;
 use crate::mechanics::energy::{Cloth, Contacts, HessianKind, HessianLayout};
+
+/// Largest residual of a step, relative to the gradient: the next step reduces what is left (inexact Newton method; Dembo, Eisenstat, Steihaug 1982).
+const STEP_TOLERANCE: f64 = 0.1;
 
 /// The inputs of a Newton step.
 pub(crate) struct State<'a> {
@@ -27,28 +31,11 @@ pub(crate) struct FullSpace {
     /// The layout with blocks for the gaps of the cloth with itself, once there are some.
     coupled: Option<HessianLayout>,
     blocks: Vec<DMat3>,
-    damped: Vec<f64>,
-    pub(super) unknowns: Vec<DVec3>,
-    /// Whether the last factorisation was of the true Hessian.
-    is_true: bool,
     /// Whether the next step takes the projected Hessian.
     projects: bool,
 }
 
 impl FullSpace {
-    /// Solves with a Hessian of this kind; the solution is in `unknowns`.
-    pub(super) fn solve(&mut self, here: &State<'_>, kind: HessianKind) -> Result<(), SolveError> {
-        let State { cloth, x, contacts, gradient, damping } = *here;
-        let layout = self.coupled.as_ref().unwrap_or_else(|| cloth.layout());
-        cloth.hessian_in(layout, kind, x, contacts, &mut self.blocks);
-        let solver = self.solver.get_or_insert_with(|| Solver::new(&layout.pattern));
-        self.damped.clear();
-        self.damped.extend(layout.order.iter().map(|&v| cloth.masses[v as usize] * damping));
-        self.unknowns.clear();
-        self.unknowns.extend(layout.order.iter().map(|&v| -gradient[v as usize]));
-        solver.solve(&layout.pattern, &self.blocks, &self.damped, kind == HessianKind::Projected, &mut self.unknowns)
-    }
-
     /// The layout of the Hessian.
     pub(super) fn layout<'a>(&'a self, cloth: &'a Cloth) -> &'a HessianLayout {
         self.coupled.as_ref().unwrap_or_else(|| cloth.layout())
@@ -68,37 +55,41 @@ impl FullSpace {
         }
     }
 
-    /// The step of every vertex, m, zero where held, and every free vertex's own block of a positive H + ε M, N/m.
+    /// The step of every vertex, m, zero where held, and every free vertex's own block of the projected H + ε M, N/m.
     pub(super) fn step(
         &mut self,
         here: &State<'_>,
         d: &mut Vec<DVec3>,
         own: &mut Vec<DMat3>,
     ) -> Result<(), SolveError> {
-        let State { cloth, x, contacts, .. } = *here;
+        let State { cloth, x, contacts, gradient, damping } = *here;
         if let Some(proximity) = &contacts.proximity {
             self.couple(cloth, x, || proximity.pairs());
         }
-        self.is_true = !std::mem::take(&mut self.projects) && self.solve(here, HessianKind::True).is_ok();
-        if !self.is_true {
-            self.solve(here, HessianKind::Projected)?;
-        }
-        d.clear();
-        d.resize(x.len(), DVec3::ZERO);
+        let Self { solver, coupled, blocks, projects } = self;
+        let layout = coupled.as_ref().unwrap_or_else(|| cloth.layout());
+        let solver = solver.get_or_insert_with(|| Solver::new(&layout.pattern));
+        let damped: Vec<f64> = layout.order.iter().map(|&v| cloth.masses[v as usize] * damping).collect();
+        cloth.hessian_in(layout, HessianKind::Projected, x, contacts, blocks);
+        solver.factorise(blocks, &damped)?;
         own.clear();
         own.resize(x.len(), DMat3::ZERO);
-        let layout = self.layout(cloth);
-        let starts = &layout.pattern.starts;
-        for (i, &v) in layout.order.iter().enumerate() {
-            d[v as usize] = self.unknowns[i];
-            own[v as usize] = self.blocks[starts[i] as usize] + DMat3::from_diagonal(DVec3::splat(self.damped[i]));
+        for ((&v, &start), shift) in layout.order.iter().zip(&layout.pattern.starts).zip(&damped) {
+            own[v as usize] = blocks[start as usize] + DMat3::from_diagonal(DVec3::splat(*shift));
         }
+        if !std::mem::take(projects) {
+            cloth.hessian_in(layout, HessianKind::True, x, contacts, blocks);
+        }
+        let mut unknowns: Vec<DVec3> = layout.order.iter().map(|&v| -gradient[v as usize]).collect();
+        solver.solve(&layout.pattern, blocks, &damped, STEP_TOLERANCE, &mut unknowns);
+        d.clear();
+        d.resize(x.len(), DVec3::ZERO);
+        layout.order.iter().zip(&unknowns).for_each(|(&v, step)| d[v as usize] = *step);
         Ok(())
     }
 
     /// After a rejected step: the next one takes the projected Hessian; returns whether this one had the true one.
     pub(crate) fn fall_back(&mut self) -> bool {
-        self.projects = true;
-        std::mem::take(&mut self.is_true)
+        !std::mem::replace(&mut self.projects, true)
     }
 }

@@ -1,13 +1,16 @@
-//! Direct solve of (∇²E + ε M) d = b: sparse Cholesky, analysed once a garment, refactored in place, and conjugate gradients.
+//! Solves (∇²E + ε M) d = b by conjugate gradients, preconditioned by a sparse Cholesky factor.
 //!
-//! LLᵀ by fronts in the garment's own elimination order (`factor.rs`), with the same bits on any number of threads. It factors in single
-//! precision, which takes half the time of double, and preconditions conjugate gradients in double (Hestenes, Stiefel 1952), which end at a residual of
-//! [`TOLERANCE`]. One or two iterations are usual, since (L Lᵀ)⁻¹A is the identity but for rounding.
+//! The factor L Lᵀ is that of a positive matrix near ∇²E + ε M, by fronts in the garment's own elimination order (`factor.rs`), with the same
+//! bits on any number of threads. It is analysed once a garment and recomputed in place, in single precision, which takes half the time of
+//! double. The gradients (Hestenes, Stiefel 1952) are in double. Where the factored matrix is ∇²E + ε M itself, (L Lᵀ)⁻¹(∇²E + ε M) is the identity
+//! but for rounding, and one or two iterations are usual.
+//!
+//! ∇²E + ε M may be indefinite: the iterations end at a direction of negative curvature, and a solution before it is still a direction of descent; the
+//! first one is (L Lᵀ)⁻¹ b (truncated Newton method; Steihaug 1983; Nocedal, Wright: "Numerical Optimization", 7.1).
 //!
 //! A positive matrix may lose a pivot by rounding: where stiffness is a million times that of a neighbour, where triangles are drawn a thousand
 //! times too large, or because a body that goes through itself is no body to its gradients. Such a pivot is replaced by the diagonal entry of the
-//! matrix. Each changes the preconditioner by a matrix of rank one, for which conjugate gradients take one iteration more. Where they end too early, the energy
-//! still decreases along the result (truncated Newton method; Nocedal, Wright: "Numerical Optimization", 7.1).
+//! matrix. Each changes the preconditioner by a matrix of rank one, for which conjugate gradients take one iteration more.
 
 use glam::{DMat3, DVec3};
 
@@ -16,10 +19,7 @@ use super::symbolic::{Front, SymbolicFactor};
 use crate::mechanics::energy::sparsity::Pattern;
 use crate::mechanics::linear_algebra::{dot, norm};
 
-/// Largest residual of a solution, relative to the right side.
-const TOLERANCE: f64 = 1e-4;
-
-/// Most iterations of conjugate gradients. Of 462 solves for box meshes in cotton none took more than three.
+/// Most iterations of conjugate gradients.
 const MAX_ITERATIONS: usize = 40;
 
 /// A factorisation whose pattern is fixed.
@@ -50,37 +50,27 @@ impl Solver {
         self.symbolic.fronts.iter().map(Front::panel_len).sum()
     }
 
-    /// Solves (A + D) x = b for the matrix A of `blocks` and the diagonal D of `diagonal` (N/m for each unknown vertex); `x`
-    /// holds b, then the solution, in elimination order.
+    /// Factors A + D for a positive matrix A of `blocks` and the diagonal D of `diagonal`, N/m for each unknown vertex, in elimination order.
     ///
     /// # Errors
-    /// [`SolveError::NotPositive`] where a pivot is not finite; where the matrix may be indefinite (`positive` is false), also where one is
-    /// zero or negative.
-    pub fn solve(
-        &mut self,
-        pattern: &Pattern,
-        blocks: &[DMat3],
-        diagonal: &[f64],
-        positive: bool,
-        x: &mut [DVec3],
-    ) -> Result<(), SolveError> {
-        let matrix = Matrix { blocks, diagonal, replaces_pivots: positive };
-        self.factor.factorise(&self.symbolic, matrix)?;
-        self.conjugate_gradients(pattern, matrix, x);
-        Ok(())
+    /// [`SolveError::NotPositive`] where a number is not finite, [`SolveError::NoRoom`] without memory.
+    pub fn factorise(&mut self, blocks: &[DMat3], diagonal: &[f64]) -> Result<(), SolveError> {
+        self.factor.factorise(&self.symbolic, Matrix { blocks, diagonal })
     }
 
-    /// Conjugate gradients from zero, preconditioned by the factor; `x` holds b, then the solution.
-    fn conjugate_gradients(&mut self, pattern: &Pattern, matrix: Matrix<'_>, x: &mut [DVec3]) {
+    /// Solves (A + D) x = b to a residual of `tolerance` times that of zero, with the factor of the last [`factorise`](Self::factorise) as
+    /// preconditioner; `x` holds b, then the solution, in elimination order. A may be another matrix than the factored one, and indefinite:
+    /// see [the module](self).
+    pub fn solve(&mut self, pattern: &Pattern, blocks: &[DMat3], diagonal: &[f64], tolerance: f64, x: &mut [DVec3]) {
         let Self { symbolic, factor } = self;
         let mut residual = x.to_vec();
-        let tolerance = TOLERANCE * norm(&residual);
+        let tolerance = tolerance * norm(&residual);
         factor.solve(symbolic, x);
         let (mut direction, mut image) = (x.to_vec(), Vec::new());
         let mut gamma = dot(&residual, &direction);
         for iteration in 0..MAX_ITERATIONS {
-            pattern.multiply(matrix.blocks, &direction, &mut image);
-            image.iter_mut().zip(&direction).zip(matrix.diagonal).for_each(|((q, p), shift)| *q += *p * *shift);
+            pattern.multiply(blocks, &direction, &mut image);
+            image.iter_mut().zip(&direction).zip(diagonal).for_each(|((q, p), shift)| *q += *p * *shift);
             let curvature = dot(&direction, &image);
             if curvature.is_nan() || curvature <= 0.0 {
                 // The solution so far, or the first direction.
@@ -104,7 +94,7 @@ impl Solver {
         }
     }
 
-    /// L⁻¹ x with the factor of the last [`solve`](Self::solve), L Lᵀ being a positive definite matrix near that one; in the order of elimination.
+    /// L⁻¹ x with the factor of the last [`factorise`](Self::factorise), in the order of elimination.
     pub(crate) fn lower(&mut self, x: &[DVec3]) -> Vec<f64> {
         self.factor.lower(&self.symbolic, x)
     }
@@ -137,9 +127,8 @@ mod tests {
         }
         let mut x = pull.clone();
         let mut solver = Solver::new(pattern);
-        let lost = solver.solve(pattern, &blocks, &none, false, &mut x);
-        assert!(matches!(lost, Err(SolveError::NotPositive { .. })), "{lost:?}");
-        solver.solve(pattern, &blocks, &none, true, &mut x).unwrap();
+        solver.factorise(&blocks, &none).unwrap();
+        solver.solve(pattern, &blocks, &none, 1e-4, &mut x);
         let mut back = Vec::new();
         pattern.multiply(&blocks, &x, &mut back);
         let off = back.iter().zip(&pull).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
@@ -148,10 +137,11 @@ mod tests {
         let own = pattern.starts[7] as usize;
         blocks[own] -= DMat3::from_diagonal(DVec3::splat(1e7));
         let mut way = pull.clone();
-        solver.solve(pattern, &blocks, &none, true, &mut way).unwrap();
+        solver.factorise(&blocks, &none).unwrap();
+        solver.solve(pattern, &blocks, &none, 1e-4, &mut way);
         assert!(way.iter().zip(&pull).map(|(d, b)| d.dot(*b)).sum::<f64>() > 0.0);
         blocks[0].x_axis.x = f64::NAN;
-        let refused = solver.solve(pattern, &blocks, &none, true, &mut pull);
+        let refused = solver.factorise(&blocks, &none);
         assert!(matches!(refused, Err(SolveError::NotPositive { .. })), "{refused:?}");
     }
 }
