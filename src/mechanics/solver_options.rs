@@ -135,6 +135,8 @@ options! {
         max_residual: f64 = 3e-2,
         /// Steps after which the places are removed if the cloth does not rest with them. The most observed are 24, in a pair of trousers.
         max_steps: usize = 80,
+        /// Amount by which the offset of a place is raised at a time, m. Halved or doubled: the same steps.
+        offset_step_m: f64 = 3e-4,
         /// Largest total amount by which the offset of a place is raised, m. With 0 skin goes through cloth in one of 33 drapes more.
         max_offset_raise_m: f64 = 4e-3,
         /// Least offset of a place, m: the amount by which the body rises between two places of a lattice.
@@ -143,7 +145,7 @@ options! {
         max_new_places: usize = 6,
         /// Updates without fewer intersections after which the intersecting triangles are released. Without it two patterns that are strained
         /// by over 100 % end after 365 and 585 steps for 214 and 156. With 3 a sheet over a cube ends with skin through cloth in five pairs.
-        max_idle_updates: usize = 3,
+        max_idle_updates: usize = 4,
     }
 
     /// Contact of the cloth with itself: see `energy::proximity`.

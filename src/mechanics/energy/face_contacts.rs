@@ -239,11 +239,11 @@ impl FaceContacts {
         added
     }
 
-    /// Raises the offset of the places of a triangle by the least one, within which a certificate looks for what they touch; returns how many.
+    /// Raises the offset of the places of a triangle; returns how many.
     fn raise(&mut self, triangle: &Triangle) -> usize {
         let max = place_offset(&self.thickness, triangle, &self.options) + self.options.max_offset_raise_m;
         let raised = self.places.iter_mut().filter(|p| p.corners == triangle.vertices && p.offset < max);
-        raised.map(|place| place.offset += self.options.min_offset_m).count()
+        raised.map(|place| place.offset += self.options.offset_step_m).count()
     }
 }
 
