@@ -357,6 +357,7 @@ impl<'b> Contacts<'b> {
             let proximity = self.proximity.as_mut();
             if let Some(moved) = moved.filter(|to| proximity.is_none_or(|p| p.move_to(&garment.positions, to))) {
                 *x = moved;
+                self.face_contacts.add_off_body(body, x, &pairs);
                 return FaceUpdate::Moved;
             }
         }
@@ -389,13 +390,10 @@ impl<'b> Contacts<'b> {
 
     /// Adds contact places near rest, if there were some already; returns how many.
     pub(crate) fn extend_face_contacts(&mut self, x: &[DVec3]) -> usize {
-        let FaceContacts { closed: false, places, triangles, .. } = &self.face_contacts else { return 0 };
+        let FaceContacts { closed: false, places, .. } = &self.face_contacts else { return 0 };
         let (false, Some(body)) = (places.is_empty(), self.body()) else { return 0 };
-        let triangles = std::sync::Arc::clone(triangles);
         let pairs = body.crossing_pairs(&self.garment(x.to_vec()));
-        let mut intersecting: Vec<u32> = pairs.into_iter().map(|[t, _]| t).collect();
-        intersecting.dedup();
-        intersecting.into_iter().map(|t| self.face_contacts.add(&triangles[t as usize], body, x, true)).sum()
+        self.face_contacts.add_to(body, x, &pairs, 0.0)
     }
 
     /// Contact energy, J, without friction.

@@ -202,14 +202,27 @@ impl FaceContacts {
         let beside = |t: &Triangle| t.vertices.iter().filter(|v| at_corner[**v as usize]).count() > 1;
         let mut changed = 0;
         for (t, &intersects) in triangles.iter().zip(&intersects).filter(|(t, _)| beside(t)) {
-            let new = self.add(t, body, x, intersects);
+            let new = self.add(t, body, x, if intersects { 0.0 } else { f64::NEG_INFINITY });
             changed += if new == 0 && intersects { self.raise(t) } else { new };
         }
         changed
     }
 
-    /// Adds the points of a triangle that are deepest in the body; returns how many.
-    pub(super) fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], intersects: bool) -> usize {
+    /// Adds places to the triangles of these `pairs` after the cloth was moved off the body at them, where otherwise it would slide back.
+    pub(super) fn add_off_body(&mut self, body: &Body, x: &[DVec3], pairs: &[[u32; 2]]) {
+        self.add_to(body, x, pairs, self.options.max_offset_raise_m);
+    }
+
+    /// [`add`](Self::add) for each triangle of these `pairs` of triangles of cloth and body; returns how many.
+    pub(super) fn add_to(&mut self, body: &Body, x: &[DVec3], pairs: &[[u32; 2]], within: f64) -> usize {
+        let triangles = Arc::clone(&self.triangles);
+        let each = pairs.chunk_by(|a, b| a[0] == b[0]).map(|pairs| &triangles[pairs[0][0] as usize]);
+        each.map(|triangle| self.add(triangle, body, x, within)).sum()
+    }
+
+    /// Adds the points of a triangle that are deepest in the body, and its nearest one if that is less than `within` (m) beyond its offset; returns
+    /// how many.
+    fn add(&mut self, triangle: &Triangle, body: &Body, x: &[DVec3], within: f64) -> usize {
         let corners = triangle.vertices;
         let options = self.options;
         let offset = place_offset(&self.thickness, triangle, &options);
@@ -225,7 +238,7 @@ impl FaceContacts {
         let present: Vec<Place> = self.places.iter().filter(|p| p.corners == corners).copied().collect();
         let mut added = 0;
         for (distance, i) in deepest {
-            let first = intersects && added == 0 && distance < offset;
+            let first = added == 0 && distance < offset + within;
             let wanted = first || distance < 0.0;
             if !wanted || added == options.max_new_places {
                 break;
