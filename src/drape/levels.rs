@@ -101,12 +101,23 @@ impl Level {
     fn of(scene: &Scene, above: Option<&Self>, coarse: Arc<Coarse>, full: &Cloth) -> Option<Self> {
         let held = above.map_or_else(|| scene.is_held(), |above| above.cloth.held.clone());
         let held: Vec<u32> = (0u32..).zip(coarse.restrict(&held)).filter(|h| h.1).map(|h| h.0).collect();
-        let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, &*full.fabrics, &held).ok()?;
-        Some(Self { coarse, cloth: cloth.with_solver(full.solver) })
+        let cloth = cloth_on(&coarse, full, &held)?;
+        Some(Self { coarse, cloth })
+    }
+
+    /// Its cloth with nothing held, in the fabrics of the `full` one.
+    pub(crate) fn released(&self, full: &Cloth) -> Option<Cloth> {
+        cloth_on(&self.coarse, full, &[])
     }
 
     /// Its cloth.
     pub(crate) fn cloth(&self) -> &Cloth {
         &self.cloth
     }
+}
+
+/// The cloth of a coarser garment, in the fabrics of the `full` one.
+fn cloth_on(coarse: &Coarse, full: &Cloth, held: &[u32]) -> Option<Cloth> {
+    let cloth = Cloth::new(&coarse.mesh, &coarse.topology, &coarse.rest, &*full.fabrics, held).ok()?;
+    Some(cloth.with_solver(full.solver))
 }

@@ -121,7 +121,7 @@ pub(super) fn moved(
     let Some(levels) = cloth else { return Ok(Moved { stage, folds, state: None, let_go: None }) };
     let ReleasedDrape { cloth, refined, let_go, .. } = timed(&mut times.refine, || {
         let start = (approach(scene, settings, levels, &stage.positions, observer), StartsFrom::Parts);
-        settle_and_release(scene, settings, &levels.cloth, Some(ground), start, observer)
+        settle_and_release(scene, settings, levels, Some(ground), start, observer)
     })?;
     let cloth = cloth.as_ref().unwrap_or(&levels.cloth);
     let state = Some(settled(scene, settings, cloth, Some(ground), refined));

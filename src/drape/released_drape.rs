@@ -2,7 +2,8 @@
 //!
 //! A skirt's waist is held while the cloth falls into its folds, as a dresser would. Friction and the shape of the hips
 //! decide whether it stays up: near rest, the steps continue with nothing held. If the cloth rests and its waist has sunk little, this
-//! is the drape; if it slides, it is brought to rest held, and a warning says so.
+//! is the drape; if it slides, it is brought to rest held, and a warning says so. A large garment is released on its coarsest cloth first
+//! ([`Levels`]), at its rest there: if it slides, it is not released at full resolution.
 
 use std::ops::ControlFlow;
 
@@ -10,11 +11,12 @@ use glam::DVec3;
 
 use super::distances::Distances;
 use super::error::DrapeError;
-use super::levels::cloth_of;
+use super::levels::{Levels, cloth_of};
 use super::release::Release;
 use super::settings::{Refine, Settings};
 use super::stages::{StartsFrom, refine_from};
 use crate::mechanics::energy::Cloth;
+use crate::mechanics::newton::SolveError;
 use crate::mechanics::refine::{self, Observer, Record, RefineOptions, Refined, Step, Stop};
 use crate::scene::Scene;
 
@@ -44,29 +46,31 @@ pub(crate) struct ReleasedDrape {
 pub(crate) fn settle_and_release(
     scene: &Scene,
     settings: &Settings,
-    cloth: &Cloth,
+    levels: &Levels,
     ground: Option<&Distances>,
     start: (Vec<DVec3>, StartsFrom),
     observer: Observer<'_>,
 ) -> Result<ReleasedDrape, DrapeError> {
-    let releases = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
+    let cloth = &levels.cloth;
+    let mut releases = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
+    let mut let_go = None;
+    if releases && let Some(sank_m) = slides_when_coarse(scene, settings, levels, &start.0, observer)? {
+        let_go = Some(Release::Slides { sank_m });
+        releases = false;
+    }
     let until = releases.then_some(RELEASE_RESIDUAL);
     let held = refine_from(scene, settings, cloth, ground, start, until, observer)?;
     let held_positions = held.positions.clone();
     if !releases || held.stop != Stop::Converged {
-        return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, let_go: None });
+        return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, let_go });
     }
     let free = cloth_of(scene, settings, &[])?;
     let mut contacts = free.contacts(&scene.body, &held.positions);
     contacts.stiffen(held.contact_stiffness / contacts.stiffness());
     contacts.update(&held.positions);
     contacts.refresh(&held.positions);
-    let sank = |x: &[DVec3]| {
-        let down = scene.held.iter().map(|&v| held_positions[v as usize].z - x[v as usize].z).sum::<f64>();
-        down / scene.held.len().max(1) as f64
-    };
-    let self_contact = settings.self_contact;
-    let options = RefineOptions { max_steps: Some(MAX_RELEASED_STEPS), self_contact, ..RefineOptions::default() };
+    let sank = |x: &[DVec3]| mean_sink(&cloth.held, &held_positions, x);
+    let options = released_steps(settings);
     let mut stopped = false;
     let released = refine::refine_with(&free, contacts, held.positions.clone(), &options, &mut |step| {
         if sank(step.positions) > MAX_SINK_M {
@@ -92,6 +96,44 @@ pub(crate) fn settle_and_release(
     })?;
     let held_positions = rested.positions.clone();
     Ok(ReleasedDrape { cloth: None, refined: after(held, rested), held_positions, let_go })
+}
+
+/// Options of the steps after a release.
+fn released_steps(settings: &Settings) -> RefineOptions {
+    let self_contact = settings.self_contact;
+    RefineOptions { max_steps: Some(MAX_RELEASED_STEPS), self_contact, ..RefineOptions::default() }
+}
+
+/// How far the vertices that were `held` are lower on average at `after` than at `before`, m.
+fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
+    let sinks = || before.iter().zip(after).zip(held).filter(|(_, held)| **held).map(|((a, b), _)| a.z - b.z);
+    sinks().sum::<f64>() / sinks().count().max(1) as f64
+}
+
+/// How far the waist has sunk, m, if the garment's coarsest cloth slides when released from `start` (m of each vertex of the full garment). `observer` receives the
+/// steps as step 0.
+fn slides_when_coarse(
+    scene: &Scene,
+    settings: &Settings,
+    levels: &Levels,
+    start: &[DVec3],
+    observer: Observer<'_>,
+) -> Result<Option<f64>, SolveError> {
+    let number = levels.coarser(scene).len();
+    let Some(level) = levels.coarser(scene).last() else { return Ok(None) };
+    let (held, from) = (&level.cloth().held, levels.restrict(number, start));
+    let Some(free) = level.released(&levels.cloth) else { return Ok(None) };
+    let contacts = free.contacts(&scene.body, &from);
+    let mut slides = None;
+    refine::refine_with(&free, contacts, from.clone(), &released_steps(settings), &mut |step| {
+        let sank_m = mean_sink(held, &from, step.positions);
+        if sank_m > MAX_SINK_M {
+            slides = Some(sank_m);
+            return ControlFlow::Break(());
+        }
+        observer(&Step { iteration: 0, positions: start, at_rest: false, ..*step })
+    })?;
+    Ok(slides)
 }
 
 /// The end of `second`, with the steps of `first` before it.

@@ -238,7 +238,7 @@ impl Worker {
             }
             task.check()
         };
-        let drape = settle_and_release(scene, settings, &levels.cloth, distances, (start, from), &mut observer)?;
+        let drape = settle_and_release(scene, settings, levels, distances, (start, from), &mut observer)?;
         let ReleasedDrape { cloth, refined, held_positions, let_go } = drape;
         let (held_positions, generation) = (Arc::new(held_positions), task.loaded_scene().generation);
         self.rest = Some(WarmStart { generation, positions: Arc::clone(&held_positions) });
