@@ -9,7 +9,8 @@ fn coarse(rows: usize) -> DrapeTest {
 }
 
 fn falls_inside(band: &Target) {
-    let drape = coarse(8).run(&Fabric::by_name(&band.fabric).unwrap()).unwrap();
+    // As the stored results; silk scatters by six points from 8 to 32 rows.
+    let drape = coarse(10).run(&Fabric::by_name(&band.fabric).unwrap()).unwrap();
     let (name, percent, nodes) = (&band.fabric, 100.0 * drape.coefficient, drape.nodes.count);
     let tolerance = crate::mechanics::solver_options::NewtonOptions::default().tolerance;
     let residual = drape.residual_over_weight;
