@@ -60,7 +60,7 @@ impl Solver {
 
     /// Solves (A + D) x = b to a residual of `tolerance` times that of zero, with the factor of the last [`factorise`](Self::factorise) as
     /// preconditioner; `x` holds b, then the solution, in elimination order. A may be another matrix than the factored one, and indefinite:
-    /// see [the module](self).
+    /// see the top of the file.
     pub fn solve(&mut self, pattern: &Pattern, blocks: &[DMat3], diagonal: &[f64], tolerance: f64, x: &mut [DVec3]) {
         let Self { symbolic, factor } = self;
         let mut residual = x.to_vec();
