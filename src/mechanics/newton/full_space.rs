@@ -88,8 +88,8 @@ impl FullSpace {
         Ok(())
     }
 
-    /// After a rejected step: the next one takes the projected Hessian; returns whether this one had the true one.
-    pub(crate) fn fall_back(&mut self) -> bool {
-        !std::mem::replace(&mut self.projects, true)
+    /// After a rejected step: the next one takes the projected Hessian.
+    pub(crate) fn project_next(&mut self) {
+        self.projects = true;
     }
 }

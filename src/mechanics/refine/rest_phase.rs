@@ -50,9 +50,4 @@ impl RestPhase {
     pub(super) fn is_first(&self) -> bool {
         self.checks == 0
     }
-
-    /// The criterion that failed at the last check, if one was made.
-    pub(super) fn failed(&self) -> Option<&'static str> {
-        (!self.failed.is_empty()).then_some(self.failed)
-    }
 }

@@ -42,6 +42,8 @@ struct Settling<'c, 'b, 'o> {
     history: Vec<Record>,
     iteration: usize,
     limit: usize,
+    /// Steps rejected one after the other.
+    rejected: usize,
     damping: Damping,
     /// Residual over weight of an equilibrium, and the smaller one that still follows.
     tolerance: f64,
@@ -91,6 +93,7 @@ pub(super) fn settle(
         tangent: FullSpace::default(),
         iteration: 0,
         limit,
+        rejected: 0,
         damping,
         tolerance: newton.tolerance,
         continued_to: options.continued_to,
@@ -247,14 +250,14 @@ impl Settling<'_, '_, '_> {
         }
         let advance = self.descent.advance(&mut self.tangent)?;
         self.iteration += usize::from(advance.accepted);
-        // The true Hessian may give no direction of descent, and the softened cloth need not converge.
-        let astray = !advance.accepted && !self.tangent.fall_back();
-        if astray && !self.soft {
-            let failed = self.rest.failed().filter(|_| self.descent.residual < self.tolerance);
-            return Ok(State::Ended(failed.map_or(Stop::Stalled, Stop::Unsettled)));
+        if advance.accepted {
+            self.rejected = 0;
+        } else {
+            self.rejected += 1;
+            self.tangent.project_next();
         }
         let stalled = self.stall.after_step(&self.descent);
-        let hardens = self.soft && (astray || stalled || self.descent.residual < self.cloth.solver.softening.tolerance);
+        let hardens = self.soft && (stalled || self.descent.residual < self.cloth.solver.softening.tolerance);
         if hardens {
             self.fresh = true;
             self.descent.damping = self.initial_damping();
@@ -269,6 +272,7 @@ impl Settling<'_, '_, '_> {
         }
         Ok(match self.seen() {
             State::Descent if stalled && !hardens => State::Ended(Stop::Stalled),
+            State::Equilibrium if self.rejected >= self.cloth.solver.newton.stall_steps => State::Ended(Stop::Stalled),
             state => state,
         })
     }
