@@ -52,16 +52,14 @@ pub(crate) fn settle_and_release(
     observer: Observer<'_>,
 ) -> Result<ReleasedDrape, DrapeError> {
     let cloth = &levels.cloth;
-    let mut releases = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
-    let mut let_go = None;
-    if releases && let Some(sank_m) = slides_when_coarse(scene, settings, levels, &start.0, observer)? {
-        let_go = Some(Release::Slides { sank_m });
-        releases = false;
-    }
+    let asked = scene.releases_held && !scene.held.is_empty() && settings.refine == Refine::Converged;
+    let slid = if asked { slides_when_coarse(scene, settings, levels, &start.0, observer)? } else { None };
+    let releases = asked && slid.is_none();
     let until = releases.then_some(RELEASE_RESIDUAL);
     let held = refine_from(scene, settings, cloth, ground, start, until, observer)?;
     let held_positions = held.positions.clone();
     if !releases || held.stop != Stop::Converged {
+        let let_go = slid.map(|sank_m| Release::Slides { sank_m });
         return Ok(ReleasedDrape { cloth: None, refined: held, held_positions, let_go });
     }
     let free = cloth_of(scene, settings, &[])?;
@@ -110,8 +108,8 @@ fn mean_sink(held: &[bool], before: &[DVec3], after: &[DVec3]) -> f64 {
     sinks().sum::<f64>() / sinks().count().max(1) as f64
 }
 
-/// How far the waist has sunk, m, if the garment's coarsest cloth slides when released from `start` (m of each vertex of the full garment). `observer` receives the
-/// steps as step 0.
+/// How far the waist has sunk, m, if the garment's coarsest cloth slides when released from `start`, the positions of the full garment, m;
+/// `None` if it stays up or there is none. `observer` receives the steps as step 0.
 fn slides_when_coarse(
     scene: &Scene,
     settings: &Settings,

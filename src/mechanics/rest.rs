@@ -54,7 +54,7 @@ const MAX_STEP_RMS_MM: f64 = 1.0;
 /// not distinguishable from rounding.
 const MIN_CURVATURE: f64 = -1e-2;
 
-/// Largest residual of the next Newton step, relative to the residual of the forces.
+/// Largest residual of the next Newton step, relative to that of the forces: soft directions move far by little force.
 const STEP_TOLERANCE: f64 = 1e-4;
 
 /// One criterion of rest.
