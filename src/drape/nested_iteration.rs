@@ -35,7 +35,9 @@ pub(crate) fn approach(
     let options = settings.solver.nested_iteration;
     let coarsest = levels.coarser(scene).len();
     let self_contact = settings.self_contact;
-    let at_most = RefineOptions { max_steps: Some(options.max_steps), self_contact, ..RefineOptions::default() };
+    // Whether the coarse equilibrium lasts is not checked: its folds are not those of the full garment.
+    let max_steps = Some(options.max_steps);
+    let at_most = RefineOptions { max_steps, self_contact, lasting: false, ..RefineOptions::default() };
     let mut reached = start.to_vec();
     for number in (1..=coarsest).rev() {
         let cloth = levels.coarser(scene)[number - 1].cloth();

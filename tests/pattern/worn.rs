@@ -129,6 +129,31 @@ fn a_waist_is_released_where_friction_holds_it_and_stays_held_where_it_slides() 
     }
 }
 
+/// A garment with a coarser one is released on that first: where it slides there, its waist never moves at full resolution.
+#[test]
+fn a_waist_that_slides_on_coarser_cloth_is_not_released_at_full_resolution() {
+    let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("skirt")) }.load().unwrap();
+    let scene = &loaded.scene;
+    for (has_coarser, friction) in [(false, 0.0), (true, 0.0), (true, 0.8)] {
+        let mut settings = Settings::default();
+        settings.fabric.friction = friction;
+        if has_coarser {
+            settings.solver.nested_iteration.min_vertices = scene.garment.vertex_count() / 8;
+        }
+        let mut released_steps = 0;
+        let drape = drape(scene, &settings, &mut |step| {
+            let moved = |v: &u32| step.positions[*v as usize] != scene.garment.positions[*v as usize];
+            released_steps += usize::from(step.iteration > 0 && scene.held.iter().any(moved));
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
+        let stays = friction > 0.0;
+        assert_eq!(matches!(drape.let_go, Some(Release::Stays { .. })), stays, "{:?}", drape.let_go);
+        assert_eq!(released_steps > 0, stays || !has_coarser, "{has_coarser} {friction}: {released_steps}");
+        assert_eq!(drape.state.unwrap().stop, Stop::Converged);
+    }
+}
+
 #[test]
 fn an_exported_garment_keeps_its_panels_and_its_flat_pattern() {
     let loaded = SceneSpec { edge_cm: 4.0, ..SceneSpec::new("form", asset("tshirt")) }.load().unwrap();

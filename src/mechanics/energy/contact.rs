@@ -419,7 +419,7 @@ impl<'b> Contacts<'b> {
 mod tests {
     use super::*;
     use crate::mechanics::energy::Cloth;
-    use crate::mesh::samples::{cuboid, sheet};
+    use crate::mesh::samples::{cuboid, sheet, tube};
 
     #[test]
     fn a_raised_offset_is_lowered_where_the_vertex_does_not_touch_by_its_own() {
@@ -467,5 +467,35 @@ mod tests {
             assert!(queried.touches().len() >= 2, "{:?}", queried.touches());
             assert_eq!(queried.touches(), bounded.touches());
         }
+    }
+
+    /// A foot in a trouser leg: the leg is moved off it, and would slide back if nothing kept it there.
+    #[test]
+    fn cloth_that_is_moved_off_a_protrusion_is_kept_there_by_places() {
+        let leg = tube(36, 28, |a, row| DVec3::new(0.08 * a.cos(), 0.08 * a.sin(), 0.4 * row / 28.0));
+        let foot = cuboid(DVec3::new(-0.05, -0.03, 0.02), DVec3::new(0.14, 0.03, 0.032));
+        let foot = Body::new(&foot).unwrap();
+        let cloth = Cloth::sample(&leg, "jersey", &[]);
+        let mut x = leg.positions.clone();
+        let mut contacts = cloth.contacts(&foot, &x);
+        contacts.proximity = Some(cloth.proximity());
+        let mut pierced: Vec<u32> = foot.crossing_pairs(&leg).iter().map(|[t, _]| *t).collect();
+        pierced.dedup();
+        assert_eq!(contacts.update_face_contacts(&mut x), FaceUpdate::Moved);
+        assert!(x.iter().any(|x| x.x > 0.14), "the leg goes about the foot");
+        contacts.update(&x);
+        contacts.refresh(&x);
+        let places: Vec<[u32; 3]> = (contacts.face_contacts.gaps(Some(&foot), &x).iter())
+            .map(|gap| {
+                let [a, b, c, ..] = gap.key.vertices;
+                [a, b, c]
+            })
+            .collect();
+        assert!(places.iter().all(|corners| pierced.iter().any(|&t| leg.triangles[t as usize] == *corners)));
+        // Half of the triangles that were pierced lie on the foot now; the others are beside it.
+        assert!(2 * places.len() > pierced.len(), "{} places for {} triangles", places.len(), pierced.len());
+        let a_millimetre_back: Vec<DVec3> =
+            x.iter().zip(&leg.positions).map(|(x, from)| *x + (*from - *x).clamp_length_max(1e-3)).collect();
+        assert!(contacts.proximity.as_ref().unwrap().pressing(&a_millimetre_back) > 0);
     }
 }

@@ -111,6 +111,71 @@ mod tests {
     use crate::mechanics::energy::{Cloth, Contacts};
     use crate::mesh::samples::sheet;
 
+    /// A sheet held at one edge: its pattern, projected Hessian, damping and a pull on every vertex, in elimination order.
+    fn held_sheet() -> (Cloth, Vec<DMat3>, Vec<f64>, Vec<DVec3>) {
+        let mesh = sheet(5, 5, |i, j| DVec3::new(i, 0.0, j) * 0.01);
+        let cloth = Cloth::sample(&mesh, "denim", &[30, 31, 32, 33, 34, 35]);
+        let mut blocks = Vec::new();
+        cloth.hessian(&mesh.positions, &Contacts::none(), &mut blocks);
+        let n = cloth.order().len();
+        let pull = (0..n).map(|i| DVec3::new(0.3, 1.0, -0.7) * 1e-2 * (1.3 * i as f64).sin()).collect();
+        (cloth, blocks, vec![0.5; n], pull)
+    }
+
+    #[test]
+    fn a_matrix_other_than_the_factored_one_is_solved_to_the_tolerance() {
+        let (cloth, factored, damping, pull) = held_sheet();
+        let pattern = cloth.pattern();
+        // Every fifth vertex also lies on something.
+        let mut blocks = factored.clone();
+        pattern.starts.iter().take(damping.len()).step_by(5).for_each(|&own| {
+            blocks[own as usize] += DMat3::from_diagonal(DVec3::new(0.0, 50.0, 0.0));
+        });
+        let mut solver = Solver::new(pattern);
+        solver.factorise(&factored, &damping).unwrap();
+        let residual_of = |x: &[DVec3]| {
+            let mut image = Vec::new();
+            pattern.multiply(&blocks, x, &mut image);
+            image.iter_mut().zip(x).zip(&damping).for_each(|((q, x), shift)| *q += *x * *shift);
+            image.iter().zip(&pull).map(|(q, b)| (*q - *b).length_squared()).sum::<f64>().sqrt() / norm(&pull)
+        };
+        let solved = |solver: &mut Solver, tolerance| {
+            let mut x = pull.clone();
+            solver.solve(pattern, &blocks, &damping, tolerance, &mut x);
+            x
+        };
+        let [coarse, fine] = [0.1, 1e-8].map(|tolerance| residual_of(&solved(&mut solver, tolerance)));
+        assert!(fine <= 1e-8 && coarse <= 0.1 && coarse > 1e-6, "{coarse} {fine}");
+        // The factor alone does not solve it.
+        let mut unchanged = pull.clone();
+        solver.solve(pattern, &factored, &damping, 1e-8, &mut unchanged);
+        assert!(residual_of(&unchanged) > 0.1);
+    }
+
+    #[test]
+    fn the_step_of_an_indefinite_matrix_points_downhill() {
+        let (cloth, factored, damping, pull) = held_sheet();
+        let pattern = cloth.pattern();
+        let mut solver = Solver::new(pattern);
+        solver.factorise(&factored, &damping).unwrap();
+        let solved = |solver: &mut Solver, less: f64| {
+            // Compressed cloth at one vertex.
+            let mut blocks = factored.clone();
+            blocks[pattern.starts[7] as usize] -= DMat3::from_diagonal(DVec3::splat(less));
+            let mut x = pull.clone();
+            solver.solve(pattern, &blocks, &damping, 1e-8, &mut x);
+            x
+        };
+        // So far below zero that the first direction has negative curvature: it is the step.
+        let first = solved(&mut solver, 1e6);
+        for (less, goes_on) in [(10.0, true), (1e4, false)] {
+            let x = solved(&mut solver, less);
+            assert!(x.iter().zip(&pull).map(|(d, b)| d.dot(*b)).sum::<f64>() > 0.0, "{less}");
+            let apart = x.iter().zip(&first).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / norm(&first);
+            assert_eq!(apart > 1e-3, goes_on, "{less}: {apart}");
+        }
+    }
+
     /// Nothing holds a sheet that has no mass in the matrix either: it may go anywhere, and the matrix is singular.
     #[test]
     fn matrices_that_lose_a_pivot_are_solved_and_non_finite_ones_are_refused() {
