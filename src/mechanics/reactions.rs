@@ -269,8 +269,10 @@ fn contacts_with_body(cloth: &Cloth, body: &Body, x: &[DVec3]) -> Vec<Reaction> 
     // inside by the exact one alone, so the smaller of the two decides.
     let margin = TOUCH_MARGIN_M + SIDE;
     let distances: Vec<f64> = body.nearest_all(x).iter().map(|nearest| nearest.signed_distance).collect();
+    // A vertex that is farther off touches by neither distance; the rounded one is not computed.
+    let bound = |(v, s): (usize, &f64)| if *s > cloth.offsets[v] + margin { f64::INFINITY } else { *s };
     let contacts = cloth.new_contacts(body).with_margin(margin);
-    let mut contacts = contacts.with_distances(x, distances.iter().copied());
+    let mut contacts = contacts.with_distances(x, distances.iter().enumerate().map(bound));
     contacts.update(x);
     let touches = |t: &&Touch| {
         let v = t.vertex as usize;

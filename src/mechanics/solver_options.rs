@@ -90,8 +90,6 @@ options! {
         max_trials: usize = 2,
         /// Longest move of a vertex in one iteration, m: a fraction of a triangle.
         longest_move_m: f64 = 3e-3,
-        /// Scale γ of the first iteration: neighbours pull as much as a vertex itself.
-        first_scale: f64 = 0.3,
     }
 
     /// The check of a rest: see `newton::saddle_escape`.
@@ -160,9 +158,6 @@ options! {
         max_min_offset_m: f64 = 4e-3,
         /// Largest offset in mean edges: places two triangles apart on a flat cloth must not form a gap.
         max_offset_of_edge: f64 = 0.25,
-        /// Distance as placed, in search reaches, from which topological neighbours count as any other places. Halved or doubled: the same
-        /// steps.
-        neighbours_apart: f64 = 2.0,
         /// Share of their distance as placed below which topological neighbours press. With 0 a shirt in cotton takes 106 steps for 63.
         neighbour_share: f64 = 0.5,
         /// Share of its rest area that an edge contributes to a gap: a vertex has some three edges, each with several gaps.
@@ -190,8 +185,6 @@ options! {
         /// Times that intersecting corners go back half the way; after that they go all the way, with their neighbours. With 0: 728 steps,
         /// and one drape does not rest.
         max_halvings: usize = 4,
-        /// Most times that a step is cut. Halved or doubled: the same steps.
-        max_cuts: usize = 16,
         /// Rings of neighbours about intersecting triangles in which new intersections are allowed. With 0 a shirt sewn from its pattern
         /// stops after 654 steps with 44 crossing pairs (14 steps with 2).
         tangled_rings: usize = 2,

@@ -4,7 +4,7 @@
 //! where it began. Both are local and stiff, so a line search that judges the step with them in cuts it to a fraction, and a
 //! factorisation is spent on a millimetre. A few iterations of L-BFGS on the same energy take them off,
 //!
-//! d = −H₀ ∇E updated by the last m pairs (s, y), H₀ = γ diag(D_i⁻¹), γ = sᵀy / yᵀ diag(D_i⁻¹) y,
+//! d = −H₀ ∇E updated by the last m pairs (s, y), H₀ = γ diag(D_i⁻¹), γ = sᵀy / yᵀ diag(D_i⁻¹) y, at first 1,
 //!
 //! each at the price of a gradient: a fiftieth of a factorisation. Every iteration lowers the energy (Armijo). Source: Nocedal,
 //! Wright: "Numerical Optimization" (2006), algorithm 7.4; in a multigrid method this is the smoother.
@@ -79,7 +79,7 @@ impl Relaxation {
             self.known[v as usize] = false;
         }
         let options = cloth.solver.relaxation;
-        let mut scale = options.first_scale;
+        let mut scale = 1.0;
         for _ in 0..iterations {
             self.touch(contacts);
             let [slope, longest] = vectors::turn(&self.pairs, &self.inverse, scale, &self.down, &mut self.direction);

@@ -5,8 +5,8 @@
 //! another triangle is nearer (feasible region of a feature; Chen and others: "Offset geometric contact", ACM TOG 44(4), 2025). Edges form
 //! a gap only while the nearest points lie between their ends; at an end a vertex has a gap.
 //!
-//! Topological neighbours are always near. If the placement kept them well apart, they count as any other places. Otherwise they press
-//! only below half of their distance as placed, and are ignored across a sliver. No gap is kept wider than it was placed.
+//! Topological neighbours are always near. They press only below half of their distance as placed, and are ignored across a sliver. No gap is
+//! kept wider than it was placed.
 
 use std::sync::Arc;
 
@@ -194,9 +194,9 @@ impl Search<'_> {
         // Places that were placed nearer are not pushed farther apart than that.
         let placed = gap.across(self.placed).length();
         gap.goal = gap.goal.min(placed.max(thickness));
-        let SelfContactOptions { neighbours_apart, neighbour_share, .. } = self.spacing.options;
-        if placed < neighbours_apart * self.reach && self.are_neighbours(&gap) {
-            gap.goal = gap.goal.min(neighbour_share * placed);
+        let neighbour_goal = self.spacing.options.neighbour_share * placed;
+        if neighbour_goal < gap.goal && self.are_neighbours(&gap) {
+            gap.goal = neighbour_goal;
         }
         gap.from = gap.across(self.x);
         let distance = gap.from.length();
